@@ -1,0 +1,39 @@
+"""The method: rational Bezier branches from voltage to force, their inverse, what happens at reversals, and how to fit them.
+
+Public here, without numpy or scipy: the curve, the branches, the model and its calibration, the checks before
+activation. `gateway.bsfm.ladder`, `.fit` and `.order_choice` need numpy and are imported by their own names, never by
+control.
+"""
+
+from gateway.bsfm.branches import Branches, Crossing
+from gateway.bsfm.curve import ORDER_MAX, RationalBezier
+from gateway.bsfm.inverse import Status
+from gateway.bsfm.model import Bsfm, Calibration
+from gateway.bsfm.reversal import DeadBand, Direction, LinearBlend
+from gateway.bsfm.validate import (
+    CoefficientFault,
+    CoefficientLimits,
+    CoefficientReason,
+    Coefficients,
+    validate,
+    validate_coefficients,
+)
+
+__all__ = [
+    "ORDER_MAX",
+    "Branches",
+    "Bsfm",
+    "Calibration",
+    "CoefficientFault",
+    "CoefficientLimits",
+    "CoefficientReason",
+    "Coefficients",
+    "Crossing",
+    "DeadBand",
+    "Direction",
+    "LinearBlend",
+    "RationalBezier",
+    "Status",
+    "validate",
+    "validate_coefficients",
+]

@@ -1,0 +1,31 @@
+"""`backup`: the state directory in one file."""
+
+from pathlib import Path
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import count_of, state_directory, state_options
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
+@click.option("--force", is_flag=True, help="Overwrite FILE.")
+@state_options
+def command(*, file: Path, force: bool, state: Path | None, rig: str) -> None:
+    """Pack a state directory into FILE (tar.gz).
+
+    Calibrations, recordings, events. The gateway may be running.
+    """
+    from gateway.cli.state_archive import pack
+
+    directory = state_directory(state, rig)
+    if not directory.is_dir():
+        raise CliError(
+            f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA
+        )
+    if file.exists() and not force:
+        raise CliError(f"E405 {file} exists and was left alone; --force overwrites it")
+    names = pack(directory, file)
+    click.echo(f"packed {count_of(names, 'file')} of {directory} into {file}, {file.stat().st_size / 1e3:.1f} kB")

@@ -1,0 +1,225 @@
+"""A Modbus master that speaks register names and engineering units, for `read`, `write` and `monitor`.
+
+Decisions
+- pymodbus does framing and sockets; timeout one second, no retries: a repeated write is a second write.
+- Assignments go out as one FC16, because the gateway takes one request as one command: setpoint and enable together or not
+  at all. Registers between them are read just before and written back as they were.
+"""
+
+import logging
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.registers import Register, RegisterMap
+
+if TYPE_CHECKING:
+    from pymodbus.client import ModbusTcpClient
+
+TIMEOUT_S: Final = 1.0
+_MOST_READ: Final = 125
+_MOST_WRITTEN: Final = 123
+
+
+class RefusedError(Exception):
+    """A Modbus exception in answer to a request. code: 1..6, 0x0B; request: what was asked, in words."""
+
+    def __init__(self, code: int, request: str) -> None:
+        super().__init__(f"exception {code:02X} to {request}")
+        self.code = code
+        self.request = request
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One register as read. value: in the register's unit, NaN when unavailable; words: as they came."""
+
+    register: Register
+    value: float | int
+    words: tuple[int, ...]
+
+    @property
+    def is_available(self) -> bool:
+        return not isnan(self.value)
+
+
+class Assignment(NamedTuple):
+    """A register and the words that it is to hold."""
+
+    register: Register
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One FC16: what will be written where. kept: names of registers in between that are written back as read."""
+
+    address: int
+    words: tuple[int, ...]
+    kept: tuple[str, ...] = ()
+
+
+class GatewayClient:
+    """One connection to a gateway. Methods raise CliError (no answer; exit 69) and RefusedError (a Modbus exception)."""
+
+    def __init__(self, host: str, port: int, unit: int, register_map: RegisterMap) -> None:
+        self.where = f"{host}:{port}"
+        self.register_map = register_map
+        self._address = (host, port)
+        self._unit = unit
+        self._client: ModbusTcpClient | None = None
+
+    def __enter__(self) -> "GatewayClient":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """The next request connects again."""
+        if self._client:
+            self._client.close()  # type: ignore[no-untyped-call]
+            self._client = None
+
+    def read_words(self, address: int, count: int) -> tuple[int, ...]:
+        """`count` words from `address` (0-based), in as many requests as Modbus needs."""
+        words: list[int] = []
+        while len(words) < count:
+            at, most = address + len(words), min(count - len(words), _MOST_READ)
+            words += self._ask("read_holding_registers", f"read {most} at {at}", at, count=most).registers
+        return tuple(words)
+
+    def read_block(self, name: str) -> list[Reading]:
+        """Every register of one block, from one snapshot where one request carries it."""
+        block = self.register_map.block(name)
+        words = self.read_words(block.first, block.words)
+        return [_reading(register, words, block.first) for register in self.register_map.registers_of(name)]
+
+    def read_values(self, registers: Sequence[Register]) -> list[Reading]:
+        """The registers in the order asked for; those close together come from one request."""
+        found: dict[int, Reading] = {}
+        for group in _groups(registers):
+            first, last = group[0].address, group[-1].address + group[-1].words
+            words = self.read_words(first, last - first)
+            found |= {register.address: _reading(register, words, first) for register in group}
+        return [found[register.address] for register in registers]
+
+    def frames(self, assignments: Sequence[Assignment]) -> list[Frame]:
+        """What `write_values` sends: one FC16 per block, more where it is too long or a read-only register lies between."""
+        runs: list[list[Assignment]] = []
+        for assignment in sorted(assignments, key=lambda assignment: assignment.register.address):
+            if runs and self._can_join(runs[-1][0].register, runs[-1][-1].register, assignment.register):
+                runs[-1].append(assignment)
+            else:
+                runs.append([assignment])
+        return [self._frame(run) for run in runs]
+
+    def write(self, frame: Frame) -> None:
+        request = f"write {len(frame.words)} at {frame.address}"
+        self._ask("write_registers", request, frame.address, list(frame.words))
+
+    def write_values(self, assignments: Sequence[Assignment]) -> list[Frame]:
+        """Write all assignments; what was sent. Those of one block travel in one FC16 (see `frames`)."""
+        frames = self.frames(assignments)
+        for frame in frames:
+            self.write(frame)
+        return frames
+
+    def _can_join(self, first: Register, last: Register, following: Register) -> bool:
+        if first.block != following.block or following.address + following.words - first.address > _MOST_WRITTEN:
+            return False
+        between = range(last.address + last.words, following.address)
+        return all(register.is_writable for register in self._registers_at(between))
+
+    def _frame(self, run: Sequence[Assignment]) -> Frame:
+        first, last = run[0].register.address, run[-1].register.address + run[-1].register.words
+        assigned = {address for assignment in run for address in _addresses(assignment.register)}
+        gap = [address for address in range(first, last) if address not in assigned]
+        words = list(self.read_words(first, last - first)) if gap else [0] * (last - first)
+        for register, data in run:
+            words[register.address - first : register.address - first + register.words] = _words(data)
+        return Frame(first, tuple(words), tuple(register.name for register in self._registers_at(gap)))
+
+    def _registers_at(self, addresses: Sequence[int]) -> list[Register]:
+        wanted = set(addresses)
+        return [register for register in self.register_map.registers if not wanted.isdisjoint(_addresses(register))]
+
+    def _ask(self, method: str, request: str, *arguments: Any, **options: Any) -> Any:
+        from pymodbus.exceptions import ModbusException
+
+        client = self._connected()
+        try:
+            answer = getattr(client, method)(*arguments, device_id=self._unit, **options)
+        except (ModbusException, OSError) as error:
+            self.close()
+            raise _no_answer(self.where, self._unit, error) from None
+        if answer.isError():
+            raise RefusedError(int(answer.exception_code), request)
+        return answer
+
+    def _connected(self) -> "ModbusTcpClient":
+        """The client with an open socket. The socket is opened here, for pymodbus does not tell why it could not."""
+        if self._client is None or not self._client.connected:
+            from pymodbus.client import ModbusTcpClient
+
+            logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # its errors reach the user as ours
+            host, port = self._address
+            try:
+                link = socket.create_connection(self._address, TIMEOUT_S)
+            except OSError as error:
+                raise _no_connection(self.where, error) from None
+            self._client = ModbusTcpClient(host, port=port, timeout=TIMEOUT_S, retries=0)
+            self._client.socket = link
+        return self._client
+
+
+def _no_connection(where: str, error: OSError) -> CliError:
+    if isinstance(error, TimeoutError):
+        seen, probably = f"no answer within {TIMEOUT_S:g} s", "wrong address, or a firewall"
+    elif isinstance(error, socket.gaierror):
+        seen, probably = "no such host name", "a typo in --gateway"
+    else:
+        seen, probably = error.strerror or str(error), "not running, or on another port"
+    return CliError(
+        f"E130 no gateway at {where}: {seen}; {probably}. Start one (force-gateway run demo --sim) or give --gateway HOST:PORT",
+        exit_codes.DEVICE,
+    )
+
+
+def _no_answer(where: str, unit: int, error: Exception) -> CliError:
+    reset = isinstance(error, OSError) or "closed" in str(error)
+    seen = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
+    return CliError(
+        f"E131 {where} {seen}: not a Modbus server, another unit id, or this machine is not on its allow-list",
+        exit_codes.DEVICE,
+    )
+
+
+def _reading(register: Register, words: Sequence[int], first: int) -> Reading:
+    own = tuple(words[register.address - first : register.address - first + register.words])
+    data = b"".join(word.to_bytes(2, "big") for word in own)
+    return Reading(register, register.decode(data), own)
+
+
+def _addresses(register: Register) -> range:
+    return range(register.address, register.address + register.words)
+
+
+def _words(data: bytes) -> list[int]:
+    return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
+
+
+def _groups(registers: Sequence[Register]) -> list[list[Register]]:
+    """By address, those of one block that one request can carry together."""
+    groups: list[list[Register]] = []
+    for register in sorted(registers, key=lambda register: register.address):
+        first = groups[-1][0] if groups else None
+        if first and first.block == register.block and register.address + register.words - first.address <= _MOST_READ:
+            groups[-1].append(register)
+        else:
+            groups.append([register])
+    return groups

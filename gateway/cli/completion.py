@@ -1,0 +1,19 @@
+"""`completion`: the line that teaches a shell our verbs."""
+
+import click
+
+from gateway.cli.errors import CliError
+
+
+@click.command(epilog='bash: eval "$(force-gateway completion bash)" in ~/.bashrc; zsh and fish alike.')
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+@click.pass_context
+def command(context: click.Context, *, shell: str) -> None:
+    """Print the completion script of a shell."""
+    from click.shell_completion import get_completion_class
+
+    maker = get_completion_class(shell)
+    if maker is None:
+        raise CliError(f"this version of click has no completion for {shell}")
+    root = context.find_root().command
+    click.echo(maker(root, {}, "force-gateway", "_FORCE_GATEWAY_COMPLETE").source())

@@ -1,0 +1,42 @@
+"""Asks the running gateway on this machine something that Modbus has no register for: one JSON line, one answer."""
+
+import json
+import socket
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+
+_TIMEOUT_S: Final = 2.0
+_LONGEST_ANSWER: Final = 1 << 20
+
+
+def ask(state: Path, request: dict[str, Any]) -> dict[str, Any]:
+    """The answer of the gateway that runs on this state directory; CliError when there is none or it refuses."""
+    path = state / "control.sock"
+    try:
+        answer = _exchange(path, json.dumps(request).encode() + b"\n")
+    except PermissionError:
+        raise CliError(f"E105 {path}: belongs to the user who runs the gateway", exit_codes.PERMISSION) from None
+    except (OSError, ValueError) as error:
+        raise CliError(
+            f"E140 no gateway answers on {path} ({getattr(error, 'strerror', None) or error}); "
+            "is it running, with the same --state or rig?",
+            exit_codes.DEVICE,
+        ) from None
+    if not answer.pop("ok", False):
+        raise CliError(f"E141 {answer.get('error', 'the gateway refused without a reason')}")
+    return answer
+
+
+def _exchange(path: Path, line: bytes) -> dict[str, Any]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        link.settimeout(_TIMEOUT_S)
+        link.connect(str(path))
+        link.sendall(line)
+        with link.makefile("rb") as stream:
+            answer = json.loads(stream.readline(_LONGEST_ANSWER) or b"null")
+    if not isinstance(answer, dict):
+        raise ValueError("no answer")
+    return answer

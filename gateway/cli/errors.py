@@ -1,0 +1,57 @@
+"""From an exception to one clear message and an exit code.
+
+Whatever a verb does not translate itself is translated here, in one place. Rooms are not imported to recognise their
+exceptions: an exception can only have come from a module that is loaded already, and start-up stays light.
+"""
+
+import errno
+import sys
+import traceback
+from typing import IO, Any
+
+import click
+
+from gateway.cli import exit_codes
+
+
+class CliError(click.ClickException):
+    """One message for stderr, beginning with its code where `explain` knows more about it."""
+
+    def __init__(self, message: str, exit_code: int = exit_codes.FAILED) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code  # type: ignore[misc]  # click reads the instance's
+
+    def show(self, file: IO[Any] | None = None) -> None:
+        click.echo(self.format_message(), file=file or sys.stderr)
+
+
+def translated(error: Exception, command_line: str, *, debug: bool) -> CliError:
+    """The message for an exception that no verb has caught. Anything unknown is our defect, and says so."""
+    if _is_a(error, "gateway.profiles.faults", "ProfileError"):
+        return CliError(str(error), exit_codes.CONFIGURATION)
+    if _is_a(error, "gateway.recording.errors", "RecordingError"):
+        return CliError(f"E403 {error}", exit_codes.DATA)
+    if _is_a(error, "gateway.ports", "PortError"):
+        return CliError(str(error), getattr(error, "exit_code", exit_codes.DEVICE))
+    if isinstance(error, OSError) and error.strerror:
+        return _from_system(error)
+    if debug:
+        traceback.print_exception(error)
+    first_line = (str(error).splitlines() or [""])[0]
+    return CliError(
+        f"E500 a defect of force-gateway, not of yours: {type(error).__name__}: {first_line}\n"
+        f"please report it with the output of: force-gateway --debug {command_line}"
+    )
+
+
+def _from_system(error: OSError) -> CliError:
+    """What the operating system refused: permission, disk, a missing directory."""
+    place = f"{error.filename}: " if error.filename else ""
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return CliError(f"E105 {place}{error.strerror}: this user may not", exit_codes.PERMISSION)
+    return CliError(f"E106 {place}{error.strerror}")
+
+
+def _is_a(error: Exception, module: str, name: str) -> bool:
+    kind = getattr(sys.modules.get(module), name, None)
+    return kind is not None and isinstance(error, kind)

@@ -1,0 +1,11 @@
+"""Exit codes of every verb, those of sysexits.h where it has one."""
+
+from typing import Final
+
+OK: Final = 0
+FAILED: Final = 1  # asked for and not done: a refusal, a full disk, a defect of ours
+USAGE: Final = 2  # the command line itself
+DATA: Final = 65  # an input file that is not what it should be
+DEVICE: Final = 69  # a port, a device or a gateway that is not there
+PERMISSION: Final = 77
+CONFIGURATION: Final = 78  # a profile with a fault

@@ -1,0 +1,52 @@
+"""`explain`: what a code means, what it probably is, and what to do; needs no gateway and no network."""
+
+import json
+from dataclasses import asdict
+from difflib import get_close_matches
+
+import click
+
+from gateway.cli.options import json_option
+
+
+@click.command()
+@click.argument("code", required=False)
+@json_option
+def command(*, code: str | None, as_json: bool) -> None:
+    """Explain a code of a message, such as E110.
+
+    A name in the registers, such as over_force, does too; without CODE all are listed.
+    """
+    from gateway.cli.codes import CATALOGUE
+
+    if code is not None:
+        _one(code, as_json=as_json)
+    elif as_json:
+        click.echo(json.dumps([asdict(entry) for entry in CATALOGUE.values()], indent=2))
+    else:
+        for entry in CATALOGUE.values():
+            click.echo(f"{entry.code}  {entry.title}" + (f"  ({entry.name})" if entry.name else ""))
+
+
+def _one(code: str, *, as_json: bool) -> None:
+    from gateway.cli.codes import find
+
+    entries = find(code)
+    if not entries:
+        raise click.UsageError(_unknown(code))
+    if as_json:
+        click.echo(json.dumps([asdict(entry) for entry in entries], indent=2))
+        return
+    for entry in entries:
+        click.echo(f"{entry.code}  {entry.title}")
+        for heading, text in (("seen", entry.seen), ("probably", entry.probably), ("do", entry.do)):
+            click.echo(click.wrap_text(text, width=100, initial_indent=f"  {heading:<10}", subsequent_indent=" " * 12))
+
+
+def _unknown(code: str) -> str:
+    from gateway.cli.codes import CATALOGUE
+
+    known = [*CATALOGUE, *(entry.name for entry in CATALOGUE.values() if entry.name)]
+    near = get_close_matches(code.upper().replace("-", "_"), known, n=2, cutoff=0.6)
+    meant = f"; did you mean {' or '.join(near)}?" if near else ";"
+    return f"{code} is not a code{meant} `force-gateway explain` lists them all"

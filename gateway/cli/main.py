@@ -1,0 +1,79 @@
+"""The command `force-gateway`. A verb's module is imported when that verb is called, so `--help` and `check` start fast
+and a verb's libraries cost only those who use it."""
+
+import sys
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any, Final
+
+import click
+
+from gateway import VERSION
+from gateway.cli.errors import translated
+
+VERBS: Final = (
+    "run",
+    "monitor",
+    "read",
+    "write",
+    "registers",
+    "check",
+    "init",
+    "ports",
+    "schema",
+    "explain",
+    "record",
+    "recordings",
+    "backup",
+    "restore",
+    "completion",
+    "version",
+)
+"""In the order in which a newcomer meets them; each is a module of this package with its `command`."""
+
+
+class VerbGroup(click.Group):
+    """Finds verbs by name, and turns whatever they raise into one message."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        command: click.Command = import_module(f"gateway.cli.{cmd_name}").command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        word = args[0]
+        if word not in VERBS and not word.startswith("-") and not ctx.resilient_parsing:
+            near = get_close_matches(word, VERBS, n=1)
+            meant = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(VERBS)}"
+            ctx.fail(f"{word} is not a verb{meant}")
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
+            raise
+        except Exception as error:
+            command_line = " ".join(word for word in sys.argv[1:] if word != "--debug")
+            raise translated(error, command_line, debug=bool(ctx.params.get("debug"))) from error
+
+
+@click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(VERSION, prog_name="force-gateway", message="%(prog)s %(version)s")
+@click.option("--debug", is_flag=True, help="Show the traceback of a defect.")
+def command(debug: bool) -> None:
+    """Modbus gateway that holds a constant contact force, and says why the force is off.
+
+    Begin with: force-gateway run demo --sim
+    """
+
+
+def main() -> None:
+    """Entry point of `force-gateway` and of `python -m gateway`."""
+    command(prog_name="force-gateway")

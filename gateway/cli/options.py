@@ -1,0 +1,83 @@
+"""Options that several verbs share: where the gateway is, where its state is, JSON."""
+
+from collections.abc import Callable, Sized
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import click
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+Endpoint = tuple[str, int]
+_DEFAULT_PORT: Final = 5020
+DEFAULT_ENDPOINT: Final = f"127.0.0.1:{_DEFAULT_PORT}"
+
+
+def endpoint(context: click.Context, parameter: click.Parameter, value: str | None) -> Endpoint | None:
+    """HOST:PORT, HOST, :PORT or [IPV6]:PORT as (host, port), for an option's callback."""
+    if value is None:
+        return None
+    host, port = _split(value)
+    port = port or str(_DEFAULT_PORT)
+    if not port.isdecimal() or int(port) > 65535:
+        raise click.BadParameter(f"{value} is not HOST:PORT such as {DEFAULT_ENDPOINT} (port 0..65535)")
+    return host or "127.0.0.1", int(port)
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Host and port, either may be empty; brackets hold an IPv6 address, and one without brackets has no port."""
+    if text.startswith("["):
+        host, _, rest = text[1:].partition("]")
+        return host, rest.removeprefix(":")
+    if text.count(":") > 1:
+        return text, ""
+    host, _, port = text.partition(":")
+    return host, port
+
+
+def gateway_options(function: Function) -> Function:
+    """--gateway, --unit and --map: which server to speak to, and by which names."""
+    for option in (
+        click.option("--map", "map_name", default="force-v1", metavar="NAME", help="Register map (name or file)."),
+        click.option("--unit", type=click.IntRange(0, 255), default=1, show_default=True, help="Modbus unit id."),
+        click.option(
+            "--gateway",
+            "endpoint",
+            callback=endpoint,
+            metavar="HOST:PORT",
+            default=DEFAULT_ENDPOINT,
+            show_default=True,
+            help="Where the gateway's Modbus TCP is.",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def state_options(function: Function) -> Function:
+    """--state and --rig: which state directory."""
+    for option in (
+        click.option(
+            "--rig", default="demo", show_default=True, help="The rig whose default state directory is meant."
+        ),
+        click.option(
+            "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway."
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def json_option(function: Function) -> Function:
+    return click.option("--json", "as_json", is_flag=True, help="Print JSON.")(function)
+
+
+def count_of(things: Sized, noun: str) -> str:
+    """`1 file`, `3 files`."""
+    return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
+
+
+def state_directory(state: Path | None, rig: str) -> Path:
+    """The directory that `run` would use."""
+    from gateway.service.guardian import RunOptions
+
+    return RunOptions(rig=rig, state=state).state_directory

@@ -1,0 +1,93 @@
+"""`recordings`: what has been recorded, and getting it out as CSV or Parquet."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import json_option, state_directory, state_options
+
+if TYPE_CHECKING:
+    from gateway.recording import Entry
+
+
+@click.group(name="recordings")
+def command() -> None:
+    """List and export recordings."""
+
+
+@command.command(name="list")
+@state_options
+@json_option
+def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
+    """List the recordings of a state directory."""
+    from gateway.recording import list_recordings
+
+    directory = state_directory(state, rig)
+    entries = list_recordings(directory)
+    if as_json:
+        click.echo(json.dumps([_facts(entry) for entry in entries], indent=2))
+        return
+    if not entries:
+        click.echo(f"no recordings in {directory / 'recordings'}; force-gateway record on, or run --record, makes one")
+        return
+    click.echo("  ID  started (UTC)             rig              duration      rows       size")
+    for entry in entries:
+        click.echo(_line(entry))
+
+
+def _facts(entry: "Entry") -> dict[str, object]:
+    return {
+        "id": entry.number,
+        "path": str(entry.path),
+        "started_utc": entry.header.get("started_utc"),
+        "rig": entry.header.get("rig"),
+        "calibration": entry.header.get("calibration"),
+        "rows": entry.rows,
+        "duration_s": round(entry.duration_s, 6),
+        "size_bytes": entry.size_bytes,
+        "truncated": entry.truncated,
+        "fault": entry.fault or None,
+    }
+
+
+def _line(entry: "Entry") -> str:
+    if entry.fault:
+        return f"{entry.number:>4}  unreadable: {entry.fault}"
+    torn = "  torn tail dropped" if entry.truncated else ""
+    return (
+        f"{entry.number:>4}  {entry.header.get('started_utc', ''):<24}  {entry.header.get('rig', ''):<14} "
+        f"{entry.duration_s:>8.1f} s {entry.rows:>9} {entry.size_bytes / 1e3:>7.1f} kB{torn}"
+    )
+
+
+@command.command(name="export")
+@click.argument("number", metavar="ID", type=click.IntRange(min=1))
+@click.option("--csv", "form", flag_value="csv", default="csv", help="CSV with # key: value lines (default).")
+@click.option("--parquet", "form", flag_value="parquet", help="Parquet with the facts as metadata.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, allow_dash=True), help="File to write; - is stdout (CSV)."
+)
+@click.option("--force", is_flag=True, help="Overwrite the file.")
+@state_options
+def export_command(*, number: int, form: str, output: Path | None, force: bool, state: Path | None, rig: str) -> None:
+    """Export recording ID (a number of `recordings list`)."""
+    from gateway import recording as room
+
+    recording = room.read_recording(room.find_recording(state_directory(state, rig), number))
+    for note in recording.notes:
+        click.echo(f"{recording.path}: {note}", err=True)
+    if output == Path("-"):
+        if form != "csv":
+            raise click.UsageError("only CSV goes to stdout; give -o FILE")
+        room.write_csv(recording, sys.stdout.buffer)
+        return
+    target = output or Path(f"{recording.header.get('rig', 'recording')}-{number:04d}.{form}")
+    if target.exists() and not force:
+        raise CliError(f"E405 {target} exists and was left alone; --force overwrites it", exit_codes.FAILED)
+    (room.export_csv if form == "csv" else room.export_parquet)(recording, target)
+    click.echo(f"wrote {recording.rows} rows to {target}", err=True)

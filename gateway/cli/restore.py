@@ -1,0 +1,58 @@
+"""`restore`: a backup back into a state directory, wholly or not at all."""
+
+import fcntl
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import count_of, state_directory, state_options
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path, dir_okay=False, exists=True))
+@click.option("--force", is_flag=True, help="Also into a directory that is not empty; its content is kept beside it.")
+@click.option("--dry-run", is_flag=True, help="Check FILE and say what would be restored.")
+@state_options
+def command(*, file: Path, force: bool, dry_run: bool, state: Path | None, rig: str) -> None:
+    """Unpack a backup into a state directory.
+
+    Wholly or not at all. The gateway must not be running.
+    """
+    from gateway.cli.state_archive import ArchiveError, names_in, unpack
+
+    directory = state_directory(state, rig)
+    try:
+        names = names_in(file)
+        if directory.is_dir() and any(directory.iterdir()) and not force:
+            raise CliError(
+                f"E405 {directory} is not empty and was left alone; --force replaces it and keeps the old one"
+            )
+        if dry_run:
+            click.echo("\n".join([*names, f"{count_of(names, 'file')} would be restored to {directory}"]))
+            return
+        with _not_running(directory):
+            kept = unpack(file, directory)
+    except ArchiveError as error:
+        raise CliError(f"E404 {error}; nothing was changed", exit_codes.DATA) from None
+    click.echo(
+        f"restored {count_of(names, 'file')} to {directory}" + (f"; what was there is in {kept}" if kept else "")
+    )
+
+
+@contextmanager
+def _not_running(directory: Path) -> Iterator[None]:
+    """Holds the lock that a running gateway holds; E104 when one does."""
+    lock = directory / "lock"
+    if not lock.exists():
+        yield
+        return
+    with lock.open("a") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CliError(f"E104 a gateway runs on {directory}; stop it first", exit_codes.DEVICE) from None
+        yield

@@ -1,0 +1,16 @@
+"""`schema`: the JSON Schema of a kind of profile, for editors that complete and check while one types."""
+
+import json
+
+import click
+
+KINDS = ("rig", "device", "plant", "calibration", "registers")
+
+
+@click.command()
+@click.argument("kind", type=click.Choice(KINDS), default="rig")
+def command(*, kind: str) -> None:
+    """Print the JSON Schema of a kind of profile."""
+    from gateway.profiles import schema
+
+    click.echo(json.dumps(schema(kind), indent=2))

@@ -1,0 +1,128 @@
+"""A state directory in one file, and back: nothing half, nothing outside, nothing overwritten.
+
+The archive is a tar.gz: `backup.json` (what this is) and `state/...`. Sockets, the lock and the running flag belong to a
+running gateway and are left out. Restoring extracts beside the target and then renames, so a full disk or a damaged
+archive changes nothing; what was there before is kept under another name, not deleted.
+"""
+
+import gzip
+import io
+import json
+import os
+import shutil
+import tarfile
+import tempfile
+import zlib
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from gateway import VERSION
+
+_MANIFEST: Final = "backup.json"
+_TOP: Final = "state"
+_LEFT_OUT: Final = {"control.sock", "lock", "running"}
+_FORMAT: Final = 1
+
+
+class ArchiveError(Exception):
+    """A file that is no backup, or a damaged one."""
+
+
+def pack(state: Path, target: Path) -> list[str]:
+    """Write everything of `state` to `target`; the names packed. OSError when either cannot be used."""
+    files = list(_files(state))
+    with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as stream:
+        beside = Path(stream.name)
+        try:
+            with tarfile.open(fileobj=stream, mode="w:gz") as archive:
+                _add_manifest(archive, state)
+                for path in files:
+                    archive.add(path, f"{_TOP}/{path.relative_to(state)}", recursive=False)
+            stream.flush()
+            os.fsync(stream.fileno())
+            beside.replace(target)
+        finally:
+            beside.unlink(missing_ok=True)
+    return [str(path.relative_to(state)) for path in files if not path.is_dir()]
+
+
+def names_in(source: Path) -> list[str]:
+    """The files of an archive, after every check that `unpack` makes; ArchiveError with the reason."""
+    try:
+        _read_to_the_end(source)
+        with tarfile.open(source, "r:gz") as archive:
+            members = archive.getmembers()
+            _check(archive, members)
+            return [member.name.removeprefix(f"{_TOP}/") for member in members if member.isfile()][1:]
+    except (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError) as error:
+        raise ArchiveError(f"{source} is damaged or no tar.gz: {error}") from None
+
+
+def unpack(source: Path, state: Path) -> Path | None:
+    """Put the archive's content where `state` is, at once; where the previous content is kept, None if there was none."""
+    names_in(source)
+    state.parent.mkdir(parents=True, exist_ok=True)
+    beside = Path(tempfile.mkdtemp(dir=state.parent, prefix=f".{state.name}."))
+    try:
+        with tarfile.open(source, "r:gz") as archive:
+            archive.extractall(beside, filter="data")
+        fresh = beside / _TOP
+        fresh.mkdir(exist_ok=True)
+        fresh.chmod(0o700)
+        kept = _set_aside(state)
+        fresh.rename(state)
+    finally:
+        shutil.rmtree(beside)
+    return kept
+
+
+def _read_to_the_end(source: Path) -> None:
+    """The checksum of a gzip file stands at its end, and tarfile does not look that far."""
+    with gzip.open(source) as stream:
+        while stream.read(1 << 20):
+            pass
+
+
+def _files(state: Path) -> Iterator[Path]:
+    """Directories and plain files, parents first; links and sockets stay behind."""
+    for path in sorted(state.rglob("*")):
+        if path.name in _LEFT_OUT and path.parent == state:
+            continue
+        if not path.is_symlink() and (path.is_dir() or path.is_file()):
+            yield path
+
+
+def _add_manifest(archive: tarfile.TarFile, state: Path) -> None:
+    facts = {"format": _FORMAT, "force-gateway": VERSION, "rig": state.name, "made_utc": datetime.now(UTC).isoformat()}
+    text = json.dumps(facts).encode()
+    member = tarfile.TarInfo(_MANIFEST)
+    member.size = len(text)
+    archive.addfile(member, io.BytesIO(text))
+
+
+def _check(archive: tarfile.TarFile, members: list[tarfile.TarInfo]) -> None:
+    first = archive.extractfile(members[0]) if members and members[0].name == _MANIFEST else None
+    if first is None:
+        raise ArchiveError(f"{archive.name!s} was not made by `force-gateway backup`")
+    form = json.loads(first.read()).get("format")
+    if form != _FORMAT:
+        raise ArchiveError(f"{archive.name!s} has format {form}; this version reads {_FORMAT}")
+    for member in members[1:]:
+        parts = member.name.split("/")
+        if parts[0] != _TOP or ".." in parts or not (member.isfile() or member.isdir()):
+            raise ArchiveError(f"{archive.name!s} holds {member.name}, which no backup does: refused as a whole")
+
+
+def _set_aside(state: Path) -> Path | None:
+    """Rename what is there; an empty directory is simply removed."""
+    if not state.exists():
+        return None
+    if not any(state.iterdir()):
+        state.rmdir()
+        return None
+    number = 1
+    while (kept := state.with_name(f"{state.name}.before-restore-{number}")).exists():
+        number += 1
+    return state.rename(kept)

@@ -1,0 +1,88 @@
+"""`write`: registers by name, in engineering units, all of them in one request where Modbus allows."""
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from gateway.cli.options import Endpoint, gateway_options, json_option
+
+if TYPE_CHECKING:
+    from gateway.cli.client import Assignment, Frame
+    from gateway.registers import RegisterMap
+
+
+@click.command()
+@click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True)
+@click.option("--dry-run", is_flag=True, help="Say what would be sent, and send nothing that writes.")
+@gateway_options
+@json_option
+def command(
+    *, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, unit: int, map_name: str, as_json: bool
+) -> None:
+    """Write registers by name, in engineering units.
+
+    NAME=VALUE in the register's unit; modes and bits by name. Those of one block go out in one request.
+
+    Example: force-gateway write force_setpoint=12 control_word=enable
+    """
+    from gateway.cli.client import GatewayClient
+    from gateway.cli.refused import explained
+    from gateway.profiles import load_register_map
+
+    register_map = load_register_map(map_name)
+    wanted = [_assignment(register_map, text) for text in assignments]
+    _refuse_doubles(wanted)
+    with GatewayClient(*endpoint, unit, register_map) as client:
+        with explained(client):
+            frames = client.frames(wanted)
+        with explained(client, frames):
+            for frame in [] if dry_run else frames:
+                client.write(frame)
+    _tell(frames, wanted, dry_run=dry_run, as_json=as_json)
+
+
+def _assignment(register_map: "RegisterMap", text: str) -> "Assignment":
+    from gateway.cli.client import Assignment
+    from gateway.cli.words_of_values import parsed
+    from gateway.registers import UnknownRegister
+
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise click.UsageError(f"{text} is not NAME=VALUE, such as force_setpoint=12")
+    try:
+        register = register_map.find(name.strip())
+        if not register.is_writable:
+            raise click.UsageError(f"{name} is read only: {register.text}")
+        return Assignment(register, parsed(register, value))
+    except UnknownRegister as error:
+        raise click.UsageError(str(error)) from None
+    except ValueError as error:
+        raise click.UsageError(f"{name}: {error}") from None
+
+
+def _refuse_doubles(wanted: "list[Assignment]") -> None:
+    addresses = [assignment.register.address for assignment in wanted]
+    for assignment in wanted:
+        if addresses.count(assignment.register.address) > 1:
+            raise click.UsageError(f"{assignment.register.name} is given twice")
+
+
+def _tell(frames: "list[Frame]", wanted: "list[Assignment]", *, dry_run: bool, as_json: bool) -> None:
+    if as_json:
+        sent = [{"address": frame.address, "words": list(frame.words), "kept": list(frame.kept)} for frame in frames]
+        click.echo(json.dumps({"sent": not dry_run, "frames": sent}))
+        return
+    for assignment in wanted:
+        click.echo(f"{assignment.register.name} = {_as_shown(assignment)}")
+    for frame in frames:
+        words = " ".join(f"{word:04X}" for word in frame.words)
+        kept = f", {', '.join(frame.kept)} kept as read" if frame.kept else ""
+        click.echo(f"{'would send' if dry_run else 'sent'} FC16 address {frame.address}: {words}{kept}")
+
+
+def _as_shown(assignment: "Assignment") -> str:
+    from gateway.cli.client import Reading
+    from gateway.cli.words_of_values import shown
+
+    return shown(Reading(assignment.register, assignment.register.decode(assignment.data), ()))

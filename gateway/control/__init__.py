@@ -1,0 +1,26 @@
+"""The force controller: command, sample and line state in, one voltage with its reasons out. Pure; time is an argument.
+
+`Controller.step` is a force law (ramp, pre-contact force, contact ramp, inverse BSFM, bounded trim, limits) under a
+supervision that shares nothing with it but the readings, over a state table. What a rig file may set is in `settings`.
+"""
+
+from gateway.control.controller import Controller
+from gateway.control.decision import safe_output
+from gateway.control.inputs import NO_COMMAND, Line, Output
+from gateway.control.reasons import FAULT_CODES
+from gateway.control.settings import ControlSettings, Defaults, LeaseAction, Limits, Supervision, Trim
+
+__all__ = [
+    "FAULT_CODES",
+    "NO_COMMAND",
+    "ControlSettings",
+    "Controller",
+    "Defaults",
+    "LeaseAction",
+    "Limits",
+    "Line",
+    "Output",
+    "Supervision",
+    "Trim",
+    "safe_output",
+]

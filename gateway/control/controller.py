@@ -1,0 +1,287 @@
+"""One decision: what the command, the sample and the lines say now, into the voltage that must be written now, with its
+reasons.
+
+Order of a step: read the sample, obey the edges of the command, look for a first cause, then pursue. So a command that
+arrives with its own step acts in that step, and no voltage is decided after a fault was seen. Enable, reset and tare
+act on their rise; everything else is level. A refused edge changes nothing, says why, and asks for the command to be
+cleared, so that the registers do not show an enable that is not there.
+"""
+
+from dataclasses import replace
+from math import inf
+from typing import Final
+
+from gateway.bsfm import Bsfm
+from gateway.control.contact import ContactSense
+from gateway.control.decision import Outcome, Standing, output_of, safe_output
+from gateway.control.demand import Demand
+from gateway.control.follower import CommandFollower
+from gateway.control.force_law import ModelError
+from gateway.control.inputs import Line, Output
+from gateway.control.limits import NotFiniteError
+from gateway.control.pursuit import Moment, Pursuit
+from gateway.control.reading import NO_READING, Reader
+from gateway.control.reasons import enable_refused, fault_sentence, stuck_sentence, unreachable_sentence
+from gateway.control.response import ModelResponse
+from gateway.control.settings import ControlSettings, LeaseAction
+from gateway.control.state_table import ENABLED_STATES, Event, next_state
+from gateway.control.supervision import Finding, Supervisor, finding
+from gateway.devices.messages import ForceSample
+from gateway.registers.command import Command
+from gateway.registers.words import ControlBit, FaultCode, LimitedBy, Mode, RefusalReason, State, WarningBit
+
+_STOP_S: Final = 4.0  # a ramp down takes at most this long (the guardian waits 5 s)
+_ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
+
+
+class Controller:
+    """The force controller of one rig. Times are monotonic seconds; calls may come microseconds apart."""
+
+    def __init__(
+        self, settings: ControlSettings, model: Bsfm, *, calibration_id: int, unclean_restart: bool = False
+    ) -> None:
+        self.calibration_id = calibration_id
+        self.state = State.OFF
+        self._settings = settings
+        self._follower = CommandFollower(settings)
+        self._pursuit = Pursuit(settings, model)
+        self._supervisor = Supervisor(settings)
+        self._reader = Reader(settings.supervision)
+        self._contact = ContactSense(settings.defaults.contact_threshold_n)
+        self._response = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
+        self._reading = NO_READING
+        self._last_s: float | None = None
+        self._fault, self._faulted_s = FaultCode.NONE, -inf
+        self._restarted = unclean_restart
+        self._stopping = self._ramping_down = self._master_lost = False
+        self._said_unreachable = self._said_stuck = False
+        self._outcome = Outcome()
+
+    # -- for the service
+
+    @property
+    def stopped(self) -> bool:
+        """True once a `stop` has led to a disabled output."""
+        return self._stopping and self.state not in ENABLED_STATES
+
+    def stop(self) -> None:
+        """Ramp the force to 0 in the following steps, then OFF for good; no enable is accepted any more."""
+        self._stopping = True
+
+    def use(self, model: Bsfm, calibration_id: int) -> None:
+        """Swap the calibration; while enabled the voltage difference fades instead of jumping."""
+        self._pursuit.law.use(model, self._follower.demand.gravity_n)
+        self._response.use(model)
+        self.calibration_id = calibration_id
+
+    def safe_output(self, fault: FaultCode) -> Output:
+        """What to write when `step` raised."""
+        return safe_output(fault, self._settings.limits.safe_voltage_v)
+
+    def step(self, now_s: float, command: Command, sample: ForceSample | None, line: Line) -> Output:
+        """The decision of this moment. An exception is a defect of ours: INTERNAL is latched before it goes on, and the
+        caller writes `safe_output`."""
+        try:
+            return self._step(now_s, command, sample, line)
+        except Exception:
+            self._pursuit.rest()
+            if self.state is not State.FAULT:
+                self.state, self._fault, self._faulted_s = State.FAULT, FaultCode.INTERNAL, now_s
+            raise
+
+    # -- the order of a step
+
+    def _step(self, now_s: float, command: Command, sample: ForceSample | None, line: Line) -> Output:
+        dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
+        self._last_s = now_s
+        self._outcome = Outcome()
+        self._pursuit.stage.earn(dt_s)
+        self._response.advance(self._pursuit.stage.voltage_v, dt_s)
+        rises, falls = self._follower.take(now_s, command)
+        self._sense(now_s, sample)
+        self._obey(now_s, rises, falls, line)
+        if self.state in ENABLED_STATES:
+            self._supervise(now_s, line)
+        if self.state in ENABLED_STATES:
+            self._pursue(now_s, dt_s)
+        return output_of(command, self._standing(now_s, line), self._pursuit, self._reading, self._outcome)
+
+    def _sense(self, now_s: float, sample: ForceSample | None) -> None:
+        self._reading = reading = self._reader.read(now_s, sample, self._follower.demand.gravity_n)
+        if not reading.is_new:
+            return
+        touching = self._contact.update(reading)
+        self._supervisor.observe(reading, self._response, self._pursuit.law.blend, touching)
+        if self.state not in ENABLED_STATES:
+            self._supervisor.observe_rest(reading)
+            self._tell_stuck()
+
+    def _obey(self, now_s: float, rises: int, falls: int, line: Line) -> None:
+        if falls & _ENABLE and self.state in ENABLED_STATES:
+            self._disable(f"info disabled by {self._follower.who}")
+        if rises & _RESET and self.state is State.FAULT:
+            self._reset(now_s)
+        if rises & _TARE:
+            self._tare()
+        if rises & _ENABLE and self.state not in ENABLED_STATES:
+            self._enable(now_s, line)
+        self._ramping_down = self._ramping_down or self._stopping
+
+    # -- edges of the command
+
+    def _disable(self, sentence: str) -> None:
+        self.state = next_state(self.state, Event.DISABLE)
+        self._let_go(sentence)
+
+    def _let_go(self, sentence: str) -> None:
+        """The output goes to the safe voltage, the command and its owner with it."""
+        self._pursuit.rest()
+        self._ramping_down = self._master_lost = self._said_unreachable = False
+        self._outcome.release_owner = True
+        self._refuse(sentence)
+
+    def _refuse(self, sentence: str) -> None:
+        self._outcome.events.append(sentence)
+        self._outcome.clear_command = True
+        self._follower.expect_clearing()
+
+    def _reset(self, now_s: float) -> None:
+        command = self._follower.command
+        if command.control_word & ControlBit.ENABLE or command.force_setpoint_n != 0.0:
+            self._refuse("W302 reset refused: write setpoint 0 and enable 0 with the reset bit")
+        elif not self._follower.lease.is_fresh_since(self._faulted_s, now_s):
+            self._refuse("W302 reset refused: the heartbeat has not changed since the fault")
+        else:
+            self._outcome.events.append(f"info fault {self._fault.name} reset by {self._follower.who}")
+            self.state, self._fault = next_state(self.state, Event.RESET), FaultCode.NONE
+            self._restarted = False
+
+    def _tare(self) -> None:
+        gravity_n = self._follower.demand.gravity_n
+        before_n = self._reader.zero.zero_n
+        pressing = self.state in ENABLED_STATES and self._pursuit.stage.voltage_v > 0.0
+        if self.state is State.FAULT or pressing:
+            reason = "disable the output or set the force to 0 first"
+        elif not self._reading.is_fresh:
+            reason = "no fresh load-cell sample"
+        else:
+            reason = self._reader.zero.tare(gravity_n)
+        zero_n = self._reader.zero.zero_n
+        self._supervisor.rise.shift(zero_n - before_n)
+        self._outcome.events.append(f"W303 tare refused: {reason}" if reason else f"info tare: zero at {zero_n:.2f} N")
+
+    def _enable(self, now_s: float, line: Line) -> None:
+        block = self._block(now_s, line)
+        if block:
+            self._refuse(enable_refused(block))
+            return
+        self.state = next_state(self.state, Event.ENABLE)
+        self._restarted = False
+        self._supervisor.start()
+        self._follower.lease.start(now_s)
+        self._outcome.events.append(f"info enabled by {self._follower.who}")
+
+    def _block(self, now_s: float, line: Line) -> RefusalReason:
+        """Why an enable would be refused now."""
+        if self.state is State.FAULT:
+            return RefusalReason.FAULT_LATCHED
+        if self.state is not State.OFF:
+            return RefusalReason.NONE
+        if self._stopping:
+            return RefusalReason.NOT_READY
+        return self._supervisor.enable_block(now_s, self._reading, line)
+
+    # -- supervision
+
+    def _supervise(self, now_s: float, line: Line) -> None:
+        name = self._follower.not_finite
+        found = finding(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
+        expected_n = self._response.rise_n(self._pursuit.law.blend)
+        found = found or self._supervisor.first_cause(now_s, self._reading, line, expected_n)
+        if found:
+            self._fail(now_s, found)
+        elif not self._follower.lease.is_lost(now_s, line.owner_connected):
+            self._master_lost = self._master_lost and self._ramping_down
+        elif not self._master_lost:
+            self._lose_master(now_s, line.owner_connected)
+
+    def _fail(self, now_s: float, found: Finding) -> None:
+        self.state = next_state(self.state, Event.FAILED)
+        self._fault, self._faulted_s = found.fault, now_s
+        self._let_go(found.sentence)
+
+    def _lose_master(self, now_s: float, connected: bool) -> None:
+        age_ms = self._follower.lease.age_s(now_s) * 1e3
+        seen = f"master lost: {'' if connected else 'connection closed, '}heartbeat unchanged for {age_ms:.0f} ms"
+        action = self._settings.supervision.lease_action
+        if action is LeaseAction.FAULT:
+            self._fail(now_s, finding(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
+            return
+        self._master_lost = self._outcome.release_owner = True
+        self._ramping_down = action is LeaseAction.RAMP
+        words = "ramping to 0 N" if self._ramping_down else "holding the last setpoint"
+        self._outcome.events.append(fault_sentence(FaultCode.MASTER_LOST, f"{seen}, {words}"))
+
+    # -- pursuit
+
+    def _target(self) -> Demand:
+        """What to pursue now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
+        demand = self._follower.demand
+        if not self._ramping_down:
+            return demand
+        rate_n_per_s = max(self._settings.defaults.force_ramp_n_per_s, self._settings.limits.force_max_n / _STOP_S)
+        return replace(demand, mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)
+
+    def _pursue(self, now_s: float, dt_s: float) -> None:
+        expected_n = self._response.force_n(self._pursuit.law.blend) + self._follower.demand.gravity_n
+        held_back = self._supervisor.rise.is_too_high
+        moment = Moment(now_s, dt_s, self._reading, self._contact.touching, expected_n, held_back)
+        try:
+            event = self._pursuit.step(self._target(), moment)
+        except ModelError as error:
+            self._fail(now_s, finding(FaultCode.MODEL_INVALID, str(error)))
+            return
+        except NotFiniteError as error:
+            self._fail(now_s, finding(FaultCode.NOT_FINITE, str(error)))
+            return
+        self.state = next_state(self.state, event)
+        if self._ramping_down and self._pursuit.law.applied_n <= 0.0:
+            self._disable("info force ramped to 0, output disabled")
+        self._tell_unreachable(expected_n)
+
+    # -- what people see
+
+    def _tell_unreachable(self, expected_n: float) -> None:
+        unreachable = self._pursuit.unreachable
+        if unreachable and not self._said_unreachable:
+            measured_n = self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
+            sentence = unreachable_sentence(self._pursuit.stage.voltage_v, measured_n, expected_n)
+            self._outcome.events.append(sentence)
+        self._said_unreachable = unreachable
+
+    def _tell_stuck(self) -> None:
+        stuck = self._supervisor.is_stuck
+        if stuck and not self._said_stuck:
+            self._outcome.events.append(stuck_sentence(self._reading.contact_n, self._settings.supervision.stuck_n))
+        self._said_stuck = stuck
+
+    def _standing(self, now_s: float, line: Line) -> Standing:
+        enabled = self.state in ENABLED_STATES
+        return Standing(
+            state=self.state,
+            fault=self._fault,
+            block=self._block(now_s, line),
+            warnings=self._warnings(int(line.warnings)),
+            touching=self._contact.touching,
+            accepted_n=self._target().force_n if enabled else 0.0,
+            expected_cell_n=self._response.force_n(self._pursuit.law.blend),
+        )
+
+    def _warnings(self, word: int) -> int:
+        return (
+            word
+            | (WarningBit.RESTARTED.value if self._restarted else 0)
+            | (WarningBit.TARGET_UNREACHABLE.value if self._pursuit.unreachable else 0)
+            | (WarningBit.TRIM_SATURATED.value if self._pursuit.trim.limited_by else 0)
+            | (WarningBit.MASTER_LOST.value if self._master_lost else 0)
+        )

@@ -1,0 +1,64 @@
+"""What a command asks for once the rig's defaults stand in for its zeros: computed once per command, not once per step.
+
+Gravity: tilt 0 means that the tool points down; then the whole payload presses, at 90 degrees none of it, at 180 all of
+it pulls back. The load cell sits between slide and payload, so it does not feel the payload's weight in the contact:
+    contact force = cell force + payload_kg g cos(tilt)
+The setpoint and the published measured force are contact forces; the model (calibrated on the cell) speaks cell force.
+"""
+
+from dataclasses import dataclass
+from math import cos
+
+from gateway.control.limits import finite, force_ranged
+from gateway.control.settings import ControlSettings, Defaults
+from gateway.registers.command import Command
+from gateway.registers.words import LimitedBy, Mode
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """One command, complete: no field means "default" any more. force_n is the accepted contact force."""
+
+    mode: Mode
+    force_n: float
+    force_limited_by: LimitedBy
+    voltage_v: float
+    ramp_n_per_s: float
+    precontact_n: float
+    contact_ramp_s: float
+    gravity_n: float
+    tolerance_n: float
+    in_band_time_s: float
+
+
+def gravity_n(payload_kg: float, tilt_rad: float) -> float:
+    """Part of the payload's weight that presses, N: m g cos(tilt), tilt 0 = tool pointing down."""
+    return finite(payload_kg, "payload_kg") * STANDARD_GRAVITY_M_PER_S2 * cos(finite(tilt_rad, "tilt_angle_rad"))
+
+
+def demand_of(command: Command, settings: ControlSettings) -> Demand:
+    """NotFiniteError if any number that matters is NaN or infinite."""
+    defaults = settings.defaults
+    force_n, limited_by = force_ranged(command.force_setpoint_n, settings.limits)
+    return Demand(
+        mode=command.mode,
+        force_n=force_n,
+        force_limited_by=limited_by,
+        voltage_v=finite(command.voltage_setpoint_v, "voltage_setpoint_v"),
+        ramp_n_per_s=_or_default(command.force_ramp_n_per_s, defaults.force_ramp_n_per_s, "force_ramp_n_per_s"),
+        precontact_n=_or_default(command.precontact_force_n, defaults.precontact_force_n, "precontact_force_n"),
+        contact_ramp_s=_or_default(command.contact_ramp_s, defaults.contact_ramp_s, "contact_ramp_s"),
+        gravity_n=_gravity_of(command, defaults),
+        tolerance_n=_or_default(command.in_band_tolerance_n, defaults.in_band_tolerance_n, "in_band_tolerance_n"),
+        in_band_time_s=_or_default(command.in_band_time_s, defaults.in_band_time_s, "in_band_time_s"),
+    )
+
+
+def _gravity_of(command: Command, defaults: Defaults) -> float:
+    return gravity_n(_or_default(command.payload_kg, defaults.payload_kg, "payload_kg"), command.tilt_angle_rad)
+
+
+def _or_default(value: float, default: float, name: str) -> float:
+    """0 in these registers means the rig's default (FIELDBUS); a negative one is as meaningless and treated alike."""
+    return value if finite(value, name) > 0.0 else default

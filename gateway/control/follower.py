@@ -1,0 +1,43 @@
+"""Follows the command block: which bits rose and fell, what is demanded, and whether the heartbeat moved."""
+
+from gateway.control.demand import Demand, demand_of
+from gateway.control.lease import Lease
+from gateway.control.limits import NotFiniteError
+from gateway.control.settings import ControlSettings
+from gateway.registers.command import Command
+
+
+class CommandFollower:
+    """`demand` is the last one that made sense; `not_finite` names the number that did not, or is empty."""
+
+    def __init__(self, settings: ControlSettings) -> None:
+        self.command = Command()
+        self.demand: Demand = demand_of(self.command, settings)
+        self.not_finite = ""
+        self.lease = Lease(settings.supervision.lease_s)
+        self._settings = settings
+        self._adopt_heartbeat = False
+
+    def expect_clearing(self) -> None:
+        """The bank is asked to zero the command: the next heartbeat value is its doing and not a beat."""
+        self._adopt_heartbeat = True
+
+    def take(self, now_s: float, command: Command) -> tuple[int, int]:
+        """Returns the control bits that rose and those that fell; none for a command that was taken before."""
+        if command is self.command:
+            return 0, 0
+        before, after = int(self.command.control_word), int(command.control_word)
+        self.command = command
+        if self._adopt_heartbeat:
+            self._adopt_heartbeat = False
+            self.lease.adopt(command.heartbeat)
+        self.lease.observe(now_s, command.heartbeat)
+        try:
+            self.demand, self.not_finite = demand_of(command, self._settings), ""
+        except NotFiniteError as error:
+            self.not_finite = str(error)
+        return after & ~before, before & ~after
+
+    @property
+    def who(self) -> str:
+        return self.command.peer or "a command"

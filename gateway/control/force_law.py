@@ -1,0 +1,111 @@
+"""From the accepted force to the feedforward voltage: approach, ramp, direction, inverse model.
+
+Approach: without contact the tool waits at the pre-contact force; from contact the target rises over contact_ramp_s, or
+by the force ramp where that is slower. Lost contact takes the target back at once: a free tool must not shoot out with
+the full force. The direction follows changes of the target (gateway.bsfm.reversal), never the measured force, whose
+noise would chatter; a vented or free tool starts on the rising branch again, because that is where the calibration
+ladder starts.
+"""
+
+from math import isfinite
+from typing import Final
+
+from gateway.bsfm import Bsfm, Status
+from gateway.control.demand import Demand
+from gateway.control.limits import TICK_S, Pace, is_below_usable, ramped
+from gateway.control.settings import Limits
+from gateway.registers.words import LimitedBy
+
+_RISING: Final = 1.0
+_CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
+_OK: Final = Status.OK
+
+
+class ModelError(Exception):
+    """The model gave no usable voltage for a finite force."""
+
+
+class Approach:
+    """Goal and rate of the target by contact. `touched_s` is when the present contact began."""
+
+    def __init__(self) -> None:
+        self._touched_s: float | None = None
+
+    def goal(self, now_s: float, demand: Demand, touching: bool, applied_n: float) -> tuple[float, float]:
+        """(goal N, rate N/s) for this step."""
+        if not touching:
+            self._touched_s = None
+            return min(demand.force_n, demand.precontact_n), demand.ramp_n_per_s
+        if self._touched_s is None:
+            self._touched_s = now_s
+        left_s = demand.contact_ramp_s - (now_s - self._touched_s)
+        rise_n = demand.force_n - applied_n
+        if left_s <= 0.0 or rise_n <= 0.0:
+            return demand.force_n, demand.ramp_n_per_s
+        return demand.force_n, min(demand.ramp_n_per_s, rise_n / max(left_s, TICK_S))
+
+
+class ForceLaw:
+    """Holds the applied target, its expected course in the plant (reference_n) and the blend state."""
+
+    def __init__(self, model: Bsfm, limits: Limits, response_lag_s: float) -> None:
+        self.model = model
+        self._limits = limits
+        self._lag_s = response_lag_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Vented: nothing applied, next movement rises."""
+        self.applied_n = self.reference_n = 0.0
+        self.blend = _RISING
+        self._pace = Pace()
+        self._carry_over_v = 0.0
+
+    def use(self, model: Bsfm, gravity_n: float) -> None:
+        """Swap the model without a bump: the voltage difference is carried over and fades."""
+        before_v, _ = self.feedforward(gravity_n)
+        self.model = model
+        after_v, _ = self.feedforward(gravity_n)
+        self._carry_over_v += before_v - after_v
+
+    def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float) -> float:
+        """Move the applied target towards the goal; returns by how much, N."""
+        self._pace.earn(dt_s)
+        last_n = self.applied_n
+        self.applied_n = ramped(goal_n, last_n, rate_n_per_s, self._pace.available_s)
+        moved_n = self.applied_n - last_n
+        self._pace.spend(moved_n, rate_n_per_s)
+        self._turn(moved_n)
+        self.reference_n += (self.applied_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
+        self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
+        return moved_n
+
+    def _turn(self, moved_n: float) -> None:
+        if moved_n:
+            self.blend = self.model.reversal.advance(self.blend, moved_n)
+        if self.applied_n <= 0.0:
+            self.blend = _RISING
+
+    def fall_back(self, goal_n: float) -> None:
+        """Contact lost: at once down to the goal, and on the rising branch for the next contact."""
+        self.applied_n = min(self.applied_n, goal_n)
+        self.blend = _RISING
+
+    def take_over(self, force_n: float) -> None:
+        """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
+        self.applied_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
+        self.blend = _RISING
+
+    def feedforward(self, gravity_n: float) -> tuple[float, LimitedBy]:
+        """Voltage for the applied contact force by the inverse model, and what limited it. ModelError if there is none."""
+        if self.applied_n <= 0.0:
+            return 0.0, LimitedBy.NONE
+        if is_below_usable(self.applied_n, self._limits):
+            return 0.0, LimitedBy.SMALLEST_FORCE
+        try:
+            voltage_v, status = self.model.voltage_v(self.applied_n - gravity_n, self.blend)
+        except ValueError as error:
+            raise ModelError(f"model: {error}") from error
+        if not isfinite(voltage_v):
+            raise ModelError(f"model: {voltage_v} V for {self.applied_n:.2f} N")
+        return voltage_v + self._carry_over_v, LimitedBy.NONE if status is _OK else LimitedBy.CALIBRATION_RANGE

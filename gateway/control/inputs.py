@@ -1,0 +1,59 @@
+"""What one step is told about the world besides the command and the sample, and what it answers."""
+
+from dataclasses import dataclass
+from math import nan
+from typing import Final
+
+from gateway.registers.command import Command
+from gateway.registers.words import FaultCode, LimitedBy, RefusalReason, State, StatusBit, WarningBit
+
+_NO_WARNING: Final = WarningBit(0)
+_NO_STATUS: Final = StatusBit(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What the output line and the process know, at the time of a step.
+
+    acknowledged_v: voltage that the device confirmed last, None before the first; unanswered_since_s: monotonic time of the
+    oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered, lost);
+    owner_connected: False once the owning master's last connection has closed; late_s: how late this step runs.
+    """
+
+    acknowledged_v: float | None = None
+    unanswered_since_s: float | None = None
+    fault: FaultCode = FaultCode.NONE
+    cell_lost: bool = False
+    pressure_pa: float = nan
+    owner_connected: bool = True
+    late_s: float = 0.0
+    warnings: WarningBit = _NO_WARNING
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """One decision with its reasons. voltage_v is what must be written now."""
+
+    voltage_v: float
+    feedforward_v: float = 0.0
+    trim_v: float = 0.0
+    limited_by: LimitedBy = LimitedBy.NONE
+    state: State = State.OFF
+    status: StatusBit = _NO_STATUS
+    fault: FaultCode = FaultCode.NONE
+    warnings: WarningBit = _NO_WARNING
+    force_measured_n: float = nan  # tared, gravity compensated
+    force_requested_n: float = 0.0
+    force_accepted_n: float = 0.0  # the target that control pursues: 0 when not enabled
+    force_applied_n: float = 0.0  # the ramped target of this instant
+    model_residual_n: float = nan  # measured minus what the model expects at this voltage
+    sample_age_s: float = nan
+    heartbeat_echo: int = 0
+    sequence_echo: int = 0
+    enable_block: RefusalReason = RefusalReason.NONE  # why an enable would be refused now
+    clear_command: bool = False  # service: bank.clear_command()
+    release_owner: bool = False  # service: bank.release_owner()
+    events: tuple[str, ...] = ()  # sentences for the log, each starting with its code or "info"
+
+
+NO_COMMAND = Command()

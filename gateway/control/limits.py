@@ -1,0 +1,81 @@
+"""Every bound as a named function that tells whether it acted. `isfinite` comes before min and max: max(0, min(100,
+nan)) is 100.
+
+Time-bounded movements (voltage slew, force ramp) claim time from a `Pace`: it earns what passes, holds at most one nominal
+tick when nothing moves, and so lets a new command act at the moment it arrives without letting calls in quick succession
+beat the limit. On the wire: a rise between any two writes is at most slew x (time between them + one tick).
+"""
+
+from math import isfinite
+from typing import Final
+
+from gateway.control.settings import Limits
+from gateway.registers.words import LimitedBy
+
+TICK_S: Final = 0.01  # nominal tick: what a movement may claim at once after rest
+LONGEST_STEP_S: Final = 0.02  # a later step catches up no more than this
+
+Limited = tuple[float, LimitedBy]
+
+
+class NotFiniteError(ValueError):
+    """A value that must be a number is NaN or infinite."""
+
+
+def finite(value: float, name: str) -> float:
+    if not isfinite(value):
+        raise NotFiniteError(f"{name} = {value}")
+    return value
+
+
+def force_ranged(target_n: float, limits: Limits) -> Limited:
+    """0 .. force_max_n (rig limits); the bank refuses such a setpoint before, this is the second line."""
+    target_n = finite(target_n, "force_setpoint_n")
+    ranged_n = max(0.0, min(limits.force_max_n, target_n))
+    return ranged_n, LimitedBy.NONE if ranged_n == target_n else LimitedBy.FORCE_RANGE
+
+
+def is_below_usable(target_n: float, limits: Limits) -> bool:
+    """Below the smallest usable force the output is 0 V (METHOD: outside the range)."""
+    return finite(target_n, "force_target_n") < limits.smallest_force_n
+
+
+def trim_ranged(trim_v: float, limit_v: float) -> Limited:
+    """+- limit_v (rig, trim.limit_v): the trim corrects the model, it does not replace it."""
+    ranged_v = max(-limit_v, min(limit_v, finite(trim_v, "trim_v")))
+    return ranged_v, LimitedBy.NONE if abs(ranged_v) < limit_v or limit_v == 0.0 else LimitedBy.TRIM_RANGE
+
+
+def voltage_ranged(target_v: float, limits: Limits) -> Limited:
+    """voltage_min_v .. voltage_max_v (rig limits, within the output device's range)."""
+    target_v = finite(target_v, "voltage_v")
+    ranged_v = max(limits.voltage_min_v, min(limits.voltage_max_v, target_v))
+    return ranged_v, LimitedBy.NONE if ranged_v == target_v else LimitedBy.VOLTAGE_RANGE
+
+
+def slew_limited(target_v: float, last_v: float, slew_v_per_s: float, dt_s: float) -> Limited:
+    """At most slew_v_per_s x dt_s above last_v; falling is immediate (SAFETY, I2)."""
+    highest_v = last_v + slew_v_per_s * finite(dt_s, "dt_s")
+    if finite(target_v, "voltage_v") > highest_v:
+        return highest_v, LimitedBy.VOLTAGE_SLEW
+    return target_v, LimitedBy.NONE
+
+
+def ramped(target_n: float, last_n: float, rate_n_per_s: float, dt_s: float) -> float:
+    """Towards the target by at most rate x dt, both ways (command register force_ramp, or the rig's default)."""
+    step_n = rate_n_per_s * finite(dt_s, "dt_s")
+    return max(last_n - step_n, min(last_n + step_n, finite(target_n, "force_target_n")))
+
+
+class Pace:
+    """Seconds that a movement may claim now."""
+
+    def __init__(self) -> None:
+        self.available_s = TICK_S
+
+    def earn(self, dt_s: float) -> None:
+        self.available_s = min(self.available_s + dt_s, max(TICK_S, min(dt_s, LONGEST_STEP_S)))
+
+    def spend(self, moved: float, rate_per_s: float) -> None:
+        """moved: by how much the value went; rate_per_s: its limit, in the same unit per second."""
+        self.available_s = max(0.0, self.available_s - abs(moved) / rate_per_s)

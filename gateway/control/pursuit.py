@@ -1,0 +1,134 @@
+"""One step towards what is demanded, while enabled: force law plus trim, or the direct voltage, through the voltage stage.
+
+READY, RAMPING and HOLDING are decided here, as events of the state table. When the trim may learn: in contact, on a new
+usable sample, in force mode, with no other limit acting, and with the target less than QUIET_N ahead of where the plant
+can be (not ramping fast).
+"""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Final
+
+from gateway.bsfm import Bsfm
+from gateway.control.band import Band
+from gateway.control.demand import Demand
+from gateway.control.force_law import Approach, ForceLaw
+from gateway.control.reading import Reading
+from gateway.control.settings import ControlSettings
+from gateway.control.state_table import Event
+from gateway.control.trim import TrimIntegral
+from gateway.control.voltage_stage import VoltageStage, strongest
+from gateway.registers.words import LimitedBy, Mode
+
+QUIET_N: Final = 3.0
+_ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What one step knows. expected_n: the model's contact force at the lagged voltage; held_back: the first rise looks
+    wrong."""
+
+    now_s: float
+    dt_s: float
+    reading: Reading
+    touching: bool
+    expected_n: float
+    held_back: bool = False
+
+
+class Pursuit:
+    """Owns the applied target, the trim, the band and the voltage on the output."""
+
+    def __init__(self, settings: ControlSettings, model: Bsfm) -> None:
+        self.law = ForceLaw(model, settings.limits, settings.supervision.response_lag_s)
+        self.trim = TrimIntegral(settings.trim)
+        self.stage = VoltageStage(settings.limits)
+        self.feedforward_v = 0.0
+        self.limited_by = LimitedBy.NONE
+        self._approach = Approach()
+        self._band = Band(settings.supervision.unreachable_s)
+        self._answer = Band(settings.supervision.unreachable_s)
+        self._was_touching = False
+
+    @property
+    def in_band(self) -> bool:
+        return self._band.in_band
+
+    @property
+    def unreachable(self) -> bool:
+        return self._band.unreachable or self._answer.unreachable
+
+    def rest(self) -> None:
+        """Disabled: the safe voltage at once, everything learned forgotten."""
+        self.stage.make_safe()
+        self.law.reset()
+        self.trim.reset()
+        self._approach = Approach()
+        self._band.restart()
+        self._answer.restart()
+        self.feedforward_v, self.limited_by = 0.0, LimitedBy.NONE
+
+    def step(self, demand: Demand, moment: Moment) -> Event:
+        """Moves the output. NotFiniteError and ModelError are the caller's to turn into faults."""
+        event = self._force(demand, moment) if demand.mode is Mode.FORCE else self._voltage(demand, moment)
+        self._was_touching = moment.touching
+        return event
+
+    def _force(self, demand: Demand, moment: Moment) -> Event:
+        law = self.law
+        goal_n, rate_n_per_s = self._approach.goal(moment.now_s, demand, moment.touching, law.applied_n)
+        if moment.held_back:
+            goal_n = min(goal_n, demand.precontact_n)
+        if self._was_touching and not moment.touching:
+            law.fall_back(goal_n)
+        moved_n = law.advance(goal_n, rate_n_per_s, moment.dt_s)
+        self._learn(moment, moved_n)
+        self.feedforward_v, by_model = law.feedforward(demand.gravity_n)
+        has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
+        by_stage = self.stage.drive(self.feedforward_v + self.trim.value_v if has_model else 0.0)
+        self.limited_by = strongest(by_stage, self.trim.limited_by, by_model, demand.force_limited_by)
+        self._answer.restart()
+        return self._judge_force(demand, moment, goal_n)
+
+    def _learn(self, moment: Moment, moved_n: float) -> None:
+        law, reading = self.law, moment.reading
+        self.trim.travel(moved_n)
+        if law.applied_n <= 0.0:
+            self.trim.reset()
+        elif self._may_learn(moment):
+            self.trim.integrate(law.reference_n - reading.contact_n, reading.interval_s)
+
+    def _may_learn(self, moment: Moment) -> bool:
+        quiet = abs(self.law.applied_n - self.law.reference_n) < QUIET_N
+        free = self.limited_by is LimitedBy.NONE or self.limited_by is LimitedBy.TRIM_RANGE  # of the step before
+        return moment.touching and moment.reading.is_new and moment.reading.is_usable and quiet and free
+
+    def _judge_force(self, demand: Demand, moment: Moment, goal_n: float) -> Event:
+        applied_n, tolerance_n = self.law.applied_n, demand.tolerance_n
+        if demand.force_n <= 0.0:
+            self._band.restart()
+            return Event.WAIT if applied_n <= 0.0 else Event.MOVE
+        if abs(goal_n - applied_n) > tolerance_n:
+            self._band.restart()
+            return Event.MOVE
+        inside = moment.touching and abs(demand.force_n - applied_n) <= tolerance_n
+        inside = inside and abs(moment.reading.contact_n - demand.force_n) <= tolerance_n
+        self._band.update(moment.now_s, inside, demand.in_band_time_s)
+        if self._band.in_band:
+            return Event.SETTLE
+        return Event.MOVE if moment.touching or applied_n != goal_n else Event.WAIT
+
+    def _voltage(self, demand: Demand, moment: Moment) -> Event:
+        self.trim.reset()
+        self.law.take_over(moment.expected_n)
+        self.feedforward_v = demand.voltage_v
+        self.limited_by = self.stage.drive(demand.voltage_v)
+        moving = self.limited_by is LimitedBy.VOLTAGE_SLEW
+        answered = moving or moment.touching or moment.expected_n < _ANSWER_N
+        self._answer.update(moment.now_s, answered, inf)
+        if moving or demand.voltage_v <= 0.0:
+            self._band.restart()
+            return Event.MOVE if moving else Event.WAIT
+        self._band.update(moment.now_s, True, demand.in_band_time_s)
+        return Event.SETTLE if self._band.in_band else Event.MOVE

@@ -1,0 +1,63 @@
+"""What a sample means at the time of a step: zeroed, gravity compensated, with its age and whether it can be used."""
+
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Final
+
+from gateway.control.settings import Supervision
+from gateway.control.tare import Zero
+from gateway.devices.messages import ForceSample, Quality
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """cell_n: zeroed cell force, nan unless usable; contact_n: with the payload's weight; interval_s: since the sample
+    before, 0 unless this one is new; overload: saturated or said so by the device; age_s: nan before the first
+    sample."""
+
+    cell_n: float = nan
+    contact_n: float = nan
+    age_s: float = nan
+    interval_s: float = 0.0
+    is_new: bool = False
+    is_fresh: bool = False
+    is_usable: bool = False
+    overload: bool = False
+
+
+NO_READING: Final = Reading()
+
+
+class Reader:
+    """Turns samples into readings; a sample given twice is not new the second time."""
+
+    def __init__(self, supervision: Supervision) -> None:
+        self.zero = Zero(supervision)
+        self._saturation_n = supervision.saturation_n
+        self._timeout_s = supervision.sample_timeout_s
+        self._last_s = nan
+
+    def read(self, now_s: float, sample: ForceSample | None, gravity_n: float) -> Reading:
+        if sample is None:
+            return NO_READING
+        force_n = sample.force_n
+        overload = sample.quality is Quality.OVERLOAD or abs(force_n) >= self._saturation_n
+        usable = isfinite(force_n) and not overload
+        interval_s = self._interval_s(sample.time_s)
+        if interval_s > 0.0 and usable:
+            self.zero.observe(force_n)
+        age_s = max(0.0, now_s - sample.time_s)
+        cell_n = force_n - self.zero.zero_n if usable else nan
+        fresh = age_s <= self._timeout_s
+        return Reading(cell_n, cell_n + gravity_n, age_s, interval_s, interval_s > 0.0, fresh, usable, overload)
+
+    def _interval_s(self, time_s: float) -> float:
+        """Time since the sample before, at most the time-out; 0 for the same one, or one from the past."""
+        last_s = self._last_s
+        if time_s <= last_s:
+            return 0.0
+        self._last_s = time_s
+        if time_s - last_s <= self._timeout_s:
+            return time_s - last_s
+        self.zero.forget()  # also for the first sample, where last_s is nan
+        return self._timeout_s

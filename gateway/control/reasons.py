@@ -1,0 +1,72 @@
+"""The sentences of control: a code, what was seen in numbers, what it probably is, one thing to do (FIRST-HOUR's rule)."""
+
+from typing import Final
+
+from gateway.registers.words import FaultCode, RefusalReason
+
+FAULT_CODES: Final[dict[FaultCode, str]] = {
+    FaultCode.SIGN_INVERTED: "A302",
+    FaultCode.GAIN_WRONG: "A303",
+    FaultCode.MASTER_LOST: "A310",
+    FaultCode.SAMPLE_STALE: "A311",
+    FaultCode.SAMPLE_FROZEN: "A312",
+    FaultCode.OVER_FORCE: "A313",
+    FaultCode.OUTPUT_SILENT: "A314",
+    FaultCode.OUTPUT_REFUSED: "A315",
+    FaultCode.OUTPUT_ALTERED: "A316",
+    FaultCode.OUTPUT_LOST: "A317",
+    FaultCode.CELL_LOST: "A318",
+    FaultCode.LOOP_STALLED: "A319",
+    FaultCode.NOT_FINITE: "A320",
+    FaultCode.MODEL_INVALID: "A321",
+    FaultCode.INTERNAL: "A499",
+}
+"""What `explain` knows each fault by."""
+
+_BLOCKS: Final[dict[RefusalReason, str]] = {
+    RefusalReason.FAULT_LATCHED: "a fault is latched: write setpoint 0, enable 0, then the reset bit",
+    RefusalReason.CELL_SILENT: "no fresh load-cell sample: check power and wires of the amplifier",
+    RefusalReason.OUTPUT_FAULT: "the output device does not answer as it should: check its line",
+    RefusalReason.NOT_READY: "not ready: first acknowledgement pending, cell overloaded or force stuck, or stopping",
+}
+
+
+def fault_sentence(fault: FaultCode, detail: str) -> str:
+    return f"{FAULT_CODES[fault]} {detail}"
+
+
+def unreachable_sentence(voltage_v: float, measured_n: float, expected_n: float) -> str:
+    """A301 in numbers. A tenth of the expected force is what kgf read as N looks like."""
+    seen = f"A301 {voltage_v:.2f} V out, {measured_n:.1f} N measured, {expected_n:.1f} expected: "
+    if expected_n > 0.0 and 0.09 < measured_n / expected_n < 0.115:
+        return seen + "no air, valve closed or no contact; or kgf read as N (factor 9.81, unit in the rig file)"
+    if measured_n < 0.5 * expected_n:
+        return seen + "no air, valve closed or no contact"
+    return seen + "target not reached: supply pressure too low, trim at its limit or calibration off"
+
+
+def sign_sentence(rise_n: float, expected_n: float) -> str:
+    return fault_sentence(
+        FaultCode.SIGN_INVERTED,
+        f"force went {rise_n:+.1f} N where {expected_n:+.1f} N were expected: swap the cell's signal wires or set sign: -1",
+    )
+
+
+def gain_sentence(rise_n: float, expected_n: float) -> str:
+    share = rise_n / expected_n
+    return fault_sentence(
+        FaultCode.GAIN_WRONG,
+        f"force rose {rise_n:.1f} N where {expected_n:.1f} N were expected ({share:.0%}): 981% or 10% means that kgf and N "
+        "are mixed up; check the unit and span of the load cell in the rig file",
+    )
+
+
+def enable_refused(reason: RefusalReason) -> str:
+    return f"W301 enable refused: {_BLOCKS[reason]}"
+
+
+def stuck_sentence(measured_n: float, limit_n: float) -> str:
+    return (
+        f"W304 {measured_n:.1f} N measured at the safe voltage, allowed {limit_n:.1f} N: stuck in contact, valve open or zero "
+        "moved; free the tool or tare"
+    )

@@ -1,0 +1,83 @@
+"""What a rig file may say about control. Each field carries its unit and its bounds; profiles builds them from YAML
+and the JSON schema from the same annotations, so there is one place to change."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Le
+
+STRICT = {"extra": "forbid"}  # read by pydantic in gateway.profiles
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Bounds that no command passes."""
+
+    __pydantic_config__ = STRICT
+    force_max_n: Annotated[float, Gt(0), Le(300)]  # largest accepted setpoint (int16 at 0.01 N carries 327)
+    over_force_n: Annotated[float, Gt(0)]  # measured force that trips OVER_FORCE
+    over_force_samples: Annotated[int, Ge(1), Le(10)] = 3
+    smallest_force_n: Annotated[float, Ge(0)] = 0.0  # below it the output is 0 V
+    voltage_min_v: Annotated[float, Ge(0)] = 0.0
+    voltage_max_v: Annotated[float, Gt(0), Le(10)] = 10.0
+    safe_voltage_v: Annotated[float, Ge(0)] = 0.0
+    voltage_slew_v_per_s: Annotated[float, Gt(0)] = 100.0  # rising only; falling may be immediate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Defaults:
+    """What 0 in a command register means."""
+
+    __pydantic_config__ = STRICT
+    force_ramp_n_per_s: Annotated[float, Gt(0), Le(3276.7)] = 200.0
+    precontact_force_n: Annotated[float, Ge(0)] = 2.0
+    contact_ramp_s: Annotated[float, Ge(0), Le(10)] = 0.0
+    in_band_tolerance_n: Annotated[float, Gt(0)] = 1.0
+    in_band_time_s: Annotated[float, Ge(0)] = 0.1
+    contact_threshold_n: Annotated[float, Gt(0)] = 0.5
+    payload_kg: Annotated[float, Ge(0)] = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trim:
+    """The bounded integral from the load cell. gain 0 switches it off: feedforward alone."""
+
+    __pydantic_config__ = STRICT
+    gain_v_per_n_s: Annotated[float, Ge(0)] = 0.0
+    limit_v: Annotated[float, Ge(0), Le(3)] = 0.5
+    dead_zone_n: Annotated[float, Ge(0)] = 0.15  # errors below it are stiction's: integrating them makes a limit cycle
+    memory_n: Annotated[float, Gt(0)] = 20.0  # travel of the target over which a correction fades to 37 %
+
+
+class LeaseAction(StrEnum):
+    FAULT = "fault"  # safe voltage at once, latched
+    HOLD = "hold"  # keep the last setpoint, raise a warning
+    RAMP = "ramp"  # ramp to 0 N, then off
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Supervision:
+    """Time bounds (SAFETY: default bounds)."""
+
+    __pydantic_config__ = STRICT
+    lease_s: Annotated[float, Gt(0)] | None = None  # None: a command lasts until the next one
+    lease_action: LeaseAction = LeaseAction.FAULT
+    sample_timeout_s: Annotated[float, Gt(0)] = 0.05
+    output_timeout_s: Annotated[float, Gt(0)] = 0.1
+    stall_s: Annotated[float, Gt(0)] = 0.1
+    frozen_s: Annotated[float, Gt(0)] = 0.5
+    sample_quantum_n: Annotated[float, Gt(0)] = 0.1  # one count of the amplifier
+    saturation_n: Annotated[float, Gt(0)] = 98.0  # raw at or beyond 98 % of the cell's range
+    frozen_equal_samples: Annotated[int, Ge(3)] | None = None  # where noise shows in every reading: so many equal ones
+    unreachable_s: Annotated[float, Gt(0)] = 2.0  # held off the setpoint this long: target-unreachable
+    response_lag_s: Annotated[float, Gt(0)] = 0.2  # voltage to force: delay and lags of the rig as one first-order lag
+    stuck_n: Annotated[float, Gt(0)] = 15.0  # measured at the safe voltage: stuck in contact, no enable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControlSettings:
+    limits: Limits
+    defaults: Defaults = Defaults()
+    trim: Trim = Trim()
+    supervision: Supervision = Supervision()

@@ -1,0 +1,60 @@
+"""The control states as a table. A pair that is missing is a defect of ours and raises: no state is entered by accident.
+
+OFF: output disabled, safe voltage (after start, disable, reset, restart). READY: enabled with nothing to pursue:
+setpoint 0, or waiting at the pre-contact force for contact. RAMPING: the target moves or the force is out of band.
+HOLDING: in band for the in-band time. FAULT: latched; there is no (FAULT, FAILED), so that a fault has exactly one
+first cause.
+"""
+
+from enum import Enum
+from typing import Final
+
+from gateway.registers.words import State
+
+
+class Event(Enum):
+    ENABLE = "enable"  # rise of control_word bit 0, accepted
+    DISABLE = "disable"  # fall of it, or the end of a ramp down
+    WAIT = "wait"  # nothing to pursue
+    MOVE = "move"  # target moving, or force out of band
+    SETTLE = "settle"  # in band for the in-band time
+    FAILED = "failed"  # supervision found a first cause
+    RESET = "reset"  # accepted fault reset
+
+
+_OFF, _READY, _RAMPING, _HOLDING, _FAULT = State.OFF, State.READY, State.RAMPING, State.HOLDING, State.FAULT
+
+TRANSITIONS: Final[dict[tuple[State, Event], State]] = {
+    (_OFF, Event.ENABLE): _READY,
+    (_OFF, Event.FAILED): _FAULT,  # only a defect of ours fails while off
+    (_READY, Event.WAIT): _READY,
+    (_READY, Event.MOVE): _RAMPING,
+    (_READY, Event.SETTLE): _HOLDING,
+    (_READY, Event.DISABLE): _OFF,
+    (_READY, Event.FAILED): _FAULT,
+    (_RAMPING, Event.WAIT): _READY,
+    (_RAMPING, Event.MOVE): _RAMPING,
+    (_RAMPING, Event.SETTLE): _HOLDING,
+    (_RAMPING, Event.DISABLE): _OFF,
+    (_RAMPING, Event.FAILED): _FAULT,
+    (_HOLDING, Event.WAIT): _READY,
+    (_HOLDING, Event.MOVE): _RAMPING,
+    (_HOLDING, Event.SETTLE): _HOLDING,
+    (_HOLDING, Event.DISABLE): _OFF,
+    (_HOLDING, Event.FAILED): _FAULT,
+    (_FAULT, Event.RESET): _OFF,
+}
+
+ENABLED_STATES: Final = frozenset({_READY, _RAMPING, _HOLDING})
+
+
+class TransitionError(Exception):
+    """A pair that the table does not have: our own defect."""
+
+
+def next_state(state: State, event: Event) -> State:
+    """The state after an event. TransitionError for a pair that is not in the table."""
+    try:
+        return TRANSITIONS[state, event]
+    except KeyError:
+        raise TransitionError(f"state {state.name} has no event {event.name}") from None

@@ -1,0 +1,47 @@
+"""The zero of the load cell: the mean of recent samples, taken on the rise of the tare bit.
+
+Allowed only while nothing presses on purpose: output off, or enabled with setpoint 0; and only on a steady, usable
+signal, so that a force that is still decaying cannot become the zero. The payload's weight is added first: after a tare
+the contact force reads 0 at the present tilt, and a later tilt is still compensated. A restart forgets the zero
+(FIELDBUS: only coefficients are restored).
+"""
+
+from collections import deque
+from typing import Final
+
+from gateway.control.settings import Supervision
+
+_WINDOW: Final = 20  # samples: 0.2 s of a 100 Hz cell
+_FEWEST: Final = 5
+_LARGEST_SHARE: Final = 0.5  # of the saturation: a zero beyond it leaves no range to measure
+
+
+class Zero:
+    """Collects cell forces as converted (before tare); `zero_n` is what is subtracted from them."""
+
+    def __init__(self, supervision: Supervision) -> None:
+        self.zero_n = 0.0
+        self._recent_n: deque[float] = deque(maxlen=_WINDOW)
+        self._largest_spread_n = max(5.0 * supervision.sample_quantum_n, 0.5)
+        self._largest_n = _LARGEST_SHARE * supervision.saturation_n
+
+    def observe(self, force_n: float) -> None:
+        """One more usable sample, N."""
+        self._recent_n.append(force_n)
+
+    def forget(self) -> None:
+        """The stream was interrupted: what came before does not describe now."""
+        self._recent_n.clear()
+
+    def tare(self, gravity_n: float) -> str:
+        """Take the zero. Returns "" or the reason of the refusal, in numbers; gravity_n as in `demand`."""
+        recent = self._recent_n
+        if len(recent) < _FEWEST:
+            return f"{len(recent)} usable samples, at least {_FEWEST} are needed"
+        spread_n, mean_n = max(recent) - min(recent), sum(recent) / len(recent)
+        if spread_n > self._largest_spread_n:
+            return f"force not steady: {spread_n:.2f} N between samples, allowed {self._largest_spread_n:.2f} N"
+        if abs(mean_n + gravity_n) > self._largest_n:
+            return f"{mean_n:.1f} N at rest, allowed {self._largest_n:.0f} N: stuck in contact or wrong cell"
+        self.zero_n = mean_n + gravity_n
+        return ""

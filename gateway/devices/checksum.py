@@ -1,0 +1,41 @@
+"""Checksums by name, appended to a sentence before its terminator."""
+
+from collections.abc import Callable
+from functools import reduce
+from operator import xor
+from typing import Final, Literal
+
+ChecksumName = Literal["none", "dcon-sum", "xor"]
+
+
+def _nothing(body: bytes) -> bytes:
+    return b""
+
+
+def _dcon_sum(body: bytes) -> bytes:
+    """Sum of the character codes modulo 256, two upper-case hex digits (ICP DAS 7000 series manuals)."""
+    return b"%02X" % (sum(body) % 256)
+
+
+def _xor(body: bytes) -> bytes:
+    """Exclusive or of all characters after a star, as NMEA 0183 does."""
+    return b"*%02X" % reduce(xor, body, 0)
+
+
+_TRAILERS: Final[dict[ChecksumName, Callable[[bytes], bytes]]] = {
+    "none": _nothing,
+    "dcon-sum": _dcon_sum,
+    "xor": _xor,
+}
+
+
+def sealed(body: bytes, name: ChecksumName) -> bytes:
+    """The sentence with its checksum behind it."""
+    return body + _TRAILERS[name](body)
+
+
+def unsealed(sentence: bytes, name: ChecksumName) -> bytes | None:
+    """The sentence without its checksum, None when that is missing or wrong."""
+    length = len(_TRAILERS[name](b""))
+    body = sentence[: len(sentence) - length]
+    return body if sealed(body, name) == sentence else None

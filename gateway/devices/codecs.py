@@ -1,0 +1,42 @@
+"""Which codec speaks for a profile. A table, no registry: a new codec is one import and one line."""
+
+from collections.abc import Callable
+from typing import Final, TypeVar
+
+from gateway.devices.profile import DeviceProfile, Role
+from gateway.devices.roles import CellDevice, CellHost, OutputDevice, OutputHost
+from gateway.devices.template_cell import TemplateCellDevice, TemplateCellHost
+from gateway.devices.template_output import TemplateOutputDevice, TemplateOutputHost
+
+Ends = TypeVar("Ends")
+OutputEnds = tuple[Callable[[DeviceProfile], OutputHost], Callable[[DeviceProfile], OutputDevice]]
+CellEnds = tuple[Callable[[DeviceProfile, int, str | None], CellHost], Callable[[DeviceProfile], CellDevice]]
+
+OUTPUT_CODECS: Final[dict[str, OutputEnds]] = {"template": (TemplateOutputHost, TemplateOutputDevice)}
+CELL_CODECS: Final[dict[str, CellEnds]] = {"template": (TemplateCellHost, TemplateCellDevice)}
+
+
+def _find(table: dict[str, Ends], profile: DeviceProfile, role: Role) -> Ends:
+    if profile.role is not role:
+        raise ValueError(f"{profile.name} is of role {profile.role}, {role} is needed here")
+    if profile.codec not in table:
+        raise ValueError(f"{profile.name}: codec {profile.codec} is not one of {', '.join(table)}")
+    return table[profile.codec]
+
+
+def output_host(profile: DeviceProfile) -> OutputHost:
+    """Our end of an output device's line. ValueError when the profile is none, or its codec is unknown; so the three below."""
+    return _find(OUTPUT_CODECS, profile, Role.OUTPUT)[0](profile)
+
+
+def output_device(profile: DeviceProfile) -> OutputDevice:
+    return _find(OUTPUT_CODECS, profile, Role.OUTPUT)[1](profile)
+
+
+def cell_host(profile: DeviceProfile, sign: int = 1, unit: str | None = None) -> CellHost:
+    """Our end of a load cell's line; sign and unit are the rig's (see CellLine)."""
+    return _find(CELL_CODECS, profile, Role.LOAD_CELL)[0](profile, sign, unit)
+
+
+def cell_device(profile: DeviceProfile) -> CellDevice:
+    return _find(CELL_CODECS, profile, Role.LOAD_CELL)[1](profile)

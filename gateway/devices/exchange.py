@@ -1,0 +1,208 @@
+"""What a profile says about one exchange with a device: question, answer, and how its number maps to a physical value.
+
+Checked when built: a template that means nothing is told to its author, not to a running cell.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Final, Literal
+
+from annotated_types import Ge, Le, MinLen
+
+from gateway.devices.fields import Choice, Decimals, TemplateError, WholeNumber
+from gateway.devices.line_settings import STRICT
+from gateway.devices.messages import Quality
+from gateway.devices.template import Template, compile_template
+from gateway.units import NEWTON_PER_UNIT
+
+Span = tuple[float, float]
+ForceUnit = Literal["N", "kg", "g", "lb"]
+
+FORCE: Final = "force"
+STATUS: Final = "status"
+UNIT: Final = "unit"
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """A straight line between the device's numbers and physical values. Both spans rise."""
+
+    device: Span
+    physical: Span
+
+    @property
+    def physical_per_number(self) -> float:
+        return (self.physical[1] - self.physical[0]) / (self.device[1] - self.device[0])
+
+    def to_physical(self, number: float) -> float:
+        return self.physical[0] + (number - self.device[0]) * self.physical_per_number
+
+    def to_number(self, value: float) -> float:
+        return self.device[0] + (value - self.physical[0]) / self.physical_per_number
+
+    def carries(self, number: float) -> bool:
+        return self.device[0] <= number <= self.device[1]
+
+
+def _scale(device: Span, physical: Span) -> Scale:
+    if device[0] >= device[1] or physical[0] >= physical[1]:
+        raise ValueError(f"range {device} <-> {physical} must rise on both sides")
+    return Scale(device, physical)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoltageRange:
+    """The device's numbers `device` mean the voltages `voltage_v`, V; linear between."""
+
+    __pydantic_config__ = STRICT
+    device: Span  # [low, high] in the device's numbers
+    voltage_v: Span  # [low, high], V
+
+    def __post_init__(self) -> None:
+        _scale(self.device, self.voltage_v)
+
+    @property
+    def scale(self) -> Scale:
+        return Scale(self.device, self.voltage_v)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureRange:
+    """The device's numbers `device` mean the gauge pressures `pressure_pa`, Pa; linear between."""
+
+    __pydantic_config__ = STRICT
+    device: Span  # [low, high] in the device's numbers
+    pressure_pa: Span  # [low, high], Pa
+
+    def __post_init__(self) -> None:
+        _scale(self.device, self.pressure_pa)
+
+    @property
+    def scale(self) -> Scale:
+        return Scale(self.device, self.pressure_pa)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoltageExchange:
+    """Set or read the output voltage. ask, answer: templates; the one number in them is scaled by range."""
+
+    __pydantic_config__ = STRICT
+    ask: Annotated[str, MinLen(1)]  # template of the question, without terminator
+    answer: Annotated[str, MinLen(1)]  # template of the answer, without terminator
+    range: VoltageRange  # what the number means
+
+    def __post_init__(self) -> None:
+        compile_template(self.ask)
+        compile_template(self.answer)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureExchange:
+    """Read the measured pressure."""
+
+    __pydantic_config__ = STRICT
+    ask: Annotated[str, MinLen(1)]  # template of the question, without terminator
+    answer: Annotated[str, MinLen(1)]  # template of the answer, without terminator
+    range: PressureRange  # what the number means
+
+    def __post_init__(self) -> None:
+        compile_template(self.ask)
+        compile_template(self.answer)
+
+
+Exchange = VoltageExchange | PressureExchange
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """A command that moves the setting by a fixed number. Only the device role knows it: the host always sets."""
+
+    __pydantic_config__ = STRICT
+    ask: Annotated[str, MinLen(1)]  # the command, a bare word
+    by: float  # in the device's numbers
+
+    def __post_init__(self) -> None:
+        if compile_template(self.ask).fields:
+            raise TemplateError(f"{self.ask!r}: a step is a bare word")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutOfRange:
+    """What the device answers to a number beyond its range, and up to which number it does (else: unknown)."""
+
+    __pydantic_config__ = STRICT
+    text: Annotated[str, MinLen(1)]  # the device's words
+    numbers: Span  # [first, last] number that is answered so; any other is unknown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refusals:
+    """The device's words for no. Empty or absent: it stays silent."""
+
+    __pydantic_config__ = STRICT
+    unknown: str = ""  # to what it does not understand; empty: silence
+    out_of_range: OutOfRange | None = None  # to a setting that it understands and cannot do
+
+    def texts(self) -> tuple[str, ...]:
+        texts = (self.unknown, self.out_of_range.text if self.out_of_range else "")
+        return tuple(text for text in texts if text)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceReading:
+    """One reading of a load cell: streamed, or the answer to `ask`.
+
+    frame: template with the number {force:...}, perhaps a word {status:...} and a word {unit:...}. Where the frame says its
+    unit, that unit counts; `unit` is what the simulated device is set to, and what a frame without one means.
+    """
+
+    __pydantic_config__ = STRICT
+    frame: Annotated[str, MinLen(1)]
+    ask: str = ""  # empty for a stream
+    unit: ForceUnit | None = None
+    quality: Mapping[str, Quality] = field(
+        default_factory=dict
+    )  # word of {status:...} -> how far to believe the reading
+    blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
+    rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second of a stream; 0: as often as it is asked
+
+    def __post_init__(self) -> None:
+        if self.ask:
+            compile_template(self.ask)
+        _check_reading(compile_template(self.frame), self)
+
+    @property
+    def template(self) -> Template:
+        return compile_template(self.frame)
+
+    @property
+    def may_be_blank(self) -> str:
+        return FORCE if self.blank_is_overload else ""
+
+    @property
+    def decimals(self) -> int:
+        number = self.template.field(FORCE)
+        return number.decimals if isinstance(number, Decimals) else 0
+
+    @property
+    def step(self) -> float:
+        """One count of the display, in the device's unit."""
+        return float(10.0**-self.decimals)
+
+    def word(self, quality: Quality) -> str | None:
+        """The status word that means this, None where the frame has none."""
+        return next((word for word, meaning in self.quality.items() if meaning == quality), None)
+
+
+def _check_reading(template: Template, reading: ForceReading) -> None:
+    number = template.field(FORCE)
+    if not isinstance(number, Decimals | WholeNumber):
+        raise TemplateError(f"{template.text!r} has no number {{force:...}}")
+    if reading.blank_is_overload and (number.is_open or isinstance(number, WholeNumber)):
+        raise TemplateError(f"{template.text!r}: blank_is_overload needs decimals of fixed width")
+    unit = template.field(UNIT)
+    if unit and not (isinstance(unit, Choice) and set(unit.words) <= set(NEWTON_PER_UNIT)):
+        raise TemplateError(f"{template.text!r}: units are {', '.join(NEWTON_PER_UNIT)}")
+    status = template.field(STATUS)
+    if set(status.words if isinstance(status, Choice) else ()) != set(reading.quality):
+        raise TemplateError(f"{template.text!r}: quality must name each word of {{status:...}}, and no other")

@@ -1,0 +1,226 @@
+"""The five field shapes of a text template: whole number, hex number, decimals, choice, text.
+
+    {counts:d} {counts:04d} {counts:+05d}   whole number, open or of fixed width
+    {address:02X}                           upper-case hex of fixed width
+    {voltage_v:+07.3f} {voltage_v:.4f}      decimals, open or of fixed width; the point is always there
+    {status:ST|US|OL}                       one of the words; the first is the default
+    {text:s} {model:8s}                     printable text, open or of fixed width
+
+Each shape is both ways: it encodes a value or refuses it (nan, inf, too wide), and decodes its own text. A shape with a
+width reads blanks where zeros could stand, as displays that suppress leading zeros send them, and nothing else leniently:
+a missing decimal point is no number.
+"""
+
+import re
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Final, Protocol
+
+Value = float | int | str
+
+_LONGEST_NUMBER: Final = 10  # digits of an open number: more is not a reading but noise
+
+
+class TemplateError(ValueError):
+    """The profile's author wrote a template that means nothing; the sentence quotes it."""
+
+
+class ValueRefused(ValueError):  # noqa: N818 - says what happened, as Refused does
+    """A value that this device's grammar cannot carry: nan, inf, too wide, not one of the words, out of range."""
+
+
+class Field(Protocol):
+    """One hole of a template. pattern: regular expression of its bytes; is_open: its length is not fixed."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def pattern(self) -> str: ...
+    @property
+    def is_open(self) -> bool: ...
+    def encode(self, value: Value) -> str: ...
+    def decode(self, text: str) -> Value | None: ...
+
+
+def _refuse(name: str, value: Value, why: str) -> ValueRefused:
+    return ValueRefused(f"{name} = {value}: {why}")
+
+
+def _finite(name: str, value: Value) -> float:
+    if isinstance(value, str) or not isfinite(value):
+        raise _refuse(name, value, "not a finite number")
+    return value
+
+
+def _of_width(name: str, text: str, width: int) -> str:
+    if width and len(text) != width:
+        raise _refuse(name, text, f"does not fit in {width} characters")
+    return text
+
+
+_PADDED_NUMBER = r"(?:[+-] *| *[+-]?)"  # "+  12" and "  +12": both orders are sent by real indicators
+
+
+@dataclass(frozen=True, slots=True)
+class WholeNumber:
+    """{counts:d}; width 0 is open."""
+
+    name: str
+    sign: str = ""
+    zero: str = ""
+    width: int = 0
+
+    @property
+    def is_open(self) -> bool:
+        return self.width == 0
+
+    @property
+    def pattern(self) -> str:
+        return rf"[+-]?\d{{1,{_LONGEST_NUMBER}}}" if self.is_open else rf"[ +\-0-9]{{{self.width}}}"
+
+    def encode(self, value: Value) -> str:
+        number = _finite(self.name, value)
+        if number != int(number):
+            raise _refuse(self.name, value, "not a whole number")
+        if abs(number) >= 10**_LONGEST_NUMBER:
+            raise _refuse(self.name, value, "too large")
+        return _of_width(self.name, format(int(number), f"{self.sign}{self.zero}{self.width or ''}d"), self.width)
+
+    def decode(self, text: str) -> Value | None:
+        return int(text.replace(" ", "")) if re.fullmatch(rf"{_PADDED_NUMBER}\d+", text) else None
+
+
+@dataclass(frozen=True, slots=True)
+class HexNumber:
+    """{address:02X}"""
+
+    name: str
+    width: int
+
+    @property
+    def is_open(self) -> bool:
+        return False
+
+    @property
+    def pattern(self) -> str:
+        return rf"[0-9A-F]{{{self.width}}}"
+
+    def encode(self, value: Value) -> str:
+        number = _finite(self.name, value)
+        if number != int(number) or number < 0:
+            raise _refuse(self.name, value, "not a whole number from 0")
+        return _of_width(self.name, format(int(number), f"0{self.width}X"), self.width)
+
+    def decode(self, text: str) -> Value | None:
+        return int(text, 16)
+
+
+@dataclass(frozen=True, slots=True)
+class Decimals:
+    """{voltage_v:+07.3f}; width 0 is open. All blanks decode to nan: an indicator that shows nothing."""
+
+    name: str
+    sign: str
+    zero: str
+    width: int
+    decimals: int
+
+    @property
+    def is_open(self) -> bool:
+        return self.width == 0
+
+    @property
+    def pattern(self) -> str:
+        if self.is_open:
+            return rf"[+-]?\d{{1,{_LONGEST_NUMBER}}}\.\d{{{self.decimals}}}"
+        return rf"[ +\-0-9.]{{{self.width}}}"
+
+    def encode(self, value: Value) -> str:
+        number = _finite(self.name, value)
+        if abs(number) >= 10.0**_LONGEST_NUMBER:
+            raise _refuse(self.name, value, "too large")
+        text = format(number, f"{self.sign}z{self.zero}{self.width or ''}.{self.decimals}f")  # z: no minus before 0.00
+        return _of_width(self.name, text, self.width)
+
+    @property
+    def blank(self) -> str:
+        return " " * self.width
+
+    def decode(self, text: str) -> Value | None:
+        if not self.is_open and not text.strip(" +-"):
+            return nan
+        if re.fullmatch(rf"{_PADDED_NUMBER}\d+\.\d{{{self.decimals}}}", text):
+            return float(text.replace(" ", ""))
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """{status:ST|US|OL}"""
+
+    name: str
+    words: tuple[str, ...]
+
+    @property
+    def is_open(self) -> bool:
+        return False
+
+    @property
+    def pattern(self) -> str:
+        return "|".join(re.escape(word) for word in sorted(self.words, key=len, reverse=True))
+
+    def encode(self, value: Value) -> str:
+        if value not in self.words:
+            raise _refuse(self.name, value, f"not one of {', '.join(self.words)}")
+        return str(value)
+
+    def decode(self, text: str) -> Value | None:
+        return text
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """{model:8s}; width 0 is open. Fixed width is padded with blanks on the right."""
+
+    name: str
+    width: int = 0
+
+    @property
+    def is_open(self) -> bool:
+        return self.width == 0
+
+    @property
+    def pattern(self) -> str:
+        return "[ -~]+?" if self.is_open else rf"[ -~]{{{self.width}}}"
+
+    def encode(self, value: Value) -> str:
+        text = str(value)
+        if not re.fullmatch("[ -~]+", text) or text != text.rstrip(" "):
+            raise _refuse(self.name, repr(value), "not printable text")
+        return _of_width(self.name, text.ljust(self.width), self.width)
+
+    def decode(self, text: str) -> Value | None:
+        return text.rstrip(" ")
+
+
+_WHOLE = re.compile(r"(\+?)(0?)(\d{0,2})d")
+_HEX = re.compile(r"0([1-8])X")
+_DECIMALS = re.compile(r"(\+?)(0?)(\d{0,2})\.([1-9])f")
+_TEXT = re.compile(r"(\d{0,2})s")
+_WORD = re.compile(r"[!-~]+")
+
+
+def field_from(name: str, spec: str) -> Field:
+    """The field that {name:spec} means; TemplateError where it is none of the five shapes."""
+    if found := _WHOLE.fullmatch(spec):
+        return WholeNumber(name, found[1], found[2], int(found[3] or 0))
+    if found := _HEX.fullmatch(spec):
+        return HexNumber(name, int(found[1]))
+    if found := _DECIMALS.fullmatch(spec):
+        return Decimals(name, found[1], found[2], int(found[3] or 0), int(found[4]))
+    if found := _TEXT.fullmatch(spec):
+        return Text(name, int(found[1] or 0))
+    words = tuple(spec.split("|"))
+    if len(words) > 1 and len(set(words)) == len(words) and all(_WORD.fullmatch(word) for word in words):
+        return Choice(name, words)
+    raise TemplateError(f"{{{name}:{spec}}} is none of d, 04d, 02X, +07.3f, ONE|TWO, s")

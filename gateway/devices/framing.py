@@ -1,0 +1,62 @@
+"""Bytes into lines: half a line is normal, an endless one is not.
+
+However a stream is cut into chunks, the same lines come out: each decision looks only at the bytes from the start of a
+line, never at how many have arrived (a property test says so).
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+LONGEST_LINE_BYTES: Final = 128  # the longest sentence of the shipped grammars is 40
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """data with its terminator, as it came; body without; is_whole is False for a piece of an overlong line."""
+
+    data: bytes
+    body: bytes
+    is_whole: bool
+
+
+class LineSplitter:
+    """Feed bytes, get the lines that they complete. At most LONGEST_LINE_BYTES and a terminator are kept."""
+
+    def __init__(self, terminator: bytes) -> None:
+        self._terminator = terminator
+        self._buffer = b""
+        self._is_skipping = False
+
+    @property
+    def pending(self) -> int:
+        """Bytes of an unfinished line."""
+        return len(self._buffer)
+
+    def forget(self) -> int:
+        """Drop the unfinished line; how many bytes that was."""
+        dropped, self._buffer, self._is_skipping = len(self._buffer), b"", False
+        return dropped
+
+    def feed(self, chunk: bytes) -> list[Line]:
+        self._buffer += chunk
+        lines = []
+        while (line := self._next()) is not None:
+            lines.append(line)
+        return lines
+
+    def _next(self) -> Line | None:
+        window = LONGEST_LINE_BYTES + len(self._terminator)
+        end = self._buffer.find(self._terminator, 0, window)
+        if end >= 0:
+            data = self._cut(end + len(self._terminator))
+            was_skipping, self._is_skipping = self._is_skipping, False
+            return Line(data, data[:end], not was_skipping)
+        if len(self._buffer) < window:
+            return None
+        self._is_skipping = True
+        data = self._cut(LONGEST_LINE_BYTES)
+        return Line(data, data, False)
+
+    def _cut(self, length: int) -> bytes:
+        data, self._buffer = self._buffer[:length], self._buffer[length:]
+        return data

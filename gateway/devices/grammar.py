@@ -1,0 +1,75 @@
+"""A profile's templates at work: numbers into whole lines and back, for both ends of a wire."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+from gateway.devices.checksum import sealed, unsealed
+from gateway.devices.exchange import Exchange, VoltageExchange
+from gateway.devices.fields import Value, ValueRefused
+from gateway.devices.framing import Line
+from gateway.devices.messages import OutputRequest, ReadPressure, ReadVoltage, SetVoltage
+from gateway.devices.profile import DeviceProfile
+from gateway.devices.template import compile_template
+
+
+@dataclass(frozen=True, slots=True)
+class Grammar:
+    profile: DeviceProfile
+
+    @property
+    def set_voltage(self) -> VoltageExchange:
+        assert self.profile.set_voltage  # an output's profile was checked for it
+        return self.profile.set_voltage
+
+    def exchange(self, message: OutputRequest) -> Exchange:
+        """How this is asked and answered; ValueRefused when the device has no words for it."""
+        exchange: Exchange | None
+        match message:
+            case SetVoltage():
+                exchange = self.profile.set_voltage
+            case ReadVoltage():
+                exchange = self.profile.read_voltage
+            case ReadPressure():
+                exchange = self.profile.read_pressure
+        if exchange is None:
+            raise ValueRefused(f"{self.profile.name} has no words for {type(message).__name__}")
+        return exchange
+
+    def line(self, body: bytes) -> bytes:
+        """A sentence with its checksum and terminator: what goes on the wire."""
+        return sealed(body, self.profile.checksum) + self.profile.terminator_bytes
+
+    def body(self, line: Line) -> bytes | None:
+        """The sentence in a line that arrived, None when it is overlong or its checksum is wrong."""
+        return unsealed(line.body, self.profile.checksum) if line.is_whole else None
+
+    def number_line(self, template: str, number: float) -> bytes:
+        """The line with this number in it, nearest on the template's own grid."""
+        values: dict[str, Value] = dict(self.profile.constants)
+        field = self.profile.number_in(template)
+        if field is not None:
+            values[field.name] = round(number, self.profile.decimals_in(template))
+        return self.line(compile_template(template).encode(values))
+
+    def read(self, template: str, body: bytes | None, may_be_blank: str = "") -> dict[str, Value] | None:
+        """Field values, None unless body is this sentence with this profile's constants: another address is not ours."""
+        values = compile_template(template).decode(body, may_be_blank) if body is not None else None
+        if values is None or any(values.get(name, fixed) != fixed for name, fixed in self.profile.constants.items()):
+            return None
+        return values
+
+    def number(self, template: str, values: dict[str, Value]) -> float | None:
+        """The number among the values, None when the template carries none."""
+        field = self.profile.number_in(template)
+        return float(values[field.name]) if field else None
+
+    def setting(self, voltage_v: float) -> float:
+        """The device's number for a voltage, on its grid. ValueRefused for nan, inf, and outside its range."""
+        exchange = self.set_voltage
+        number = exchange.range.scale.to_number(voltage_v)
+        if isfinite(number):
+            number = round(number, self.profile.decimals_in(exchange.ask))
+        if not exchange.range.scale.carries(number):  # nan is carried by no range
+            low_v, high_v = exchange.range.voltage_v
+            raise ValueRefused(f"{voltage_v} V, {self.profile.name} takes {low_v:g} .. {high_v:g} V")
+        return number

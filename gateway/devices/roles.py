@@ -1,0 +1,76 @@
+"""The four ends of two wires, as seen by those who use them. Bytes in, values out; half a frame is normal.
+
+Codecs (the template codec, or a Python one for a device that needs it) provide these; `gateway.devices.codecs` makes them.
+"""
+
+from typing import Protocol
+
+from gateway.devices.messages import ForceSample, Garbage, OutputReply, OutputRequest, Quality, Refused
+
+
+class OutputHost(Protocol):
+    """Our end of the line to the DAC or regulator. Answers are matched to requests in order."""
+
+    @property
+    def resolution_v(self) -> float:
+        """One step of the output, V: an echo may differ by half of it from what was asked."""
+
+    @property
+    def expecting(self) -> int:
+        """How many requests wait for their answer; when each was sent is the caller's to know."""
+
+    @property
+    def safe_reply(self) -> bytes:
+        """What acknowledges the last `safe_frame` (0 V before the first): a whole line; empty if nothing does."""
+
+    def request(self, message: OutputRequest) -> bytes:
+        """The bytes to write; their answer is expected from now on. ValueRefused when the device cannot be told that."""
+
+    def safe_frame(self, voltage_v: float) -> bytes:
+        """The bytes that set this voltage, without expecting anything: for the guardian and the last word."""
+
+    def receive(self, chunk: bytes, now_s: float) -> list[OutputReply]:
+        """What these bytes complete. Never raises."""
+
+    def forget(self) -> None:
+        """Drop half-received bytes and expected answers: after a timeout, or when the port was opened again."""
+
+
+class OutputDevice(Protocol):
+    """The regulator's end, for the simulated rig and for tests."""
+
+    def receive(self, chunk: bytes, now_s: float) -> list[OutputRequest | Garbage]:
+        """Requests in the order of arrival. Garbage is answered by `refusal`."""
+
+    def reply(self, reply: OutputReply, to: OutputRequest | None = None) -> bytes:
+        """The bytes of an answer; `to` says the question where Accepted answers a ReadVoltage."""
+
+    def refusal(self, garbage: Garbage) -> Refused:
+        """The device's own word for bytes that it does not obey; no text: it stays silent."""
+
+
+class CellHost(Protocol):
+    """Our end of the line from the load-cell amplifier."""
+
+    @property
+    def resolution_n(self) -> float:
+        """One count of the amplifier as it is set in the profile, N."""
+
+    def poll(self) -> bytes:
+        """The bytes that ask for one reading; empty for a stream."""
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
+        """What these bytes complete. Never raises."""
+
+    def forget(self) -> None:
+        """Drop half-received bytes: when the port was opened again."""
+
+
+class CellDevice(Protocol):
+    """The amplifier's end, for the simulated rig and for tests."""
+
+    def receive(self, chunk: bytes, now_s: float) -> int:
+        """How many readings these bytes ask for; 0 for a stream."""
+
+    def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
+        """One reading. A force that does not fit the display is an overload, as on the device."""

@@ -1,0 +1,105 @@
+"""A text template, compiled to an encoder and a decoder: "SET {counts:d}" is both `SET 512` and how to read it.
+
+There are no branches, loops or arithmetic here, and there never will be: a device that needs them gets a Python codec.
+A template that could be read in two ways (two open fields without a mark between them) is refused when it is compiled.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from math import isnan
+from string import Formatter
+
+from gateway.devices.fields import Choice, Decimals, Field, TemplateError, Text, Value, ValueRefused, field_from
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """Compiled by `compile_template`. may_be_blank names the one field whose blanks mean "no digits", nan as a value."""
+
+    text: str
+    pieces: tuple[str | Field, ...]
+    fields: tuple[Field, ...]
+    pattern: re.Pattern[bytes]
+
+    def field(self, name: str) -> Field | None:
+        return next((field for field in self.fields if field.name == name), None)
+
+    def encode(self, values: Mapping[str, Value], may_be_blank: str = "") -> bytes:
+        """The bytes of one sentence. A choice that is not given is its first word. ValueRefused when a value does not fit."""
+        text = "".join(
+            piece if isinstance(piece, str) else _encoded(piece, values, may_be_blank) for piece in self.pieces
+        )
+        data = text.encode("ascii")
+        if any(isinstance(field, Text) for field in self.fields) and self.decode(data, may_be_blank) is None:
+            raise ValueRefused(f"{text!r} could not be read back as {self.text!r}")
+        return data
+
+    def decode(self, data: bytes, may_be_blank: str = "") -> dict[str, Value] | None:
+        """The values by field name, None when these bytes are not this sentence."""
+        found = self.pattern.fullmatch(data)
+        if found is None:
+            return None
+        values: dict[str, Value] = {}
+        for field, part in zip(self.fields, found.groups(), strict=True):
+            value = field.decode(part.decode("ascii"))
+            if value is None or (isinstance(value, float) and isnan(value) and field.name != may_be_blank):
+                return None
+            values[field.name] = value
+        return values
+
+
+def _encoded(field: Field, values: Mapping[str, Value], may_be_blank: str) -> str:
+    value = values.get(field.name)
+    if value is None and isinstance(field, Choice):
+        return field.words[0]
+    if value is None:
+        raise ValueRefused(f"{field.name} is not given")
+    if isinstance(field, Decimals) and field.name == may_be_blank and isinstance(value, float) and isnan(value):
+        return field.blank
+    return field.encode(value)
+
+
+@cache
+def compile_template(text: str) -> Template:
+    """The template that this text means; TemplateError with a sentence for its author."""
+    pieces = _pieces(text)
+    _check(text, pieces)
+    expression = "".join(re.escape(piece) if isinstance(piece, str) else f"({piece.pattern})" for piece in pieces)
+    fields = tuple(piece for piece in pieces if not isinstance(piece, str))
+    return Template(text, tuple(pieces), fields, re.compile(expression.encode("ascii")))
+
+
+def _pieces(text: str) -> list[str | Field]:
+    pieces: list[str | Field] = []
+    try:
+        for literal, name, spec, conversion in Formatter().parse(text):
+            if literal:
+                pieces.append(literal)
+            if name is not None:
+                if not name.isidentifier() or conversion:
+                    raise TemplateError(f"{text!r}: a field is {{name:shape}}")
+                pieces.append(field_from(name, spec or ""))
+    except TemplateError:
+        raise
+    except ValueError as error:  # a lone brace
+        raise TemplateError(f"{text!r}: {error}") from error
+    return pieces
+
+
+def _check(text: str, pieces: list[str | Field]) -> None:
+    if not text or not re.fullmatch("[ -~]+", text):
+        raise TemplateError(f"{text!r} is not printable text (the terminator is a setting of its own)")
+    names = [piece.name for piece in pieces if not isinstance(piece, str)]
+    if len(set(names)) != len(names):
+        raise TemplateError(f"{text!r} uses a field twice")
+    for piece, following in pairwise(pieces):
+        if not isinstance(piece, str) and piece.is_open and _runs_on(following):
+            raise TemplateError(f"{text!r}: nothing marks the end of {{{piece.name}}}; give it a width")
+
+
+def _runs_on(following: str | Field) -> bool:
+    """What follows an open field could be read as a part of it."""
+    return following[0] in "0123456789.+-" if isinstance(following, str) else not isinstance(following, Choice)

@@ -1,0 +1,102 @@
+"""Both ends of the line from a load-cell amplifier whose readings are templates: a stream, or answers to polls.
+
+The frame's own unit counts, so kilograms never pass for newtons. Blanks instead of digits are an overload whatever the
+status word says: a display that shows nothing has no valid reading, and saturation counts as over-force.
+"""
+
+from math import isfinite, isnan, nan
+
+from gateway.devices.exchange import FORCE, STATUS, UNIT, ForceReading
+from gateway.devices.fields import Decimals, Value, ValueRefused
+from gateway.devices.framing import Line, LineSplitter
+from gateway.devices.grammar import Grammar
+from gateway.devices.messages import ForceSample, Garbage, Quality
+from gateway.devices.profile import DeviceProfile
+from gateway.devices.template import compile_template
+from gateway.units import NEWTON_PER_UNIT
+
+
+def _question(grammar: Grammar, reading: ForceReading) -> bytes:
+    if not reading.ask:
+        return b""
+    return grammar.line(compile_template(reading.ask).encode(grammar.profile.constants))
+
+
+class TemplateCellHost:
+    """See roles.CellHost. sign -1: the wiring shows a push as negative. unit: only where frames leave it out."""
+
+    def __init__(self, profile: DeviceProfile, sign: int = 1, unit: str | None = None) -> None:
+        self._grammar = Grammar(profile)
+        self._reading = profile.reading
+        if unit and self._reading.template.field(UNIT):
+            raise ValueError(f"{profile.name} says its unit in each frame: the rig's unit ({unit}) is one too many")
+        unit = unit or self._reading.unit
+        if unit is None:
+            raise ValueError(f"{profile.name} does not say its unit: the rig must")
+        self._newton_per_unit = NEWTON_PER_UNIT[unit]
+        self._sign = sign
+        self._lines = LineSplitter(profile.terminator_bytes)
+        self.resolution_n = self._reading.step * self._newton_per_unit
+
+    def poll(self) -> bytes:
+        return _question(self._grammar, self._reading)
+
+    def forget(self) -> None:
+        self._lines.forget()
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
+        return [self._sample(line, now_s) for line in self._lines.feed(chunk)]
+
+    def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage:
+        values = self._grammar.read(self._reading.frame, self._grammar.body(line), self._reading.may_be_blank)
+        if values is None:
+            return Garbage(line.data)
+        raw = float(values[FORCE])
+        return ForceSample(raw, self._newtons(raw, values), self._quality(raw, values), now_s)
+
+    def _newtons(self, raw: float, values: dict[str, Value]) -> float:
+        per_unit = NEWTON_PER_UNIT[str(values[UNIT])] if UNIT in values else self._newton_per_unit
+        return self._sign * raw * per_unit
+
+    def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
+        if isnan(raw):
+            return Quality.OVERLOAD
+        return self._reading.quality[str(values[STATUS])] if STATUS in values else Quality.OK
+
+
+class TemplateCellDevice:
+    """See roles.CellDevice."""
+
+    def __init__(self, profile: DeviceProfile) -> None:
+        self._grammar = Grammar(profile)
+        self._reading = profile.reading
+        self._unit = self._reading.unit or "N"
+        self._lines = LineSplitter(profile.terminator_bytes)
+
+    def receive(self, chunk: bytes, now_s: float) -> int:
+        question = _question(self._grammar, self._reading)
+        return sum(line.data == question for line in self._lines.feed(chunk)) if question else 0
+
+    def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
+        raw = force_n / NEWTON_PER_UNIT[self._unit]
+        if quality is not Quality.OVERLOAD and isfinite(raw):
+            try:
+                return self._encoded(raw, quality)
+            except ValueRefused:  # more digits than the display has
+                pass
+        return self._encoded(nan if self._reading.blank_is_overload else self._largest(), Quality.OVERLOAD)
+
+    def _largest(self) -> float:
+        """The largest number that the display can show: what a grammar without blanks says at overload."""
+        number = self._reading.template.field(FORCE)
+        if isinstance(number, Decimals) and number.width:
+            return float(10.0 ** (number.width - 2 - number.decimals)) - self._reading.step
+        return 999999.0
+
+    def _encoded(self, raw: float, quality: Quality) -> bytes:
+        values: dict[str, Value] = {**self._grammar.profile.constants, UNIT: self._unit}
+        values[FORCE] = round(raw, self._reading.decimals) if isfinite(raw) else raw
+        word = self._reading.word(quality)
+        if word is not None:
+            values[STATUS] = word
+        return self._grammar.line(self._reading.template.encode(values, self._reading.may_be_blank))

@@ -1,0 +1,56 @@
+"""Two limits over time, as arithmetic: requests of one client, log lines of one cause. Time is an argument."""
+
+from collections.abc import Callable
+from typing import Final
+
+_BURST_S: Final = 0.25  # what a client saves up while it is quiet: a poll of several blocks in a row is normal
+_LINES_PER_S: Final = 10
+_ROUNDING: Final = 1e-6  # of a request: whoever waited as long as told need not wait again
+
+
+class RequestRate:
+    """A token bucket: requests_per_s on average, a quarter of a second's worth at once."""
+
+    __slots__ = ("_last_s", "_most", "_rate_per_s", "_tokens")
+
+    def __init__(self, requests_per_s: float, now_s: float) -> None:
+        self._rate_per_s = requests_per_s
+        self._most = max(1.0, requests_per_s * _BURST_S)
+        self._tokens = self._most
+        self._last_s = now_s
+
+    def wait_s(self, now_s: float) -> float:
+        """Seconds until the next request may run; 0 when it may now."""
+        self._tokens = min(self._most, self._tokens + (now_s - self._last_s) * self._rate_per_s)
+        self._last_s = now_s
+        missing = 1.0 - self._tokens
+        return missing / self._rate_per_s if missing > _ROUNDING else 0.0
+
+    def spend(self) -> None:
+        """One request runs."""
+        self._tokens -= 1.0
+
+    def rested(self, now_s: float) -> bool:
+        """Whether a new bucket would be no different."""
+        self.wait_s(now_s)
+        return self._tokens >= self._most
+
+
+class LogGate:
+    """At most ten lines a second of each cause reach the sink; the next line that does tells how many did not."""
+
+    __slots__ = ("_sink", "_windows")
+
+    def __init__(self, sink: Callable[[str, str], None]) -> None:
+        self._sink = sink
+        self._windows: dict[str, tuple[float, int]] = {}  # cause: start of its second, lines in it
+
+    def __call__(self, cause: str, sentence: str, now_s: float) -> None:
+        start_s, lines = self._windows.get(cause, (now_s, 0))
+        if now_s - start_s >= 1.0:
+            if (missing := lines - _LINES_PER_S) > 0:
+                sentence = f"{sentence} ({missing} more lines like this were left out)"
+            start_s, lines = now_s, 0
+        self._windows[cause] = (start_s, lines + 1)
+        if lines < _LINES_PER_S:
+            self._sink(cause, sentence)

@@ -1,0 +1,47 @@
+"""The host's view of an answer: does it belong to the request, and what does it carry.
+
+No transaction logic here: a host that speaks RTU has one request outstanding, one that speaks TCP compares transaction
+ids itself.
+"""
+
+from gateway.modbus.bits import unpack_bits
+from gateway.modbus.errors import ModbusError
+from gateway.modbus.pdu import ENCAPSULATED, MASK_WRITE, READ_DISCRETE_INPUTS, READ_WRITE, WRITE_COIL, WRITE_REGISTER
+
+_ECHOED_WHOLE = (WRITE_COIL, WRITE_REGISTER, MASK_WRITE)
+
+
+class AnswerMismatch(Exception):  # noqa: N818  no error of ours: the wire does this
+    """The bytes are no answer to this request: an earlier one's, a damaged one, or another device's."""
+
+
+def answer_data(request: bytes, answer: bytes) -> bytes:
+    """Words or packed bits of a read, everything after the function for FC43, nothing for a write.
+
+    Raises ModbusError with the device's code when it refused, AnswerMismatch when the answer is not this request's.
+    """
+    function = request[0]
+    if len(answer) == 2 and answer[0] == function | 0x80:
+        raise ModbusError(answer[1])
+    if not answer or answer[0] != function:
+        raise AnswerMismatch(f"asked function {function}, answered {answer[:1].hex() or 'nothing'}")
+    if function <= 4 or function == READ_WRITE:
+        return _read_data(request, answer)
+    if function == ENCAPSULATED:
+        return answer[1:]
+    if answer != (request if function in _ECHOED_WHOLE else request[:5]):
+        raise AnswerMismatch(f"the echo of function {function} differs from the request")
+    return b""
+
+
+def answer_bits(request: bytes, answer: bytes) -> list[bool]:
+    """The values of an FC01 or FC02 answer. Raises as answer_data."""
+    return unpack_bits(answer_data(request, answer), int.from_bytes(request[3:5], "big"))
+
+
+def _read_data(request: bytes, answer: bytes) -> bytes:
+    count = int.from_bytes(request[3:5], "big")
+    size = (count + 7) // 8 if request[0] <= READ_DISCRETE_INPUTS else 2 * count
+    if len(answer) != 2 + size or answer[1] != size:
+        raise AnswerMismatch(f"asked for {size} bytes, answered {len(answer) - 2}")
+    return answer[2:]

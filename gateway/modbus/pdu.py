@@ -1,0 +1,168 @@
+"""Requests as bytes, both ends of the wire side by side: NAME_request() is the host's, parse_NAME() the device's.
+
+Plain functions and tuples on purpose: a frozen dataclass for each request costs more than the answer itself.
+parse_* check shape and quantity and raise ModbusError(03): a truncated PDU, surplus bytes and a byte count that
+disagrees are all 03, and they are checked before any address is looked at. *_request raise ValueError: that is our own
+mistake, never the wire's.
+Source of layouts and limits: MODBUS Application Protocol V1.1b3, section 6.
+"""
+
+from collections.abc import Sequence
+from struct import Struct
+from typing import Final
+
+from gateway.modbus.bits import pack_bits, unpack_bits
+from gateway.modbus.errors import ILLEGAL_VALUE, ModbusError
+
+READ_COILS: Final = 1
+READ_DISCRETE_INPUTS: Final = 2
+READ_HOLDING_REGISTERS: Final = 3
+READ_INPUT_REGISTERS: Final = 4
+WRITE_COIL: Final = 5
+WRITE_REGISTER: Final = 6
+WRITE_COILS: Final = 15
+WRITE_REGISTERS: Final = 16
+MASK_WRITE: Final = 22
+READ_WRITE: Final = 23
+ENCAPSULATED: Final = 43
+
+MOST_BITS_READ: Final = 2000
+MOST_BITS_WRITTEN: Final = 1968
+MOST_REGISTERS_READ: Final = 125
+MOST_REGISTERS_WRITTEN: Final = 123
+MOST_REGISTERS_READ_WRITE: Final = 121  # the written half of FC23
+
+_TWO: Final = Struct(">BHH")  # function, address, quantity or value
+_MANY: Final = Struct(">BHHB")  # function, address, quantity, bytes that follow
+_MASK: Final = Struct(">BHHH")  # function, address, and-mask, or-mask
+_READ_WRITE: Final = Struct(">BHHHHB")  # function, read address, quantity, write address, quantity, bytes that follow
+
+
+def read_request(function: int, address: int, count: int) -> bytes:
+    """FC01 to FC04. Raises ValueError for a quantity that no device may accept."""
+    most = MOST_BITS_READ if function <= READ_DISCRETE_INPUTS else MOST_REGISTERS_READ
+    _own_quantity(count, most)
+    return _TWO.pack(function, address, count)
+
+
+def parse_read(pdu: bytes, most: int) -> tuple[int, int]:
+    """address, count of FC01 to FC04."""
+    if len(pdu) != _TWO.size:
+        raise _refused(f"{len(pdu)} bytes, a read has {_TWO.size}")
+    _function, address, count = _TWO.unpack(pdu)
+    _quantity(count, most)
+    return address, count
+
+
+def write_coil_request(address: int, value: bool) -> bytes:
+    """FC05."""
+    return _TWO.pack(WRITE_COIL, address, 0xFF00 if value else 0)
+
+
+def write_register_request(address: int, word: int) -> bytes:
+    """FC06. word: 0..65535."""
+    return _TWO.pack(WRITE_REGISTER, address, word)
+
+
+def parse_write_one(pdu: bytes) -> tuple[int, int]:
+    """address, word of FC05 and FC06. The word is the server's to judge: its address comes first."""
+    if len(pdu) != _TWO.size:
+        raise _refused(f"{len(pdu)} bytes, a single write has {_TWO.size}")
+    _function, address, word = _TWO.unpack(pdu)
+    return address, word
+
+
+def write_coils_request(address: int, values: Sequence[bool]) -> bytes:
+    """FC15."""
+    _own_quantity(len(values), MOST_BITS_WRITTEN)
+    data = pack_bits(values)
+    return _MANY.pack(WRITE_COILS, address, len(values), len(data)) + data
+
+
+def parse_write_coils(pdu: bytes) -> tuple[int, list[bool]]:
+    """address, values of FC15; padding bits are ignored."""
+    address, count, data = _parse_many(pdu)
+    _quantity(count, MOST_BITS_WRITTEN)
+    _byte_count(len(data), (count + 7) // 8)
+    return address, unpack_bits(data, count)
+
+
+def write_registers_request(address: int, data: bytes) -> bytes:
+    """FC16. data: big-endian words."""
+    _own_quantity(len(data) // 2, MOST_REGISTERS_WRITTEN, odd=len(data) % 2)
+    return _MANY.pack(WRITE_REGISTERS, address, len(data) // 2, len(data)) + data
+
+
+def parse_write_registers(pdu: bytes) -> tuple[int, bytes]:
+    """address, big-endian words of FC16."""
+    address, count, data = _parse_many(pdu)
+    _quantity(count, MOST_REGISTERS_WRITTEN)
+    _byte_count(len(data), 2 * count)
+    return address, data
+
+
+def mask_write_request(address: int, and_mask: int, or_mask: int) -> bytes:
+    """FC22: word = (word & and_mask) | (or_mask & ~and_mask)."""
+    return _MASK.pack(MASK_WRITE, address, and_mask, or_mask)
+
+
+def parse_mask_write(pdu: bytes) -> tuple[int, int, int]:
+    """address, and_mask, or_mask of FC22."""
+    if len(pdu) != _MASK.size:
+        raise _refused(f"{len(pdu)} bytes, a mask write has {_MASK.size}")
+    _function, address, and_mask, or_mask = _MASK.unpack(pdu)
+    return address, and_mask, or_mask
+
+
+def read_write_request(read_address: int, count: int, write_address: int, data: bytes) -> bytes:
+    """FC23: data (big-endian words) is written before the count words are read."""
+    _own_quantity(count, MOST_REGISTERS_READ)
+    _own_quantity(len(data) // 2, MOST_REGISTERS_READ_WRITE, odd=len(data) % 2)
+    return _READ_WRITE.pack(READ_WRITE, read_address, count, write_address, len(data) // 2, len(data)) + data
+
+
+def parse_read_write(pdu: bytes) -> tuple[int, int, int, bytes]:
+    """read address, count, write address, big-endian words of FC23."""
+    if len(pdu) < _READ_WRITE.size:
+        raise _refused(f"{len(pdu)} bytes, a read/write has at least {_READ_WRITE.size}")
+    _function, read_address, count, write_address, written, size = _READ_WRITE.unpack_from(pdu)
+    data = pdu[_READ_WRITE.size :]
+    _quantity(count, MOST_REGISTERS_READ)
+    _quantity(written, MOST_REGISTERS_READ_WRITE)
+    _byte_count(size, 2 * written)
+    _byte_count(len(data), size)
+    return read_address, count, write_address, data
+
+
+def exception_pdu(function: int, code: int) -> bytes:
+    """The answer that refuses: the function with its top bit set, and the code."""
+    return bytes((function | 0x80, code))
+
+
+def _parse_many(pdu: bytes) -> tuple[int, int, bytes]:
+    """address, quantity, data of FC15 and FC16, when the byte count is that of the data."""
+    if len(pdu) < _MANY.size:
+        raise _refused(f"{len(pdu)} bytes, a multiple write has at least {_MANY.size}")
+    _function, address, count, size = _MANY.unpack_from(pdu)
+    data = pdu[_MANY.size :]
+    _byte_count(len(data), size)
+    return address, count, data
+
+
+def _quantity(count: int, most: int) -> None:
+    if not 1 <= count <= most:
+        raise _refused(f"quantity {count}, allowed 1 to {most}")
+
+
+def _byte_count(found: int, expected: int) -> None:
+    if found != expected:
+        raise _refused(f"byte count {found}, expected {expected}")
+
+
+def _refused(sentence: str) -> ModbusError:
+    return ModbusError(ILLEGAL_VALUE, sentence)
+
+
+def _own_quantity(count: int, most: int, odd: int = 0) -> None:
+    if odd or not 1 <= count <= most:
+        raise ValueError(f"{count} values in one request, allowed 1 to {most} whole ones")

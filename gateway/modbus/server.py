@@ -1,0 +1,127 @@
+"""From one request PDU to one answer PDU: which function codes are served, and in which order things are checked.
+
+Order (FIELDBUS): function 01, shape and quantity 03, address 02, value 03. Addresses and values are the bank's to
+judge, in that order; FC05 with a value other than 0x0000/0xFF00 is 03 only when the coil exists. FC23 checks both
+halves before it writes: the read half here by check_registers_readable, the write half by the bank, whose writes are
+all or nothing.
+Only ModbusError becomes an answer; anything else a bank raises is our bug and reaches the caller.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from struct import Struct
+from typing import Final, Protocol
+
+from gateway.modbus import pdu as P  # noqa: N812  the names of function codes are constants
+from gateway.modbus.errors import ILLEGAL_FUNCTION, ILLEGAL_VALUE, ModbusError
+from gateway.modbus.identification import identification_answer
+from gateway.modbus.peer import Peer
+
+_ONE_WORD: Final = Struct(">H")
+
+
+class DataBank(Protocol):
+    """What a server needs from behind it. Methods raise ModbusError to refuse; a refused write changes nothing."""
+
+    @property
+    def identity(self) -> Mapping[int, bytes]:
+        """Objects of FC43/14: number to text."""
+
+    def read_registers(self, address: int, count: int) -> bytes:
+        """Big-endian words. count is 1..125 already."""
+
+    def read_bits(self, address: int, count: int) -> bytes:
+        """Packed, first bit lowest, unused bits 0. count is 1..2000 already."""
+
+    def check_registers_readable(self, address: int, count: int) -> None:
+        """Raises what read_registers would raise."""
+
+    def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
+        """Big-endian words, all or nothing."""
+
+    def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
+        """All or nothing."""
+
+    def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
+        """One word: (word & and_mask) | (or_mask & ~and_mask)."""
+
+
+def answer(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    """Execute one request and return its answer. An empty PDU, which no framing lets through, is function 0."""
+    function = pdu[0] if pdu else 0
+    handler = _HANDLERS.get(function)
+    if handler is None:
+        return P.exception_pdu(function, ILLEGAL_FUNCTION)
+    try:
+        return handler(pdu, bank, peer)
+    except ModbusError as refusal:
+        return P.exception_pdu(function, refusal.code)
+
+
+def _read_bits(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
+    data = bank.read_bits(*P.parse_read(pdu, P.MOST_BITS_READ))
+    return bytes((pdu[0], len(data))) + data
+
+
+def _read_registers(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
+    data = bank.read_registers(*P.parse_read(pdu, P.MOST_REGISTERS_READ))
+    return bytes((pdu[0], len(data))) + data
+
+
+def _write_coil(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    address, word = P.parse_write_one(pdu)
+    if word not in (0x0000, 0xFF00):
+        bank.read_bits(address, 1)
+        raise ModbusError(ILLEGAL_VALUE, f"coil value 0x{word:04X}, allowed 0x0000 and 0xFF00")
+    bank.write_bits(address, (word == 0xFF00,), peer)
+    return pdu
+
+
+def _write_register(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    address, word = P.parse_write_one(pdu)
+    bank.write_registers(address, _ONE_WORD.pack(word), peer)
+    return pdu
+
+
+def _write_coils(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    address, values = P.parse_write_coils(pdu)
+    bank.write_bits(address, values, peer)
+    return pdu[:5]
+
+
+def _write_registers(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    address, data = P.parse_write_registers(pdu)
+    bank.write_registers(address, data, peer)
+    return pdu[:5]
+
+
+def _mask_write(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    address, and_mask, or_mask = P.parse_mask_write(pdu)
+    bank.mask_write(address, and_mask, or_mask, peer)
+    return pdu
+
+
+def _read_write(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    read_address, count, write_address, data = P.parse_read_write(pdu)
+    bank.check_registers_readable(read_address, count)
+    bank.write_registers(write_address, data, peer)
+    words = bank.read_registers(read_address, count)
+    return bytes((P.READ_WRITE, len(words))) + words
+
+
+def _encapsulated(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
+    return identification_answer(pdu, bank.identity)
+
+
+_HANDLERS: Final[Mapping[int, Callable[[bytes, DataBank, Peer], bytes]]] = {
+    P.READ_COILS: _read_bits,
+    P.READ_DISCRETE_INPUTS: _read_bits,
+    P.READ_HOLDING_REGISTERS: _read_registers,
+    P.READ_INPUT_REGISTERS: _read_registers,
+    P.WRITE_COIL: _write_coil,
+    P.WRITE_REGISTER: _write_register,
+    P.WRITE_COILS: _write_coils,
+    P.WRITE_REGISTERS: _write_registers,
+    P.MASK_WRITE: _mask_write,
+    P.READ_WRITE: _read_write,
+    P.ENCAPSULATED: _encapsulated,
+}

@@ -1,0 +1,123 @@
+"""Why a serial port does not serve, in the user's words: what we saw, what it probably is, one thing to do.
+
+pyserial, the system calls and termios raise three families of exceptions after an unplug; all of them end here.
+"""
+
+import difflib
+import errno
+import grp
+import os
+import pwd
+import termios
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, Literal
+
+from serial import SerialException
+
+from gateway.ports.holders import holders_of
+
+PortCode = Literal["E101", "E102", "E103", "E110", "E111"]
+
+SERIAL_FAILURES: Final = (SerialException, OSError, termios.error)
+"""What opening, reading, writing or configuring a port may raise."""
+
+_DENIED: Final = {errno.EACCES, errno.EPERM}
+_ABSENT: Final = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR}
+_HELD: Final = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY}
+
+
+class PortError(Exception):
+    """code: E101 permission, E102 missing or gone, E103 held by another process, E110 wrong baud, E111 silence."""
+
+    def __init__(self, code: PortCode, sentence: str) -> None:
+        super().__init__(f"{code} {sentence}")
+        self.code = code
+        self.sentence = sentence
+
+    @property
+    def exit_code(self) -> int:
+        """What a program ends with: 77 permission, 69 device."""
+        return 77 if self.code == "E101" else 69
+
+
+def number_of(error: Exception) -> int | None:
+    """The errno of any of the three families: termios.error keeps it in args, pyserial sometimes only in its text."""
+    number = getattr(error, "errno", None)
+    if number is None and error.args and isinstance(error.args[0], int):
+        number = error.args[0]
+    return number
+
+
+def why_closed(path: str, error: Exception, present: Sequence[str]) -> PortError:
+    """The reason why a port did not open. present: the ports that are there, by-id names where they exist."""
+    number = number_of(error)
+    if number in _DENIED:
+        return PortError("E101", _permission(path))
+    if number in _ABSENT:
+        return PortError("E102", _missing(path, present))
+    if number in _HELD:
+        return PortError("E103", _held(path))
+    return PortError("E102", f"{path} does not open as a serial port: {error}")
+
+
+def why_lost(path: str, error: Exception | None) -> PortError:
+    """The reason why an open port is gone."""
+    reason = f" ({os.strerror(number)})" if error and (number := number_of(error)) else ""
+    return PortError("E102", f"{path} is gone{reason}: unplugged? It is reopened as soon as it is back")
+
+
+def _permission(path: str) -> str:
+    user = _user()
+    try:
+        status = Path(path).stat()
+        group = _group(status.st_gid)
+    except OSError:
+        return f"{path}: user {user} may not open it: its folder is closed to them"
+    if status.st_mode & 0o060 != 0o060 or status.st_gid == 0:
+        mode = f"{status.st_mode & 0o777:04o} {_owner(status.st_uid)}:{group}"
+        give = f"sudo chgrp dialout {path} && sudo chmod 660 {path}"
+        return f"{path}: user {user} may not open it, nor may any group (mode {mode}): {give}, lasting by a udev rule"
+    if user in _members(group):
+        return f"{path} belongs to group {group}; user {user} is in it, but logged in before that: log in again"
+    return f"{path} belongs to group {group}, and user {user} is not in it: sudo usermod -aG {group} {user}, then log in again"
+
+
+def _missing(path: str, present: Sequence[str]) -> str:
+    if not present:
+        return f"{path} is not there, nor is any other serial port: is the adapter plugged in?"
+    near = difflib.get_close_matches(path, present, n=1, cutoff=0.6)
+    meant = f"; did you mean {near[0]}?" if near else ""
+    return f"{path} is not there. Present: {', '.join(present)}{meant}"
+
+
+def _held(path: str) -> str:
+    holders = [holder for holder in holders_of(path) if holder.is_locking] or holders_of(path)
+    if not holders:
+        return f"{path} is held by another process, of another user (sudo fuser {path} names it); stop that one first"
+    return f"{path} is held by {', '.join(str(holder) for holder in holders)}; stop that one first"
+
+
+def _user() -> str:
+    return _owner(os.geteuid())
+
+
+def _owner(number: int) -> str:
+    try:
+        return pwd.getpwuid(number).pw_name
+    except KeyError:  # a container without that user
+        return str(number)
+
+
+def _group(number: int) -> str:
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)
+
+
+def _members(group: str) -> list[str]:
+    try:
+        return grp.getgrnam(group).gr_mem
+    except KeyError:
+        return []

@@ -1,0 +1,56 @@
+"""Open and configure a serial port: pyserial knows every termios corner, so it opens; we keep only the descriptor."""
+
+import os
+import termios
+from typing import Final
+
+import serial
+
+from gateway.devices import SerialSettings
+from gateway.ports.errors import SERIAL_FAILURES, why_closed
+from gateway.ports.listing import present_paths
+
+_PARITY: Final = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
+_MINIMUM, _TIME = termios.VMIN, termios.VTIME
+
+
+def open_descriptor(path: str, settings: SerialSettings) -> int:
+    """A raw, non-blocking, exclusively locked descriptor of the port, input flushed. PortError says why there is none.
+
+    The lock is flock's: TIOCEXCL would outlive a killed process as EBUSY for the guardian too. Ptys have no modem lines,
+    which pyserial tolerates.
+    """
+    try:
+        return _opened(path, settings)
+    except (*SERIAL_FAILURES, ValueError) as error:  # ValueError: a baud rate that termios does not know
+        raise why_closed(path, error, present_paths()) from error
+
+
+def _opened(path: str, settings: SerialSettings) -> int:
+    port = serial.Serial(
+        path,
+        settings.baud,
+        bytesize=settings.data_bits,
+        parity=_PARITY[settings.parity],
+        stopbits=settings.stop_bits,
+        timeout=0,
+        exclusive=True,
+    )
+    try:
+        descriptor = os.dup(port.fileno())  # the same open file: lock and settings stay, pyserial's four pipes go
+    finally:
+        port.close()
+    try:
+        _return_eagain_for_nothing(descriptor)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def _return_eagain_for_nothing(descriptor: int) -> None:
+    """With VMIN 0, as pyserial leaves it, a read of nothing and a hang-up are both b""; with 1 the first is EAGAIN."""
+    attributes = termios.tcgetattr(descriptor)
+    attributes[6][_MINIMUM], attributes[6][_TIME] = 1, 0
+    termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+    os.set_blocking(descriptor, False)

@@ -1,0 +1,206 @@
+"""One serial port on asyncio: owns opening, losing and reopening; bytes go by the raw descriptor.
+
+pyserial's own read and write are not used in the loop: they would add a select per call and hide hang-ups. A read error, a
+hang-up or a device that takes no bytes for too long all end in `on_lost` and a reopening with backoff; `on_open` comes again.
+Nothing written before a loss is sent after it: an old voltage is worse than none.
+"""
+
+import asyncio
+import contextlib
+import fcntl
+import os
+import select
+import struct
+import termios
+from typing import Final
+
+from gateway.devices import SerialSettings
+from gateway.ports.errors import SERIAL_FAILURES, PortError, why_lost
+from gateway.ports.latency import set_low_latency
+from gateway.ports.opening import open_descriptor
+from gateway.ports.port import WRITE_DEADLINE_S, OnBytes, OnLost, OnOpen, monotonic_s
+
+MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here is longer than 40 bytes
+_CHUNK_BYTES: Final = 4096
+_FIRST_BACKOFF_S, _LONGEST_BACKOFF_S = 0.1, 2.0
+_CLOSE_DEADLINE_S: Final = 0.25
+
+
+class SerialPort:
+    """See port.Port. All callbacks run in the loop; on_lost is never called from inside `write`."""
+
+    def __init__(
+        self, path: str, settings: SerialSettings, *, on_bytes: OnBytes, on_lost: OnLost, on_open: OnOpen
+    ) -> None:
+        self._path = path
+        self._settings = settings
+        self._on_bytes, self._on_lost, self._on_open = on_bytes, on_lost, on_open
+        self._descriptor = -1
+        self._unsent = b""
+        self._backoff_s = _FIRST_BACKOFF_S
+        self._reopening: asyncio.TimerHandle | None = None
+        self._failure: PortError | None = None  # found while writing, told in the loop's next turn
+        self.warning = ""  # a sentence about the adapter's latency, empty if there is nothing to say
+        self.reopened = 0
+
+    @property
+    def path(self) -> str:
+        return self._path
+
+    @property
+    def is_open(self) -> bool:
+        return self._descriptor >= 0 and self._failure is None
+
+    @property
+    def unsent_bytes(self) -> int:
+        """Bytes that are not on the wire yet: ours and the driver's."""
+        return len(self._unsent) + _queued_bytes(self._descriptor) if self._descriptor >= 0 else 0
+
+    def fileno(self) -> int:
+        """The raw descriptor; PortError E102 while the port is lost."""
+        if not self.is_open:
+            raise PortError("E102", f"{self._path} is not open")
+        return self._descriptor
+
+    async def open(self) -> None:
+        self._open()
+
+    def write(self, data: bytes) -> bool:
+        if not self.is_open:
+            return False
+        if self._unsent:
+            self._keep(data)
+            return self.is_open
+        try:
+            sent = os.write(self._descriptor, data)
+        except BlockingIOError:
+            sent = 0
+        except OSError as error:
+            self._fail(why_lost(self._path, error))
+            return False
+        if sent < len(data):
+            asyncio.get_running_loop().add_writer(self._descriptor, self._on_writable)
+            self._keep(data[sent:])
+        return self.is_open
+
+    def flush_input(self) -> int:
+        """Drop what has arrived and was not read yet; how many bytes that was."""
+        dropped = 0
+        with contextlib.suppress(OSError):
+            while self.is_open and (chunk := os.read(self._descriptor, _CHUNK_BYTES)):
+                dropped += len(chunk)
+        return dropped
+
+    async def drain(self, deadline_s: float = WRITE_DEADLINE_S) -> None:
+        end_s = monotonic_s() + deadline_s
+        while (unsent := self._still_unsent()) and (left_s := end_s - monotonic_s()) > 0:
+            await asyncio.sleep(min(left_s, max(1e-3, unsent * self._settings.character_s)))
+        if unsent:
+            raise PortError("E111", f"{self._path} takes no bytes: {unsent} unsent after {deadline_s:g} s")
+        termios.tcdrain(self._descriptor)  # the driver's queue is empty: only the chip's own few bytes are left
+
+    async def write_last(self, data: bytes, deadline_s: float = WRITE_DEADLINE_S) -> None:
+        if not self.write(data):
+            raise PortError("E102", f"{self._path} is not open")
+        try:
+            await self.drain(deadline_s)
+        except SERIAL_FAILURES as error:
+            raise why_lost(self._path, error) from error
+
+    def close(self) -> None:
+        """Blocks for at most 0.25 s, and only while bytes are on their way."""
+        if self._reopening:
+            self._reopening.cancel()
+            self._reopening = None
+        if self._descriptor >= 0:
+            with contextlib.suppress(*SERIAL_FAILURES):
+                self._send_the_rest(monotonic_s() + _CLOSE_DEADLINE_S)
+            self._release()
+
+    def _open(self) -> None:
+        self._descriptor = open_descriptor(self._path, self._settings)
+        self._failure, self._unsent, self._backoff_s = None, b"", _FIRST_BACKOFF_S
+        self.warning = set_low_latency(self._descriptor, self._path)
+        asyncio.get_running_loop().add_reader(self._descriptor, self._on_readable)
+        self._on_open(self._descriptor)
+
+    def _on_readable(self) -> None:
+        try:
+            chunk = os.read(self._descriptor, _CHUNK_BYTES)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._lose(why_lost(self._path, error))
+            return
+        if chunk:
+            self._on_bytes(chunk, monotonic_s())
+        else:
+            self._lose(why_lost(self._path, None))
+
+    def _on_writable(self) -> None:
+        try:
+            self._unsent = self._unsent[os.write(self._descriptor, self._unsent) :]
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._lose(why_lost(self._path, error))
+            return
+        if not self._unsent:
+            asyncio.get_running_loop().remove_writer(self._descriptor)
+
+    def _keep(self, data: bytes) -> None:
+        self._unsent += data
+        if len(self._unsent) > MOST_UNSENT_BYTES:
+            self._fail(PortError("E111", f"{self._path} takes no bytes: more than {MOST_UNSENT_BYTES} unsent"))
+
+    def _fail(self, failure: PortError) -> None:
+        self._failure = failure
+        asyncio.get_running_loop().call_soon(self._lose, failure)
+
+    def _lose(self, failure: PortError) -> None:
+        if self._descriptor < 0:
+            return
+        self._release()
+        self._reopen_after(self._backoff_s)
+        self._on_lost(failure)
+
+    def _release(self) -> None:
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(self._descriptor)
+        loop.remove_writer(self._descriptor)
+        with contextlib.suppress(OSError):  # the guardian has the same open file, and with it the lock: give it back
+            fcntl.flock(self._descriptor, fcntl.LOCK_UN)
+        with contextlib.suppress(OSError):
+            os.close(self._descriptor)
+        self._descriptor, self._unsent = -1, b""
+
+    def _reopen_after(self, delay_s: float) -> None:
+        self._reopening = asyncio.get_running_loop().call_later(delay_s, self._reopen)
+
+    def _reopen(self) -> None:
+        try:
+            self._open()
+            self.reopened += 1
+        except PortError:
+            self._backoff_s = min(2.0 * self._backoff_s, _LONGEST_BACKOFF_S)
+            self._reopen_after(self._backoff_s)
+
+    def _still_unsent(self) -> int:
+        if not self.is_open:
+            raise PortError("E102", f"{self._path} was lost while bytes were on their way")
+        return self.unsent_bytes
+
+    def _send_the_rest(self, end_s: float) -> None:
+        while self._unsent and (left_s := end_s - monotonic_s()) > 0:
+            if select.select([], [self._descriptor], [], left_s)[1]:
+                self._unsent = self._unsent[os.write(self._descriptor, self._unsent) :]
+        while _queued_bytes(self._descriptor) and (left_s := end_s - monotonic_s()) > 0:
+            select.select([], [], [], min(left_s, 1e-3))
+        if not _queued_bytes(self._descriptor):
+            termios.tcdrain(self._descriptor)
+
+
+def _queued_bytes(descriptor: int) -> int:
+    """Bytes in the driver's output queue."""
+    (count,) = struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)))
+    return int(count)

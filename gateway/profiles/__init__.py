@@ -1,0 +1,39 @@
+"""Profiles: YAML text + positions -> frozen typed objects; every fault at once, file:line:column, in the user's words.
+
+A package instead of the one file that the plan of the house shows, for strict YAML, sentences, cross-checks and schemas are
+four trades. In the order of the way of a text: scalars, syntax, text (strict YAML), typed, sentences (pydantic's findings),
+models (form of a rig file), plants, calibrations, device_files, register_files, find, load, checks, line_checks,
+network_checks, rig, report; schema stands apart, for editors.
+
+Nothing here imports scipy: `check` answers at once.
+"""
+
+from gateway.profiles.faults import Fault, ProfileError
+from gateway.profiles.find import root, shipped
+from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
+from gateway.profiles.models import Network
+from gateway.profiles.plants import Origin, PlantProfile
+from gateway.profiles.report import Report, check_report, load_rig
+from gateway.profiles.rig import CellLine, OutputLine, Rig
+from gateway.profiles.schema import schema
+
+__all__ = [
+    "CellLine",
+    "Fault",
+    "Network",
+    "Origin",
+    "OutputLine",
+    "PlantProfile",
+    "ProfileError",
+    "Report",
+    "Rig",
+    "check_report",
+    "load_calibration",
+    "load_device",
+    "load_plant",
+    "load_register_map",
+    "load_rig",
+    "root",
+    "schema",
+    "shipped",
+]

@@ -1,0 +1,23 @@
+"""Device files: the profile's own rules, and the codec that it names."""
+
+from collections.abc import Callable
+from typing import Final
+
+from gateway.devices import DeviceProfile, Role, cell_device, output_host
+from gateway.profiles.faults import Fault
+from gateway.profiles.text import Document
+from gateway.profiles.typed import build
+
+_MAKE: Final[dict[Role, Callable[[DeviceProfile], object]]] = {Role.OUTPUT: output_host, Role.LOAD_CELL: cell_device}
+
+
+def read_device(document: Document) -> tuple[DeviceProfile | None, list[Fault]]:
+    """The device profile of a file, or None and every fault."""
+    device, faults = build(DeviceProfile, document)
+    if device is None:
+        return None, faults
+    try:
+        _MAKE[device.role](device)
+    except ValueError as error:
+        return None, [document.fault(("codec",) if "codec" in str(error) else (), str(error))]
+    return device, []

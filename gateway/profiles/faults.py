@@ -1,0 +1,68 @@
+"""What is wrong in a profile, where, and in the user's words.
+
+A fault is one line, `file:line:column path: message`, as compilers print theirs, so that editors jump to it. Faults are
+collected and told together: a file with five typos takes one run to mend, not five.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+Path = tuple[str | int, ...]
+"""Where in a document: keys and list indices from the top."""
+
+
+def path_text(path: Path) -> str:
+    """`("network", "units", 1)` as a user reads it: `network.units[1]`."""
+    text = ""
+    for step in path:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text
+
+
+def printable(text: str) -> str:
+    """One line without control characters: a file cannot write on the reader's terminal."""
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Fault:
+    """One thing to mend. line and column count from 1; line 0: the file as a whole (it could not be found or read)."""
+
+    file: str
+    line: int
+    column: int
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+        return printable(f"{place} {self.path}: {self.message}" if self.path else f"{place}: {self.message}")
+
+
+class ProfileError(Exception):
+    """A profile that cannot be used, with every fault found. Exit code 78 at the command line."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = tuple(dict.fromkeys(faults))
+        super().__init__("\n".join(map(str, self.faults)))
+
+
+@dataclass(slots=True)
+class Findings:
+    """Collects while files are read: faults stop a rig from starting, warnings do not. `texts`: all bytes read, by file."""
+
+    faults: list[Fault] = field(default_factory=list)
+    warnings: list[Fault] = field(default_factory=list)
+    texts: dict[str, bytes] = field(default_factory=dict)
+
+
+def closest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that a typist most likely meant, None when nothing is near."""
+    candidates = {name.lower(): name for name in known}
+    found = get_close_matches(word.lower(), candidates, n=1, cutoff=0.6)
+    return candidates[found[0]] if found else None
+
+
+def one_of(words: Iterable[object]) -> str:
+    return ", ".join(str(word) for word in words)

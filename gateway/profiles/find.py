@@ -1,0 +1,72 @@
+"""Where profiles are: the shipped ones, and those that people keep beside their rig file."""
+
+from pathlib import Path
+from typing import Final
+
+import gateway
+from gateway.profiles.faults import closest, one_of
+
+FOLDERS: Final = {
+    "rig": "rigs",
+    "device": "devices",
+    "plant": "plants",
+    "calibration": "calibrations",
+    "registers": "registers",
+}
+"""Kind of profile -> its folder."""
+
+_SUFFIXES: Final = (".yaml", ".yml")
+
+
+def root() -> Path:
+    """The shipped profiles: gateway/_profiles in an installed wheel, else the checkout's profiles/."""
+    package = Path(gateway.__file__).parent
+    installed = package / "_profiles"
+    return installed if installed.is_dir() else package.parent / "profiles"
+
+
+def shipped(kind: str) -> list[str]:
+    """Names of the shipped profiles of a kind (rig, device, plant, calibration, registers)."""
+    return sorted(path.stem for path in (root() / FOLDERS[kind]).glob("*.yaml"))
+
+
+def locate(kind: str, name: str, beside: Path | None = None) -> Path:
+    """The file of a profile: a shipped name, else a path (relative to the folder `beside`, or to the working directory).
+
+    FileNotFoundError with a sentence that follows the name: what is there, and what was probably meant.
+    """
+    known = shipped(kind)
+    if name in known:
+        return root() / FOLDERS[kind] / f"{name}.yaml"
+    path = (beside or Path()) / Path(name).expanduser()
+    if _is_file(path):
+        return path
+    if "/" in name or name.endswith(_SUFFIXES):
+        raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(path)}")
+    near = closest(name, known)
+    meant = f"; did you mean {near}?" if near else ""
+    raise FileNotFoundError(f"is neither a shipped {kind} ({one_of(known) or 'there is none'}) nor a file{meant}")
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that is too long, or holds what no file name may
+        return False
+
+
+def _near(path: Path) -> str:
+    try:
+        here = [entry.name for entry in path.parent.iterdir() if entry.suffix in _SUFFIXES]
+    except (OSError, ValueError):
+        return ""
+    near = closest(path.name, here)
+    return f"; did you mean {near}?" if near else ""
+
+
+def display(path: Path) -> str:
+    """A path as messages show it: short below the working directory, whole elsewhere."""
+    try:
+        return str(path.absolute().relative_to(Path.cwd()))
+    except (OSError, ValueError):
+        return str(path)

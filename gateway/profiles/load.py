@@ -1,0 +1,100 @@
+"""Reading profiles by name or path: a rig, and every file that it names.
+
+A fault in one file does not keep the others from being read: all are told together. Every text that was read goes into
+`Findings.texts`, and so into the rig's fingerprint.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from gateway.bsfm.model import Calibration
+from gateway.devices import DeviceProfile
+from gateway.profiles.calibrations import read_calibration
+from gateway.profiles.device_files import read_device
+from gateway.profiles.faults import Fault, Findings, ProfileError
+from gateway.profiles.find import display, locate
+from gateway.profiles.plants import PlantProfile, read_plant
+from gateway.profiles.register_files import read_registers
+from gateway.profiles.text import Document, parse
+from gateway.registers.map import RegisterMap
+
+T = TypeVar("T")
+Read = Callable[[Document], tuple[T | None, list[Fault]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A profile's name, and where it was written: `place(sentence)` makes the fault about it."""
+
+    name: str
+    place: Callable[[str], Fault]
+    beside: Path | None = None
+
+
+def asked_for(name: str | Path) -> Reference:
+    """A profile that was named on the command line or by a program."""
+    return Reference(str(name), lambda sentence: Fault(str(name), 0, 0, "", sentence))
+
+
+def written_at(document: Document, path: tuple[str, ...], folder: Path, default: str | None = None) -> Reference | None:
+    """The profile named at a path of a document; None where no name stands (which the types tell) and none is the default."""
+    name = document.at(*path) if path in document.marks else default
+    if not isinstance(name, str) or not name:
+        return None
+    return Reference(name, lambda sentence: document.fault(path, f"{name} {sentence}"), folder)
+
+
+def open_profile(kind: str, reference: Reference, findings: Findings) -> tuple[Document, Path] | None:
+    """Find, read and parse one file; None with the faults noted."""
+    try:
+        path = locate(kind, reference.name, reference.beside)
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        findings.faults.append(reference.place(str(error)))
+        return None
+    except OSError as error:
+        findings.faults.append(reference.place(f"cannot be read: {error.strerror}"))
+        return None
+    findings.texts[display(path)] = data
+    try:
+        return parse(data, display(path)), path
+    except ProfileError as error:
+        findings.faults += error.faults
+        return None
+
+
+def read_named(kind: str, reference: Reference | None, read: Read[T], findings: Findings) -> T | None:
+    """One profile, or None with the faults noted."""
+    opened = open_profile(kind, reference, findings) if reference else None
+    if opened is None:
+        return None
+    value, faults = read(opened[0])
+    findings.faults += faults
+    return value
+
+
+def _load(kind: str, name: str | Path, read: Read[T]) -> T:
+    findings = Findings()
+    value = read_named(kind, asked_for(name), read, findings)
+    if value is None or findings.faults:
+        raise ProfileError(findings.faults)
+    return value
+
+
+def load_device(name: str | Path) -> DeviceProfile:
+    """A device profile by shipped name or path; ProfileError with every fault. So the three below."""
+    return _load("device", name, read_device)
+
+
+def load_plant(name: str | Path) -> PlantProfile:
+    return _load("plant", name, read_plant)
+
+
+def load_calibration(name: str | Path) -> Calibration:
+    return _load("calibration", name, read_calibration)
+
+
+def load_register_map(name: str | Path) -> RegisterMap:
+    return _load("registers", name, read_registers)

@@ -1,0 +1,106 @@
+"""A rig, read and checked: everything that the service needs to wire one cell, frozen."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Final
+
+from gateway.bsfm.model import Calibration
+from gateway.control.settings import ControlSettings
+from gateway.devices import DeviceProfile, SerialSettings
+from gateway.profiles.models import Network
+from gateway.profiles.plants import PlantProfile
+from gateway.registers.map import RegisterMap
+from gateway.registers.words import ControlBit
+from gateway.twin import Plant
+
+SUPPORTED_BITS: Final = ControlBit.ENABLE | ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP
+"""Control bits that act; the others are refused (no rig has a valve, a ladder or a self-test behind them yet)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputLine:
+    """The wire to the DAC or regulator; port None in a simulated rig."""
+
+    device: DeviceProfile
+    port: str | None
+    baud: int
+
+    @property
+    def settings(self) -> SerialSettings:
+        """The device's frame at the rig's speed."""
+        return self.device.serial.at(self.baud)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellLine:
+    """The wire from the load-cell amplifier; sign and unit are the rig's, range_n is the cell's rated force."""
+
+    device: DeviceProfile
+    port: str | None
+    baud: int
+    sign: int
+    unit: str | None
+    range_n: float
+
+    @property
+    def settings(self) -> SerialSettings:
+        """The device's frame at the rig's speed."""
+        return self.device.serial.at(self.baud)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rig:
+    """One cell. texts: every file it was read from, as it was; fingerprint: their SHA-256; notes: what was decided in the
+    user's stead."""
+
+    name: str
+    description: str
+    file: Path
+    simulated: bool
+    seed: int
+    loop_hz: float
+    register_map: RegisterMap
+    output: OutputLine
+    load_cell: CellLine
+    plant_profile: PlantProfile | None
+    stand_in: PlantProfile | None  # what `run --sim` simulates where the rig names no plant
+    calibration: Calibration
+    control: ControlSettings
+    network: Network
+    supported_bits: ControlBit
+    accept_no_device_watchdog: bool
+    texts: Mapping[str, str]
+    fingerprint: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def plant(self) -> Plant | None:
+        """What is simulated; None for a real rig that names no plant."""
+        return self.plant_profile.plant if self.plant_profile else None
+
+    def ports(self) -> dict[str, str]:
+        """The serial ports of a real rig, by line; empty for a simulated one."""
+        ports = {"output": self.output.port, "load_cell": self.load_cell.port}
+        return {name: port for name, port in ports.items() if port is not None}
+
+    def as_simulated(self) -> "Rig":
+        """The same rig with its devices simulated, on loopback. What was decided in the user's stead is in `notes`."""
+        if self.simulated:
+            return self
+        notes, network = self.notes, self.network
+        if self.plant_profile is None and self.stand_in is not None:
+            notes = (*notes, f"rig {self.name} names no plant: {self.stand_in.name} is simulated in its place")
+        if not ip_address(network.bind).is_loopback:
+            notes = (*notes, f"bound to 127.0.0.1: a simulated rig does not take the cell's address {network.bind}")
+            network = replace(network, bind="127.0.0.1")
+        return replace(
+            self,
+            simulated=True,
+            output=replace(self.output, port=None),
+            load_cell=replace(self.load_cell, port=None),
+            plant_profile=self.plant_profile or self.stand_in,
+            network=network,
+            notes=notes,
+        )

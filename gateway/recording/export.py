@@ -1,0 +1,66 @@
+"""Recordings as CSV and Parquet, for every other tool. Whole files or none: written beside the target, then renamed.
+
+CSV follows the recording contract of the diagnosis: UTF-8, `# key: value` lines, one header row, one row per sample;
+values that are not there read `nan`. What is no plain word or number in the header stands as JSON on its one line.
+"""
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+from gateway.recording.reader import Recording
+
+
+def export_csv(recording: Recording, target: Path) -> None:
+    """Write `recording` as CSV; OSError when target cannot be written."""
+    _replace(target, lambda stream: write_csv(recording, stream))
+
+
+def write_csv(recording: Recording, stream: IO[bytes]) -> None:
+    """The CSV's bytes, to a stream that stays open."""
+    from pyarrow import csv
+
+    for key, value in _comments(recording):
+        stream.write(f"# {key}: {value}\n".encode())
+    stream.write((",".join(recording.columns) + "\n").encode())
+    options = csv.WriteOptions(include_header=False, quoting_style="none")
+    csv.write_csv(_table(recording), stream, write_options=options)
+
+
+def export_parquet(recording: Recording, target: Path) -> None:
+    """Write `recording` as Parquet; the header stands in the schema's metadata, one JSON value per key."""
+    from pyarrow import parquet
+
+    _replace(target, lambda stream: parquet.write_table(_table(recording), stream, compression="zstd"))
+
+
+def _table(recording: Recording) -> Any:
+    import pyarrow as pa
+
+    facts = recording.header | ({"dropped": list(recording.notes)} if recording.truncated else {})
+    metadata = {key: json.dumps(value) for key, value in facts.items()}
+    return pa.table(dict(recording.columns)).replace_schema_metadata(metadata)
+
+
+def _comments(recording: Recording) -> list[tuple[str, str]]:
+    facts = {key: value for key, value in recording.header.items() if key != "columns"}
+    lines = [(key, _one_line(value)) for key, value in facts.items()]
+    return lines + [("dropped", note) for note in recording.notes]
+
+
+def _one_line(value: Any) -> str:
+    if isinstance(value, str) and "\n" not in value and "\r" not in value:
+        return value
+    return json.dumps(value)
+
+
+def _replace(target: Path, write: Callable[[IO[bytes]], None]) -> None:
+    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        with beside.open("wb") as stream:
+            write(stream)
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,163 @@
+"""Reads recordings back, whatever a crash or a full disk left of them.
+
+What is dropped is said: a torn tail is the normal end after kill -9, and batches that fail their CRC in the middle (a bad
+disk) cost themselves only. numpy is imported when a file is read, not with the room: the recorder's process needs none.
+"""
+
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+from zlib import crc32
+
+from gateway.recording.errors import RecordingError
+from gateway.recording.layout import HEADER_PREFIX, LONGEST_HEADER, MAGIC, MARK, SUFFIX, Batch, batch_at
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_FLOAT64: Final = struct.Struct("<d")
+_ROW_ITEM: Final = _FLOAT64.size
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One recording: header as written, one float64 array per column, all of length rows.
+
+    truncated: bytes were dropped, `notes` says which; a gap in the middle shows in time_s.
+    """
+
+    path: Path
+    header: dict[str, Any]
+    columns: "dict[str, NDArray[np.float64]]"
+    rows: int
+    truncated: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One line of `recordings list`. fault: why the file cannot be read, empty when it can."""
+
+    number: int
+    path: Path
+    header: dict[str, Any]
+    rows: int
+    duration_s: float
+    size_bytes: int
+    truncated: bool
+    fault: str = ""
+
+
+def read_recording(path: Path) -> Recording:
+    """Everything whole in the file; RecordingError when it is no recording or its header is cut, OSError as usual."""
+    import numpy as np
+
+    data = memoryview(path.read_bytes())
+    header, offset = _header(data, path)
+    names = header["columns"]
+    batches, notes = _all_batches(data, offset, len(names) * _ROW_ITEM)
+    rows = b"".join(data[batch.start : batch.end] for batch in batches)
+    table = np.frombuffer(rows, dtype="<f8").reshape(-1, len(names))
+    columns = {name: table[:, index].copy() for index, name in enumerate(names)}
+    return Recording(path, header, columns, len(table), bool(notes), notes)
+
+
+def list_recordings(state_directory: Path) -> list[Entry]:
+    """The recordings of one state directory by number; unreadable ones are listed with their fault."""
+    paths = [path for path in (state_directory / "recordings").glob(f"*{SUFFIX}") if path.stem.isdigit()]
+    return [_entry(path) for path in sorted(paths, key=lambda path: int(path.stem))]
+
+
+def find_recording(state_directory: Path, number: int) -> Path:
+    """The file of one number; RecordingError that names the ones there are."""
+    path = state_directory / "recordings" / f"{number:04d}{SUFFIX}"
+    if path.exists():
+        return path
+    present = ", ".join(str(entry.number) for entry in list_recordings(state_directory)) or "none"
+    raise RecordingError(f"no recording {number} in {path.parent}; there: {present}")
+
+
+def _entry(path: Path) -> Entry:
+    number, size_bytes = int(path.stem), path.stat().st_size
+    try:
+        data = memoryview(path.read_bytes())
+        header, offset = _header(data, path)
+    except (RecordingError, OSError) as error:
+        return Entry(number, path, {}, 0, 0.0, size_bytes, True, str(error))
+    row_size = len(header["columns"]) * _ROW_ITEM
+    batches, notes = _all_batches(data, offset, row_size)
+    rows = sum(batch.rows for batch in batches)
+    return Entry(number, path, header, rows, _duration_s(data, header, batches, row_size), size_bytes, bool(notes))
+
+
+def _duration_s(data: memoryview, header: dict[str, Any], batches: list[Batch], row_size: int) -> float:
+    """From the first row's time_s to the last one's; 0 without rows or such a column."""
+    if not batches or "time_s" not in header["columns"]:
+        return 0.0
+    at = header["columns"].index("time_s") * _ROW_ITEM
+    first: float = _FLOAT64.unpack_from(data, batches[0].start + at)[0]
+    last: float = _FLOAT64.unpack_from(data, batches[-1].end - row_size + at)[0]
+    return last - first
+
+
+def _header(data: memoryview, path: Path) -> tuple[dict[str, Any], int]:
+    """The header and the offset of the first batch."""
+    start = len(MAGIC) + HEADER_PREFIX.size
+    if data[: len(MAGIC)] != MAGIC[: len(data)]:
+        raise RecordingError(f"{path} is not a recording of force-gateway: it begins with {bytes(data[:8]).hex(' ')}")
+    length, crc = HEADER_PREFIX.unpack_from(data, len(MAGIC)) if len(data) >= start else (0, 0)
+    if len(data) < start or (length <= LONGEST_HEADER and len(data) < start + length):
+        raise RecordingError(
+            f"{path} ends inside its header, after {len(data)} bytes: the recorder was stopped as it began"
+        )
+    document = data[start : start + length]
+    if length > LONGEST_HEADER or crc32(document) != crc:
+        raise RecordingError(
+            f"{path} has a damaged header (its CRC-32 differs): the rows cannot be understood without it"
+        )
+    header = json.loads(bytes(document))
+    if header.get("format") != 1:
+        raise RecordingError(f"{path} is of format {header.get('format')}; this version reads format 1")
+    return header, start + length
+
+
+def _all_batches(data: memoryview, offset: int, row_size: int) -> tuple[list[Batch], tuple[str, ...]]:
+    """Whole batches in order, and a sentence for every piece between or after them that was dropped."""
+    batches: list[Batch] = []
+    notes: list[str] = []
+    for batch in _scan(data, offset, row_size):
+        if isinstance(batch, Batch):
+            batches.append(batch)
+        else:
+            notes.append(batch)
+    return batches, tuple(notes)
+
+
+def _scan(data: memoryview, offset: int, row_size: int) -> Iterator[Batch | str]:
+    while offset < len(data):
+        batch = batch_at(data, offset, row_size)
+        if batch is not None:
+            yield batch
+            offset = batch.end
+            continue
+        following = _next_batch(data, offset, row_size)
+        if following is None:
+            yield f"torn tail: the last {len(data) - offset} bytes are not a whole batch and were dropped"
+            return
+        yield f"{following - offset} bytes at {offset} are damaged (CRC-32) and were dropped"
+        offset = following
+
+
+def _next_batch(data: memoryview, offset: int, row_size: int) -> int | None:
+    """Where the next whole batch begins after a damaged place, None when there is none."""
+    raw = bytes(data[offset:])  # memoryview cannot be searched
+    at = raw.find(MARK, 1)
+    while at >= 0:
+        if batch_at(data, offset + at, row_size) is not None:
+            return offset + at
+        at = raw.find(MARK, at + 1)
+    return None

@@ -1,0 +1,129 @@
+"""Writes a recording: one os.write per 0.1 s, nothing else that could wait, so that it may live inside the control loop.
+
+Decisions
+- Rows go into one buffer that is reused; a batch is complete, with its CRC, before its single write. A kill -9 at any
+  moment leaves whole batches and at most one torn one.
+- No fsync: the kernel keeps what was written when the process dies; a power cut may cost the last seconds. SQLite and
+  Parquet were rejected for the same reason and because a torn Parquet file has no footer and so no data at all.
+- A full disk ends the recording, with a sentence, never the control loop.
+- No numpy here: the control process needs none of it to record.
+"""
+
+import json
+import os
+import struct
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, header_bytes
+
+_FLUSH_S: Final = 0.1
+_BATCH_ROWS: Final = 256  # a batch is written early when it is full: 2.5 kHz still gives one write per 0.1 s
+_FORMAT: Final = 1
+
+
+class Recorder:
+    """One open recording. failure: None while it records, else the sentence that says why it stopped."""
+
+    def __init__(self, directory: Path, header: Mapping[str, Any], columns: tuple[str, ...]) -> None:
+        """Create the next numbered file in `directory` (made if absent); OSError when that cannot be done.
+
+        header: what a reader needs to understand the rows: rig, rig_fingerprint, rig_texts, calibration, seed ...;
+        `format`, `number`, `columns` and, if absent, `started_utc` are added.
+        """
+        self._row = struct.Struct(f"<{len(columns)}d")
+        self._buffer = bytearray(BATCH_PREFIX.size + _BATCH_ROWS * self._row.size)
+        self._view = memoryview(self._buffer)
+        self._rows = 0
+        self._batch = 0
+        self._next_flush_s: float | None = None
+        self.rows_written = 0
+        self.failure: str | None = None
+        directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self.number, self.path, descriptor = _create_next(directory)
+        self._descriptor: int | None = descriptor
+        self._length = 0
+        facts = {"format": _FORMAT, "number": self.number, "started_utc": _utc_now()} | dict(header)
+        self._write(header_bytes(json.dumps(facts | {"columns": list(columns)}).encode()))
+
+    @property
+    def is_open(self) -> bool:
+        return self._descriptor is not None
+
+    def append(self, values: tuple[float, ...]) -> None:
+        """Add one row, in the order of the columns; struct.error when their number differs. Nothing once it stopped."""
+        if self._descriptor is None:
+            return
+        self._row.pack_into(self._buffer, BATCH_PREFIX.size + self._rows * self._row.size, *values)
+        self._rows += 1
+        if self._rows == _BATCH_ROWS:
+            self._write_batch()
+
+    def flush(self, now_s: float) -> None:
+        """Write what has been gathered if 0.1 s passed since the last write. now_s: monotonic."""
+        if self._next_flush_s is None:
+            self._next_flush_s = now_s + _FLUSH_S
+        elif self._rows and now_s >= self._next_flush_s:
+            self._write_batch()
+            self._next_flush_s = now_s + _FLUSH_S
+
+    def close(self) -> None:
+        """Write the last rows and close the file; a second call does nothing."""
+        if self._rows:
+            self._write_batch()
+        self._release()
+
+    def _write_batch(self) -> None:
+        end = BATCH_PREFIX.size + self._rows * self._row.size
+        crc = batch_crc(self._batch, self._rows, self._view[BATCH_PREFIX.size : end])
+        BATCH_PREFIX.pack_into(self._buffer, 0, MARK, self._batch, self._rows, crc)
+        rows, self._rows = self._rows, 0
+        if self._write(self._view[:end]):
+            self._batch += 1
+            self.rows_written += rows
+
+    def _write(self, data: bytes | memoryview) -> bool:
+        """One write; False, and the recording ends, when the disk did not take all of it."""
+        if self._descriptor is None:
+            return False
+        try:
+            written = os.write(self._descriptor, data)
+        except OSError as error:
+            return self._stop(error.strerror or str(error))
+        if written < len(data):
+            return self._stop("the disk is full")
+        self._length += written
+        return True
+
+    def _stop(self, reason: str) -> bool:
+        self.failure = f"E402 recording {self.path} stopped after {self.rows_written} rows: {reason}; control goes on"
+        if self._descriptor is not None:
+            try:
+                os.ftruncate(self._descriptor, self._length)  # the piece of a batch that did fit is no data
+            except OSError:
+                pass  # the reader drops it just as well
+        self._rows = 0
+        self._release()
+        return False
+
+    def _release(self) -> None:
+        if self._descriptor is not None:
+            descriptor, self._descriptor = self._descriptor, None
+            os.close(descriptor)
+
+
+def _create_next(directory: Path) -> tuple[int, Path, int]:
+    """Number, path and descriptor of a file that nobody else has: O_EXCL settles who gets a number."""
+    number = 1 + max((int(path.stem) for path in directory.glob(f"*{SUFFIX}") if path.stem.isdigit()), default=0)
+    while True:
+        path = directory / f"{number:04d}{SUFFIX}"
+        try:
+            return number, path, os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o640)
+        except FileExistsError:
+            number += 1
+
+
+def _utc_now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

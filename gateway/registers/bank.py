@@ -1,0 +1,239 @@
+"""The register bank: what a Modbus server asks for and writes to, and the one place where commands are accepted or
+refused.
+
+Checks run in FIELDBUS's order: address (02), whole values (03), values (03), owner (06), then what the state allows.
+Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal registers. One accepted
+write is one Command, handed on inside the write, so that a setpoint acts before its answer is sent. The Command carries
+the edge bits as written, each write with a new number; in the registers they read back as 0.
+
+Decisions: a write to a read-only register is 02, as to an address that cannot be written. Refused reads are noted like
+refused writes, so that a newcomer's 40001 can be explained. Clearing enable also clears control_word, force_setpoint
+and voltage_setpoint (an old voltage must not wait for the next enable), releases the ownership, and is granted to any
+peer: then nothing else of its write is taken. byte_order_echo takes 1234.5 in both word orders and reads back as
+written; it proves the order of one host.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Final
+
+from gateway import VERSION
+from gateway.bsfm.model import Calibration
+from gateway.modbus import Peer
+from gateway.modbus.bits import pack_bits
+from gateway.registers.addresses import no_such_address
+from gateway.registers.admission import EDGE_BITS, TAKE, Admission, Admitted
+from gateway.registers.command import Command, Status
+from gateway.registers.command_block import CONTROL_WORD, FORCE_SETPOINT, VOLTAGE_SETPOINT, CommandBlock, check_zeros
+from gateway.registers.echo import ByteOrderEcho
+from gateway.registers.image import RegisterImage
+from gateway.registers.map import Block, RegisterMap
+from gateway.registers.ownership import Ownership, ip_number
+from gateway.registers.refusal import Refusal
+from gateway.registers.rules import BankRules
+from gateway.registers.staging_block import NO_SLOT, StagingBlock
+from gateway.registers.status_block import StatusBlock
+from gateway.registers.words import ControlBit, RefusalReason
+
+BITS: Final = 16
+READER: Final = Peer("a reader")
+"""Stands for the peer of a refused read, which is not told to the bank."""
+
+
+class RegisterBank:
+    """Implements gateway.modbus.DataBank. Single-threaded; callbacks run inside the write or read that causes them.
+
+    on_command: each accepted command write; on_refusal: each refusal; on_accepted: a sentence for each write that changed
+    something besides heartbeat and sequence. last_writer: register name ("staging" for its whole block) -> (peer, time in s).
+    now: monotonic clock in s.
+    """
+
+    def __init__(self, register_map: RegisterMap, rules: BankRules, *, now: Callable[[], float]) -> None:
+        self.command = Command()
+        self.on_command: Callable[[Command], None] = lambda command: None
+        self.on_refusal: Callable[[Refusal, Peer], None] = lambda refusal, peer: None
+        self.on_accepted: Callable[[str, Peer], None] | None = None
+        self.last_writer: dict[str, tuple[Peer, float]] = {}
+        self.identity: Mapping[int, bytes] = _identity(register_map, rules)
+        self._now = now
+        self._blocks = register_map.blocks
+        self._image = RegisterImage(register_map)
+        self._data, self._room = self._image.data, self._image.room
+        self._commands = CommandBlock(register_map, rules, self._image)
+        self._status = StatusBlock(register_map, self._image)
+        self._ownership = Ownership(rules.owner)
+        self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
+        self._admission = Admission(self._commands, self._ownership, self._echo, rules)
+        self.staging = StagingBlock(register_map, rules, self._image)
+        self._image.put(register_map.find("map_version"), register_map.version)
+        self._image.put(register_map.find("map_hash"), register_map.map_hash)
+        self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
+        self._show_owner()
+        self.publish(Status())
+
+    @property
+    def owner(self) -> str | None:
+        """The host that may command, None for nobody yet."""
+        return self._ownership.owner
+
+    def read_registers(self, address: int, count: int) -> bytes:
+        """Big-endian words of one block. Refusal (02) for a range that no block holds."""
+        if not 0 < count <= self._room[address]:
+            raise self._noted(no_such_address(self._blocks, address, count), READER)
+        return bytes(self._data[2 * address : 2 * (address + count)])
+
+    def check_registers_readable(self, address: int, count: int) -> None:
+        self.read_registers(address, count)
+
+    def read_bits(self, address: int, count: int) -> bytes:
+        """Bits of control_word (0-15) or status_word (100-115), packed."""
+        try:
+            first = self._bit_word(address, count)
+        except Refusal as refusal:
+            raise self._noted(refusal, READER) from None
+        word = self._image.word(first)
+        return pack_bits([bool(word >> (address - first + k) & 1) for k in range(count)])
+
+    def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
+        """All or nothing. Refusal says why not; nothing but the last-refusal registers has changed then."""
+        try:
+            self._write(address, data, peer)
+        except Refusal as refusal:
+            raise self._noted(refusal, peer) from None
+
+    def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
+        """Coils 0-15: the control word is read, changed and written under the same checks as by register."""
+        try:
+            first = self._bit_word(address, len(values))
+            if first != self._bits[0]:
+                raise Refusal(
+                    RefusalReason.READ_ONLY, address, f"bits {first} .. {first + BITS - 1} are status_word, read only"
+                )
+            mask = sum(1 << (address - first + k) for k in range(len(values)))
+            bits = sum(bool(value) << (address - first + k) for k, value in enumerate(values))
+            self._write(first, (self._image.word(first) & ~mask | bits).to_bytes(2, "big"), peer)
+        except Refusal as refusal:
+            raise self._noted(refusal, peer) from None
+
+    def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
+        """One word, under the same checks as any write."""
+        word = self._image.word(address) if self._room[address] else 0
+        self.write_registers(address, (word & and_mask | or_mask & ~and_mask & 0xFFFF).to_bytes(2, "big"), peer)
+
+    def publish(self, status: Status) -> None:
+        """Show what control and service know; from now on an enable is refused for status.enable_block."""
+        self._admission.enable_block = status.enable_block
+        self._status.publish(status)
+
+    def clear_command(self) -> None:
+        """Control's doing after a fault or the lease's end: control_word and setpoints to 0. No new Command number."""
+        values = self._commands.values
+        if values[CONTROL_WORD] or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT] or self.command.control_word:
+            cleared = values.copy()
+            cleared[FORCE_SETPOINT] = cleared[VOLTAGE_SETPOINT] = 0.0
+            self._commands.store(cleared, 0)
+            self.command = replace(
+                self.command, control_word=ControlBit(0), force_setpoint_n=0.0, voltage_setpoint_v=0.0
+            )
+
+    def release_owner(self) -> None:
+        """Nobody owns the setpoint any more (unless the rig names the owner)."""
+        if self._ownership.release():
+            self._show_owner()
+
+    def set_active_model(self, calibration: Calibration, slot: int = NO_SLOT) -> None:
+        """Show the coefficients in use in the active block, and their hash. slot: which recipe they are, if any."""
+        self.staging.show_active(calibration, slot)
+
+    def _noted(self, refusal: Refusal, peer: Peer) -> Refusal:
+        self._status.show_refusal(refusal)
+        self.on_refusal(refusal, peer)
+        return refusal
+
+    def _bit_word(self, address: int, count: int) -> int:
+        """First address of the word that holds all of these bits."""
+        for first in self._bits:
+            if count > 0 and first <= address and address + count <= first + BITS:
+                return first
+        words = [Block("control_word", self._bits[0], self._bits[0] + BITS - 1)]
+        words.append(Block("status_word", self._bits[1], self._bits[1] + BITS - 1))
+        raise no_such_address(words, address, count)
+
+    def _write(self, address: int, data: bytes, peer: Peer) -> None:
+        count = len(data) // 2
+        if not 0 < count <= self._room[address]:
+            raise no_such_address(self._blocks, address, count)
+        if count > self._image.writable[address]:
+            raise self._read_only(address + self._image.writable[address])
+        block = self._image.block_at[address]
+        if block.name == "staging":
+            self.staging.write(address, data, peer)
+            self.last_writer["staging"] = peer, self._now()
+            return
+        if (cut := self._image.cuts_value(address, count)) is not None:
+            text = f"{cut.name}@{cut.block} is the registers {cut.address} and {cut.address + 1}: write both in one request"
+            raise Refusal(RefusalReason.HALF_VALUE, address, text)
+        if self._commands.holds(block, address):
+            self._write_command(block, address, data, peer)
+        elif block.name == "proof":
+            self._write_echo(address, data, peer)
+        else:
+            check_zeros(address, data)
+
+    def _read_only(self, address: int) -> Refusal:
+        register = self._image.register_at[address]
+        text = f"{register.name}@{register.block} at {register.address} is read only"
+        return Refusal(RefusalReason.READ_ONLY, address, text)
+
+    def _write_echo(self, address: int, data: bytes, peer: Peer) -> None:
+        order = self._echo.write(address, data, peer.host)
+        if order is not None:
+            self.last_writer["byte_order_echo"] = peer, self._now()
+            self._tell(f"byte_order_echo {order.upper()}: use block {'200' if order == 'abcd' else '300'}", peer)
+
+    def _write_command(self, block: Block, address: int, data: bytes, peer: Peer) -> None:
+        admitted = self._admission.admit(block, address, data, peer.host)
+        if admitted is None:
+            return
+        before, owner = self._commands.values, self._ownership.owner
+        self._commands.store(admitted.values, admitted.kept)
+        self._settle_owner(admitted, peer.host)
+        now_s = self._now()
+        for name in self._commands.names(block, address, len(data) // 2):
+            self.last_writer[name] = peer, now_s
+        self.command = self._commands.command(admitted.written, self.command.number + 1, now_s, peer.host)
+        self.on_command(self.command)
+        if self.on_accepted is not None:
+            self._tell(self._sentence(before, owner, admitted), peer)
+
+    def _settle_owner(self, admitted: Admitted, host: str) -> None:
+        values = admitted.values
+        if admitted.written & TAKE or admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT]:
+            changed = self._ownership.take(host)
+        else:
+            changed = self._ownership.release()
+        if changed:
+            self._show_owner()
+
+    def _show_owner(self) -> None:
+        self._status.show_owner(ip_number(self._ownership.owner))
+
+    def _sentence(self, before: list[float], owner: str | None, admitted: Admitted) -> str:
+        """What an accepted write changed; empty when nothing that people want to know."""
+        changes = self._commands.differences(before, admitted.values)
+        edges = (admitted.written & EDGE_BITS & ~TAKE) or 0
+        asked = ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
+        now_owner = self._ownership.owner
+        owners = f"owner {owner or 'nobody'} -> {now_owner or 'nobody'}" if owner != now_owner else ""
+        return ", ".join(part for part in (changes, asked, owners) if part)
+
+    def _tell(self, sentence: str, peer: Peer) -> None:
+        if self.on_accepted is not None and sentence:
+            self.on_accepted(sentence, peer)
+
+
+def _identity(register_map: RegisterMap, rules: BankRules) -> Mapping[int, bytes]:
+    """Objects of FC43/14: vendor, product code, revision, product, model (the map), application (the rig)."""
+    texts = {0: "force-gateway", 1: "FG", 2: VERSION, 4: "force-gateway", 5: register_map.name, 6: rules.rig_name}
+    return MappingProxyType({number: text.encode("ascii", "replace") for number, text in texts.items()})

@@ -1,0 +1,58 @@
+"""The frozen snapshot that the bank hands to control, and the snapshot that control's decision publishes."""
+
+from dataclasses import dataclass
+from math import nan
+
+from gateway.registers.words import ControlBit, FaultCode, LimitedBy, Mode, RefusalReason, State
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One accepted write of the command block, whole, SI units. 0 in the fields named in FIELDBUS means the rig's default.
+
+    number counts accepted writes (control sees a new one by it); received_s is monotonic; peer is the writer's address.
+    """
+
+    control_word: ControlBit = ControlBit(0)  # noqa: RUF009  flags are immutable
+    force_setpoint_n: float = 0.0
+    force_ramp_n_per_s: float = 0.0
+    mode: Mode = Mode.FORCE
+    heartbeat: int = 0
+    voltage_setpoint_v: float = 0.0
+    tilt_angle_rad: float = 0.0
+    precontact_force_n: float = 0.0
+    contact_ramp_s: float = 0.0
+    payload_kg: float = 0.0
+    command_sequence: int = 0
+    in_band_tolerance_n: float = 0.0
+    in_band_time_s: float = 0.0
+    number: int = 0
+    received_s: float = 0.0
+    peer: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Everything that control and service publish, SI units; nan = unavailable. Owner and refusals are the bank's own."""
+
+    state: State = State.OFF
+    status_word: int = 0
+    force_measured_n: float = nan
+    force_requested_n: float = 0.0
+    force_accepted_n: float = 0.0
+    force_applied_n: float = 0.0
+    output_voltage_v: float = nan
+    feedforward_v: float = 0.0
+    trim_v: float = 0.0
+    limited_by: LimitedBy = LimitedBy.NONE
+    fault_code: FaultCode = FaultCode.NONE
+    warning_word: int = 0
+    sample_age_s: float = nan
+    loop_time_s: float = nan
+    heartbeat_echo: int = 0
+    sequence_echo: int = 0
+    calibration_id: int = 0
+    model_residual_n: float = nan
+    pressure_pa: float = nan
+    missed_ticks: int = 0
+    enable_block: RefusalReason = RefusalReason.NONE

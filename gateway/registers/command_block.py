@@ -1,0 +1,184 @@
+"""The command block: three faces of one snapshot (int16, float ABCD, float CDAB).
+
+A write is decoded into a candidate, a whole new list of values, and nothing is stored until everything about it has been found
+good. What the master reads back is what was accepted, rounded to each face's resolution; a float keeps its digits although the
+int16 face cannot show them. Each edge bit (reset, tare, take ownership) reads back as 0, so that writing it again acts again.
+"""
+
+from collections.abc import Sequence
+from math import radians
+from struct import Struct
+from typing import Final
+
+from gateway.registers.command import Command
+from gateway.registers.command_field import CommandField, command_field
+from gateway.registers.image import RegisterImage
+from gateway.registers.map import Block, RegisterMap
+from gateway.registers.refusal import Refusal
+from gateway.registers.rules import BankRules
+from gateway.registers.values import WordOrder, swap_words, words_swapped_from_little_endian
+from gateway.registers.words import ControlBit, Mode, RefusalReason
+
+NAMES: Final = (
+    "control_word", "force_setpoint", "force_ramp", "mode", "heartbeat", "voltage_setpoint", "tilt_angle",
+    "precontact_force", "contact_ramp", "payload", "command_sequence", "in_band_tolerance", "in_band_time",
+)  # fmt: skip
+"""Registers of the command block in the order of their offsets: what this code relies on, whatever else a map has."""
+
+CONTROL_WORD, FORCE_SETPOINT, MODE, HEARTBEAT, VOLTAGE_SETPOINT, SEQUENCE = 0, 1, 3, 4, 5, 10
+_KNOWN_BITS: Final = 1 << 7
+_CONTROL_WORDS: Final = tuple(ControlBit(word) for word in range(_KNOWN_BITS))  # building a flag costs a microsecond
+_MODES: Final = {mode.value: mode for mode in Mode}
+_WORD_STRUCTS: Final = tuple(Struct(f">{count}H") for count in range(129))
+_FLOAT_STRUCTS: Final = tuple(Struct(f">{count}f") for count in range(129))
+
+Values = list[float]
+"""One value per word of the command block, in the registers' units; 0 in reserved ones."""
+
+
+class CommandBlock:
+    """Accepted values, and their three faces in the image."""
+
+    def __init__(self, register_map: RegisterMap, rules: BankRules, image: RegisterImage) -> None:
+        block = register_map.block("command")
+        registers = register_map.registers_of("command")
+        if tuple((r.name, r.address - block.first) for r in registers) != tuple((n, k) for k, n in enumerate(NAMES)):
+            raise ValueError(f"map {register_map.name}: block command must hold {', '.join(NAMES)} in this order")
+        self.values: Values = [0.0] * block.words
+        self.fields: tuple[CommandField | None, ...] = tuple(
+            command_field(registers[k], rules, register_map.name) if k < len(registers) else None
+            for k in range(block.words)
+        )
+        self._counts = [field.counts_per_unit if field else 1 for field in self.fields]
+        self._image = image
+        self._rules = rules
+        self._first = block.first
+        self._floats = [(b, b.repeats["command"]) for b in register_map.blocks if "command" in b.repeats]
+        self._words, self._high_first = _WORD_STRUCTS[block.words], _FLOAT_STRUCTS[block.words]
+        self._low_first = Struct(f"<{block.words}f")
+
+    def holds(self, block: Block, address: int) -> bool:
+        """Whether this address is in a face of the command block, named or reserved."""
+        base = block.repeats.get("command")
+        return block.first == self._first if base is None else base <= address < base + 2 * len(self.values)
+
+    def address(self, block: Block, offset: int) -> int:
+        """Where a word of the command block is in this face."""
+        return self._first + offset if not block.repeats else block.repeats["command"] + 2 * offset
+
+    def names(self, block: Block, address: int, count: int) -> Sequence[str]:
+        """The registers that a write of these words sets."""
+        if not block.repeats:
+            return NAMES[address - self._first : address - self._first + count]
+        start = (address - block.repeats["command"] + 1) // 2
+        return NAMES[start : start + count // 2]
+
+    def decode(self, block: Block, address: int, data: bytes) -> Values:
+        """A candidate: the accepted values with those of this write put over them. Refusal (03) for a bad one."""
+        if not block.repeats:
+            return self._decode_words(address, data)
+        return self._decode_floats(block, address, data)
+
+    def _decode_words(self, address: int, data: bytes) -> Values:
+        candidate = self.values.copy()
+        fields = self.fields
+        offset = address - self._first
+        for word in _WORD_STRUCTS[len(data) // 2].unpack(data):
+            field = fields[offset]
+            if field is not None:
+                candidate[offset] = field.of_word(word, self._first + offset)
+            elif word:
+                raise reserved(self._first + offset, word)
+            offset += 1
+        return candidate
+
+    def _decode_floats(self, block: Block, address: int, data: bytes) -> Values:
+        """Reserved words may be cut (a single 0 is fine); whole values have been seen to by the caller."""
+        candidate = self.values.copy()
+        start, end = 0, len(data)
+        if (address - block.first) % 2:
+            start = 2
+        end -= (end - start) % 4
+        check_zeros(address, data[:start])
+        check_zeros(address + end // 2, data[end:])
+        middle = data[start:end]
+        order = block.word_order
+        offset = (address + start // 2 - block.repeats["command"]) // 2
+        numbers = _FLOAT_STRUCTS[len(middle) // 4].unpack(middle if order is WordOrder.ABCD else swap_words(middle))
+        for k, number in enumerate(numbers):
+            field, at = self.fields[offset + k], address + start // 2 + 2 * k
+            if field is not None:
+                candidate[offset + k] = field.of_float(number, at, order)
+            else:
+                check_zeros(at, middle[4 * k : 4 * k + 4])
+        return candidate
+
+    def check_known(self, values: Values, block: Block) -> None:
+        """Refuses bits that the rig has nothing behind and modes that do not exist (03)."""
+        word = int(values[CONTROL_WORD])
+        if unsupported := word & ~int(self._rules.supported_bits):
+            bit = unsupported.bit_length() - 1
+            name = f" ({ControlBit(1 << bit).name})".lower() if 1 << bit < _KNOWN_BITS else ""
+            text = f"control_word bit {bit}{name}: rig {self._rules.rig_name} has nothing behind it"
+            raise Refusal(RefusalReason.UNSUPPORTED_BIT, self.address(block, CONTROL_WORD), text, value=float(word))
+        if values[MODE] not in _MODES:
+            known = ", ".join(f"{mode.value} {mode.name.lower()}" for mode in Mode)
+            text = f"mode = {values[MODE]:g}, known are {known}"
+            raise Refusal(RefusalReason.UNSUPPORTED_BIT, self.address(block, MODE), text, value=values[MODE])
+
+    def store(self, candidate: Values, control_word: int) -> None:
+        """Accept: from now on these are the values, in all three faces. control_word: without its edge bits."""
+        candidate[CONTROL_WORD] = control_word
+        self.values = candidate
+        counts = [
+            round(value * count) & 0xFFFF if value else 0 for value, count in zip(candidate, self._counts, strict=True)
+        ]
+        data = self._image.data
+        self._words.pack_into(data, 2 * self._first, *counts)
+        for block, base in self._floats:
+            if block.word_order is WordOrder.ABCD:
+                self._high_first.pack_into(data, 2 * base, *candidate)
+            else:
+                self._image.write(base, words_swapped_from_little_endian(self._low_first.pack(*candidate)))
+
+    def command(self, control_word: int, number: int, received_s: float, peer: str) -> Command:
+        """The accepted values in SI units. control_word: as written, edge bits included."""
+        v = self.values
+        return Command(
+            control_word=_CONTROL_WORDS[control_word],
+            force_setpoint_n=v[1],
+            force_ramp_n_per_s=v[2],
+            mode=_MODES[int(v[3])],
+            heartbeat=int(v[4]),
+            voltage_setpoint_v=v[5] / 1000.0,
+            tilt_angle_rad=radians(v[6]),
+            precontact_force_n=v[7],
+            contact_ramp_s=v[8] / 1000.0,
+            payload_kg=v[9] / 1000.0,
+            command_sequence=int(v[10]),
+            in_band_tolerance_n=v[11],
+            in_band_time_s=v[12] / 1000.0,
+            number=number,
+            received_s=received_s,
+            peer=peer,
+        )
+
+    def differences(self, before: Values, after: Values) -> str:
+        """`force_setpoint 0.00 N -> 12.00 N`: what a write changed, heartbeat and sequence apart (they always change)."""
+        return ", ".join(
+            f"{field.name} {field.shown(old)} -> {field.shown(new)}"
+            for k, (field, old, new) in enumerate(zip(self.fields, before, after, strict=True))
+            if field is not None and old != new and k not in (HEARTBEAT, SEQUENCE)
+        )
+
+
+def check_zeros(address: int, data: bytes) -> None:
+    """Reserved words accept only 0 (03)."""
+    for k in range(0, len(data), 2):
+        if word := data[k] << 8 | data[k + 1]:
+            raise reserved(address + k // 2, word)
+
+
+def reserved(address: int, word: int) -> Refusal:
+    text = f"address {address} is reserved: {word} was written, only 0 is accepted"
+    return Refusal(RefusalReason.RESERVED, address, text, value=float(word))

@@ -1,0 +1,128 @@
+"""One register of the command block: words -> a value that may be used, or the refusal that says why not.
+
+Checked before a value is looked at any further: finite, in range, whole where it counts something, and in the right word order.
+12.0 N with its words swapped reads 2.34e-41 N, which is in range: hence no float between 0 and 1e-3 is accepted.
+0 is always in range; it means "the rig's default" or "nothing".
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final
+
+from gateway.registers.map import Register
+from gateway.registers.refusal import Refusal, allowed_range, quantity
+from gateway.registers.rules import BankRules
+from gateway.registers.values import WordOrder, float32, pack_number, unpack_number
+from gateway.registers.words import RefusalReason
+
+SMALLEST_MEANT: Final = 1.0e-3
+
+
+@dataclass(frozen=True, slots=True)
+class CommandField:
+    """low, high: limits of map and rig in the register's unit; float_low, float_high: the same after rounding to float32."""
+
+    name: str
+    counts_per_unit: int
+    is_signed: bool
+    is_whole: bool
+    low: float
+    high: float
+    float_low: float
+    float_high: float
+    unit: str
+    decimals: int
+    limit_source: str
+    values: Mapping[int, str]
+
+    def of_word(self, word: int, address: int) -> float:
+        """The value of one int16 or uint16 register."""
+        if self.is_signed and word >= 0x8000:
+            word -= 0x10000
+        value = word / self.counts_per_unit
+        if self.low <= value <= self.high or not value:
+            return value
+        raise self._out_of_range(value, address)
+
+    def of_float(self, value: float, address: int, order: WordOrder) -> float:
+        """The value of one float register, decoded already."""
+        if not value:
+            return 0.0  # -0.0 too
+        if self.float_low <= value <= self.float_high and (value >= SMALLEST_MEANT or value <= -SMALLEST_MEANT):
+            if not self.is_whole or value == int(value):
+                return value
+            raise Refusal(
+                RefusalReason.OUT_OF_RANGE, address, f"{self.name} = {value:g} is not a whole number", value=value
+            )
+        raise self._not_a_value(value, address, order)
+
+    def shown(self, value: float) -> str:
+        """`12.00 N`, or `1 (voltage)` for an enumeration."""
+        name = self.values.get(int(value)) if self.values and isfinite(value) else None
+        return quantity(value, self.decimals, self.unit) + (f" ({name})" if name else "")
+
+    def _not_a_value(self, value: float, address: int, order: WordOrder) -> Refusal:
+        if self._is_plausible(swapped := _swapped(value)):
+            sends, cure = _CURES[order]
+            seen = f"{self.shown(value)}; with the words swapped {self.shown(swapped)}"
+            text = f"{seen}: your client sends {sends}, {cure} ({self.name} at {address})"
+            return Refusal(RefusalReason.WORDS_SWAPPED, address, text, value=value)
+        if not isfinite(value):
+            return Refusal(
+                RefusalReason.NOT_FINITE, address, f"{self.name} = {value} is not a number to command", value=value
+            )
+        if self.float_low <= value <= self.float_high:
+            text = f"{self.name} = {self.shown(value)} is too small to be meant: swapped words, or an integer sent as a float?"
+            return Refusal(RefusalReason.TOO_SMALL, address, text, value=value)
+        return self._out_of_range(value, address)
+
+    def _is_plausible(self, value: float) -> bool:
+        return self.float_low <= value <= self.float_high and abs(value) >= SMALLEST_MEANT
+
+    def _out_of_range(self, value: float, address: int) -> Refusal:
+        allowed = allowed_range(self.low, self.high, self.unit)
+        text = f"{self.name} = {self.shown(value)}, allowed {allowed} ({self.limit_source})"
+        return Refusal(RefusalReason.OUT_OF_RANGE, address, text, value=value)
+
+
+_CURES: Final = {
+    WordOrder.ABCD: ("CDAB", "use block 300 or mbpoll -B"),
+    WordOrder.CDAB: ("ABCD", "use block 200 or mbpoll without -B"),
+}
+
+
+def _swapped(value: float) -> float:
+    """The same four bytes read in the other word order."""
+    return float(unpack_number("float32", WordOrder.CDAB, pack_number("float32", WordOrder.ABCD, value)))
+
+
+def command_field(register: Register, rules: BankRules, map_name: str) -> CommandField:
+    """The register's limits narrowed by the rig's. Enumerations keep the type's range: what they lack is refused by name."""
+    low, high = register.minimum or 0.0, register.maximum if register.maximum is not None else 65535.0
+    source = f"map {map_name}"
+    rig_low, rig_high = _rig_limits(register.name, rules) or (low, high)
+    if rig_low > low or rig_high < high:
+        low, high, source = max(low, rig_low), min(high, rig_high), f"rig {rules.rig_name}"
+    if register.values:
+        low, high = 0.0, 65535.0
+    return CommandField(
+        name=register.name,
+        counts_per_unit=register.counts_per_unit,
+        is_signed=register.type == "int16",
+        is_whole=register.type == "uint16",
+        low=low,
+        high=high,
+        float_low=min(low, float32(low)),
+        float_high=max(high, float32(high)),
+        unit=register.unit,
+        decimals=register.decimals,
+        limit_source=source,
+        values=register.values,
+    )
+
+
+def _rig_limits(name: str, rules: BankRules) -> tuple[float, float] | None:
+    if name in ("force_setpoint", "precontact_force"):
+        return 0.0, rules.force_max_n
+    return (1000.0 * rules.voltage_min_v, 1000.0 * rules.voltage_max_v) if name == "voltage_setpoint" else None

@@ -1,0 +1,88 @@
+"""Typed fields out of plain YAML content, collecting every fault with its place instead of stopping at the first."""
+
+import re
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from math import isfinite
+from typing import Any, Final
+
+from gateway.registers.values import WordOrder
+
+Place = tuple[str | int, ...]
+
+_NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
+
+
+class DocumentReader:
+    """Collects faults; what its methods return is of use only when there are none."""
+
+    def __init__(self) -> None:
+        self.faults: list[tuple[Place, str]] = []
+
+    def fault(self, place: Place, sentence: str) -> None:
+        self.faults.append((place, sentence))
+
+    def keys(self, place: Place, content: Mapping[str, Any], known: tuple[str, ...]) -> None:
+        for key in content:
+            if key not in known:
+                self.fault((*place, key), f"is not a known key{meant(str(key), known)}")
+
+    def group(self, place: Place, content: Any) -> Mapping[str, Any]:
+        if isinstance(content, Mapping):
+            return content
+        self.fault(place, "is missing" if content is None else "is not a group of keys")
+        return {}
+
+    def is_name(self, place: Place, name: str) -> None:
+        if not _NAME.fullmatch(name):
+            self.fault(place, f'"{name}" is not a name: small letters, digits and _, beginning with a letter')
+
+    def text(self, place: Place, content: Mapping[str, Any], key: str, default: str | None = None) -> str:
+        found = content.get(key, default)
+        if not isinstance(found, str):
+            self.fault(
+                (*place, key) if key in content else place,
+                f"{key} is not text" if key in content else f"{key} is missing",
+            )
+            return ""
+        return found
+
+    def number(self, place: Place, content: Mapping[str, Any], key: str) -> float:
+        found = content[key]
+        if isinstance(found, bool) or not isinstance(found, (int, float)) or not isfinite(found):
+            self.fault((*place, key), f"{found} is not a number")
+            return 0.0
+        return found
+
+    def whole(self, place: Place, content: Mapping[str, Any], key: str, low: int, high: int) -> int:
+        found = content.get(key)
+        if found is None:
+            self.fault(place, f"{key} is missing")
+        elif not isinstance(found, int) or isinstance(found, bool) or not low <= found <= high:
+            self.fault((*place, key), f"{found} is not a whole number {low} .. {high}")
+        else:
+            return found
+        return low
+
+    def order(self, place: Place, content: Mapping[str, Any]) -> WordOrder:
+        given = content.get("word_order", "abcd")
+        if given not in tuple(WordOrder):
+            self.fault((*place, "word_order"), f"{given} is not abcd or cdab")
+            return WordOrder.ABCD
+        return WordOrder(given)
+
+    def numbered(self, place: Place, given: Any, most: int) -> dict[int, str]:
+        """{number: name}; numbers may have become text on the way (JSON)."""
+        names: dict[int, str] = {}
+        for key, name in self.group(place, given).items():
+            is_number = str(key).isdecimal() and int(key) <= most
+            if not is_number or not isinstance(name, str) or not _NAME.fullmatch(name) or name in names.values():
+                self.fault((*place, key), f"{key}: {name} is not a number 0 .. {most} with a name of its own")
+            else:
+                names[int(key)] = name
+        return names
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    near = get_close_matches(word, list(known), 1, 0.6)
+    return f"; did you mean {near[0]}?" if near else ""

@@ -1,0 +1,58 @@
+"""byte_order_echo: the master writes 1234.5 once, and so proves that it and the gateway mean the same number.
+
+Both word orders are accepted, because a CDAB client has a block of its own (300) and must be able to prove itself too.
+The words read back as written: 0x449A first is ABCD, 0x5000 first is CDAB. Swapped bytes, integers and anything else
+are refused (03).
+"""
+
+from typing import Final
+
+from gateway.registers.command_block import check_zeros
+from gateway.registers.image import RegisterImage
+from gateway.registers.map import Register
+from gateway.registers.refusal import Refusal
+from gateway.registers.values import WordOrder, pack_number, unpack_number
+from gateway.registers.words import RefusalReason
+
+_PROOF: Final = 1234.5
+_ORDERS: Final = {pack_number("float32", order, _PROOF): order for order in WordOrder}
+_MOST_HOSTS: Final = 64  # memory stays bounded whoever writes
+
+
+class ByteOrderEcho:
+    """Remembers which hosts have proven their word order, the latest 64 of them."""
+
+    def __init__(self, register: Register, image: RegisterImage) -> None:
+        self._register = register
+        self._image = image
+        self._proven: dict[str, WordOrder] = {}
+
+    def is_proven_by(self, host: str) -> bool:
+        return host in self._proven
+
+    def write(self, address: int, data: bytes, host: str) -> WordOrder | None:
+        """A write of whole values to the proof block: the word order that it proves, None for reserved words only."""
+        at = self._register.address - address
+        if not 0 <= at < len(data) // 2:
+            check_zeros(address, data)
+            return None
+        echo = data[2 * at : 2 * at + 4]
+        check_zeros(address, data[: 2 * at])
+        check_zeros(address + at + 2, data[2 * at + 4 :])
+        if (order := _ORDERS.get(echo)) is None:
+            raise self._refusal(float(unpack_number("float32", WordOrder.ABCD, echo)))
+        self._image.write(self._register.address, echo)
+        self._remember(host, order)
+        return order
+
+    def _remember(self, host: str, order: WordOrder) -> None:
+        self._proven.pop(host, None)
+        self._proven[host] = order
+        if len(self._proven) > _MOST_HOSTS:
+            del self._proven[next(iter(self._proven))]
+
+    def _refusal(self, value: float) -> Refusal:
+        is_number = value == value and abs(value) != float("inf")
+        reason = RefusalReason.OUT_OF_RANGE if is_number else RefusalReason.NOT_FINITE
+        text = f"byte_order_echo = {value:g}, allowed 1234.5 in either word order: swapped bytes, or an integer?"
+        return Refusal(reason, self._register.address, text, value=value)

@@ -1,0 +1,71 @@
+"""Why a request was not executed: a Modbus exception for the master, a number for the registers, a sentence for people.
+
+Sentences begin with the code that `force-gateway explain` expands: what was seen, in numbers, then what it probably is.
+"""
+
+from math import nan
+from typing import Final
+
+from gateway.modbus import ModbusError
+from gateway.modbus.errors import (
+    BUSY,
+    DEVICE_FAILURE,
+    ILLEGAL_ADDRESS,
+    ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
+    TARGET_SILENT,
+)
+from gateway.registers.words import RefusalReason
+
+_WIRE: Final = {
+    RefusalReason.ADDRESS: (ILLEGAL_ADDRESS, "W202"),
+    RefusalReason.READ_ONLY: (ILLEGAL_ADDRESS, "W205"),
+    RefusalReason.HALF_VALUE: (ILLEGAL_VALUE, "W206"),
+    RefusalReason.NOT_FINITE: (ILLEGAL_VALUE, "W207"),
+    RefusalReason.OUT_OF_RANGE: (ILLEGAL_VALUE, "W204"),
+    RefusalReason.WORDS_SWAPPED: (ILLEGAL_VALUE, "W201"),
+    RefusalReason.TOO_SMALL: (ILLEGAL_VALUE, "W208"),
+    RefusalReason.RESERVED: (ILLEGAL_VALUE, "W209"),
+    RefusalReason.NOT_OWNER: (BUSY, "W210"),
+    RefusalReason.ROLE: (ILLEGAL_FUNCTION, "W211"),  # as Modbus/TCP Security answers a role that may not
+    RefusalReason.FAULT_LATCHED: (DEVICE_FAILURE, "W212"),
+    RefusalReason.NOT_READY: (BUSY, "W213"),
+    RefusalReason.OUTPUT_FAULT: (DEVICE_FAILURE, "W214"),
+    RefusalReason.CELL_SILENT: (TARGET_SILENT, "W215"),
+    RefusalReason.RESET_NEEDS_ZERO: (ILLEGAL_VALUE, "W216"),
+    RefusalReason.UNSUPPORTED_BIT: (ILLEGAL_VALUE, "W217"),
+    RefusalReason.BYTE_ORDER_UNPROVEN: (BUSY, "W218"),
+    RefusalReason.BUSY: (BUSY, "W219"),
+    RefusalReason.QUANTITY: (ILLEGAL_VALUE, "W220"),
+    RefusalReason.FUNCTION: (ILLEGAL_FUNCTION, "W221"),
+    RefusalReason.COEFFICIENTS: (BUSY, "E401"),
+}
+"""Exception code and message code of every reason; a reason without an entry cannot refuse."""
+
+OFF_BY_ONE: Final = "W203"
+
+
+class Refusal(ModbusError):  # noqa: N818  the glossary's word
+    """address: 0-based, of the first word concerned; value: in the register's unit, NaN where there is none."""
+
+    def __init__(
+        self, reason: RefusalReason, address: int, text: str, *, value: float = nan, label: str | None = None
+    ) -> None:
+        code, usual_label = _WIRE[reason]
+        self.reason = reason
+        self.address = address
+        self.value = value
+        self.sentence = f"{label or usual_label} {text}"
+        super().__init__(code, self.sentence)
+
+
+def quantity(value: float, decimals: int, unit: str) -> str:
+    """`12.00 N`; numbers that those digits would hide or swell are written as `2.34e-41 N`."""
+    usual = value == 0.0 or 1.0e-3 <= abs(value) < 1.0e7
+    number = f"{value:.{decimals}f}" if usual else f"{value:.3g}"
+    return f"{number} {unit}".rstrip()
+
+
+def allowed_range(low: float, high: float, unit: str) -> str:
+    """`0 .. 60 N`."""
+    return f"{low:g} .. {high:g} {unit}".rstrip()

@@ -1,0 +1,26 @@
+"""What a rig adds to the map: narrower limits, who may command, which bits have something behind them."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.registers.words import ControlBit
+
+BASIC_BITS: Final = ControlBit.ENABLE | ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BankRules:
+    """force_max_n bounds force_setpoint and precontact_force; voltage_setpoint is 0 or within the voltage limits.
+
+    owner: the one host that may command, None for the first that does. cell_range_n bounds uploaded handles.
+    """
+
+    rig_name: str
+    force_max_n: float
+    voltage_min_v: float = 0.0
+    voltage_max_v: float = 10.0
+    cell_range_n: float = 100.0
+    supported_bits: ControlBit = BASIC_BITS
+    require_byte_order_echo: bool = False
+    owner: str | None = None
+    allow_plain_upload: bool = False

@@ -1,0 +1,153 @@
+"""The status block and its two float faces: a Status in, packed words out, in microseconds.
+
+What the bank knows itself (owner, last refusal) lies between the published registers and is written when it changes; a publish
+leaves it alone. What is not finite is unavailable: NaN, or 0x8000 in int16 (0 in counters). A measured value beyond int16 is
+clamped there, and exact in the float blocks.
+"""
+
+from collections.abc import Sequence
+from math import isfinite
+from operator import attrgetter
+from struct import Struct
+from typing import Final, NamedTuple
+
+from gateway.registers.command import Status
+from gateway.registers.image import RegisterImage
+from gateway.registers.map import Register, RegisterMap
+from gateway.registers.refusal import Refusal
+from gateway.registers.values import (
+    RAW_LIMITS,
+    UNAVAILABLE_INT16,
+    WordOrder,
+    carried_by_float32,
+    words_swapped_from_little_endian,
+)
+
+_SOURCES: Final = {
+    "status_word": "status_word",
+    "state": "state",
+    "force_measured": "force_measured_n",
+    "force_requested": "force_requested_n",
+    "force_accepted": "force_accepted_n",
+    "force_applied": "force_applied_n",
+    "output_voltage": "output_voltage_v",
+    "feedforward": "feedforward_v",
+    "trim": "trim_v",
+    "limited_by": "limited_by",
+    "fault_code": "fault_code",
+    "warning_word": "warning_word",
+    "sample_age": "sample_age_s",
+    "loop_time": "loop_time_s",
+    "heartbeat_echo": "heartbeat_echo",
+    "sequence_echo": "sequence_echo",
+    "calibration_id": "calibration_id",
+    "model_residual": "model_residual_n",
+    "pressure": "pressure_pa",
+    "missed_ticks": "missed_ticks",
+}
+"""Register -> field of Status."""
+
+_UNITS_PER_SI: Final = {"": 1.0, "N": 1.0, "mV": 1.0e3, "ms": 1.0e3, "us": 1.0e6, "kPa": 1.0e-3}
+BANK_REGISTERS: Final = ("owner_ip", "refusal_address", "refusal_reason", "refusal_value")
+
+
+class _Scale(NamedTuple):
+    """From a field of Status to its register's unit, and on to counts."""
+
+    units_per_si: float
+    counts_per_unit: int
+    low: int
+    high: int
+    unavailable: int
+
+
+class _Run(NamedTuple):
+    """Neighbouring published registers, packed in one go: which of them, and where each face has them."""
+
+    span: slice
+    words: Struct
+    words_at: int
+    high_first: Struct
+    high_first_at: int
+    low_first: Struct
+    low_first_at: int
+
+
+class StatusBlock:
+    """Raises ValueError for a map that lacks a register which the bank or control fills."""
+
+    def __init__(self, register_map: RegisterMap, image: RegisterImage) -> None:
+        registers = {register.name: register for register in register_map.registers_of("status")}
+        if missing := [name for name in (*_SOURCES, *BANK_REGISTERS) if name not in registers]:
+            raise ValueError(f"map {register_map.name}: block status lacks {', '.join(missing)}")
+        published = [register for register in registers.values() if register.name in _SOURCES]
+        self._image = image
+        self._fields = attrgetter(*(_SOURCES[register.name] for register in published))
+        self._scales = tuple(_scale(register) for register in published)
+        self._runs = tuple(_runs(register_map, published))
+        self._own = {name: _faces(register_map, name) for name in BANK_REGISTERS}
+
+    def publish(self, status: Status) -> None:
+        """Everything that control and service know, into all three faces."""
+        counts: list[int] = []
+        numbers: list[float] = []
+        for value, (units_per_si, counts_per_unit, low, high, unavailable) in zip(
+            self._fields(status), self._scales, strict=True
+        ):
+            number = value * units_per_si
+            scaled = number * counts_per_unit
+            if low <= scaled <= high:
+                counts.append(round(scaled) & 0xFFFF)
+                numbers.append(number)
+            else:
+                counts.append((unavailable if not isfinite(number) else high if scaled > high else low) & 0xFFFF)
+                numbers.append(carried_by_float32(number))
+        self._pack(counts, numbers)
+
+    def _pack(self, counts: Sequence[int], numbers: Sequence[float]) -> None:
+        data = self._image.data
+        for run in self._runs:
+            floats = numbers[run.span]
+            run.words.pack_into(data, run.words_at, *counts[run.span])
+            run.high_first.pack_into(data, run.high_first_at, *floats)
+            low_first = words_swapped_from_little_endian(run.low_first.pack(*floats))
+            data[run.low_first_at : run.low_first_at + len(low_first)] = low_first
+
+    def show_owner(self, number: int) -> None:
+        self._put("owner_ip", number)
+
+    def show_refusal(self, refusal: Refusal) -> None:
+        self._put("refusal_address", refusal.address)
+        self._put("refusal_reason", refusal.reason)
+        self._put("refusal_value", refusal.value)
+
+    def _put(self, name: str, value: float) -> None:
+        for register in self._own[name]:
+            self._image.put(register, value)
+
+
+def _scale(register: Register) -> _Scale:
+    low, high = RAW_LIMITS[register.type]
+    unavailable = UNAVAILABLE_INT16 if register.type == "int16" else 0
+    return _Scale(_UNITS_PER_SI[register.unit], register.counts_per_unit, low, high, unavailable)
+
+
+def _faces(register_map: RegisterMap, name: str) -> tuple[Register, ...]:
+    """The register in the status block, and where a float face repeats it."""
+    blocks = {"status", *(block.name for block in register_map.blocks if "status" in block.repeats)}
+    return tuple(register for register in register_map.registers if register.name == name and register.block in blocks)
+
+
+def _runs(register_map: RegisterMap, published: Sequence[Register]) -> list[_Run]:
+    first = register_map.block("status").first
+    bases = {b.word_order: b.repeats["status"] for b in register_map.blocks if "status" in b.repeats}
+    if set(bases) != set(WordOrder):
+        raise ValueError(f"map {register_map.name}: status is not repeated as float in both word orders")
+    breaks = [0, *(k for k in range(1, len(published)) if published[k].address != published[k - 1].address + 1)]
+    runs = []
+    for start, stop in zip(breaks, [*breaks[1:], len(published)], strict=True):
+        count, offset = stop - start, published[start].address - first
+        high, low = (2 * (bases[order] + 2 * offset) for order in (WordOrder.ABCD, WordOrder.CDAB))
+        words, floats, little = Struct(f">{count}H"), Struct(f">{count}f"), Struct(f"<{count}f")
+        runs.append(_Run(slice(start, stop), words, 2 * published[start].address, floats, high, little, low))
+    return runs

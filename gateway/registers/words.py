@@ -1,0 +1,139 @@
+"""Numbers with names that masters rely on: frozen within a map version; profiles/registers repeats them and a test compares."""
+
+from enum import IntEnum, IntFlag
+
+
+class State(IntEnum):
+    """The control state. OFF: output disabled, safe voltage. READY: enabled, nothing to press with yet (setpoint 0,
+    or waiting at the pre-contact force). RAMPING: on the way. HOLDING: at the setpoint. FAULT: latched."""
+
+    OFF = 0
+    READY = 1
+    RAMPING = 2
+    HOLDING = 3
+    FAULT = 4
+
+
+class Mode(IntEnum):
+    FORCE = 0
+    VOLTAGE = 1
+
+
+class ControlBit(IntFlag):
+    ENABLE = 1 << 0
+    RESET_FAULT = 1 << 1  # acts on its rise
+    TARE = 1 << 2  # acts on its rise
+    TAKE_OWNERSHIP = 1 << 3
+    VALVE_PULL = 1 << 4
+    START_CALIBRATION = 1 << 5
+    START_SELF_TEST = 1 << 6
+
+
+class StatusBit(IntFlag):
+    ENABLED = 1 << 0
+    READY = 1 << 1  # an enable would be accepted (or has been): cell fresh, output acknowledged, no fault
+    CONTACT = 1 << 2
+    IN_BAND = 1 << 3
+    FAULT = 1 << 4
+    WARNING = 1 << 5
+    LIMITED = 1 << 6
+    TARGET_UNREACHABLE = 1 << 7
+
+
+class LimitedBy(IntEnum):
+    """What kept the voltage from being what the law asked for, strongest first when several act."""
+
+    NONE = 0
+    VOLTAGE_SLEW = 1
+    VOLTAGE_RANGE = 2
+    TRIM_RANGE = 3
+    CALIBRATION_RANGE = 4
+    FORCE_RANGE = 5
+    SMALLEST_FORCE = 6
+
+
+class FaultCode(IntEnum):
+    """The first cause of a latched fault."""
+
+    NONE = 0
+    MASTER_LOST = 1  # A310: the lease ran out
+    SAMPLE_STALE = 2
+    SAMPLE_FROZEN = 3
+    OVER_FORCE = 4  # saturation counts as over-force
+    SIGN_INVERTED = 5  # A302
+    GAIN_WRONG = 6  # A303
+    OUTPUT_SILENT = 7
+    OUTPUT_REFUSED = 8
+    OUTPUT_ALTERED = 9
+    OUTPUT_LOST = 10  # the port went away
+    CELL_LOST = 11
+    LOOP_STALLED = 12
+    NOT_FINITE = 13
+    INTERNAL = 14
+    MODEL_INVALID = 15
+
+
+class WarningBit(IntFlag):
+    RESTARTED = 1 << 0
+    TARGET_UNREACHABLE = 1 << 1  # A301
+    TRIM_SATURATED = 1 << 2
+    SERIAL_NOISE = 1 << 3
+    SLOW_LOOP = 1 << 4
+    NO_WATCHDOG = 1 << 5
+    CLOCK_FALLBACK = 1 << 6
+    MASTER_LOST = 1 << 7  # A310: the lease ran out, and the rig says hold or ramp
+
+
+class RefusalReason(IntEnum):
+    """Why the last write was refused; the sentence goes to the log."""
+
+    NONE = 0
+    ADDRESS = 1  # W202, W203
+    READ_ONLY = 2
+    HALF_VALUE = 3
+    NOT_FINITE = 4
+    OUT_OF_RANGE = 5  # W204
+    WORDS_SWAPPED = 6  # W201
+    TOO_SMALL = 7
+    RESERVED = 8
+    NOT_OWNER = 9
+    ROLE = 10
+    FAULT_LATCHED = 11
+    NOT_READY = 12
+    OUTPUT_FAULT = 13
+    CELL_SILENT = 14
+    RESET_NEEDS_ZERO = 15
+    UNSUPPORTED_BIT = 16
+    BYTE_ORDER_UNPROVEN = 17
+    BUSY = 18
+    QUANTITY = 19
+    FUNCTION = 20
+    COEFFICIENTS = 21
+
+
+class CommitAction(IntEnum):
+    """What the commit word of the staging block asks for."""
+
+    NONE = 0
+    COMMIT = 1
+    DRY_RUN = 2  # all checks, nothing stored
+
+
+class CommitStatus(IntEnum):
+    """How far the last commit is."""
+
+    IDLE = 0
+    CHECKING = 1
+    WRITING = 2
+    COMMITTED = 3  # durable: after the directory's fsync
+    FAILED = 4  # the active set stays
+
+
+class UploadReason(IntEnum):
+    """Why a staged set failed before its numbers were judged: failing_reason, beside gateway.bsfm.CoefficientReason (0..10)."""
+
+    LENGTH = 20
+    CRC = 21
+    UNUSED_NOT_ZERO = 22
+    TARGET_SLOT = 23
+    FORCE_LIMITS = 24

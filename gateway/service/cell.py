@@ -1,0 +1,227 @@
+"""One running cell: the wired gateway with its real edges (two ports, the Modbus server, tick, recorder, control socket)."""
+
+import asyncio
+import contextlib
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from gateway.control import Controller
+from gateway.devices import cell_host, output_host
+from gateway.fieldbus import BindError, ModbusTcpServer
+from gateway.modbus import Peer
+from gateway.ports import PortError, SerialPort
+from gateway.profiles import Rig
+from gateway.registers import RegisterBank
+from gateway.registers.words import FaultCode, WarningBit
+from gateway.service import banner
+from gateway.service.control_socket import ControlSocket
+from gateway.service.event_log import EventLog
+from gateway.service.gateway import Gateway
+from gateway.service.guardian_line import GuardianLine
+from gateway.service.output_line import OutputLine
+from gateway.service.recordings import Recordings
+from gateway.service.rules import bank_rules, server_settings
+from gateway.service.run_flag import RunFlag
+from gateway.service.tick import Tick
+
+_FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
+_STOP_BOUND_S = 4.5  # the guardian waits 5 s
+
+
+class StartError(Exception):
+    """The gateway can't start; the sentence says why, exit_code how the process ends."""
+
+    def __init__(self, sentence: str, exit_code: int) -> None:
+        super().__init__(sentence)
+        self.exit_code = exit_code
+
+
+def _cause_of_restart(restarted: str, *, was_unclean: bool) -> FaultCode:
+    """What the fault_code register says after an unclean end: the guardian's words, or a run that never ended."""
+    if not restarted and not was_unclean:
+        return FaultCode.NONE
+    return FaultCode.LOOP_STALLED if "stalled" in restarted else FaultCode.INTERNAL
+
+
+class Cell:
+    """Wires one rig's gateway to its edges. `failed` is set when a defect of ours left the loop in an unknown state."""
+
+    def __init__(self, rig: Rig, ports: dict[str, str], state: Path, guardian: GuardianLine, log: EventLog) -> None:
+        self._rig = rig
+        self._state = state
+        self._guardian = guardian
+        self._log = log
+        self._flag = RunFlag(state)
+        self._closing = False
+        self._spoke = asyncio.Event()
+        self.failed = asyncio.Event()
+        asyncio.get_running_loop().set_exception_handler(self._on_defect)
+        host = output_host(rig.output.device)
+        self._safe_frame = host.safe_frame(rig.control.limits.safe_voltage_v)
+        self._safe_reply = host.safe_reply
+        self._output_port = SerialPort(
+            ports["output"],
+            rig.output.settings,
+            on_bytes=self._on_output_bytes,
+            on_lost=self._on_output_lost,
+            on_open=self._on_output_open,
+        )
+        self._cell_port = SerialPort(
+            ports["load_cell"],
+            rig.load_cell.settings,
+            on_bytes=self._on_cell_bytes,
+            on_lost=self._on_cell_lost,
+            on_open=self._on_cell_open,
+        )
+        self._line = OutputLine(host, self._write_output, rig.output.device.reply_timeout_s)
+        self._tick = Tick(1.0 / rig.loop_hz, self._on_tick)
+        self._recordings = Recordings(state / "recordings", rig, log)
+
+    def _wire(self, cause: FaultCode) -> None:
+        rig = self._rig
+        self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
+        self.bank.set_active_model(rig.calibration)
+        self.bank.on_refusal = lambda refusal, peer: self._log(f"refusal {peer}", f"{refusal.sentence}   ({peer})")
+        self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer}", f"{sentence}   ({peer})")
+        self.controller = Controller(
+            rig.control, rig.calibration.model(), calibration_id=rig.calibration.number, unclean_restart=bool(cause)
+        )
+        self.gateway = Gateway(
+            self.bank,
+            self.controller,
+            self._line,
+            cell_host(rig.load_cell.device, sign=rig.load_cell.sign, unit=rig.load_cell.unit),
+            calibration_id=rig.calibration.number,
+            clock=time.monotonic,
+            log=self._log,
+        )
+        self.gateway.recordings = self._recordings
+        self.gateway.restart_cause = cause
+        if self._tick.is_fallback:
+            self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
+        self._server = ModbusTcpServer(
+            self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
+        )
+        self._control_socket = ControlSocket(self._state, self.bank, self._recordings, self.gateway.health)
+
+    async def start(self, bind: list[Any] | None, *, record: bool, restarted: str) -> banner.Ready:
+        """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
+        self._wire(_cause_of_restart(restarted, was_unclean=self._flag.raise_flag()))
+        await self._output_port.open()
+        await self._cell_port.open()
+        self._tick.start()
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._spoke.wait(), _FIRST_WORDS_S)
+        if record:
+            self._recordings.start()
+        await self._control_socket.start()
+        modbus = await self._listen(bind)
+        return banner.Ready(
+            rig=self._rig,
+            modbus=modbus,
+            output_port=self._output_port.path,
+            cell_port=self._cell_port.path,
+            voltage_v=self._line.acknowledged_v,
+            force_n=self.gateway.sample.force_n if self.gateway.sample else None,
+            notes=self._notes(restarted),
+        )
+
+    def _notes(self, restarted: str) -> tuple[str, ...]:
+        notes = list(self._rig.notes)
+        if restarted:
+            notes.append(f"restarted in OFF after: {restarted}")
+        if self._line.acknowledged_v is None:
+            notes.append(
+                f"E111 {self._output_port.path}: no answer; power, crossed wires, baud? force-gateway explain E111"
+            )
+        if self.gateway.sample is None:
+            notes.append(
+                f"E111 {self._cell_port.path}: no valid line; power, crossed wires, stream mode? force-gateway explain E111"
+            )
+        return tuple(notes)
+
+    async def _listen(self, bind: list[Any] | None) -> tuple[str, int]:
+        host, port = bind or (self._rig.network.bind, self._rig.network.port)
+        try:
+            return await self._server.start(str(host), int(port))
+        except PermissionError as error:
+            raise StartError(
+                f"E120 port {port} needs the capability net_bind_service; use --bind {host}:5020 (force-gateway explain E120)",
+                77,
+            ) from error
+        except BindError as error:
+            raise StartError(str(error), 78) from error
+        except OSError as error:
+            raise StartError(f"E121 cannot listen on {host}:{port}: {error}; another --bind HOST:PORT?", 69) from error
+
+    async def ramp_down(self) -> None:
+        """Force to 0 along the ramp, then the safe voltage (at most 4.5 s)."""
+        self.controller.stop()
+        deadline_s = time.monotonic() + _STOP_BOUND_S
+        while not self.controller.stopped and time.monotonic() < deadline_s:
+            await asyncio.sleep(self._tick.period_s)
+
+    async def close(self) -> None:
+        """Safe voltage on the wire, then everything closed; the clean-run flag goes last."""
+        self._closing = True
+        self._tick.close()
+        await self._server.close()
+        await self._control_socket.close()
+        self._recordings.stop()
+        with contextlib.suppress(PortError):
+            await self._output_port.write_last(self._safe_frame)
+        self._output_port.close()
+        self._cell_port.close()
+        self._flag.lower()
+
+    def _on_defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """An exception that nobody expected: the process ends with the safe voltage, the guardian starts it again in OFF."""
+        error = context.get("exception")
+        trace = "".join(traceback.format_exception(error)) if isinstance(error, BaseException) else ""
+        self._log("internal", f"A499 a defect of ours: {context['message']}\n{trace}")
+        self.failed.set()
+
+    def _on_tick(self, expirations: int, late_s: float) -> None:
+        self.gateway.on_tick(expirations, late_s)
+        self._guardian.heartbeat()
+        self._recordings.flush(time.monotonic())
+        if self._line.acknowledged_v is not None and self.gateway.sample is not None:
+            self._spoke.set()
+
+    def _write_output(self, data: bytes) -> None:
+        if not self._closing:
+            self._output_port.flush_input()  # at most one question is out: whatever is there answers none of ours
+            self._output_port.write(data)
+
+    def _on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.gateway.on_output_bytes(chunk, now_s)
+
+    def _on_output_open(self, descriptor: int) -> None:
+        self._guardian.hand_over(descriptor, self._safe_frame, self._safe_reply)
+        self.gateway.output_opened()
+        self._warn_of_latency(self._output_port)
+
+    def _on_output_lost(self, error: PortError) -> None:
+        self._log("port", str(error))
+        self.gateway.output_closed()
+
+    def _on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.gateway.on_cell_bytes(chunk, now_s)
+
+    def _on_cell_open(self, descriptor: int) -> None:
+        self.gateway.cell_opened()
+        self._warn_of_latency(self._cell_port)
+
+    def _warn_of_latency(self, port: SerialPort) -> None:
+        if port.warning:
+            self._log("port", port.warning)
+
+    def _on_cell_lost(self, error: PortError) -> None:
+        self._log("port", str(error))
+        self.gateway.cell_lost = True
+
+    def _on_peer_closed(self, peer: Peer) -> None:
+        if peer.host == self.bank.owner:
+            self.gateway.owner_connected = False

@@ -1,0 +1,97 @@
+"""The control process: one lean asyncio loop with Modbus, both serial ports, the control step and the recorder.
+
+scipy, pandas, matplotlib and jinja2 are never imported here (a full garbage collection costs 2.6 ms lean and 21-36 ms
+with them; a test checks). It is started by the guardian, feeds its heartbeat from the tick, and ends with the safe
+voltage on the wire when the guardian says stop or is gone.
+"""
+
+import asyncio
+import contextlib
+import gc
+import json
+import socket
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from gateway.ports import PortError
+from gateway.profiles import ProfileError, Rig, load_rig
+from gateway.service import banner
+from gateway.service.cell import Cell, StartError
+from gateway.service.event_log import EventLog
+from gateway.service.guardian_line import GuardianLine
+from gateway.service.realtime import use_realtime
+
+EXIT_DEFECT, EXIT_CONFIGURATION = 1, 78
+
+
+def main(arguments: list[str]) -> int:
+    link = socket.socket(fileno=int(arguments[0]))
+    link.setblocking(False)
+    options = json.loads(arguments[1])
+    try:
+        rig = load(options)
+    except ProfileError as error:
+        print("\n".join(str(fault) for fault in error.faults), file=sys.stderr)
+        return EXIT_CONFIGURATION
+    notes = use_realtime() if options["realtime"] else ()
+    with EventLog() as log, asyncio.Runner(loop_factory=_loop_factory()) as runner:
+        try:
+            return runner.run(run(rig, options, link, log, notes))
+        except StartError as error:
+            print(error, file=sys.stderr)
+            return error.exit_code
+        except PortError as error:
+            print(error, file=sys.stderr)
+            return error.exit_code
+
+
+def load(options: dict[str, Any]) -> Rig:
+    rig = load_rig(options["rig"])
+    return rig.as_simulated() if options["simulate"] else rig
+
+
+def _loop_factory() -> Any:
+    """uvloop where it is installed (the `fast` extra), else the standard loop."""
+    with contextlib.suppress(ImportError):
+        import uvloop
+
+        return uvloop.new_event_loop
+    return None
+
+
+async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: EventLog, notes: tuple[str, ...]) -> int:
+    """From the first open port to the last safe voltage; the exit code."""
+    guardian = GuardianLine(link)
+    ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
+    if ports is None:
+        return EXIT_CONFIGURATION
+    cell = Cell(rig, ports, Path(options["state"]), guardian, log)
+    try:
+        ready = await cell.start(options["bind"], record=options["record"], restarted=options["restarted"])
+        ready = replace(ready, notes=ready.notes + notes)
+        gc.collect()
+        gc.freeze()
+        guardian.ready({"banner": banner.banner(ready), "info": banner.info(ready)}, rig.control.supervision.stall_s)
+        await _first_of(guardian.told_to_stop, cell.failed)
+        if cell.failed.is_set():
+            return EXIT_DEFECT
+        if not guardian.is_gone:
+            await cell.ramp_down()
+    finally:
+        await cell.close()
+        guardian.close()
+    return 0
+
+
+async def _first_of(*events: asyncio.Event) -> None:
+    waiting = [asyncio.ensure_future(event.wait()) for event in events]
+    await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+    for task in waiting:
+        task.cancel()
+    await asyncio.gather(*waiting, return_exceptions=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,49 @@
+"""`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
+
+record on|off|status, last writers of each register, and faults of a simulated rig (passed on to the rig's own socket by
+the tools themselves). Mode 0600: whoever may write the state directory may ask.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from gateway.registers import RegisterBank
+from gateway.service.json_lines import Handler, JsonLineServer
+from gateway.service.publish import LoopHealth
+from gateway.service.recordings import Recordings
+
+
+class ControlSocket(JsonLineServer):
+    def __init__(self, state: Path, bank: RegisterBank, recordings: Recordings, health: LoopHealth) -> None:
+        handlers: dict[str, Handler] = {
+            "record": self._record,
+            "last-writer": self._last_writer,
+            "health": self._health_figures,
+        }
+        super().__init__(state / "control.sock", handlers)
+        self._bank = bank
+        self._recordings = recordings
+        self._health = health
+
+    def _record(self, request: dict[str, Any]) -> dict[str, Any]:
+        is_on = request.get("on")
+        if is_on is None:
+            return self._recordings.status()
+        return self._recordings.start() if is_on else self._recordings.stop()
+
+    def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
+        return {
+            "owner": self._bank.owner,
+            "writers": {
+                name: {"peer": str(peer), "time_s": at_s} for name, (peer, at_s) in self._bank.last_writer.items()
+            },
+        }
+
+    def _health_figures(self, request: dict[str, Any]) -> dict[str, Any]:
+        return {
+            "ticks": self._health.ticks,
+            "missed_ticks": self._health.missed_ticks,
+            "loop_time_us": self._health.loop_time_s * 1e6,
+            "late_p50_us": self._health.lateness_us(0.5),
+            "late_p99_us": self._health.lateness_us(0.99),
+        }

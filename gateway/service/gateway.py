@@ -1,0 +1,143 @@
+"""One rig, wired: the way of one setpoint through the house, and the way of a measured force back.
+
+A master's write calls `on_command` inside the bank's write, so the voltage is on its way before the master has its answer.
+The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Clock and ports come in as arguments; the
+same class runs behind ptys, behind real ports and in virtual time. No exception of ours may leave the last voltage
+standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
+"""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+
+from gateway.control import Controller
+from gateway.control.inputs import Line, Output
+from gateway.devices import CellHost
+from gateway.devices.messages import ForceSample
+from gateway.registers import RegisterBank
+from gateway.registers.command import Command
+from gateway.registers.words import FaultCode, WarningBit
+from gateway.service.output_line import OutputLine
+from gateway.service.publish import LoopHealth, status_of
+from gateway.service.recordings import Recordings
+
+Log = Callable[[str, str], None]
+"""log(cause, sentence): the cause groups lines for rate limits, the sentence is for people."""
+
+
+class Gateway:
+    """Joins bank, controller, output line and load cell; owns no file and no socket."""
+
+    def __init__(
+        self,
+        bank: RegisterBank,
+        controller: Controller,
+        output: OutputLine,
+        cell: CellHost,
+        *,
+        calibration_id: int,
+        clock: Callable[[], float],
+        log: Log,
+    ) -> None:
+        self.bank = bank
+        self.controller = controller
+        self.output = output
+        self.recordings: Recordings | None = None
+        self.health = LoopHealth()
+        self.decision: Output | None = None
+        self.sample: ForceSample | None = None
+        self.samples = 0
+        self.cell_garbage_bytes = 0
+        self.output_lost = FaultCode.NONE
+        self.cell_lost = False
+        self.owner_connected = True
+        self.warnings = WarningBit(0)
+        self.restart_cause = FaultCode.NONE
+        self._cell = cell
+        self._calibration_id = calibration_id
+        self._clock = clock
+        self._log = log
+        self._last_tick_s: float | None = None
+        bank.on_command = self._on_command
+
+    def _on_command(self, command: Command) -> None:
+        self.owner_connected = True
+        self._step(self._clock())
+
+    def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
+        fresh = False
+        for message in self._cell.receive(chunk, now_s):
+            if isinstance(message, ForceSample):
+                self.sample, fresh = message, True
+                self.samples += 1
+            else:
+                self.cell_garbage_bytes += len(message.data)
+        if fresh:
+            self._step(now_s)
+            self._record()
+
+    def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.output.on_bytes(chunk, now_s)
+
+    def on_tick(self, expirations: int, late_s: float) -> None:
+        """expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
+        self.health.count(expirations, late_s)
+        now_s = self._clock()
+        self.output.tick(now_s)
+        self._step(now_s)
+        self._last_tick_s = now_s
+
+    def output_opened(self) -> None:
+        self.output.opened()
+        self.output_lost = FaultCode.NONE
+
+    def output_closed(self) -> None:
+        self.output.opened()
+        self.output_lost = FaultCode.OUTPUT_LOST
+
+    def cell_opened(self) -> None:
+        self._cell.forget()
+        self.cell_lost = False
+
+    def _late_s(self, now_s: float) -> float:
+        """How long the loop has not come by: what arrived meanwhile is executed late (SAFETY: stall)."""
+        return 0.0 if self._last_tick_s is None else now_s - self._last_tick_s
+
+    def _line(self, now_s: float) -> Line:
+        return Line(
+            acknowledged_v=self.output.acknowledged_v,
+            unanswered_since_s=self.output.unanswered_since_s,
+            fault=self.output_lost or self.output.fault,
+            cell_lost=self.cell_lost,
+            pressure_pa=self.output.pressure_pa,
+            owner_connected=self.owner_connected,
+            late_s=self._late_s(now_s),
+            warnings=self.warnings,
+        )
+
+    def _decide(self, now_s: float) -> Output:
+        try:
+            return self.controller.step(now_s, self.bank.command, self.sample, self._line(now_s))
+        except Exception:
+            self._log("internal", "A499 a defect of ours, safe voltage written:\n" + traceback.format_exc())
+            return self.controller.safe_output(FaultCode.INTERNAL)
+
+    def _step(self, now_s: float) -> None:
+        decision = self._decide(now_s)
+        self.output.want(decision.voltage_v, now_s)
+        self.decision = decision
+        if decision.clear_command:
+            self.bank.clear_command()
+        if decision.release_owner:
+            self.bank.release_owner()
+        self.health.loop_time_s = self._clock() - now_s
+        status = status_of(decision, self.health, self.output.pressure_pa, self._calibration_id)
+        if decision.warnings & WarningBit.RESTARTED and not decision.fault:
+            status = replace(status, fault_code=self.restart_cause)
+        self.bank.publish(status)
+        for event in decision.events:
+            self._log("control", event)
+
+    def _record(self) -> None:
+        if self.recordings and self.sample and self.decision:
+            self.recordings.append(self.sample, self.decision, self.output.pressure_pa)

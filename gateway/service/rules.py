@@ -1,0 +1,32 @@
+"""From a rig to what its bank and its server must hold to."""
+
+from gateway.fieldbus import ServerSettings
+from gateway.profiles import Rig
+from gateway.registers import BankRules
+
+
+def bank_rules(rig: Rig) -> BankRules:
+    limits = rig.control.limits
+    return BankRules(
+        rig_name=rig.name,
+        force_max_n=limits.force_max_n,
+        voltage_min_v=limits.voltage_min_v,
+        voltage_max_v=limits.voltage_max_v,
+        cell_range_n=rig.load_cell.range_n,
+        supported_bits=rig.supported_bits,
+        require_byte_order_echo=rig.network.require_byte_order_echo,
+        owner=rig.network.owner,
+        allow_plain_upload=rig.network.allow_plain_upload,
+    )
+
+
+def server_settings(rig: Rig) -> ServerSettings:
+    network = rig.network
+    return ServerSettings(
+        units=network.units,
+        connections=network.connections,
+        per_address=network.per_address,
+        idle_s=network.idle_s,
+        requests_per_s=network.requests_per_s,
+        allow=network.allow,
+    )

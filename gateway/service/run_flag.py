@@ -1,0 +1,17 @@
+"""Did the last run end cleanly? A file that exists only while a gateway runs."""
+
+from pathlib import Path
+
+
+class RunFlag:
+    def __init__(self, state: Path) -> None:
+        self._path = state / "running"
+
+    def raise_flag(self) -> bool:
+        """Mark this run as begun; True when the one before never lowered its flag."""
+        was_unclean = self._path.exists()
+        self._path.touch(mode=0o600)
+        return was_unclean
+
+    def lower(self) -> None:
+        self._path.unlink(missing_ok=True)

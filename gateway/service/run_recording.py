@@ -1,0 +1,62 @@
+"""What a run records: one row per load-cell sample, in the columns of the recording contract.
+
+`command_v` is what stands from this row on; `force_n` was read before it acts.
+"""
+
+from gateway.control.inputs import Output
+from gateway.devices.messages import ForceSample, Quality
+from gateway.recording import Recorder
+from gateway.units import kilopascal_from_pascal
+
+COLUMNS = (
+    "time_s",
+    "command_v",
+    "force_n",
+    "pressure_kpa",
+    "quality",
+    "setpoint_n",
+    "applied_n",
+    "feedforward_v",
+    "trim_v",
+    "state",
+    "fault_code",
+    "limited_by",
+    "model_residual_n",
+)
+
+_QUALITY_NUMBER = {Quality.OK: 0.0, Quality.UNSTABLE: 1.0, Quality.OVERLOAD: 2.0}
+
+
+class RunRecording:
+    """One open recording; time_s counts from its first row."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._start_s: float | None = None
+        self.rows = 0
+
+    @property
+    def recorder(self) -> Recorder:
+        return self._recorder
+
+    def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
+        if self._start_s is None:
+            self._start_s = sample.time_s
+        self.rows += 1
+        self._recorder.append(
+            (
+                sample.time_s - self._start_s,
+                decision.voltage_v,
+                decision.force_measured_n,
+                kilopascal_from_pascal(pressure_pa),
+                _QUALITY_NUMBER[sample.quality],
+                decision.force_requested_n,
+                decision.force_applied_n,
+                decision.feedforward_v,
+                decision.trim_v,
+                float(decision.state),
+                float(decision.fault),
+                float(decision.limited_by),
+                decision.model_residual_n,
+            )
+        )

@@ -1,0 +1,62 @@
+"""The guardian's last word on the wire: the safe voltage, until the device has acknowledged it.
+
+A dead process may leave half a command behind, so the first safe frame can be swallowed into an unknown command: it is
+repeated until the acknowledgement comes, at most three times, and output is never flushed.
+Standard library only.
+"""
+
+import contextlib
+import os
+import re
+import select
+import time
+from dataclasses import dataclass
+
+_REPEATS = 3
+
+
+@dataclass(frozen=True)
+class SafeLine:
+    """One output port: its descriptor, the frame for the safe voltage and the reply that acknowledges it (may be empty)."""
+
+    descriptor: int
+    frame: bytes
+    reply: bytes
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            os.close(self.descriptor)
+
+    def write_safe(self, reply_timeout_s: float = 0.1) -> bool:
+        """Put the safe voltage on the wire. True when acknowledged, False when the device is silent or the port gone."""
+        try:
+            for _ in range(_REPEATS):
+                _write_all(self.descriptor, self.frame, reply_timeout_s)
+                if not self.reply or self._acknowledged(reply_timeout_s):
+                    return True
+        except OSError:
+            return False
+        return False
+
+    def _acknowledged(self, timeout_s: float) -> bool:
+        """A reply counts only as a whole line: the 0 at the end of 510 acknowledges nothing."""
+        deadline_s = time.monotonic() + timeout_s
+        seen = b""
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            if not select.select([self.descriptor], [], [], left_s)[0]:
+                return False
+            chunk = os.read(self.descriptor, 256)
+            if not chunk:
+                return False
+            seen += chunk
+            if self.reply.strip() in re.split(rb"[\r\n]+", seen)[:-1]:
+                return True
+        return False
+
+
+def _write_all(descriptor: int, data: bytes, timeout_s: float) -> None:
+    view = memoryview(data)
+    while view:
+        if not select.select([], [descriptor], [], timeout_s)[1]:
+            raise OSError("the line does not take bytes")
+        view = view[os.write(descriptor, view) :]

@@ -1,0 +1,139 @@
+"""The simulated rig: a process of its own with two ptys, the device role of each codec, and the twin behind them.
+
+It is a child of the guardian in its own session, so it outlives a kill of control as a real rig does, and ends when the
+guardian does (its link closes). The wires take the time that their baud rates take. A socket in the state directory
+(`rig.sock`) takes faults for tests and demonstrations: no air, no contact, a cut wire, an inverted sign.
+"""
+
+import asyncio
+import json
+import socket
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from gateway.devices import cell_device, output_device
+from gateway.devices.messages import (
+    Accepted,
+    Garbage,
+    OutputRequest,
+    Pressure,
+    Quality,
+    ReadPressure,
+    ReadVoltage,
+    SetVoltage,
+)
+from gateway.ports import PacedPty
+from gateway.profiles import Rig, load_rig
+from gateway.service.json_lines import JsonLineServer
+from gateway.service.tick import Tick
+from gateway.twin import Twin
+
+_LONGEST_LEAP_S = 1.0  # a rig process that was stopped does not replay the hours it missed
+
+
+class SimulatedRig:
+    """The twin behind the device ends of both wires. Bytes in through `on_output_bytes`, out through the two `send`s."""
+
+    def __init__(
+        self, rig: Rig, *, send_output: Callable[[bytes], None], send_cell: Callable[[bytes], None], now_s: float
+    ) -> None:
+        assert rig.plant
+        self.twin = Twin(rig.plant, rig.seed)
+        self.is_cell_cut = False
+        self.is_output_cut = False
+        self._output = output_device(rig.output.device)
+        self._cell = cell_device(rig.load_cell.device)
+        self._send_output = send_output
+        self._send_cell = send_cell
+        self._setting_v = 0.0
+        self._now_s = now_s
+        self._range_n = rig.plant.cell.range_n
+
+    def advance(self, now_s: float) -> None:
+        self.twin.advance(min(max(0.0, now_s - self._now_s), _LONGEST_LEAP_S))
+        self._now_s = now_s
+
+    def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.advance(now_s)
+        for request in self._output.receive(chunk, now_s):
+            answer = self._answer(request)
+            if not self.is_output_cut:
+                self._send_output(answer)
+
+    def stream(self, now_s: float) -> None:
+        """One frame of the load-cell amplifier."""
+        self.advance(now_s)
+        if not self.is_cell_cut:
+            force_n = float(self.twin.measured_n)
+            overload = abs(force_n) >= self._range_n
+            self._send_cell(self._cell.frame(force_n, Quality.OVERLOAD if overload else Quality.OK))
+
+    def _answer(self, request: OutputRequest | Garbage) -> bytes:
+        match request:
+            case SetVoltage(voltage_v):
+                self._setting_v = voltage_v
+                self.twin.command(voltage_v)
+                return self._output.reply(Accepted(voltage_v), to=request)
+            case ReadVoltage():
+                return self._output.reply(Accepted(self._setting_v), to=request)
+            case ReadPressure():
+                return self._output.reply(Pressure(float(self.twin.pressure_pa)), to=request)
+            case Garbage():
+                return self._output.reply(self._output.refusal(request))
+
+    def fault(self, request: dict[str, Any]) -> dict[str, Any]:
+        """{"do": "fault", "name": NAME, "on": bool}; ValueError on an unknown name."""
+        name, is_on = request.get("name"), bool(request.get("on", True))
+        match name:
+            case "no-air":
+                self.twin.set_air(not is_on)
+            case "no-contact":
+                self.twin.set_contact(not is_on)
+            case "sign-inverted":
+                self.twin.set_sign(-1 if is_on else 1)
+            case "cell-cut":
+                self.is_cell_cut = is_on
+            case "output-cut":
+                self.is_output_cut = is_on
+            case _:
+                raise ValueError(
+                    f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, output-cut"
+                )
+        return {"fault": name, "on": is_on}
+
+
+async def serve(rig: Rig, link: socket.socket, state: Path) -> None:
+    """Run until the guardian's end of the link closes."""
+    loop = asyncio.get_running_loop()
+    ended = asyncio.Event()
+    output_pty = PacedPty(rig.output.baud, on_bytes=lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s))
+    cell_pty = PacedPty(rig.load_cell.baud, on_bytes=lambda chunk, now_s: None)
+    simulated = SimulatedRig(rig, send_output=output_pty.send, send_cell=cell_pty.send, now_s=time.monotonic())
+    faults = JsonLineServer(state / "rig.sock", {"fault": simulated.fault})
+    tick = Tick(1.0 / rig.load_cell.device.rate_hz, lambda *_: simulated.stream(time.monotonic()))
+    output_pty.open()
+    cell_pty.open()
+    await faults.start()
+    tick.start()
+    loop.add_reader(link.fileno(), ended.set)
+    link.send(json.dumps({"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}}).encode())
+    await ended.wait()
+    loop.remove_reader(link.fileno())
+    tick.close()
+    await faults.close()
+    output_pty.close()
+    cell_pty.close()
+
+
+def main(arguments: list[str]) -> int:
+    link = socket.socket(fileno=int(arguments[0]))
+    options = json.loads(arguments[1])
+    asyncio.run(serve(load_rig(options["rig"]).as_simulated(), link, Path(options["state"])))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

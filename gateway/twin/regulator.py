@@ -1,0 +1,105 @@
+"""The electro-pneumatic regulator: command steps, dead band, hysteresis, supply limit, delay, slew, two lags.
+
+Order of the terms: what does not depend on time (steps, dead band, play, supply) acts when the command arrives, and
+what does (delay, slew, lags) acts in each step. The two commute - a rate-independent operator does not care when its
+input comes - and a held command then costs nothing but the lags. The lags are exact for a held input:
+p += (1 - exp(-dt/tau)) (u - p), stable for any dt. The delay may be a fraction of a step (interpolated, never early),
+so that its sensitivity can be computed.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from gateway.twin.elementwise import Real, clip, exponential, larger, quantised, smaller, where
+from gateway.twin.plant import UNLIMITED, Regulator
+
+
+def lag_factor(lag_s: Real, step_s: float) -> Real:
+    """Share of the remaining difference that a first-order lag covers in one step; 1 without a lag."""
+    present = larger(lag_s, 1.0e-12)
+    return where(lag_s > 0.0, 1.0 - exponential(-step_s / present), lag_s * 0.0 + 1.0)
+
+
+def target_pa(regulator: Regulator, voltage_v: Real) -> Real:
+    """Pressure that a command asks for, in the command's own steps."""
+    stepped_v = quantised(clip(voltage_v, 0.0, regulator.full_scale_v), regulator.command_step_v)
+    return smaller(stepped_v, regulator.full_scale_v) * (regulator.full_scale_pa / regulator.full_scale_v)
+
+
+def noticed(target: Real, held: Real, dead_band: Real) -> Real:
+    """The target that the regulator works on: a change within the dead band passes unnoticed."""
+    return where(abs(target - held) > dead_band, target, held)
+
+
+def play(state: Real, value: Real, width: Real) -> Real:
+    """Hysteresis of full width `width`: the state is dragged along, half a width behind."""
+    return clip(state, value - 0.5 * width, value + 0.5 * width)
+
+
+class DelayLine:
+    """What was put in `delay_s` ago, one `put` per step. One ring for all lanes; lanes may have different delays."""
+
+    def __init__(self, delay_s: Real, step_s: float, start: Real) -> None:
+        steps = np.round(np.asarray(delay_s) / step_s, 9)
+        whole = np.floor(steps).astype(int)
+        self._fraction = float(steps - whole) if steps.ndim == 0 else steps - whole
+        self._interpolates = bool(np.any(steps != whole))
+        self._same = bool(np.all(whole == whole.flat[0]))
+        self._whole, self._first = whole, int(whole.flat[0])
+        self._length = int(whole.max()) + 2
+        self._lanes = np.arange(whole.size)
+        self._ring: Any = [start] * self._length if self._same else np.zeros((self._length, whole.size))
+        self._at = 0
+
+    def put(self, value: Real) -> Real:
+        """Store this step's value and return the one that is due."""
+        self._at = at = (self._at + 1) % self._length
+        self._ring[at] = value
+        if not self._interpolates:
+            return self._look_back(at)
+        later, earlier = self._look_back(at), self._look_back(at - 1)
+        return later + self._fraction * (earlier - later)
+
+    def _look_back(self, at: int) -> Real:
+        if self._same:
+            return self._ring[(at - self._first) % self._length]
+        return self._ring[(at - self._whole) % self._length, self._lanes]
+
+
+class RegulatorState:
+    """The moving part: `command` when a voltage arrives, `step` every step."""
+
+    def __init__(self, regulator: Regulator, step_s: float, zero: Real) -> None:
+        self._regulator = regulator
+        self._noticed_pa = self._play_pa = self._target_pa = self._slewed_pa = self._first_pa = zero
+        self._zero = zero
+        self.pressure_pa: Real = zero
+        self.air = True
+        self._delay = DelayLine(regulator.delay_s, step_s, zero) if np.any(regulator.delay_s) else None
+        self._slew_pa = regulator.slew_pa_per_s * step_s if np.any(regulator.slew_pa_per_s < UNLIMITED) else None
+        self._lag = lag_factor(regulator.lag_s, step_s) if np.any(regulator.lag_s) else None
+        self._second_lag = lag_factor(regulator.second_lag_s, step_s) if np.any(regulator.second_lag_s) else None
+
+    def command(self, voltage_v: Real) -> None:
+        """Take a new command, V (one for all lanes, or one per lane)."""
+        regulator = self._regulator
+        target = target_pa(regulator, voltage_v)
+        self._noticed_pa = noticed(target, self._noticed_pa, regulator.dead_band_pa)
+        self._play_pa = play(self._play_pa, self._noticed_pa, regulator.hysteresis_pa)
+        self._target_pa = smaller(larger(self._play_pa, 0.0), regulator.supply_pa) + self._zero
+
+    def step(self) -> Real:
+        """Pressure at the end of one step, Pa."""
+        pressure = self._target_pa if self._delay is None else self._delay.put(self._target_pa)
+        if not self.air:
+            pressure = self._zero
+        if self._slew_pa is not None:
+            last = self._slewed_pa
+            self._slewed_pa = pressure = clip(pressure, last - self._slew_pa, last + self._slew_pa)
+        if self._lag is not None:
+            self._first_pa = pressure = self._first_pa + self._lag * (pressure - self._first_pa)
+        if self._second_lag is not None:
+            pressure = self.pressure_pa + self._second_lag * (pressure - self.pressure_pa)
+        self.pressure_pa = pressure
+        return pressure

@@ -1,0 +1,132 @@
+"""The twin: regulator, slide and load cell in series, advanced in fixed steps of 1 ms.
+
+Pressure does not feel the slide: the regulator's own loop (tens of ms) holds it against the volume change of a pad that
+gives 1 mm, and no figure of the paper shows otherwise. Time and chance are arguments: `advance(dt_s)` and `seed`.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.random import default_rng
+
+from gateway.twin.elementwise import Real
+from gateway.twin.load_cell import LoadCellState
+from gateway.twin.plant import Plant, lane_count, plain
+from gateway.twin.regulator import RegulatorState
+from gateway.twin.slide import SlideState
+
+STEP_S: Final = 1.0e-3
+_ROUNDING: Final = 1.0e-6  # of a step: ten times 0.001 s are ten steps
+
+
+class Twin:
+    """A simulated rig. Floats in, floats out; arrays of lanes when the plant is stacked."""
+
+    def __init__(self, plant: Plant, seed: int) -> None:
+        """Start at rest, without air pressure, at time 0. ValueError when the plant's lanes differ in number."""
+        self.plant = plain(plant)
+        self._seed = seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the start: state, time, faults and noise."""
+        lanes = lane_count(self.plant)
+        zero: Real = 0.0 if lanes is None else np.zeros(lanes)
+        self._regulator = RegulatorState(self.plant.regulator, STEP_S, zero)
+        self._slide = SlideState(self.plant, STEP_S, zero)
+        self._cell = LoadCellState(self.plant.cell, STEP_S, zero)
+        self._rng = default_rng(self._seed)
+        self._steps = 0
+        self._owed_steps = 0.0
+        self._reading: Real = None
+
+    def command(self, voltage_v: Real) -> None:
+        """Apply a command voltage, V; it holds until the next one. ValueError when it is not finite."""
+        if not np.all(np.isfinite(voltage_v)):
+            raise ValueError(f"command {voltage_v} V is not finite")
+        lanes = isinstance(voltage_v, np.ndarray)
+        self._regulator.command(voltage_v if lanes else float(voltage_v))
+
+    def advance(self, dt_s: float) -> None:
+        """Let time pass. Parts of a step are kept for the next call, so that only the sum counts."""
+        if not 0.0 <= dt_s < float("inf"):
+            raise ValueError(f"time advances by a finite dt_s >= 0, not by {dt_s}")
+        self._owed_steps += dt_s / STEP_S
+        steps = int(self._owed_steps + _ROUNDING)
+        self._owed_steps -= steps
+        regulator, slide, cell = self._regulator.step, self._slide.step, self._cell.step
+        for _ in range(steps):
+            cell(slide(regulator()))
+        self._steps += steps
+        if steps:
+            self._reading = None
+
+    def read(self) -> Real:
+        """A reading of the load cell now, N: each call draws new noise."""
+        self._reading = self._cell.read(self._rng)
+        return self._reading
+
+    @property
+    def measured_n(self) -> Real:
+        """The reading of this moment, N: the last `read`, or a new one when time has passed since."""
+        return self.read() if self._reading is None else self._reading
+
+    @property
+    def time_s(self) -> float:
+        return (self._steps + self._owed_steps) * STEP_S
+
+    @property
+    def pressure_pa(self) -> Real:
+        """Gauge pressure in the cylinder."""
+        return self._regulator.pressure_pa
+
+    @property
+    def force_n(self) -> Real:
+        """True contact force, without cell, noise or sign."""
+        return self._slide.force_n
+
+    @property
+    def friction_n(self) -> Real:
+        """Friction on the slide, positive against motion outward."""
+        return self._slide.friction_n
+
+    @property
+    def position_m(self) -> Real:
+        """Travel of the slide from its back stop."""
+        return self._slide.position_m
+
+    @property
+    def speed_m_per_s(self) -> Real:
+        return self._slide.speed_m_per_s
+
+    def set_surface(self, height_m: Real) -> None:
+        """Input: the workpiece under the pad, m towards the tool (one for all lanes, or one per lane); 0 is null.
+
+        Feed under the tool is a series of heights. ValueError when not finite.
+        """
+        if not np.all(np.isfinite(height_m)):
+            raise ValueError(f"surface height {height_m} m is not finite")
+        self._slide.set_surface(height_m if isinstance(height_m, np.ndarray) else float(height_m))
+
+    def set_disturbance(self, force_n: Real) -> None:
+        """Input: an outside force on the slide, N towards the workpiece (a spindle's vibration); 0 is null.
+
+        It holds until the next one. ValueError when not finite.
+        """
+        if not np.all(np.isfinite(force_n)):
+            raise ValueError(f"disturbance {force_n} N is not finite")
+        self._slide.set_disturbance(force_n if isinstance(force_n, np.ndarray) else float(force_n))
+
+    def set_air(self, on: bool) -> None:
+        """Fault: shut the air supply off; the pressure falls with the regulator's lag."""
+        self._regulator.air = on
+
+    def set_contact(self, on: bool) -> None:
+        """Fault: take the workpiece away, or bring it back."""
+        self._slide.set_contact(on)
+
+    def set_sign(self, sign: int) -> None:
+        """Fault: wires of the load cell swapped (-1) or right (+1)."""
+        if sign not in (-1, 1):
+            raise ValueError(f"sign is -1 or +1, not {sign}")
+        self._cell.sign = float(sign)

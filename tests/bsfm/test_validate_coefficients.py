@@ -1,0 +1,97 @@
+"""What may not drive a plant, and which number is to blame."""
+
+import math
+import struct
+from dataclasses import replace
+
+import pytest
+
+from gateway.bsfm import (
+    Branches,
+    CoefficientLimits,
+    CoefficientReason,
+    Coefficients,
+    RationalBezier,
+    validate,
+    validate_coefficients,
+)
+
+LIMITS = CoefficientLimits(cell_range_n=98.0)
+GOOD = Coefficients(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.93, 1.2), (0.5, 22.0, 38.0), (1.0, 1.1, 1.2), 3.0)
+
+
+def swapped(number: float) -> float:
+    data = struct.pack(">f", number)
+    return struct.unpack(">f", data[2:] + data[:2])[0]
+
+
+def branches(rising: tuple[float, ...], falling: tuple[float, ...]) -> Branches:
+    return Branches(*(RationalBezier(0.0, 5.0, handles, (1.0,) * len(handles)) for handles in (rising, falling)))
+
+
+def test_a_good_set_has_no_fault():
+    assert validate_coefficients(GOOD, LIMITS) == []
+    assert validate(branches((0.0, 10.0, 20.0), (0.0, 12.0, 20.0)), LIMITS) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "index", "reason"),
+    [
+        ({"rising_weights": (1.0, swapped(0.93), 1.2)}, 17, CoefficientReason.WORDS_SWAPPED),
+        ({"falling_handles_n": (0.5, swapped(22.0), 38.0)}, 33, CoefficientReason.WORDS_SWAPPED),
+        ({"falling_weights": (1.0, 1.1, -1.0)}, 50, CoefficientReason.WEIGHT_RANGE),
+        ({"falling_weights": (1.0, 1.1, 1.1e3)}, 50, CoefficientReason.WEIGHT_RANGE),
+        ({"rising_weights": (100.0, 0.01, 100.0)}, 17, CoefficientReason.WEIGHT_RANGE),
+        ({"rising_handles_n": (0.5, 14.0, 98.1)}, 2, CoefficientReason.HANDLE_RANGE),
+        ({"rising_handles_n": (math.nan, 14.0, 38.0)}, 0, CoefficientReason.NOT_FINITE),
+        ({"rising_handles_n": (0.5, 14.0, 1e39)}, 2, CoefficientReason.NOT_FINITE),
+        ({"falling_handles_n": (0.5, 39.0, 38.0)}, 32, CoefficientReason.NOT_INCREASING),
+        ({"rising_handles_n": (0.5, 0.6, 38.0)}, 0, CoefficientReason.SLOPE_FLOOR),
+        ({"falling_handles_n": (0.5, 13.0, 38.0)}, -1, CoefficientReason.CROSSING),
+        ({"x1_v": 10.5}, -1, CoefficientReason.VOLTAGE_RANGE),
+        ({"x0_v": math.nan}, -1, CoefficientReason.VOLTAGE_RANGE),
+        ({"blend_span_n": math.nan}, -1, CoefficientReason.BLEND_SPAN),
+        ({"rising_weights": (1.0, 1.0)}, -1, CoefficientReason.ORDER),
+    ],
+)
+def test_the_faulty_number_is_named_with_its_reason(change, index, reason):
+    faults = validate_coefficients(replace(GOOD, **change), LIMITS)
+    assert [(fault.index, fault.reason) for fault in faults] == [(index, reason)]
+
+
+def test_the_text_says_what_a_swapped_weight_was_meant_to_be():
+    faults = validate_coefficients(replace(GOOD, rising_weights=(1.0, swapped(0.93), 1.2)), LIMITS)
+    assert "words swapped 0.93" in faults[0].text
+
+
+def test_all_numbers_are_named_at_once():
+    faults = validate_coefficients(replace(GOOD, rising_handles_n=(math.nan, 200.0, 38.0), x1_v=99.0), LIMITS)
+    assert len(faults) == 3
+
+
+def test_what_is_checked_is_what_float32_stores():
+    barely = math.nextafter(20.0, 0.0)  # increasing in double, flat after rounding
+    rising = (0.0, 10.0, barely, 20.0)
+    limits = replace(LIMITS, slope_floor_n_per_v=0.0)
+    double = branches(rising, rising)
+    assert double.rising.is_increasing()
+    stored = Coefficients.of(double).rounded()
+    assert stored.rising_handles_n == (0.0, 10.0, 20.0, 20.0)
+    assert validate(double, limits) == []  # still increasing inside: the end may be flat
+    flat = branches((0.0, math.nextafter(0.0, 1.0)), (0.0, math.nextafter(0.0, 1.0)))
+    assert flat.rising.is_increasing()
+    assert {fault.reason for fault in validate(flat, limits)} == {CoefficientReason.NOT_INCREASING}
+
+
+def test_a_weight_limit_is_met_exactly():
+    assert (
+        validate_coefficients(
+            replace(GOOD, x1_v=5.0), replace(LIMITS, weight_max=struct.unpack(">f", struct.pack(">f", 1.2))[0])
+        )
+        == []
+    )
+
+
+def test_a_missing_array_is_an_order_fault_and_nothing_crashes():
+    faults = validate_coefficients(Coefficients(0.0, 5.0, (), (), (), ()), LIMITS)
+    assert [fault.reason for fault in faults] == [CoefficientReason.ORDER]

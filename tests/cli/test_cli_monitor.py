@@ -1,0 +1,246 @@
+"""The monitor tells what the registers say, at any size, and lives through a gateway that goes away and comes back."""
+
+import fcntl
+import os
+import pty
+import re
+import signal
+import struct
+import subprocess
+import sys
+import termios
+from io import StringIO
+from math import nan
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from gateway.cli.client import GatewayClient, Reading
+from gateway.cli.monitoring.page import page
+from gateway.cli.monitoring.parts import big, chart, chart_top_n
+from gateway.cli.monitoring.poll import Poller
+from gateway.cli.monitoring.table import View, Writer
+from gateway.cli.monitoring.track import Point, Track, buckets
+from gateway.registers import RegisterMap
+from gateway.registers.words import FaultCode, State, StatusBit, WarningBit
+
+IN_BAND = StatusBit.ENABLED | StatusBit.CONTACT | StatusBit.IN_BAND
+
+
+def poll_of(register_map: RegisterMap, **values: float) -> list[Reading]:
+    """What a poll brings: every register of both blocks, 0 where no value is given."""
+    readings = []
+    for block in ("command", "status"):
+        for register in register_map.registers_of(block):
+            data = register.encode(values.get(register.name, 0))
+            words = tuple(int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2))
+            readings.append(Reading(register, register.decode(data), words))
+    return readings
+
+
+@pytest.fixture
+def holding(register_map: RegisterMap) -> Track:
+    track = Track()
+    for tick in range(50):
+        track.add(tick * 0.1, poll_of(register_map, force_measured=0, force_requested=0, status_word=StatusBit.ENABLED))
+    for tick in range(50, 300):
+        force_n = 12 - 10 * 0.8 ** (tick - 50)
+        status = IN_BAND if force_n > 11 else StatusBit.ENABLED
+        readings = poll_of(
+            register_map,
+            force_measured=force_n,
+            force_requested=12,
+            force_setpoint=12,
+            output_voltage=1555,
+            state=State.HOLDING if status == IN_BAND else State.RAMPING,
+            status_word=status,
+        )
+        track.add(tick * 0.1, readings)
+    return track
+
+
+def text_of(view: View) -> list[str]:
+    console = Console(width=view.width, height=view.height, file=StringIO(), color_system=None)
+    console.print(page(view))
+    return console.file.getvalue().rstrip("\n").split("\n")
+
+
+def test_settling_counts_from_the_setpoint_to_the_band(holding: Track) -> None:
+    assert holding.settling.is_settled
+    assert holding.settling.after_s == pytest.approx(1.1, abs=0.11)  # 0.8 ** 11 = 0.086
+    assert holding.largest_error_n(5.0) < 0.01
+    assert holding.largest_error_n(60.0) == pytest.approx(0.86, abs=0.05)
+
+
+def test_leaving_the_band_forgets_the_settling_and_coming_back_counts_from_the_setpoint(
+    holding: Track, register_map: RegisterMap
+) -> None:
+    holding.add(30.0, poll_of(register_map, force_requested=12, force_measured=9, status_word=StatusBit.ENABLED))
+    assert not holding.settling.is_settled
+    holding.add(31.0, poll_of(register_map, force_requested=12, force_measured=11.9, status_word=IN_BAND))
+    assert holding.settling.after_s == pytest.approx(26.0)
+
+
+def test_what_settled_before_the_monitor_has_no_settling_time(register_map: RegisterMap) -> None:
+    track = Track()
+    track.add(5.0, poll_of(register_map, force_measured=12, force_requested=12, status_word=IN_BAND))
+    assert track.settling.is_settled
+    assert track.settling.after_s is None
+
+
+def test_the_age_of_a_change_is_known_only_once_it_was_seen(holding: Track) -> None:
+    assert holding.change_age_s("mode") is None
+    assert holding.change_age_s("force_setpoint") == pytest.approx(29.9 - 5.0)
+
+
+def test_a_minute_is_kept_and_no_more(register_map: RegisterMap) -> None:
+    track = Track()
+    for tick in range(2000):
+        track.add(tick * 0.1, poll_of(register_map))
+    assert len(track.points) <= 602
+
+
+def test_buckets_are_means_with_the_newest_at_the_right() -> None:
+    points = [Point(0.0, 1.0, 0.0), Point(59.0, 4.0, 5.0), Point(59.5, 6.0, 5.0), Point(59.9, nan, 5.0)]
+    assert buckets(points, 60.0, 6) == [None] * 5 + [Point(59.5, 5.0, 5.0)]
+    assert buckets(points, 59.9, 6)[0] == Point(0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (81, 25), (100, 30), (112, 34), (160, 50), (240, 70)])
+def test_a_frame_fits_any_terminal_from_80_by_24(width: int, height: int, holding: Track) -> None:
+    for writers in (None, {"command": Writer("192.168.125.101", "50001", 3.0)}):
+        lines = text_of(View(holding, "127.0.0.1:5020", width, height, "", writers))
+        assert len(lines) <= height
+        assert max(map(len, lines)) <= width
+        for word in ("HOLDING", "in band", "settled in 1.1 s", "measured N", "12.00 N", "04B0", "holding"):
+            assert any(word in line for line in lines), word
+        assert any("192.168.125.101" in line for line in lines) == (writers is not None)
+
+
+def test_a_fault_and_a_warning_say_what_to_do(register_map: RegisterMap) -> None:
+    track = Track()
+    readings = poll_of(
+        register_map, state=State.FAULT, fault_code=FaultCode.CELL_LOST, warning_word=WarningBit.TARGET_UNREACHABLE
+    )
+    track.add(0.0, readings)
+    text = "\n".join(text_of(View(track, "here", 120, 40)))
+    assert "FAULT" in text
+    assert "A318 load cell's port lost  Plug it in again" in text
+    assert "A301 target unreachable  Open the air supply" in text
+
+
+def test_many_warnings_do_not_push_the_table_out(register_map: RegisterMap) -> None:
+    track = Track()
+    track.add(0.0, poll_of(register_map, warning_word=sum(WarningBit), fault_code=1, state=4))
+    lines = text_of(View(track, "here", 80, 24))
+    assert len(lines) == 23
+    assert sum("force_setpoint" in line for line in lines) == 1
+    assert any("more: see warning_word" in line for line in lines)
+
+
+def test_what_is_not_available_is_not_drawn_as_zero(register_map: RegisterMap) -> None:
+    track = Track()
+    track.add(0.0, poll_of(register_map, force_measured=nan, output_voltage=nan))
+    assert "–" in "\n".join(text_of(View(track, "here", 80, 24)))
+
+
+@pytest.mark.parametrize("value", [0.0, 9.99, -0.02, 12.34, -12.34, 123.45, -327.67])
+def test_big_digits_lose_decimals_before_they_lose_their_meaning(value: float) -> None:
+    rows = big(value, 2, width=18, style="").plain.split("\n")
+    assert len(rows) == 3
+    assert all(len(row) <= 18 for row in rows)
+
+
+def test_the_chart_grows_with_the_force() -> None:
+    points = [Point(0.0, force_n, 10.0) for force_n in (0.0, 2.5, 5.0, 7.5, 10.0)]
+    columns = ["".join(column) for column in zip(*chart(points, 3, 10.0).plain.split("\n"), strict=True)]
+    heights = [sum(" ▁▂▃▄▅▆▇█".find(cell) for cell in column if cell in "▁▂▃▄▅▆▇█") for column in columns]
+    assert heights == [0, 6, 12, 18, 24]
+    assert columns[0][0] == "─"  # the setpoint's line, where no column hides it
+    assert chart_top_n(points) == 20.0
+
+
+def test_once_prints_one_frame(fake, call) -> None:
+    fake.bank.set("state", State.HOLDING)
+    answer = call("monitor", "--once", "--gateway", fake.address)
+    assert answer.exit_code == 0, answer.output
+    assert answer.output.count("HOLDING") == 1
+    assert len(answer.output.splitlines()) <= 24
+
+
+def test_the_picture_needs_nothing_from_the_web(fake, call, tmp_path: Path) -> None:
+    fake.bank.set("force_measured", 12.0)
+    answer = call("monitor", "--svg", tmp_path / "monitor.svg", "--gateway", fake.address)
+    assert answer.exit_code == 0, answer.output
+    svg = (tmp_path / "monitor.svg").read_text(encoding="utf-8")
+    assert svg.startswith("<svg")
+    assert "force_measured" in svg
+    assert "url(http" not in svg.replace('"', "")
+    assert "@font-face" not in svg
+
+
+def test_no_gateway_at_the_start_ends_with_69(call) -> None:
+    answer = call("monitor", "--once", "--gateway", "127.0.0.1:1")
+    assert answer.exit_code == 69
+    assert answer.stderr.startswith("E130 ")
+
+
+def test_a_gateway_that_comes_back_is_found_again(serve, fake, register_map: RegisterMap) -> None:
+    with GatewayClient("127.0.0.1", fake.port, 1, register_map) as client:
+        poller = Poller(client, None, lambda: 0.0)
+        poller.poll_or_note()
+        assert poller.trouble == ""
+        fake.stop()
+        poller.poll_or_note()
+        assert poller.trouble.startswith(("E130", "E131"))
+        assert "NO ANSWER" in text_of(poller.view(80, 24))[0]
+        serve(fake.bank, fake.port)
+        poller.poll_or_note()
+        assert poller.trouble == ""
+
+
+def test_writers_come_from_the_control_socket_and_their_absence_is_no_trouble(
+    fake, register_map: RegisterMap, monkeypatch, tmp_path: Path
+) -> None:
+    answer = {"owner": "10.0.0.7", "writers": {"force_setpoint": {"peer": "10.0.0.7:50001", "time_s": 97.0}}}
+    monkeypatch.setattr("gateway.cli.monitoring.poll.ask", lambda state, request: answer)
+    with GatewayClient("127.0.0.1", fake.port, 1, register_map) as client:
+        poller = Poller(client, tmp_path, lambda: 100.0)
+        poller.poll()
+        assert poller.view(80, 24).writers == {"force_setpoint": Writer("10.0.0.7", "50001", 3.0)}
+        assert any("10.0.0.7 3 s" in line for line in text_of(poller.view(80, 24)))
+        monkeypatch.undo()
+        assert poller.view(80, 24).writers == {}
+
+
+def test_ctrl_c_leaves_the_live_page_cleanly(fake) -> None:
+    fake.bank.set("state", State.HOLDING)
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gateway", "monitor", "--gateway", fake.address],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=subprocess.PIPE,
+        env=os.environ | {"TERM": "xterm-256color"},
+    )
+    os.close(theirs)
+    shown = b""
+    while b"HOLDING" not in shown:
+        shown += os.read(ours, 65536)
+    process.send_signal(signal.SIGINT)
+    try:
+        while chunk := os.read(ours, 65536):
+            shown += chunk
+    except OSError:  # the far end is closed: the process has ended
+        pass
+    os.close(ours)
+    assert process.stderr
+    with process.stderr:
+        assert process.stderr.read() == b""
+    assert process.wait(10) == 0
+    assert b"\x1b[?25h" in shown[-40:]  # the cursor is shown again ...
+    assert b"\x1b[?1049l" in shown[-40:]  # ... and the screen as it was
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
+    assert "measured N" in plain

@@ -1,0 +1,103 @@
+"""`check`, `init`, `schema`, `registers`, `ports`: what a newcomer types before anything runs."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from gateway.ports import PortInfo
+from gateway.registers import RegisterMap
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_init_writes_a_rig_that_check_accepts(here: Path, call) -> None:
+    assert call("init", "cell-7").exit_code == 0
+    text = (here / "cell-7.yaml").read_text()
+    assert text.count("EDIT") >= 8
+    answer = call("check", "cell-7.yaml")
+    assert answer.exit_code == 0, answer.output
+    assert "cell-7" in answer.output
+
+
+def test_init_overwrites_nothing(here: Path, call) -> None:
+    (here / "my-cell.yaml").write_text("mine")
+    answer = call("init")
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith("E405 my-cell.yaml exists")
+    assert (here / "my-cell.yaml").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["demo", "Cell", "../x", "a b", "sub/x.yaml"])
+def test_init_takes_no_name_that_cannot_be_a_rigs(name: str, here: Path, call) -> None:
+    assert call("init", name).exit_code == 2
+    assert list(here.iterdir()) == []
+
+
+def test_check_tells_every_fault_with_its_place(here: Path, call) -> None:
+    call("init", "cell")
+    text = (here / "cell.yaml").read_text()
+    text = text.replace("baud: 9600", "baud: 115300").replace("force_max_n: 40", "force_max: 40")
+    (here / "cell.yaml").write_text(text)
+    answer = call("check", "cell.yaml")
+    assert answer.exit_code == 78
+    assert "output.baud: 115300 is not one of 9600, 19200, 38400, 115200" in answer.stderr
+    assert "did you mean force_max_n" in answer.stderr
+    line = 1 + next(at for at, line in enumerate(text.splitlines()) if "115300" in line)
+    assert f"cell.yaml:{line}:9 output.baud" in answer.stderr
+    document = json.loads(call("check", "cell.yaml", "--json").output)
+    assert document["ok"] is False
+    assert {"file", "line", "column", "path", "message"} == set(document["faults"][0])
+
+
+def test_check_of_the_shipped_rigs_is_ok(call) -> None:
+    for rig in ("demo", "irc5-cell"):
+        answer = call("check", rig)
+        assert answer.exit_code == 0, answer.output
+        assert "no faults" in answer.stdout
+
+
+def test_a_rig_that_is_not_there_is_a_configuration_error(call) -> None:
+    answer = call("check", "demoo")
+    assert answer.exit_code == 78
+    assert "did you mean demo?" in answer.stderr
+
+
+@pytest.mark.parametrize("kind", ["rig", "device", "plant", "calibration", "registers"])
+def test_schemas_are_schemas(kind: str, call) -> None:
+    jsonschema.Draft202012Validator.check_schema(json.loads(call("schema", kind).output))
+
+
+def test_the_register_table_has_three_forms(call, register_map: RegisterMap) -> None:
+    entries = json.loads(call("registers", "--format", "json").output)
+    rows = list(csv.DictReader(io.StringIO(call("registers", "--format", "csv").output)))
+    assert len(entries) == len(rows) == len(register_map.registers)
+    promised = set("name address words type scale unit access min max block text values bits".split())
+    assert promised <= set(entries[0])
+    assert "| force_setpoint |" in call("registers").output
+
+
+def test_a_map_that_is_not_there_is_told(call) -> None:
+    answer = call("registers", "--map", "force-v2")
+    assert answer.exit_code == 78
+    assert "did you mean force-v1?" in answer.stderr
+
+
+def test_ports_lists_by_id_names_first(call, monkeypatch: pytest.MonkeyPatch) -> None:
+    by_id = "/dev/serial/by-id/usb-FTDI_FT232R_A10K-if00-port0"
+    found = [PortInfo(by_id, "/dev/ttyUSB0", "FTDI FT232R USB UART", "ftdi_sio", 16, "minicom (4711)")]
+    monkeypatch.setattr("gateway.ports.list_ports", lambda: found)
+    answer = call("ports")
+    assert answer.output.splitlines()[0] == by_id
+    assert "latency timer 16 ms (slow" in answer.output
+    assert "in use by minicom (4711)" in answer.output
+    assert json.loads(call("ports", "--json").output)[0]["path"] == by_id
+    monkeypatch.setattr("gateway.ports.list_ports", list)
+    assert "is the adapter plugged in?" in call("ports").output

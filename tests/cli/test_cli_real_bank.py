@@ -1,0 +1,78 @@
+"""The client verbs against the real register bank: what a newcomer gets wrong is answered with the code that explains it."""
+
+import json
+
+import pytest
+
+from gateway.registers import BankRules, RegisterBank, RegisterMap
+from gateway.registers.command import Status
+from gateway.registers.words import RefusalReason, State
+
+
+@pytest.fixture
+def bank(register_map: RegisterMap) -> RegisterBank:
+    return RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
+
+
+@pytest.fixture
+def gateway(bank: RegisterBank, serve) -> str:
+    address: str = serve(bank).address
+    return address
+
+
+def test_a_force_is_commanded_and_read_back(bank: RegisterBank, gateway: str, call) -> None:
+    answer = call("write", "force_setpoint=12", "control_word=enable", "--gateway", gateway)
+    assert answer.exit_code == 0, answer.output
+    assert (bank.command.force_setpoint_n, bank.command.number) == (12.0, 1)
+    bank.publish(Status(state=State.HOLDING, force_measured_n=11.97))
+    facts = json.loads(
+        call("read", "state", "force_measured", "force_measured@float_cdab", "--json", "--gateway", gateway).output
+    )
+    assert facts["state"]["text"] == "holding"
+    assert facts["force_measured"]["value"] == 11.97
+    assert facts["force_measured@float_cdab"]["value"] == pytest.approx(11.97)
+
+
+@pytest.mark.parametrize(
+    ("assignments", "code"),
+    [
+        (["force_setpoint=65"], "W204"),
+        (["force_setpoint=65", "control_word=1"], "W204"),
+        (["force_setpoint@float_abcd=nan"], "W207"),
+        (["force_setpoint@float_abcd=2.3419e-41"], "W201"),
+        (["control_word=valve_pull"], "W217"),
+    ],
+)
+def test_what_a_newcomer_gets_wrong_has_its_code(
+    assignments: list[str], code: str, bank: RegisterBank, gateway: str, call
+) -> None:
+    answer = call("write", *assignments, "--gateway", gateway)
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith(f"{code} "), answer.stderr
+    assert bank.command.number == 0
+
+
+@pytest.mark.parametrize(
+    ("block", "code"),
+    [
+        (RefusalReason.FAULT_LATCHED, "W212"),
+        (RefusalReason.CELL_SILENT, "W215"),
+        (RefusalReason.OUTPUT_FAULT, "W214"),
+        (RefusalReason.NOT_READY, "W213"),
+    ],
+)
+def test_an_enable_that_is_refused_says_why(block: RefusalReason, code: str, bank, gateway: str, call) -> None:
+    bank.publish(Status(enable_block=block))
+    answer = call("write", "control_word=enable", "--gateway", gateway)
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith(f"{code} "), answer.stderr
+
+
+def test_every_register_of_the_map_can_be_read_by_its_name(register_map: RegisterMap, gateway: str, call) -> None:
+    names = [f"{register.name}@{register.block}" for register in register_map.registers]
+    answer = call("read", *names, "--json", "--gateway", gateway)
+    assert answer.exit_code == 0, answer.output
+    facts = json.loads(answer.output)
+    assert len(facts) == len(names)
+    assert facts["proof_word@proof"]["value"] == 0x1234
+    assert facts["proof_float_cdab@proof"]["value"] == 1234.5

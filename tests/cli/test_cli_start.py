@@ -1,0 +1,161 @@
+"""Start-up: light, the same by every door, and one clear message when something is wrong."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from gateway.cli import main
+from gateway.service.guardian import RunOptions
+
+HEAVY = ("scipy", "matplotlib", "pandas", "pyarrow", "pymodbus", "rich", "uvloop")
+
+
+def loaded_modules(*words: str) -> set[str]:
+    """What a call of the command line leaves in sys.modules, in a process of its own."""
+    code = (
+        "import sys, json\n"
+        f"sys.argv = ['force-gateway', *{list(words)!r}]\n"
+        "from gateway.cli.main import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print('\\n' + json.dumps([name.split('.')[0] for name in sys.modules]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.mark.parametrize("words", [("--help",), ("--version",), ("run", "--help"), ("explain", "E110")])
+def test_help_and_version_import_nothing_heavy(words: tuple[str, ...]) -> None:
+    assert loaded_modules(*words).isdisjoint({*HEAVY, "numpy", "yaml", "pydantic"})
+
+
+def test_check_never_imports_scipy() -> None:
+    assert loaded_modules("check", "demo").isdisjoint(HEAVY)
+    done = subprocess.run([sys.executable, "-m", "gateway", "check", "demo"], capture_output=True, check=False)
+    assert done.returncode == 0  # so the modules above are those of a whole check
+
+
+def test_the_guardian_is_reached_without_numpy() -> None:
+    assert loaded_modules("run", "--help", "--json").isdisjoint({"numpy", "yaml", "pydantic"})
+    code = "import sys, gateway.cli.run, gateway.service.guardian; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_module_and_command_are_the_same() -> None:
+    by_module = subprocess.run(
+        [sys.executable, "-m", "gateway", "--version"], capture_output=True, text=True, check=True
+    )
+    by_command = subprocess.run(
+        [Path(sys.executable).with_name("force-gateway"), "--version"], capture_output=True, text=True, check=True
+    )
+    assert by_module.stdout == by_command.stdout == "force-gateway 0.1.0\n"
+
+
+@pytest.mark.parametrize("verb", main.VERBS)
+def test_every_verb_has_help_that_fits_its_list_line(verb: str, call) -> None:
+    answer = call(verb, "--help")
+    assert answer.exit_code == 0, answer.output
+    assert verb in call("--help").output
+
+
+def test_options_of_run_are_the_fields_of_run_options() -> None:
+    context = click.Context(main.command)
+    run = main.command.get_command(context, "run")
+    assert run is not None
+    assert {parameter.name for parameter in run.params} == set(RunOptions.__dataclass_fields__)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("127.0.0.1:502", ("127.0.0.1", 502)),
+        (":0", ("127.0.0.1", 0)),
+        ("robot", ("robot", 5020)),
+        ("[::1]:5020", ("::1", 5020)),
+        ("::1", ("::1", 5020)),
+    ],
+)
+def test_an_endpoint_is_read_as_people_write_it(text: str, expected: tuple[str, int], call, monkeypatch) -> None:
+    seen: list[RunOptions] = []
+    monkeypatch.setattr("gateway.service.guardian.run", lambda options: seen.append(options) or 0)
+    assert call("run", "--bind", text).exit_code == 0
+    assert seen[0].bind == expected
+
+
+@pytest.mark.parametrize("text", ["127.0.0.1:http", "host:70000", "1.2.3.4:-1"])
+def test_a_wrong_endpoint_is_a_usage_error(text: str, call) -> None:
+    answer = call("run", "--bind", text)
+    assert answer.exit_code == 2
+    assert "is not HOST:PORT" in answer.stderr
+
+
+def test_run_hands_over_everything_and_ends_with_the_guardians_code(call, monkeypatch, tmp_path: Path) -> None:
+    seen: list[RunOptions] = []
+    monkeypatch.setattr("gateway.service.guardian.run", lambda options: seen.append(options) or 69)
+    answer = call("run", "my.yaml", "--sim", "--state", tmp_path, "--json", "--record", "--realtime")
+    assert answer.exit_code == 69
+    expected = RunOptions(rig="my.yaml", simulate=True, state=tmp_path, json=True, record=True, realtime=True)
+    assert seen == [expected]
+
+
+def test_a_mistyped_verb_gets_a_proposal(call) -> None:
+    answer = call("moniter")
+    assert answer.exit_code == 2
+    assert "did you mean monitor?" in answer.stderr
+
+
+def test_a_defect_says_so_without_a_traceback(call, monkeypatch) -> None:
+    monkeypatch.setattr("gateway.service.guardian.run", lambda options: {}["missing"])
+    answer = call("run")
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith("E500 a defect of force-gateway, not of yours: KeyError")
+    assert "Traceback" not in answer.stderr
+    assert "Traceback" in call("--debug", "run").stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "exit_code"),
+    [
+        (PermissionError(13, "Permission denied", "/x"), "E105", 77),
+        (OSError(28, "No space left on device", "/x"), "E106", 1),
+    ],
+)
+def test_what_the_system_refuses_is_told_in_one_line(
+    error: OSError, code: str, exit_code: int, call, monkeypatch
+) -> None:
+    def fail(options: RunOptions) -> int:
+        raise error
+
+    monkeypatch.setattr("gateway.service.guardian.run", fail)
+    answer = call("run")
+    assert answer.exit_code == exit_code
+    assert answer.stderr.startswith(f"{code} /x: {error.strerror}")
+    assert answer.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(("shell", "word"), [("bash", "complete"), ("zsh", "compdef"), ("fish", "complete")])
+def test_completion_prints_a_script_for_the_shell(shell: str, word: str, call) -> None:
+    answer = call("completion", shell)
+    assert answer.exit_code == 0
+    assert word in answer.output
+    assert "_FORCE_GATEWAY_COMPLETE" in answer.output
+
+
+def test_completion_offers_the_verbs(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "gateway"],
+        env={"_FORCE_GATEWAY_COMPLETE": "bash_complete", "COMP_WORDS": "force-gateway re", "COMP_CWORD": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    offered = {line.split(",")[1] for line in done.stdout.splitlines()}
+    assert offered == {"read", "registers", "record", "recordings", "restore"}
+
+
+def test_version_names_what_a_report_needs(call) -> None:
+    facts = json.loads(call("version", "--json").output)
+    assert set(facts) == {"force-gateway", "python", "system", "executable"}

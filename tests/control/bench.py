@@ -1,0 +1,215 @@
+"""A rig in virtual time for the tests of control: a small plant, a stand-in for bank and output line, and the history.
+
+The plant shares nothing with the product's twin nor with its model: delay, first-order lag, a play operator for
+friction, a rest, a cell with lag, noise and quantum. Its loop differs from the model's by a few newtons, so that the
+trim has something to do.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from math import nan
+from random import Random
+
+from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
+from gateway.control import Controller, ControlSettings, Limits, Line, Output, Supervision, Trim
+from gateway.devices.messages import ForceSample, Quality
+from gateway.registers.command import Command
+from gateway.registers.words import ControlBit, FaultCode, Mode
+
+STEP_S = 0.001
+
+
+def bsfm(scale: float = 1.0, span_n: float = 6.0) -> Bsfm:
+    """0..8 V, 0..57 N, a loop 4 N wide; scale multiplies all forces."""
+    rising = RationalBezier(0.0, 8.0, [0.0, 26.0 * scale, 57.0 * scale], [1.0, 1.0, 1.0])
+    falling = RationalBezier(0.0, 8.0, [0.0, 34.0 * scale, 57.0 * scale], [1.0, 1.0, 1.0])
+    return Bsfm(Branches(rising, falling), LinearBlend(span_n))
+
+
+def settings(**supervision: object) -> ControlSettings:
+    """Of a rig as fast as SmallPlant; supervision: fields to change."""
+    return ControlSettings(
+        limits=Limits(force_max_n=50.0, over_force_n=60.0, smallest_force_n=0.2, voltage_max_v=9.0),
+        trim=Trim(gain_v_per_n_s=0.8, limit_v=0.6),
+        supervision=Supervision(**{"response_lag_s": 0.12, **supervision}),  # type: ignore[arg-type]
+    )
+
+
+@dataclass
+class SmallPlant:
+    """Regulator, friction and cell. contact False: nothing pushes back; air False: no pressure comes."""
+
+    rng: Random
+    gain_n_per_v: float = 7.4
+    friction_n: float = 2.0
+    lag_s: float = 0.08
+    delay_s: float = 0.02
+    cell_lag_s: float = 0.015
+    noise_n: float = 0.04
+    quantum_n: float = 0.098
+    contact: bool = True
+    air: bool = True
+    sign: float = 1.0
+    unit: float = 1.0
+    force_n: float = 0.0
+    _pressure: float = 0.0
+    _cell_n: float = 0.0
+    _waiting: deque[float] = field(default_factory=deque)
+
+    def advance(self, voltage_v: float) -> None:
+        """One step of 1 ms."""
+        self._waiting.append(voltage_v if self.air else 0.0)
+        delayed_v = self._waiting.popleft() if len(self._waiting) > round(self.delay_s / STEP_S) else 0.0
+        self._pressure += (delayed_v - self._pressure) * STEP_S / self.lag_s
+        drive_n = self.gain_n_per_v * self._pressure
+        play_n = min(self.friction_n, 0.25 * drive_n)
+        held_n = max(drive_n - play_n, min(drive_n + play_n, self.force_n))
+        self.force_n = max(0.0, held_n) if self.contact else 0.0
+        self._cell_n += (self.force_n - self._cell_n) * STEP_S / self.cell_lag_s
+
+    def reading_n(self) -> float:
+        noisy_n = self.sign * self.unit * self._cell_n + self.rng.gauss(0.0, self.noise_n)
+        return round(noisy_n / self.quantum_n) * self.quantum_n
+
+
+@dataclass(frozen=True)
+class Record:
+    """One step: what went in, what came out, and the true force at that time."""
+
+    time_s: float
+    output: Output
+    force_n: float
+    command: Command
+    sample: ForceSample | None
+    line: Line
+
+
+class Bench:
+    """Control at 100 Hz ticks, on each sample of a 100 Hz cell (5 ms apart from the ticks) and on each command."""
+
+    def __init__(self, control: ControlSettings | None = None, seed: int = 1, **plant: float | bool) -> None:
+        self.settings = control or settings()
+        self.rng = Random(seed)
+        self.plant = SmallPlant(self.rng, **plant)  # type: ignore[arg-type]
+        self.controller = Controller(self.settings, bsfm(), calibration_id=1)
+        self.line = Line(acknowledged_v=0.0)
+        self.command = Command()
+        self.sample: ForceSample | None = None
+        self.history: list[Record] = []
+        self.events: list[str] = []
+        self.voltage_v = 0.0
+        self.ms = 0
+        self.heartbeat_every_ms = 0
+        self.cell_silent = self.output_silent = self.cell_frozen = self.loop_blocked = False
+        self.alter_sample: Callable[[ForceSample], ForceSample] = lambda sample: sample
+        self.releases = 0
+        self.clearing_zeroes_heartbeat = self.ignores_clearing = False
+
+    @property
+    def now_s(self) -> float:
+        return self.ms * STEP_S
+
+    @property
+    def last(self) -> Output:
+        return self.history[-1].output
+
+    def write(self, **changes: object) -> Output:
+        """A master's write of some registers, as the bank would pass it on."""
+        number = self.command.number + 1
+        changed = {**changes, "number": number, "received_s": self.now_s, "peer": "10.0.0.5"}
+        self.command = replace(self.command, **changed)  # type: ignore[arg-type]
+        return self.step()
+
+    def enable(self, force_n: float = 0.0, **changes: object) -> Output:
+        return self.write(control_word=ControlBit.ENABLE, force_setpoint_n=force_n, **changes)
+
+    def force(self, force_n: float) -> Output:
+        return self.write(force_setpoint_n=force_n)
+
+    def voltage(self, voltage_v: float) -> Output:
+        return self.write(control_word=ControlBit.ENABLE, mode=Mode.VOLTAGE, voltage_setpoint_v=voltage_v)
+
+    def disable(self) -> Output:
+        return self.write(control_word=ControlBit(0))
+
+    def reset(self) -> Output:
+        self.write(control_word=ControlBit(0), force_setpoint_n=0.0)
+        return self.write(control_word=ControlBit.RESET_FAULT, heartbeat=self.command.heartbeat + 1)
+
+    def step(self) -> Output:
+        if self.output_silent and self.line.unanswered_since_s is None:
+            self.line = replace(self.line, unanswered_since_s=self.now_s)
+        output = self.controller.step(self.now_s, self.command, self.sample, self.line)
+        self.voltage_v = output.voltage_v
+        self.history.append(Record(self.now_s, output, self.plant.force_n, self.command, self.sample, self.line))
+        self.line = replace(self.line, late_s=0.0)
+        self.events.extend(output.events)
+        self.releases += output.release_owner
+        if output.clear_command and not self.ignores_clearing:
+            cleared = replace(
+                self.command, control_word=ControlBit(0), force_setpoint_n=0.0, number=self.command.number + 1
+            )
+            self.command = replace(cleared, heartbeat=0) if self.clearing_zeroes_heartbeat else cleared
+        return output
+
+    def run(self, seconds: float) -> Output:
+        for _ in range(round(seconds / STEP_S)):
+            self._millisecond()
+        return self.last
+
+    def _millisecond(self) -> None:
+        self.ms += 1
+        self.plant.advance(self.voltage_v)
+        if self.loop_blocked:
+            return
+        if self.ms % 10 == 5 and not self.cell_silent:
+            self._measure()
+            self.step()
+        if self.heartbeat_every_ms and self.ms % self.heartbeat_every_ms == 0:
+            self.write(heartbeat=(self.command.heartbeat + 1) % 1000)
+        if self.ms % 10 == 0:
+            self.step()
+
+    def _measure(self) -> None:
+        if self.cell_frozen and self.sample:
+            self.sample = replace(self.sample, time_s=self.now_s)
+            return
+        force_n = self.plant.reading_n()
+        self.sample = self.alter_sample(ForceSample(force_n, force_n, Quality.OK, self.now_s))
+
+    def block_loop(self, seconds: float) -> None:
+        """The process stands still; the plant does not."""
+        self.loop_blocked = True
+        self.run(seconds)
+        self.loop_blocked = False
+        self.line = replace(self.line, late_s=seconds)
+
+    def silence_output(self) -> None:
+        self.output_silent = True
+
+    def heal(self) -> None:
+        """Everything outside control works again."""
+        self.cell_silent = self.output_silent = self.cell_frozen = False
+        self.line = Line(acknowledged_v=self.voltage_v)
+        self.alter_sample = lambda sample: sample
+        self.plant.sign = self.plant.unit = 1.0
+        self.plant.contact = self.plant.air = True
+
+    def seconds_until(self, done: Callable[[Output], bool], limit_s: float) -> float:
+        """Virtual time until a step answers what is waited for; nan when it does not within limit_s."""
+        start_ms = self.ms
+        seen = len(self.history)
+        while self.ms - start_ms < limit_s / STEP_S:
+            self._millisecond()
+            if any(done(record.output) for record in self.history[seen:]):
+                return (self.ms - start_ms) * STEP_S
+            seen = len(self.history)
+        return nan
+
+    def voltages(self) -> Iterator[tuple[float, float]]:
+        return ((record.time_s, record.output.voltage_v) for record in self.history)
+
+
+def has_fault(code: FaultCode) -> Callable[[Output], bool]:
+    return lambda output: output.fault is code

@@ -1,0 +1,232 @@
+"""Direct voltage, tare, stop, bands and warnings, as a master sees them."""
+
+from dataclasses import replace
+from math import isnan
+
+import pytest
+
+from gateway.control import LeaseAction, Line
+from gateway.devices.messages import Quality
+from gateway.registers.words import ControlBit, FaultCode, LimitedBy, RefusalReason, State, StatusBit, WarningBit
+from tests.control.bench import Bench, settings
+
+
+def enabled(control=None, **plant) -> Bench:
+    bench = Bench(control, **plant)
+    bench.run(0.3)
+    bench.enable(0.0)
+    return bench
+
+
+def test_direct_voltage_goes_out_as_it_came_within_range_and_slew():
+    bench = enabled(gain_n_per_v=5.0)
+    assert 0.0 < bench.voltage(3.0).voltage_v <= 1.0  # one tick of 100 V/s
+    output = bench.run(0.5)
+    assert (output.voltage_v, output.state, output.trim_v) == (3.0, State.HOLDING, 0.0)
+    output = bench.voltage(9.9)
+    output = bench.run(0.3)
+    assert (output.voltage_v, output.limited_by) == (9.0, LimitedBy.VOLTAGE_RANGE)
+
+
+def test_direct_voltage_is_still_supervised_for_over_force():
+    bench = enabled()
+    bench.plant.gain_n_per_v = 12.0
+    bench.voltage(6.0)
+    output = bench.run(1.0)
+    assert (output.state, output.fault, output.voltage_v) == (State.FAULT, FaultCode.OVER_FORCE, 0.0)
+
+
+def test_direct_voltage_without_an_answer_warns_in_numbers():
+    bench = enabled(air=False)
+    bench.voltage(2.31)
+    output = bench.run(3.0)
+    assert output.status & StatusBit.TARGET_UNREACHABLE
+    sentence = next(event for event in bench.events if event.startswith("A301"))
+    assert sentence.startswith("A301 2.31 V out, ")
+    assert sentence.endswith("no air, valve closed or no contact")
+
+
+def test_no_air_is_a_warning_with_numbers_and_no_fault():
+    bench = enabled()
+    bench.force(18.0)
+    bench.run(1.0)
+    bench.plant.air = False
+    output = bench.run(4.0)
+    assert output.state is State.READY  # waits at the pre-contact force
+    assert output.status & StatusBit.TARGET_UNREACHABLE
+    assert output.warnings & WarningBit.TARGET_UNREACHABLE
+    assert sum(event.startswith("A301") for event in bench.events) == 1
+    bench.plant.air = True
+    output = bench.run(2.0)
+    assert output.state is State.HOLDING
+    assert not output.warnings & WarningBit.TARGET_UNREACHABLE
+
+
+def test_low_pressure_is_unreachable_once_the_trim_is_spent():
+    bench = enabled(gain_n_per_v=4.5)
+    bench.force(30.0)
+    output = bench.run(4.0)
+    assert output.state is State.RAMPING
+    assert output.status & StatusBit.TARGET_UNREACHABLE
+    assert any("supply pressure too low" in event for event in bench.events)
+
+
+def test_in_band_needs_the_tolerance_and_the_time_of_the_command():
+    bench = enabled()
+    bench.write(force_setpoint_n=12.0, in_band_time_s=1.0)
+    within_s = bench.seconds_until(lambda output: abs(output.force_measured_n - 12.0) < 1.0, 2.0)
+    held_s = bench.seconds_until(lambda output: bool(output.status & StatusBit.IN_BAND), 3.0)
+    assert within_s < 1.0
+    assert held_s >= 0.95
+
+
+def test_in_band_is_left_when_the_force_leaves():
+    bench = enabled()
+    bench.force(12.0)
+    assert bench.run(1.0).state is State.HOLDING
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n - 3.0, raw=sample.raw - 3.0)
+    bench.run(0.02)
+    assert bench.last.state is State.RAMPING
+    assert not bench.last.status & StatusBit.IN_BAND
+
+
+def test_a_tare_makes_the_resting_force_zero():
+    bench = Bench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.7)
+    bench.run(0.3)
+    assert bench.last.force_measured_n == pytest.approx(1.7, abs=0.2)
+    bench.write(control_word=ControlBit.TARE)
+    bench.run(0.1)
+    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
+    assert any(event.startswith("info tare") for event in bench.events)
+
+
+def test_a_tare_with_payload_makes_the_contact_force_zero_at_any_tilt():
+    bench = Bench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n - 5.88)  # 0.6 kg hang on the cell
+    bench.write(payload_kg=0.6, control_word=ControlBit.TARE)
+    assert any(event.startswith("W303 tare refused: no fresh") for event in bench.events)
+    bench.run(0.3)
+    bench.write(control_word=ControlBit(0))
+    bench.write(control_word=ControlBit.TARE)
+    bench.run(0.1)
+    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
+
+
+def test_a_tare_under_force_is_refused():
+    bench = enabled()
+    bench.force(12.0)
+    bench.run(1.0)
+    output = bench.write(control_word=ControlBit.ENABLE | ControlBit.TARE)
+    assert output.events == ("W303 tare refused: disable the output or set the force to 0 first",)
+    assert bench.run(0.1).force_measured_n == pytest.approx(12.0, abs=1.0)
+
+
+def test_a_tare_of_a_decaying_force_is_refused():
+    bench = enabled()
+    bench.force(40.0)
+    bench.run(1.0)
+    bench.disable()
+    bench.run(0.15)
+    output = bench.write(control_word=ControlBit.TARE)
+    assert "not steady" in output.events[0]
+
+
+def test_stop_ramps_to_zero_within_the_time_and_ends_in_off():
+    bench = enabled()
+    bench.write(force_setpoint_n=40.0, force_ramp_n_per_s=5.0)
+    bench.run(9.0)
+    assert bench.plant.force_n > 35.0
+    bench.controller.stop()
+    assert not bench.controller.stopped
+    bench.run(0.05)
+    assert bench.last.voltage_v > 0.0
+    took_s = bench.seconds_until(lambda output: output.state is State.OFF, 4.5)
+    assert took_s <= 4.0
+    assert bench.controller.stopped
+    assert bench.last.voltage_v == 0.0
+    assert bench.enable(12.0).enable_block is RefusalReason.NOT_READY
+
+
+def test_stop_from_direct_voltage_ramps_too():
+    bench = enabled()
+    bench.voltage(5.0)
+    bench.run(0.5)
+    bench.controller.stop()
+    bench.run(0.03)
+    assert 1.0 < bench.last.voltage_v < 5.0
+    bench.run(1.0)
+    assert bench.controller.stopped
+
+
+def test_stop_while_off_is_stopped_at_once():
+    bench = Bench()
+    bench.run(0.1)
+    bench.controller.stop()
+    assert bench.controller.stopped
+
+
+def test_a_force_that_stays_at_the_safe_voltage_refuses_enable():
+    bench = Bench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=22.0)
+    output = bench.run(1.5)
+    assert output.enable_block is RefusalReason.NOT_READY
+    assert sum(event.startswith("W304 22.0 N measured") for event in bench.events) == 1
+
+
+def test_an_overloaded_cell_refuses_enable():
+    bench = Bench()
+    bench.alter_sample = lambda sample: replace(sample, quality=Quality.OVERLOAD, force_n=float("nan"))
+    output = bench.run(0.2)
+    assert output.enable_block is RefusalReason.NOT_READY
+    assert isnan(output.force_measured_n)
+
+
+def test_a_stale_force_is_unavailable_and_its_age_is_true():
+    bench = Bench()
+    bench.run(0.1)
+    bench.cell_silent = True
+    output = bench.run(0.5)
+    assert isnan(output.force_measured_n)
+    assert output.sample_age_s == pytest.approx(0.505, abs=0.011)
+
+
+def test_warnings_of_the_line_are_passed_on():
+    bench = Bench()
+    bench.line = Line(acknowledged_v=0.0, warnings=WarningBit.SERIAL_NOISE)
+    assert bench.run(0.1).warnings == WarningBit.SERIAL_NOISE
+
+
+def test_a_lease_that_holds_keeps_the_force_and_warns():
+    bench = enabled(settings(lease_s=0.2, lease_action=LeaseAction.HOLD))
+    bench.heartbeat_every_ms = 50
+    bench.force(12.0)
+    bench.run(1.0)
+    bench.heartbeat_every_ms = 0
+    output = bench.run(1.0)
+    assert (output.state, output.fault) == (State.HOLDING, FaultCode.NONE)
+    assert output.warnings & WarningBit.MASTER_LOST
+    assert bench.releases == 1
+    bench.heartbeat_every_ms = 50
+    assert not bench.run(0.2).warnings & WarningBit.MASTER_LOST
+
+
+def test_a_lease_that_ramps_ends_in_off_without_a_fault():
+    bench = enabled(settings(lease_s=0.2, lease_action=LeaseAction.RAMP))
+    bench.heartbeat_every_ms = 50
+    bench.write(force_setpoint_n=30.0)
+    bench.run(1.0)
+    bench.heartbeat_every_ms = 0
+    bench.run(0.23)
+    assert bench.last.voltage_v > 0.0
+    output = bench.run(1.0)
+    assert (output.state, output.fault, output.voltage_v) == (State.OFF, FaultCode.NONE, 0.0)
+    assert any(event.startswith("A310") for event in bench.events)
+
+
+def test_without_a_lease_a_closed_connection_changes_nothing():
+    bench = enabled()
+    bench.force(12.0)
+    bench.run(1.0)
+    bench.line = replace(bench.line, owner_connected=False)
+    assert bench.run(1.0).state is State.HOLDING

@@ -1,0 +1,186 @@
+"""The state table, and what the states mean to a master."""
+
+import pytest
+
+from gateway.control.controller import Controller
+from gateway.control.state_table import ENABLED_STATES, TRANSITIONS, Event, TransitionError, next_state
+from gateway.registers.command import Command
+from gateway.registers.words import ControlBit, FaultCode, RefusalReason, State, StatusBit, WarningBit
+from tests.control.bench import Bench, settings
+
+
+def ready(**plant: float | bool) -> Bench:
+    bench = Bench(**plant)
+    bench.run(0.1)
+    return bench
+
+
+def test_a_pair_that_the_table_lacks_raises():
+    with pytest.raises(TransitionError, match="FAULT has no event ENABLE"):
+        next_state(State.FAULT, Event.ENABLE)
+    with pytest.raises(TransitionError):
+        next_state(State.FAULT, Event.FAILED)  # a second first cause
+    with pytest.raises(TransitionError):
+        next_state(State.OFF, Event.MOVE)
+
+
+def test_every_enabled_state_can_be_left_by_disable_and_by_a_fault():
+    for state in ENABLED_STATES:
+        assert TRANSITIONS[state, Event.DISABLE] is State.OFF
+        assert TRANSITIONS[state, Event.FAILED] is State.FAULT
+
+
+def test_only_reset_leaves_fault():
+    assert [event for state, event in TRANSITIONS if state is State.FAULT] == [Event.RESET]
+
+
+def test_start_is_off_at_the_safe_voltage_and_says_what_is_missing():
+    bench = Bench()
+    output = bench.step()
+    assert (output.state, output.voltage_v) == (State.OFF, 0.0)
+    assert output.enable_block is RefusalReason.CELL_SILENT
+    assert not output.status & StatusBit.READY
+
+
+def test_ready_bit_comes_with_a_fresh_cell_and_an_acknowledged_output():
+    bench = ready()
+    assert bench.last.status & StatusBit.READY
+    assert bench.last.enable_block is RefusalReason.NONE
+
+
+def test_enable_with_setpoint_zero_is_ready_and_keeps_zero_volts():
+    bench = ready()
+    bench.enable(0.0)
+    output = bench.run(0.2)
+    assert (output.state, output.voltage_v) == (State.READY, 0.0)
+    assert output.status & StatusBit.ENABLED
+
+
+def test_a_setpoint_acts_in_the_step_of_its_arrival():
+    bench = ready()
+    bench.enable(0.0)
+    bench.run(0.05)
+    before = bench.step().voltage_v
+    after = bench.force(12.0).voltage_v  # same virtual time
+    assert after > before
+    bench.run(1.0)
+    before = bench.step().voltage_v
+    assert bench.force(5.0).voltage_v < before
+
+
+def test_an_enable_after_a_ramp_cut_short_acts_on_arrival_too():
+    bench = ready()
+    bench.enable(40.0)
+    bench.run(0.3)
+    bench.disable()
+    bench.run(0.5)
+    bench.step()
+    assert bench.enable(12.0).voltage_v > 0.0
+
+
+def test_enable_and_force_in_one_write_ramp_and_then_hold():
+    bench = ready()
+    assert bench.enable(12.0).state is State.READY  # at the pre-contact force
+    bench.seconds_until(lambda output: output.state is State.RAMPING, 0.5)
+    output = bench.run(1.0)
+    assert output.state is State.HOLDING
+    assert output.status & StatusBit.IN_BAND
+    assert abs(output.force_measured_n - 12.0) < 1.0
+
+
+def test_disable_is_the_safe_voltage_at_once_and_asks_to_clear_the_command():
+    bench = ready()
+    bench.enable(12.0)
+    bench.run(1.0)
+    output = bench.disable()
+    assert (output.state, output.voltage_v) == (State.OFF, 0.0)
+    assert output.clear_command and output.release_owner
+    assert bench.command.force_setpoint_n == 0.0
+
+
+def test_enable_acts_on_its_rise_only():
+    bench = ready()
+    bench.enable(12.0)
+    bench.run(0.5)
+    bench.line = bench.line.__class__(acknowledged_v=0.0, fault=FaultCode.OUTPUT_ALTERED)
+    bench.step()
+    bench.heal()
+    output = bench.write(control_word=ControlBit.RESET_FAULT)
+    assert output.state is State.OFF
+    stale_enable = Command(control_word=ControlBit.ENABLE, force_setpoint_n=12.0, number=99)
+    bench.command = stale_enable
+    assert bench.step().state is not State.OFF  # this one is a rise
+    bench.disable()
+    bench.command = Command(control_word=ControlBit(0), number=100)
+    bench.step()
+    assert bench.run(0.1).state is State.OFF
+
+
+def test_an_enable_that_is_blocked_changes_nothing_and_says_why():
+    bench = ready()
+    bench.cell_silent = True
+    bench.run(0.2)
+    output = bench.enable(12.0)
+    assert (output.state, output.voltage_v, output.clear_command) == (State.OFF, 0.0, True)
+    assert output.events[0].startswith("W301 enable refused: no fresh load-cell sample")
+
+
+def test_a_refused_enable_does_not_come_true_later_by_itself():
+    bench = ready()
+    bench.ignores_clearing = True  # a bank that left the bit standing
+    bench.cell_silent = True
+    bench.run(0.2)
+    bench.enable(12.0)
+    bench.heal()
+    bench.run(0.1)
+    assert bench.force(13.0).state is State.OFF
+    bench.disable()
+    assert bench.enable(13.0).state is State.READY
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"fault": FaultCode.OUTPUT_REFUSED}, RefusalReason.OUTPUT_FAULT),
+        ({"unanswered_since_s": 0.0}, RefusalReason.OUTPUT_FAULT),
+        ({"cell_lost": True}, RefusalReason.CELL_SILENT),
+        ({"acknowledged_v": None}, RefusalReason.NOT_READY),
+    ],
+)
+def test_while_off_a_broken_line_is_no_fault_but_blocks_enable(change, reason):
+    bench = ready()
+    bench.run(0.2)
+    bench.line = bench.line.__class__(**{"acknowledged_v": 0.0, **change})
+    output = bench.step()
+    assert (output.state, output.fault, output.enable_block) == (State.OFF, FaultCode.NONE, reason)
+
+
+def test_an_unclean_restart_warns_until_somebody_enables():
+    bench = ready()
+    bench.controller = Controller(
+        settings(), bench.controller._pursuit.law.model, calibration_id=1, unclean_restart=True
+    )
+    output = bench.run(0.1)
+    assert output.warnings & WarningBit.RESTARTED
+    assert output.status & StatusBit.WARNING
+    bench.enable(0.0)
+    assert not bench.step().warnings & WarningBit.RESTARTED
+
+
+def test_echoes_follow_the_command():
+    bench = ready()
+    output = bench.write(heartbeat=17, command_sequence=4, force_setpoint_n=9.0)
+    assert (output.heartbeat_echo, output.sequence_echo, output.force_requested_n) == (17, 4, 9.0)
+    assert output.force_accepted_n == 0.0  # not enabled
+
+
+def test_a_defect_of_ours_latches_and_the_caller_gets_the_safe_voltage():
+    bench = ready()
+    bench.enable(12.0)
+    bench.run(0.5)
+    with pytest.raises(AttributeError):
+        bench.controller.step(bench.now_s, bench.command, bench.sample, None)  # type: ignore[arg-type]
+    answer = bench.controller.safe_output(FaultCode.INTERNAL)
+    assert (answer.voltage_v, answer.state, answer.fault) == (0.0, State.FAULT, FaultCode.INTERNAL)
+    output = bench.step()
+    assert (output.voltage_v, output.state, output.fault) == (0.0, State.FAULT, FaultCode.INTERNAL)

@@ -1,0 +1,94 @@
+"""A whole running gateway for tests: guardian, control process, simulated rig, on free ports."""
+
+import contextlib
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymodbus.client import ModbusTcpClient
+
+READY_BOUND_S = 60.0
+
+
+@dataclass
+class RunningGateway:
+    process: subprocess.Popen[str]
+    ready: dict[str, Any]
+    state: Path
+    client: ModbusTcpClient
+
+    @property
+    def port(self) -> int:
+        return int(self.ready["modbus"][1])
+
+    def words(self, address: int, count: int) -> list[int]:
+        answer = self.client.read_holding_registers(address, count=count, device_id=1)
+        assert not answer.isError(), answer
+        return list(answer.registers)
+
+    def status(self) -> dict[str, int]:
+        names = "status_word state force_measured force_requested force_accepted force_applied output_voltage".split()
+        signed = (word - 65536 if word >= 32768 else word for word in self.words(100, len(names)))
+        return dict(zip(names, signed, strict=True))
+
+    def write(self, address: int, *words: int) -> Any:
+        return self.client.write_registers(address, [word & 0xFFFF for word in words], device_id=1)
+
+    def wait_until(self, condition: Callable[[dict[str, int]], bool], within_s: float = 5.0) -> dict[str, int]:
+        deadline_s = time.monotonic() + within_s
+        while True:
+            status = self.status()
+            if condition(status):
+                return status
+            assert time.monotonic() < deadline_s, f"not within {within_s} s: {status}"
+
+    def force_n(self) -> float:
+        return self.status()["force_measured"] / 100
+
+
+def start(state: Path, *options: str, rig: str = "demo") -> RunningGateway:
+    command = [
+        sys.executable,
+        "-m",
+        "gateway",
+        "run",
+        rig,
+        "--json",
+        "--bind",
+        "127.0.0.1:0",
+        "--state",
+        str(state),
+        *options,
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout
+    line = process.stdout.readline()
+    assert line, f"the gateway ended with {process.wait()}"
+    ready = json.loads(line)
+    client = ModbusTcpClient("127.0.0.1", port=ready["modbus"][1], timeout=1.0, retries=0)
+    assert client.connect()
+    return RunningGateway(process, ready, state, client)
+
+
+def stop(gateway: RunningGateway) -> int:
+    gateway.client.close()
+    with contextlib.suppress(ProcessLookupError):
+        gateway.process.send_signal(signal.SIGINT)
+    code = gateway.process.wait(15)
+    assert gateway.process.stdout
+    gateway.process.stdout.close()
+    return code
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[RunningGateway]:
+    gateway = start(tmp_path / "state", "--sim")
+    yield gateway
+    stop(gateway)

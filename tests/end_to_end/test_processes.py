@@ -1,0 +1,61 @@
+"""What happens on the wire when a process in the middle goes away."""
+
+import os
+import signal
+import time
+
+import psutil
+
+OFF = 0
+
+
+def pressing(running, setpoint=2000):
+    running.write(0, 1, setpoint)
+    running.wait_until(lambda status: status["force_measured"] > setpoint - 200)
+
+
+def reconnect(running, within_s=10.0):
+    deadline_s = time.monotonic() + within_s
+    running.client.close()
+    while not running.client.connect():
+        assert time.monotonic() < deadline_s
+    while True:
+        try:
+            return running.status()
+        except Exception:
+            assert time.monotonic() < deadline_s
+            running.client.close()
+            running.client.connect()
+
+
+def test_killing_control_drops_the_force_and_restarts_in_off(running):
+    pressing(running)
+    os.kill(running.ready["pids"]["control"], signal.SIGKILL)
+    status = reconnect(running)
+    assert status["state"] == OFF
+    assert status["output_voltage"] == 0
+    assert running.words(111, 1)[0] & 1, "the restarted warning"
+    running.wait_until(lambda status: abs(status["force_measured"]) < 200)
+    pressing(running)
+
+
+def test_a_stopped_control_process_is_killed_and_replaced(running):
+    pressing(running)
+    os.kill(running.ready["pids"]["control"], signal.SIGSTOP)
+    assert reconnect(running)["state"] == OFF
+
+
+def test_ctrl_c_ramps_to_zero_and_leaves_no_process(running):
+    pressing(running, 3000)
+    children = psutil.Process(running.process.pid).children(recursive=True)
+    running.process.send_signal(signal.SIGINT)
+    assert running.process.wait(6) == 0
+    assert not any(child.is_running() and child.status() != psutil.STATUS_ZOMBIE for child in children)
+
+
+def test_a_dead_guardian_takes_control_and_rig_with_it(running):
+    pressing(running)
+    children = psutil.Process(running.process.pid).children(recursive=True)
+    running.process.kill()
+    _, alive = psutil.wait_procs(children, timeout=5)
+    assert not alive

@@ -1,0 +1,365 @@
+"""SAFETY.md's table, row by row: what is detected, and within which time the safe voltage goes out."""
+
+from dataclasses import replace
+from math import nan
+
+import pytest
+
+from gateway.bsfm import Status
+from gateway.control import LeaseAction
+from gateway.devices.messages import Quality
+from gateway.registers.words import ControlBit, FaultCode, Mode, RefusalReason, State, StatusBit
+from tests.control.bench import Bench, has_fault, settings
+
+TICK_S = 0.01
+SAMPLE_S = 0.01
+
+
+def pressing(force_n: float = 12.0, control=None, seed: int = 1, **plant) -> Bench:
+    bench = Bench(control, seed, **plant)
+    bench.run(0.3)
+    bench.enable(force_n)
+    bench.run(1.0)
+    assert bench.last.state is State.HOLDING
+    return bench
+
+
+def assert_faulted(bench: Bench, code: FaultCode, within_s: float) -> None:
+    took_s = bench.seconds_until(has_fault(code), within_s + 1.0)
+    assert took_s <= within_s
+    record = next(record for record in bench.history if record.output.fault is code)
+    assert (record.output.voltage_v, record.output.state) == (bench.settings.limits.safe_voltage_v, State.FAULT)
+    assert record.output.clear_command
+    assert record.output.release_owner
+    assert record.output.status & StatusBit.FAULT
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_stale_load_cell_stops_within_its_time(seed):
+    bench = pressing(seed=seed)
+    bench.cell_silent = True
+    assert_faulted(bench, FaultCode.SAMPLE_STALE, 0.05 + SAMPLE_S + TICK_S)
+
+
+def test_a_lost_master_stops_within_the_lease_and_20_ms():
+    bench = Bench(settings(lease_s=0.2))
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(1.0)
+    assert bench.last.state is State.HOLDING
+    bench.heartbeat_every_ms = 0
+    assert_faulted(bench, FaultCode.MASTER_LOST, 0.22)
+
+
+def test_frames_with_a_frozen_heartbeat_do_not_feed_the_lease():
+    bench = Bench(settings(lease_s=0.2))
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(1.0)
+    bench.heartbeat_every_ms = 0
+    for _ in range(10):
+        bench.write(force_setpoint_n=12.0)
+        bench.run(0.04)
+    assert bench.last.fault is FaultCode.MASTER_LOST
+
+
+def test_an_enable_has_one_lease_to_beat():
+    bench = Bench(settings(lease_s=0.2))
+    bench.run(1.0)
+    assert bench.enable(12.0).state is not State.FAULT
+    bench.run(0.15)
+    assert bench.last.fault is FaultCode.NONE
+    assert_faulted(bench, FaultCode.MASTER_LOST, 0.07)
+
+
+def test_a_closed_connection_is_loss_where_a_lease_is_set():
+    bench = Bench(settings(lease_s=0.2))
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(1.0)
+    bench.line = replace(bench.line, owner_connected=False)
+    assert_faulted(bench, FaultCode.MASTER_LOST, TICK_S)
+
+
+def test_a_frozen_cell_is_found_once_the_force_must_have_changed():
+    bench = pressing(12.0)
+    bench.cell_frozen = True
+    bench.run(1.0)
+    assert bench.last.fault is FaultCode.NONE  # nothing had to change
+    bench.force(25.0)
+    assert_faulted(bench, FaultCode.SAMPLE_FROZEN, 0.5 + 2 * TICK_S)
+
+
+def test_a_quiet_cell_under_friction_is_not_called_frozen():
+    bench = pressing(12.0, noise_n=0.0, friction_n=2.0)
+    for target_n in (12.5, 11.8, 12.2, 11.9):
+        bench.force(target_n)
+        bench.run(1.0)
+    assert bench.last.fault is FaultCode.NONE
+
+
+def test_a_quiet_cell_in_free_air_is_not_called_frozen():
+    bench = Bench(contact=False, noise_n=0.0)
+    bench.run(0.3)
+    bench.enable(12.0)
+    assert bench.run(3.0).fault is FaultCode.NONE
+
+
+def test_equal_samples_of_a_noisy_cell_are_enough_where_the_rig_says_so():
+    bench = pressing(12.0, settings(frozen_equal_samples=25), quantum_n=0.001)
+    bench.cell_frozen = True
+    assert_faulted(bench, FaultCode.SAMPLE_FROZEN, 25 * SAMPLE_S + TICK_S)
+
+
+def test_over_force_stops_within_three_samples():
+    bench = pressing(30.0)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 40.0)
+    assert_faulted(bench, FaultCode.OVER_FORCE, 3 * SAMPLE_S + TICK_S)
+
+
+def test_one_spike_is_not_over_force():
+    bench = pressing(30.0)
+    spikes = iter([80.0, 80.0, 0.0, 80.0])
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + next(spikes, 0.0))
+    bench.run(0.5)
+    assert bench.last.fault is FaultCode.NONE
+
+
+@pytest.mark.parametrize("force_n", [98.1, -98.1, nan])
+def test_saturation_counts_as_over_force(force_n):
+    bench = pressing(12.0)
+    quality = Quality.OVERLOAD if force_n != force_n else Quality.OK
+    bench.alter_sample = lambda sample: replace(sample, force_n=force_n, quality=quality)
+    assert_faulted(bench, FaultCode.OVER_FORCE, 3 * SAMPLE_S + TICK_S)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("force_n", [5.0, 40.0])
+def test_swapped_wires_are_found_within_a_second_of_the_first_rise(seed, force_n):
+    bench = Bench(seed=seed, sign=-1.0, noise_n=0.2)
+    bench.run(0.3)
+    bench.enable(force_n)
+    assert_faulted(bench, FaultCode.SIGN_INVERTED, 1.0)
+    assert max(record.force_n for record in bench.history) < 6.0  # it never left the pre-contact force
+    assert any(event.startswith("A302") and "sign: -1" in event for event in bench.events)
+
+
+def test_swapped_wires_are_found_within_a_second_of_contact():
+    bench = Bench(sign=-1.0, contact=False)
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(2.0)
+    assert bench.last.fault is FaultCode.NONE
+    bench.plant.contact = True
+    assert_faulted(bench, FaultCode.SIGN_INVERTED, 1.0)
+
+
+def test_wires_that_swap_while_running_are_found_within_a_second():
+    bench = pressing(12.0)
+    bench.plant.sign = -1.0
+    assert_faulted(bench, FaultCode.SIGN_INVERTED, 1.0)
+
+
+def test_a_cell_saturates_before_the_over_force_limit_is_reached():
+    control = settings(saturation_n=40.0)
+    bench = pressing(12.0, control)
+    bench.alter_sample = lambda sample: replace(sample, force_n=45.0)
+    assert bench.settings.limits.over_force_n > 45.0
+    assert_faulted(bench, FaultCode.OVER_FORCE, 3 * SAMPLE_S + TICK_S)
+
+
+def test_one_sample_seen_by_many_steps_is_one_sample():
+    bench = pressing(12.0)
+    bench.alter_sample = lambda sample: replace(sample, force_n=80.0)
+    bench.run(0.01)
+    bench.cell_silent = True
+    bench.run(0.2)
+    assert bench.last.fault is FaultCode.SAMPLE_STALE
+
+
+def test_a_zero_that_is_off_is_not_taken_for_swapped_wires():
+    bench = Bench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n - 3.0)
+    bench.run(0.3)
+    bench.enable(12.0)
+    assert bench.run(3.0).fault is FaultCode.NONE
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("unit", [9.81, 4.5])
+def test_a_gain_far_too_high_stops_within_a_second_and_before_the_force_is_there(seed, unit):
+    bench = Bench(seed=seed, unit=unit)
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(1.0)
+    assert bench.last.state is State.FAULT
+    assert bench.last.fault in (FaultCode.GAIN_WRONG, FaultCode.OVER_FORCE)
+    assert max(record.force_n for record in bench.history) < 12.0
+
+
+def test_while_the_first_rise_looks_too_high_nothing_more_is_pressed():
+    bench = Bench(unit=4.6, friction_n=1.0)
+    bench.run(0.3)
+    bench.write(control_word=ControlBit.ENABLE, force_setpoint_n=12.0, contact_ramp_s=0.3)
+    assert_faulted(bench, FaultCode.GAIN_WRONG, 1.0)
+    assert max(record.force_n for record in bench.history) < 8.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_gain_far_too_low_stops_within_a_second_of_contact(seed):
+    bench = Bench(seed=seed, unit=1.0 / 9.81)
+    bench.run(0.3)
+    bench.write(control_word=ControlBit.ENABLE, force_setpoint_n=20.0, precontact_force_n=8.0)
+    assert_faulted(bench, FaultCode.GAIN_WRONG, 1.0)
+    assert any(event.startswith("A303") and "kgf" in event for event in bench.events)
+
+
+def test_a_gain_so_low_that_contact_is_not_felt_waits_and_warns():
+    bench = Bench(unit=1.0 / 9.81)
+    bench.run(0.3)
+    bench.enable(12.0)
+    output = bench.run(3.0)
+    assert (output.state, output.force_applied_n) == (State.READY, 2.0)
+    assert output.status & StatusBit.TARGET_UNREACHABLE
+
+
+@pytest.mark.parametrize("gain", [4.0, 13.0])
+@pytest.mark.parametrize("friction_n", [0.0, 3.0])
+def test_a_plant_that_is_merely_off_is_not_called_a_wrong_gain(gain, friction_n):
+    bench = Bench(gain_n_per_v=gain, friction_n=friction_n)
+    bench.run(0.3)
+    for force_n in (12.0, 20.0, 4.0, 0.0, 12.0):
+        bench.enable(force_n)
+        bench.run(1.0)
+    assert bench.last.fault is FaultCode.NONE
+
+
+def test_a_quick_second_enable_is_no_wrong_sign_while_the_old_force_decays():
+    bench = pressing(40.0)
+    for _ in range(3):
+        bench.disable()
+        bench.run(0.03)
+        bench.enable(5.0)
+        bench.run(0.5)
+    assert bench.last.fault is FaultCode.NONE
+
+
+def test_a_silent_output_stops_within_its_time():
+    bench = pressing()
+    bench.silence_output()
+    assert_faulted(bench, FaultCode.OUTPUT_SILENT, 0.1 + TICK_S)
+
+
+@pytest.mark.parametrize("code", [FaultCode.OUTPUT_REFUSED, FaultCode.OUTPUT_ALTERED, FaultCode.OUTPUT_LOST])
+def test_what_the_output_line_reports_is_the_fault_of_the_next_step(code):
+    bench = pressing()
+    bench.line = replace(bench.line, fault=code)
+    assert_faulted(bench, code, TICK_S)
+
+
+def test_a_lost_cell_port_is_the_fault_of_the_next_step():
+    bench = pressing()
+    bench.line = replace(bench.line, cell_lost=True)
+    assert_faulted(bench, FaultCode.CELL_LOST, TICK_S)
+
+
+def test_a_reading_that_is_no_number_stops_at_once():
+    bench = pressing()
+    bench.alter_sample = lambda sample: replace(sample, force_n=nan)
+    assert_faulted(bench, FaultCode.NOT_FINITE, SAMPLE_S + TICK_S)
+
+
+@pytest.mark.parametrize("field", ["force_setpoint_n", "force_ramp_n_per_s", "tilt_angle_rad", "voltage_setpoint_v"])
+def test_a_command_that_is_no_number_stops_at_once(field):
+    bench = pressing()
+    assert bench.write(**{field: nan}).fault is FaultCode.NOT_FINITE
+    assert bench.last.voltage_v == 0.0
+
+
+def test_a_stalled_loop_drops_what_arrived_in_it():
+    bench = pressing()
+    bench.block_loop(0.12)
+    output = bench.force(40.0)
+    assert (output.fault, output.voltage_v) == (FaultCode.LOOP_STALLED, 0.0)
+
+
+def test_an_enable_that_waited_for_a_stalled_loop_is_not_obeyed():
+    bench = Bench()
+    bench.run(0.3)
+    bench.block_loop(0.12)
+    bench.run(0.005)  # a sample comes first
+    bench.line = replace(bench.line, late_s=0.12)
+    output = bench.enable(12.0)
+    assert output.voltage_v == 0.0
+    assert output.state is State.FAULT
+
+
+def test_a_model_that_answers_nonsense_is_named():
+    class Nonsense:
+        reversal = Bench().controller._pursuit.law.model.reversal
+
+        def voltage_v(self, force_n: float, state: float) -> tuple[float, Status]:
+            return nan, Status.OK
+
+        def force_n(self, voltage_v: float, state: float) -> float:
+            return 0.0
+
+    bench = pressing()
+    bench.controller._pursuit.law.model = Nonsense()  # type: ignore[assignment]
+    assert_faulted(bench, FaultCode.MODEL_INVALID, TICK_S)
+
+
+def test_the_first_cause_stays_when_others_follow():
+    bench = pressing()
+    bench.line = replace(bench.line, fault=FaultCode.OUTPUT_REFUSED)
+    bench.run(0.02)
+    bench.cell_silent = True
+    bench.line = replace(bench.line, cell_lost=True)
+    bench.run(1.0)
+    assert bench.last.fault is FaultCode.OUTPUT_REFUSED
+    assert bench.last.enable_block is RefusalReason.FAULT_LATCHED
+    assert sum(event[:2] == "A3" for event in bench.events) == 1
+
+
+def test_a_reset_needs_its_rise_setpoint_zero_and_enable_zero():
+    bench = pressing()
+    bench.line = replace(bench.line, fault=FaultCode.OUTPUT_REFUSED)
+    bench.run(0.02)
+    bench.heal()
+    assert bench.write(control_word=ControlBit.RESET_FAULT, force_setpoint_n=5.0).state is State.FAULT
+    bench.write(control_word=ControlBit(0), force_setpoint_n=0.0)
+    both = ControlBit.RESET_FAULT | ControlBit.ENABLE
+    assert bench.write(control_word=both, force_setpoint_n=0.0).state is State.FAULT
+    bench.write(control_word=ControlBit(0))
+    assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.OFF
+    assert bench.last.fault is FaultCode.NONE
+    assert bench.enable(12.0).state is not State.FAULT
+
+
+def test_a_reset_with_a_lease_needs_a_heartbeat_since_the_fault():
+    bench = Bench(settings(lease_s=0.2, lease_action=LeaseAction.FAULT))
+    bench.clearing_zeroes_heartbeat = True  # a bank's own clearing is no beat
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(0.5)
+    bench.heartbeat_every_ms = 0
+    bench.seconds_until(has_fault(FaultCode.MASTER_LOST), 0.5)
+    bench.run(0.05)
+    assert bench.command.heartbeat == 0
+    assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.FAULT
+    bench.write(control_word=ControlBit(0), heartbeat=5)
+    assert bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=6).state is State.OFF
+
+
+def test_direct_voltage_needs_a_fresh_cell_too():
+    bench = Bench(gain_n_per_v=5.0)
+    bench.run(0.3)
+    bench.voltage(3.0)
+    bench.run(0.5)
+    assert bench.command.mode is Mode.VOLTAGE
+    bench.cell_silent = True
+    assert_faulted(bench, FaultCode.SAMPLE_STALE, 0.05 + SAMPLE_S + TICK_S)

@@ -1,0 +1,133 @@
+"""Where the server listens, who gets in, and how it ends, on both event loops."""
+
+import asyncio
+import socket
+from ipaddress import ip_network
+from typing import Any
+
+import pytest
+
+from gateway.fieldbus import BindError, ModbusTcpServer, ServerSettings
+from gateway.modbus import Adu, pdu
+from gateway.modbus.mbap import encode
+from gateway.modbus.memory import MemoryBank
+
+READ = pdu.read_request(3, 0, 2)
+READ_ANSWER = bytes.fromhex("0304") + bytes(4)
+
+
+def framed(request: bytes, transaction: int = 1) -> bytes:
+    return encode(Adu(transaction, 1, request))
+
+
+async def end_of(reader: asyncio.StreamReader) -> bytes:
+    """Everything up to the end of the connection, however it ends."""
+    found = b""
+    try:
+        while chunk := await reader.read(65536):
+            found += chunk
+    except ConnectionError:
+        pass
+    return found
+
+
+async def exchange(port: int, data: bytes, size: int) -> bytes:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(data)
+    found = await reader.readexactly(size)
+    writer.close()
+    await writer.wait_closed()
+    return found
+
+
+def test_closing_leaves_nothing_behind_and_frees_the_port(run: Any, serve: Any) -> None:
+    async def main() -> None:
+        async with serve() as running:
+            ends = [await running.connect() for _ in range(5)]
+            for reader, writer in ends:
+                writer.write(framed(READ))
+                await reader.readexactly(13)
+            await running.server.close()
+            assert running.server.peers == ()
+            assert all([await end_of(reader) == b"" for reader, _writer in ends])
+            assert asyncio.all_tasks() == {asyncio.current_task()}
+            again = ModbusTcpServer(MemoryBank(), ServerSettings(), on_peer_closed=print, log=print)
+            assert (await again.start("127.0.0.1", running.port))[1] == running.port
+            await again.close()
+            await again.close()
+            for _reader, writer in ends:
+                writer.close()
+
+    run(main())
+
+
+def test_a_client_that_does_not_read_cannot_hold_up_closing(run: Any, serve: Any) -> None:
+    async def main() -> None:
+        async with serve(write_buffer_bytes=1 << 30) as running:
+            raw = socket.socket()
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            raw.setblocking(False)
+            loop = asyncio.get_running_loop()
+            await loop.sock_connect(raw, ("127.0.0.1", running.port))
+            while not running.server.peers or not _waiting_bytes(running):
+                await loop.sock_sendall(raw, framed(pdu.read_request(3, 0, 125)) * 500)
+                await exchange(running.port, framed(READ), 13)
+            await running.server.close()
+            assert running.server.peers == ()
+            raw.close()
+
+    def _waiting_bytes(running: Any) -> int:
+        return max(c._transport.get_write_buffer_size() for c in running.server._shared.connections)
+
+    run(main())
+
+
+def test_the_last_answer_is_sent_when_the_server_closes_at_once(run: Any, serve: Any) -> None:
+    async def main() -> None:
+        async with serve() as running:
+            closing: list[asyncio.Task[None]] = []
+
+            def close_at_once(*_: object) -> None:
+                closing.append(asyncio.ensure_future(running.server.close()))
+
+            running.bank.write_registers = close_at_once
+            reader, writer = await running.connect()
+            writer.write(framed(pdu.write_register_request(0, 1)))
+            assert await end_of(reader) == framed(pdu.write_register_request(0, 1))
+            await closing[0]
+            writer.close()
+
+    run(main())
+
+
+def test_a_bind_beyond_loopback_needs_an_allow_list(run: Any, serve: Any) -> None:
+    async def main() -> None:
+        with pytest.raises(BindError, match=r"E122 0\.0\.0\.0"):
+            async with serve("0.0.0.0"):
+                pass
+
+    run(main())
+
+
+def test_beyond_loopback_whoever_is_not_in_the_list_is_closed(run: Any, serve: Any) -> None:
+    async def main() -> None:
+        async with serve("0.0.0.0", allow=(ip_network("192.0.2.0/24"),)) as running:
+            reader, writer = await running.connect()
+            assert await end_of(reader) == b""
+            assert "none of the allowed networks" in running.log[0][1]
+            writer.close()
+        async with serve("0.0.0.0", allow=(ip_network("127.0.0.0/8"),)) as running:
+            assert await exchange(running.port, framed(READ), 13) == framed(READ_ANSWER)
+
+    run(main())
+
+
+def test_a_port_that_is_taken_is_an_oserror_and_leaves_nothing(run: Any, serve: Any) -> None:
+    async def main() -> None:
+        async with serve() as running:
+            second = ModbusTcpServer(MemoryBank(), ServerSettings(), on_peer_closed=print, log=print)
+            with pytest.raises(OSError, match="in use"):
+                await second.start("127.0.0.1", running.port)
+            await second.close()
+
+    run(main())

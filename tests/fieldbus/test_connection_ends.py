@@ -1,0 +1,91 @@
+"""How a connection ends: deadlines, too many of one address, and who is told."""
+
+from typing import Any
+
+from gateway.modbus import Adu, pdu
+from gateway.modbus.mbap import encode
+
+READ = pdu.read_request(3, 0, 2)
+FAR = "192.0.2.7"
+
+
+def framed(request: bytes, transaction: int = 1) -> bytes:
+    return encode(Adu(transaction, 1, request))
+
+
+def test_half_a_request_is_waited_for_no_longer_than_partial_s(stand: Any, deliver: Any) -> None:
+    made = stand(partial_s=5.0)
+    connection, far = made.connect()
+    deliver(connection, far, framed(READ)[:7])
+    made.wait(4.5)
+    assert not far.ended
+    made.wait(1.5)
+    assert (far.ended, made.log[0][0]) == ("closed", "partial")
+
+
+def test_a_byte_now_and_then_does_not_keep_half_a_request_alive(stand: Any, deliver: Any) -> None:
+    made = stand(partial_s=5.0)
+    connection, far = made.connect()
+    for byte in framed(READ)[:11]:
+        deliver(connection, far, bytes((byte,)))
+        made.wait(1.0)
+    assert (far.ended, made.log[0][0]) == ("closed", "partial")
+
+
+def test_a_frame_that_ends_late_starts_the_next_one_s_time_anew(stand: Any, deliver: Any) -> None:
+    made = stand(partial_s=5.0)
+    connection, far = made.connect()
+    for number in range(6):
+        deliver(connection, far, framed(READ, transaction=number)[:6])
+        made.wait(3.0)
+        deliver(connection, far, framed(READ, transaction=number)[6:])
+    assert (far.writes, far.ended) == (6, "")
+
+
+def test_an_idle_connection_is_closed_and_a_busy_one_is_not(stand: Any, deliver: Any) -> None:
+    made = stand(idle_s=60.0)
+    (busy, near), (_quiet, far) = made.connect(), made.connect()
+    for number in range(13):
+        deliver(busy, near, framed(READ, transaction=number))
+        made.wait(5.0)
+    assert (near.ended, far.ended, made.log[0][0]) == ("", "closed", "idle")
+
+
+def test_a_peer_that_does_not_let_go_is_cut(stand: Any, deliver: Any) -> None:
+    made = stand(partial_s=5.0)
+    connection, far = made.connect(stuck=True)
+    deliver(connection, far, framed(READ) + b"\x00\x01\x00\x07\x00\x06")
+    assert far.ended == "closed"
+    made.wait(5.5)
+    assert far.ended == "aborted"
+    assert not made.shared.connections
+
+
+def test_a_host_is_gone_with_its_last_connection(stand: Any) -> None:
+    made = stand()
+    ends = [made.connect(FAR) for _ in range(3)]
+    for _connection, far in ends[:2]:
+        far.close()
+    assert made.closed == []
+    ends[2][1].close()
+    assert [peer.host for peer in made.closed] == [FAR]
+
+
+def test_a_fifth_connection_of_one_address_is_refused_and_is_nobody_s_loss(stand: Any) -> None:
+    made = stand()
+    ends = [made.connect(FAR)[1] for _ in range(5)]
+    assert [far.ended for far in ends] == ["", "", "", "", "aborted"]
+    assert (made.closed, made.log[0][0]) == ([], "refused")
+    assert "4 connections from its address" in made.log[0][1]
+
+
+def test_the_33rd_connection_is_refused_even_on_loopback(stand: Any) -> None:
+    made = stand()
+    ends = [made.connect()[1] for _ in range(33)]
+    assert [far.ended for far in ends] == [""] * 32 + ["aborted"]
+
+
+def test_a_place_that_becomes_free_is_used_again(stand: Any) -> None:
+    made = stand(connections=1)
+    made.connect()[1].close()
+    assert made.connect()[1].ended == ""

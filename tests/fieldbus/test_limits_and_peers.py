@@ -1,0 +1,96 @@
+"""Rates, log lines, and who may connect."""
+
+from ipaddress import ip_network
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.fieldbus import ServerSettings
+from gateway.fieldbus.limits import LogGate, RequestRate
+from gateway.fieldbus.peers import Peers, address_of, is_loopback
+
+
+@given(st.floats(1.0, 1000.0), st.lists(st.floats(0.0, 0.5), max_size=100))
+def test_no_timing_gets_more_than_the_rate_and_one_burst(rate_per_s: float, pauses_s: list[float]) -> None:
+    rate, now_s, run = RequestRate(rate_per_s, 0.0), 0.0, 0
+    for pause_s in pauses_s:
+        now_s += pause_s
+        while rate.wait_s(now_s) == 0.0 and run < 10_000:
+            rate.spend()
+            run += 1
+    assert run <= max(1.0, 0.25 * rate_per_s) + rate_per_s * now_s + 1e-3
+
+
+def test_the_wait_that_is_told_is_long_enough() -> None:
+    rate, now_s = RequestRate(7.0, 0.0), 0.0
+    for _ in range(100):
+        while (wait_s := rate.wait_s(now_s)) > 0.0:
+            now_s += wait_s
+        rate.spend()
+    assert now_s == pytest.approx((100 - 1.75) / 7.0, rel=1e-6)
+
+
+def test_ten_lines_a_second_of_a_cause_and_the_rest_counted() -> None:
+    lines: list[tuple[str, str]] = []
+    gate = LogGate(lambda cause, sentence: lines.append((cause, sentence)))
+    for number in range(500):
+        gate("framing", f"line {number}", 10.0 + number / 1000)
+        gate("idle", "other", 10.0) if number == 250 else None
+    gate("framing", "later", 11.5)
+    assert [sentence for cause, sentence in lines if cause == "framing"] == [
+        *(f"line {number}" for number in range(10)),
+        "later (490 more lines like this were left out)",
+    ]
+    assert ("idle", "other") in lines
+
+
+NETWORK = ServerSettings(allow=(ip_network("192.0.2.0/24"), ip_network("2001:db8::/32")))
+
+
+@pytest.mark.parametrize(
+    ("host", "allowed"),
+    [
+        ("192.0.2.7", True),
+        ("::ffff:192.0.2.7", True),
+        ("2001:db8::1", True),
+        ("198.51.100.1", False),
+        ("2001:db9::1", False),
+        ("127.0.0.1", False),
+    ],
+)
+def test_beyond_loopback_the_allow_list_decides(host: str, allowed: bool) -> None:
+    assert (Peers(NETWORK, guarded=True).refusal(host) is None) == allowed
+
+
+def test_on_loopback_the_allow_list_is_not_asked() -> None:
+    assert Peers(NETWORK, guarded=False).refusal("127.0.0.1") is None
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.8.8", "::1", "localhost", "::ffff:127.0.0.1", "::1%lo"])
+def test_loopback_is_known_in_all_its_spellings(host: str) -> None:
+    assert is_loopback(host)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "", "192.0.2.7", "robot.example", "fe80::1%eth0"])
+def test_what_others_can_reach_is_not_loopback(host: str) -> None:
+    assert not is_loopback(host)
+
+
+def test_an_ipv4_peer_is_the_same_through_an_ipv6_socket() -> None:
+    assert address_of("::ffff:192.0.2.7") == address_of("192.0.2.7")
+
+
+def test_leaving_and_coming_back_is_no_way_to_a_new_burst() -> None:
+    peers = Peers(ServerSettings(requests_per_s=200.0), guarded=False)
+    host = "192.0.2.7"
+    peers.join(host)
+    rate = peers.rate(host, 0.0)
+    assert rate is not None
+    while rate.wait_s(0.0) == 0.0:
+        rate.spend()
+    peers.leave(host)
+    peers.forget(0.01)
+    assert peers.rate(host, 0.01) is rate
+    peers.forget(1.0)
+    assert peers.rate(host, 1.0) is not rate

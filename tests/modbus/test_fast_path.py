@@ -1,0 +1,78 @@
+"""The short cuts answer exactly what the long way answers, or leave it alone."""
+
+from struct import pack
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from gateway.modbus import Adu, FramingLost, MbapFramer, Peer, answer
+from gateway.modbus.fast import whole_answer, whole_read_answer
+from gateway.modbus.mbap import encode
+from gateway.modbus.memory import MemoryBank
+
+PEER = Peer("127.0.0.1", 4711)
+UNITS = frozenset((0, 1, 255))
+
+
+def bank() -> MemoryBank:
+    made = MemoryBank(words=200, bits=20, identity={0: b"v"})
+    made.image[:] = bytes(index * 7 & 0xFF for index in range(400))
+    return made
+
+
+def the_long_way(frame: bytes) -> bytes | None:
+    """Framer and answer(); None when it is not exactly one frame for a served unit."""
+    try:
+        frames = MbapFramer().feed(frame)
+    except FramingLost:
+        return None
+    if len(frames) != 1 or len(frames[0].pdu) + 7 != len(frame) or frames[0].unit not in UNITS:
+        return None
+    return encode(Adu(frames[0].transaction, frames[0].unit, answer(frames[0].pdu, bank(), PEER)))
+
+
+nearly = st.tuples(
+    st.integers(0, 0xFFFF),
+    st.sampled_from([0, 0, 0, 0, 7]),
+    st.sampled_from([6, 6, 6, 6, 0, 1, 5, 7, 262]),
+    st.sampled_from([1, 1, 0, 255, 2]),
+    st.one_of(st.sampled_from([3, 4]), st.integers(0, 255)),
+    st.one_of(st.integers(0, 210), st.integers(0, 0xFFFF)),
+    st.one_of(st.integers(0, 127), st.integers(0, 0xFFFF)),
+).map(lambda fields: pack(">HHHBBHH", *fields))
+
+
+@given(nearly)
+@example(pack(">HHHBBHH", 1, 0, 6, 1, 3, 0, 125))
+@example(pack(">HHHBBHH", 1, 0, 6, 1, 4, 0, 126))
+@example(pack(">HHHBBHH", 1, 0, 6, 1, 3, 199, 2))
+def test_a_read_is_answered_as_the_long_way_or_left_to_it(frame: bytes) -> None:
+    quick = whole_read_answer(frame, UNITS, bank().read_registers)
+    assert quick is None or quick == the_long_way(frame)
+
+
+@given(
+    st.integers(0, 0xFFFF),
+    st.sampled_from(sorted(UNITS)),
+    st.sampled_from([3, 4]),
+    st.integers(0, 250),
+    st.integers(1, 125),
+)
+def test_every_plain_read_takes_the_short_cut(
+    transaction: int, unit: int, function: int, address: int, count: int
+) -> None:
+    frame = pack(">HHHBBHH", transaction, 0, 6, unit, function, address, count)
+    assert whole_read_answer(frame, UNITS, bank().read_registers) == the_long_way(frame) is not None
+
+
+frames = st.builds(Adu, st.integers(0, 0xFFFF), st.sampled_from([1, 2]), st.binary(min_size=1, max_size=253)).map(
+    encode
+)
+
+
+@given(st.one_of(nearly, frames, st.binary(max_size=40)), st.binary(min_size=300, max_size=300))
+def test_any_segment_is_answered_as_the_long_way_or_left_to_it(segment: bytes, stale: bytes) -> None:
+    """The buffer keeps what an earlier, longer segment left behind; it must not matter."""
+    buffer = bytearray(stale)
+    buffer[: len(segment)] = segment
+    assert whole_answer(buffer, len(segment), UNITS, bank(), PEER) == the_long_way(segment)

@@ -1,0 +1,50 @@
+"""Coefficients in a file are judged as an upload is, each fault at its number."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import ProfileError, load_calibration
+
+SHIPPED = (Path(__file__).parents[2] / "profiles" / "calibrations" / "demo.yaml").read_text(encoding="utf-8")
+
+
+def told(folder: Path, *edits: tuple[str, str]) -> list[str]:
+    lines = {line.partition(":")[0]: line for line in SHIPPED.splitlines()}
+    text = SHIPPED
+    for key, value in edits:
+        text = text.replace(lines[key], f"{key}: {value}")
+    path = folder / "calibration.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ProfileError) as caught:
+        load_calibration(path)
+    return [str(fault).split("calibration.yaml:")[1].partition(":")[2] for fault in caught.value.faults]
+
+
+def test_the_shipped_calibration_makes_a_model() -> None:
+    calibration = load_calibration("demo")
+    assert calibration.name == "demo" and calibration.model().force_range_n[1] > 60
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "sentence"),
+    [
+        ("rising_weights", "[1.0, -0.9, 2.3]", "23 rising_weights[1]: rising weight 1 = -0.9: 0.001 .. 1000 is allowed"),
+        ("rising_weights", "[1.0, 1.3e-26, 2.3]", "23 rising_weights[1]: rising weight 1 = 1.3e-26"),
+        ("falling_handles_n", "[1.0, 9e9, 65]", "26 falling_handles_n[1]: falling handle 1 = 9e+09: -5000 .. 5000 is allowed"),
+        ("rising_handles_n", "[1.0, 65]", "19 rising_handles_n: has 2 entries: order 2 has 3"),
+        ("rising_handles_n", "[60, 50, 40]", "20 rising_handles_n[0]: the rising branch is not increasing"),
+        ("x1_v", "0", "1 range 0 .. 0 V: 0 <= x0 < x1 <= 10 V is allowed"),
+        ("order", "two", '8 order: "two" is not a whole number'),
+    ],
+)  # fmt: skip
+def test_a_wrong_coefficient_is_told_at_its_number(tmp_path: Path, key: str, value: str, sentence: str) -> None:
+    found = [text.replace("1: range", "1 range") for text in told(tmp_path, (key, value))]
+    assert any(text.startswith(sentence) for text in found), found
+
+
+def test_crossing_branches_are_no_calibration(tmp_path: Path) -> None:
+    lines = {line.partition(":")[0]: line.partition(": ")[2] for line in SHIPPED.splitlines()}
+    pairs = [("rising_handles_n", "falling_handles_n"), ("rising_weights", "falling_weights")]
+    swapped = [(a, lines[b]) for a, b in pairs] + [(b, lines[a]) for a, b in pairs]
+    assert any("below the rising one" in text for text in told(tmp_path, *swapped))

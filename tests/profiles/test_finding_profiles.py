@@ -1,0 +1,93 @@
+"""Profiles are found by shipped name or path, and what is not found is told with what is there."""
+
+from pathlib import Path
+
+import pytest
+
+import gateway
+from gateway.profiles import ProfileError, check_report, find, load_device, load_rig, shipped
+
+PROFILES = Path(__file__).parents[2] / "profiles"
+DEMO = (PROFILES / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+
+
+def test_what_the_first_issue_ships() -> None:
+    assert {"demo", "irc5-cell"} <= set(shipped("rig"))
+    assert {"smc-itv-rc", "stream-st-gs"} <= set(shipped("device"))
+    assert "paper-slide" in shipped("plant") and "force-v1" in shipped("registers") and "demo" in shipped("calibration")
+
+
+def test_an_installed_wheel_carries_its_profiles_a_checkout_has_them_beside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert find.root() == PROFILES
+    package = tmp_path / "site-packages" / "gateway"
+    (package / "_profiles").mkdir(parents=True)
+    monkeypatch.setattr(gateway, "__file__", str(package / "__init__.py"))
+    assert find.root() == package / "_profiles"
+
+
+def test_a_name_that_is_neither_shipped_nor_a_file_is_told_with_what_is_there() -> None:
+    (fault,) = check_report("dmeo").faults
+    assert str(fault) == "dmeo: is neither a shipped rig (demo, irc5-cell) nor a file; did you mean demo?"
+    with pytest.raises(ProfileError, match="is neither a shipped device"):
+        load_device("no-such-thing")
+
+
+def test_a_path_that_is_not_there_is_told_with_its_neighbour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "rig.yaml").write_text(DEMO, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    (fault,) = check_report("./rigg.yaml").faults
+    assert str(fault) == "./rigg.yaml: is no file (looked for rigg.yaml); did you mean rig.yaml?"
+
+
+@pytest.mark.parametrize(
+    "name", ["", ".", "/", "a\0b", "x" * 5000, "\n", "~", "/proc/self/mem", "no/such/folder/rig.yaml"]
+)
+def test_no_name_whatever_ends_in_anything_but_a_rig_or_faults(name: str) -> None:
+    assert check_report(name).faults
+
+
+def test_a_file_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(DEMO, encoding="utf-8")
+
+    def refuse(self: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    (fault,) = check_report(path).faults
+    assert fault.message == "cannot be read: Permission denied"
+
+
+def test_a_rig_names_profiles_beside_itself_and_faults_in_them_point_into_them(tmp_path: Path) -> None:
+    device = (PROFILES / "devices" / "smc-itv-rc.yaml").read_text(encoding="utf-8")
+    (tmp_path / "devices").mkdir()
+    (tmp_path / "devices" / "mine.yaml").write_text(device, encoding="utf-8")
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(DEMO.replace("device: smc-itv-rc", "device: devices/mine.yaml"), encoding="utf-8")
+    assert load_rig(rig).output.device == load_device("smc-itv-rc")
+
+    (tmp_path / "devices" / "mine.yaml").write_text(device.replace("terminator:", "terminater:"), encoding="utf-8")
+    (fault,) = check_report(rig).faults
+    line = device[: device.index("terminator:")].count("\n") + 1
+    assert str(fault).endswith(f"devices/mine.yaml:{line}:1 terminater: is not a known key; did you mean terminator?")
+
+
+def test_the_fingerprint_changes_with_every_text_that_was_read(tmp_path: Path) -> None:
+    names = {"plant": "plants/paper-slide", "calibration": "calibrations/demo", "registers": "registers/force-v1"}
+    rig = tmp_path / "rig.yaml"
+    text = DEMO
+    for key, source in names.items():
+        shipped_text = (PROFILES / f"{source}.yaml").read_text(encoding="utf-8")
+        (tmp_path / f"{key}.yaml").write_text(shipped_text, encoding="utf-8")
+        text = text.replace(f"{key}: {source.split('/')[1]}", f"{key}: ./{key}.yaml")
+    rig.write_text(text, encoding="utf-8")
+    first = load_rig(rig)
+    assert set(first.texts) >= {str(rig), *(str(tmp_path / f"{key}.yaml") for key in names)}
+    seen = {first.fingerprint}
+    for changed in (rig, *(tmp_path / f"{key}.yaml" for key in names)):
+        changed.write_text(changed.read_text(encoding="utf-8") + "# a comment\n", encoding="utf-8")
+        seen.add(load_rig(rig).fingerprint)
+    assert len(seen) == 1 + 1 + len(names)
+    assert load_rig("demo").fingerprint == load_rig("demo").fingerprint

@@ -1,0 +1,118 @@
+"""What a wrong type, bound or key is told: what was seen, what is allowed, what was probably meant, and where."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles.models import RigFile
+from gateway.profiles.text import parse
+from gateway.profiles.typed import build
+
+DEMO = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+
+
+def told(*edits: tuple[str, str]) -> list[str]:
+    """The faults of demo.yaml after `old -> new` edits, each without the file's name."""
+    source = DEMO
+    for old, new in edits:
+        assert source.count(old) == 1, old
+        source = source.replace(old, new)
+    _, faults = build(RigFile, parse(source.encode(), "rig.yaml"))
+    return [str(fault).removeprefix("rig.yaml:") for fault in faults]
+
+
+def line_of(text: str) -> int:
+    return DEMO[: DEMO.index(text)].count("\n") + 1
+
+
+def test_the_example_of_the_first_hour() -> None:
+    source = "name: cell\ncalibration: demo\noutput:\n  device: smc-itv-rc\n  baud: 115300\n"
+    _, faults = build(RigFile, parse(source.encode(), "rig.yaml"))
+    assert "rig.yaml:5:9 output.baud: 115300 is not one of 9600, 19200, 38400, 115200" in map(str, faults)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("baud: 9600", "boud: 9600", "output.boud: is not a known key; did you mean baud?"),
+        ("force_max_n: 60", "force_max: 60",
+         "limits.force_max: is not a known key; did you mean force_max_n? (a key ends with its unit)"),
+        ("lease_s: null", "lease_ms: 200", "supervision.lease_ms: is not a known key; this quantity is given as lease_s: 0.2"),
+        ("lease_s: null", "lease: 200",
+         "supervision.lease: is not a known key; did you mean lease_s? (a key ends with its unit)"),
+        ("limit_v: 0.5", "limit_mv: 500", "trim.limit_mv: is not a known key; this quantity is given as limit_v: 0.5"),
+        ("sign: 1", "over_force_n: 1", "load_cell.over_force_n: is not a known key here; it belongs under limits"),
+        ("bind: 127.0.0.1", "xyz: 1", "network.xyz: is not a known key; known are bind, port, "),
+    ],
+)  # fmt: skip
+def test_an_unknown_key_is_placed_at_the_key_with_what_was_meant(old: str, new: str, sentence: str) -> None:
+    (fault,) = told((old, new))
+    assert fault.startswith(f"{line_of(old)}:3 {sentence}")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("seed: 7", 'seed: "7"', 'seed: "7" is not a whole number: write 7 (take the quotes away)'),
+        ("seed: 7", "seed: 7.0", "seed: 7.0 is not a whole number: write 7"),
+        ("seed: 7", "seed: -1", "seed: -1 is below 0, the least allowed"),
+        ("loop_hz: 100", "loop_hz: 49", "loop_hz: 49 Hz is below 50 Hz, the least allowed"),
+        ("loop_hz: 100", "loop_hz: 251", "loop_hz: 251 Hz is above 250 Hz, the most allowed"),
+        ("loop_hz: 100", "loop_hz: true", "loop_hz: true is not a number"),
+        ("loop_hz: 100", "loop_hz: 100 Hz", 'loop_hz: "100 Hz" is not a number: write 100 (the unit stands in the key)'),
+        ("loop_hz: 100", "loop_hz: 1_00", 'loop_hz: "1_00" is not a number: write 100 (digits are not grouped)'),
+        ("loop_hz: 100", "loop_hz: 1:40", 'loop_hz: "1:40" is not a number'),
+        ("loop_hz: 100", "loop_hz:", "loop_hz: has no value"),
+        ("loop_hz: 100", "loop_hz: [100]", "loop_hz: a list is not a number"),
+        ("simulated: true", "simulated: yes", 'simulated: "yes" is not true or false: write true'),
+        ("simulated: true", "simulated: off", 'simulated: "off" is not true or false: write false'),
+        ("simulated: true", "simulated: 1", "simulated: 1 is not true or false"),
+        ("name: demo", "name: 12", 'name: 12 is not text: write "12" in quotes'),
+        ("name: demo", "name: null", "name: has no value"),
+        ("lease_s: null", "lease_action: falt",
+         "supervision.lease_action: falt is not one of fault, hold, ramp; did you mean fault?"),
+        ("limit_v: 0.5", "limit_v: 0,5", 'trim.limit_v: "0,5" is not a number: write 0.5 (decimals take a point)'),
+        ("force_max_n: 60", "force_max_n: 400", "limits.force_max_n: 400 N is above 300 N, the most allowed"),
+        ("force_max_n: 60", "force_max_n: 0", "limits.force_max_n: 0 N is not above 0 N"),
+        ("units: [0, 1, 255]", "units: [0, 1, 256]", "network.units[2]: 256 is above 255, the most allowed"),
+        ("units: [0, 1, 255]", "units: []", "network.units: has 0 entries, at least 1 are needed"),
+        ("bind: 127.0.0.1", "bind: robot", 'network.bind: "robot" is not an IP address such as 127.0.0.1 or 192.168.125.10'),
+        ("units: [0, 1, 255]", "allow: [192.168.125.1/24]",
+         'network.allow[0]: "192.168.125.1/24" is not a network such as 192.168.125.0/24; did you mean 192.168.125.0/24?'),
+        ("units: [0, 1, 255]", "allow: [24]", "network.allow[0]: 24 is not a network such as 192.168.125.0/24"),
+    ],
+)  # fmt: skip
+def test_a_wrong_value_is_told_in_the_users_words(old: str, new: str, sentence: str) -> None:
+    (fault,) = told((old, new))
+    assert fault.split(" ", 1)[1] == sentence
+    assert int(fault.split(":")[0]) == line_of(old)
+
+
+def test_a_missing_key_is_placed_at_its_group() -> None:
+    assert told(("  force_max_n: 60\n", "")) == [
+        f"{line_of('limits:')}:1 limits.force_max_n: is missing (a value in N)"
+    ]
+    assert told(("calibration: demo", "#")) == ["5:1 calibration: is missing"]
+
+
+def test_a_group_that_is_a_word_is_told_once() -> None:
+    assert told(("trim: #", "trim: off #"), ("  gain_v_per_n_s: 0.3\n  limit_v: 0.5\n", ""))[0].endswith(
+        'trim: "off" is not a group of keys'
+    )
+
+
+def test_whole_numbers_are_accepted_where_a_number_is_needed_and_become_floats() -> None:
+    file, faults = build(RigFile, parse(DEMO.encode(), "rig.yaml"))
+    assert not faults and file is not None
+    assert file.limits.force_max_n == 60.0 and type(file.limits.force_max_n) is float
+
+
+def test_all_faults_are_told_at_once_from_top_to_bottom() -> None:
+    faults = told(
+        ("seed: 7", "seed: x"),
+        ("baud: 9600", "boud: 115300"),
+        ("force_max_n: 60", "force_max_n: -1"),
+        ("port: 5020", "port: 70000"),
+    )
+    places = [int(fault.split(":")[0]) for fault in faults]
+    assert places == [line_of(text) for text in ("seed: 7", "baud: 9600", "force_max_n: 60", "port: 5020")]

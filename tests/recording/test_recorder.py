@@ -1,0 +1,250 @@
+"""What a recorder promises: whole rows, one write per 0.1 s, its own number, and an end that never takes control with it."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.recording import Recorder, RecordingError, list_recordings, read_recording
+
+COLUMNS = ("time_s", "command_v", "force_n")
+HEADER = {"rig": "demo", "seed": 7, "rig_texts": {"demo.yaml": "name: demo\n# ü\n"}, "calibration": 3}
+
+
+def record(directory: Path, batches: int, rows: int = 3) -> Path:
+    recorder = Recorder(directory, HEADER, COLUMNS)
+    recorder.flush(0.0)
+    for batch in range(batches):
+        for row in range(rows):
+            at = batch * rows + row
+            recorder.append((at * 0.01, at * 0.5, float(at)))
+        recorder.flush(1.0 + batch)
+    recorder.close()
+    return recorder.path
+
+
+def test_what_was_appended_is_read_back_bit_for_bit(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    rows = [(0.1, -0.0, float("nan")), (0.2, 1e-308, float("inf")), (0.3, 1 / 3, 5e-324)]
+    for row in rows:
+        recorder.append(row)
+    recorder.close()
+    recording = read_recording(recorder.path)
+    assert not recording.truncated
+    assert recording.rows == 3
+    assert np.array(list(recording.columns.values())).T.tobytes() == np.array(rows).tobytes()
+    assert recording.header["rig_texts"] == HEADER["rig_texts"]
+    assert recording.header["started_utc"].endswith("Z")
+    assert recording.header["columns"] == list(COLUMNS)
+
+
+def test_a_file_cut_at_any_byte_loses_at_most_one_batch(tmp_path: Path) -> None:
+    whole = record(tmp_path, batches=4)
+    data = whole.read_bytes()
+    ends = batch_ends(data, len(COLUMNS))
+    cut_file = tmp_path / "cut.fgr"
+    for cut in range(len(data) + 1):
+        cut_file.write_bytes(data[:cut])
+        if cut < ends[0]:
+            with pytest.raises(RecordingError, match=r"header|not a recording"):
+                read_recording(cut_file)
+            continue
+        recording = read_recording(cut_file)
+        written = sum(end <= cut for end in ends[1:])
+        assert recording.rows == 3 * written
+        assert recording.columns["force_n"].tolist() == list(range(3 * written))
+        assert recording.truncated == (cut not in ends)
+        assert any("torn tail" in note for note in recording.notes) == recording.truncated
+
+
+def batch_ends(data: bytes, columns: int) -> list[int]:
+    """Where the header and each batch end, found without the code under test."""
+    ends = [16 + int.from_bytes(data[8:12], "little")]
+    while ends[-1] < len(data):
+        rows = int.from_bytes(data[ends[-1] + 8 : ends[-1] + 12], "little")
+        ends.append(ends[-1] + 16 + rows * columns * 8)
+    return ends
+
+
+def test_a_flipped_bit_costs_its_own_batch_only(tmp_path: Path) -> None:
+    path = record(tmp_path, batches=4)
+    data = path.read_bytes()
+    ends = batch_ends(data, len(COLUMNS))
+    for at in range(ends[1], ends[2]):
+        damaged = bytearray(data)
+        damaged[at] ^= 0x10
+        path.write_bytes(damaged)
+        recording = read_recording(path)
+        assert recording.columns["force_n"].tolist() == [0, 1, 2, 6, 7, 8, 9, 10, 11]
+        assert recording.truncated
+        assert "damaged" in recording.notes[0]
+
+
+def test_a_damaged_header_is_refused_and_not_guessed(tmp_path: Path) -> None:
+    path = record(tmp_path, batches=1)
+    data = bytearray(path.read_bytes())
+    data[20] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="damaged header"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"time_s,force_n\n0,1\n", b"\x89FGR1\n\n", b"PAR1" * 20])
+def test_what_is_no_recording_is_called_so(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "0001.fgr"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"not a recording|ends inside its header"):
+        read_recording(path)
+
+
+def test_one_write_per_tenth_of_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    writes: list[int] = []
+    real_write = os.write
+
+    def counted(descriptor: int, data: bytes) -> int:
+        writes.append(len(data))
+        return real_write(descriptor, data)
+
+    monkeypatch.setattr(os, "write", counted)
+    for tick in range(1000):
+        now_s = tick * 0.004
+        recorder.append((now_s, 0.0, 0.0))
+        recorder.flush(now_s)
+    recorder.close()
+    assert 38 <= len(writes) <= 41
+    assert read_recording(recorder.path).rows == 1000
+
+
+def test_rows_that_nobody_flushes_are_not_lost(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    for row in range(1000):
+        recorder.append((row * 0.001, 0.0, 0.0))
+    recorder.close()
+    assert read_recording(recorder.path).rows == 1000
+
+
+def test_a_row_of_another_length_is_refused_and_leaves_no_trace(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    recorder.append((0.0, 1.0, 2.0))
+    with pytest.raises(Exception, match="expected 3 items"):
+        recorder.append((0.0, 1.0))
+    recorder.close()
+    assert read_recording(recorder.path).rows == 1
+
+
+@pytest.mark.parametrize("taken", [None, 0, 10])
+def test_a_full_disk_ends_the_recording_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken: int | None
+) -> None:
+    """taken: how many bytes of the last batch the disk still takes; None: the write itself fails."""
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    recorder.append((0.0, 1.0, 2.0))
+    recorder.flush(0.0)
+    recorder.flush(0.1)
+    real_write = os.write
+
+    def full(descriptor: int, data: bytes) -> int:
+        if taken is None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return real_write(descriptor, data[:taken])
+
+    monkeypatch.setattr(os, "write", full)
+    recorder.append((0.1, 1.0, 2.0))
+    recorder.flush(0.3)
+    assert recorder.failure is not None
+    assert recorder.failure.startswith("E402")
+    assert "after 1 rows" in recorder.failure
+    assert not recorder.is_open
+    recorder.append((0.2, 1.0, 2.0))
+    recorder.flush(9.0)
+    recorder.close()
+    recording = read_recording(recorder.path)
+    assert (recording.rows, recording.truncated) == (1, False)
+
+
+def test_a_really_full_disk_is_a_sentence_too(tmp_path: Path) -> None:
+    """/dev/full answers every write with ENOSPC."""
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    with open("/dev/full", "wb", buffering=0) as full:  # noqa: PTH123
+        os.dup2(full.fileno(), recorder._descriptor or -1)
+    recorder.append((0.0, 0.0, 0.0))
+    recorder.close()
+    assert "No space left" in (recorder.failure or "")
+
+
+def test_numbers_are_never_used_twice_even_by_two_at_once(tmp_path: Path) -> None:
+    first, second = Recorder(tmp_path, HEADER, COLUMNS), Recorder(tmp_path, HEADER, COLUMNS)
+    first.close()
+    second.close()
+    (tmp_path / "0017.fgr").touch()
+    third = Recorder(tmp_path, HEADER, COLUMNS)
+    third.close()
+    assert [first.number, second.number, third.number] == [1, 2, 18]
+    assert third.path.name == "0018.fgr"
+    assert read_recording(third.path).header["number"] == 18
+
+
+def test_a_number_taken_between_look_and_create_is_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path, batches=1)
+    monkeypatch.setattr(Path, "glob", lambda self, pattern: iter(()))
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    recorder.close()
+    assert recorder.number == 2
+
+
+def test_list_names_what_it_cannot_read(tmp_path: Path) -> None:
+    directory = tmp_path / "recordings"
+    record(directory, batches=2)
+    (directory / "0002.fgr").write_bytes(b"\x89FGR1\r\n\n\x09")
+    torn = record(directory, batches=2)
+    torn.write_bytes(torn.read_bytes()[:-1])
+    good, cut, short = list_recordings(tmp_path)
+    assert (good.number, good.rows, round(good.duration_s, 6), good.truncated) == (1, 6, 0.05, False)
+    assert "ends inside its header" in cut.fault
+    assert (short.rows, short.truncated, short.fault) == (3, True, "")
+    assert list_recordings(tmp_path / "nothing") == []
+
+
+_RECORDING_PROCESS = """
+import sys
+from pathlib import Path
+from gateway.recording import Recorder
+recorder = Recorder(Path(sys.argv[1]), {"rig": "demo"}, ("time_s", "command_v", "force_n"))
+row, told = 0, 0
+while True:
+    recorder.append((row * 0.01, 1.0, float(row)))
+    recorder.flush(row * 0.01)
+    row += 1
+    if recorder.rows_written >= told + 200:
+        told = recorder.rows_written
+        print(told, row, flush=True)
+"""
+
+
+def test_kill_9_in_the_middle_loses_at_most_one_batch(tmp_path: Path, budget: int) -> None:
+    for _ in range(2 * budget):
+        process = subprocess.Popen(
+            [sys.executable, "-c", _RECORDING_PROCESS, str(tmp_path)], stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout
+        with process.stdout:
+            told = process.stdout.readline()
+            process.send_signal(signal.SIGKILL)
+            told = (process.stdout.read().splitlines(keepends=True) or [told])[-1]
+        assert process.wait() == -signal.SIGKILL
+        written, appended = (int(word) for word in told.split())
+        recording = read_recording(max(tmp_path.glob("*.fgr")))
+        assert recording.rows >= written
+        assert appended - written <= 20  # 0.1 s at 100 Hz, and the row that opened the next one
+        assert recording.columns["force_n"].tolist() == list(range(recording.rows))
+
+
+def test_the_recorder_needs_no_numpy() -> None:
+    code = "import sys, gateway.recording; sys.exit('numpy' in sys.modules or 'pyarrow' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,175 @@
+"""Accepted writes: one snapshot each, three faces of it, edge bits that act each time, and the ways to stop."""
+
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.modbus import Peer
+from gateway.registers import BankRules, Command, RegisterBank
+from gateway.registers.words import ControlBit, Mode, RefusalReason
+
+
+def test_enable_and_setpoint_in_one_write_are_one_command(master, commands):
+    master.write(0, 1, 1200)
+    (command,) = commands
+    assert command == Command(
+        control_word=ControlBit.ENABLE, force_setpoint_n=12.0, number=1, received_s=7.0, peer="10.0.0.1"
+    )
+
+
+def test_a_whole_block_is_one_snapshot_in_si_units(master, commands):
+    master.write(0, 1, 1234, 205, 1, 9, 2500, -900, 150, 300, 600, 77, 50, 200)
+    (command,) = commands
+    assert command.mode is Mode.VOLTAGE
+    assert (command.force_setpoint_n, command.force_ramp_n_per_s, command.heartbeat) == (12.34, 20.5, 9)
+    assert (command.voltage_setpoint_v, command.precontact_force_n, command.contact_ramp_s) == (2.5, 1.5, 0.3)
+    assert command.tilt_angle_rad == pytest.approx(-math.pi / 2)
+    assert (command.payload_kg, command.command_sequence) == (0.6, 77)
+    assert (command.in_band_tolerance_n, command.in_band_time_s) == (0.5, 0.2)
+
+
+def test_the_three_faces_show_the_same_command(bank, master):
+    master.write(0, 1, 1250, 205)
+    assert (master.float(200), master.float(202), master.float(204)) == (1.0, 12.5, 20.5)
+    assert bank.read_registers(302, 2) == bytes.fromhex("0000 4148")
+    master.write_float_cdab(302, 20.25)
+    assert (master.word(1), master.float(202)) == (2025, 20.25)
+    master.write_float(202, 30.0)
+    assert (master.word(1), bank.read_registers(302, 2)) == (3000, bytes.fromhex("0000 41F0"))
+
+
+def test_a_float_keeps_the_digits_that_int16_cannot_show(bank, master):
+    master.write_float(202, 12.3456)
+    master.write(4, 1)
+    assert bank.command.force_setpoint_n == pytest.approx(12.3456, abs=1e-6)
+    assert master.word(1) == 1235
+
+
+def test_a_float_block_is_one_snapshot_too(master, commands):
+    master.write_float(200, 1.0, 12.0, 100.0)
+    (command,) = commands
+    assert (command.control_word, command.force_setpoint_n, command.force_ramp_n_per_s) == (1, 12.0, 100.0)
+
+
+def test_reserved_words_at_the_end_of_a_float_write_may_be_cut(master, commands):
+    master.write(224, *struct.unpack(">2H", struct.pack(">f", 200.0)), 0)
+    assert commands[-1].in_band_time_s == 0.2
+    master.write(227, 0, 0)
+    assert master.refusal(master.write, 227, 0, 5).address == 228
+
+
+@given(raw=st.integers(-1800, 1800), block=st.sampled_from([212, 312]))
+def test_int16_and_float_mean_the_same(register_map, raw, block):
+    bank = RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
+    peer = Peer("10.0.0.1")
+    bank.write_registers(6, struct.pack(">h", raw), peer)
+    by_word, shown = bank.command.tilt_angle_rad, bank.read_registers(block, 2)
+    bank.write_registers(6, b"\0\0", peer)
+    bank.write_registers(block, shown, peer)
+    assert bank.read_registers(6, 1) == struct.pack(">h", raw)
+    assert bank.read_registers(block, 2) == shown
+    assert bank.command.tilt_angle_rad == pytest.approx(by_word, rel=1e-6, abs=1e-12)
+
+
+def test_edge_bits_act_each_time_they_are_written(master, commands):
+    for _ in range(2):
+        master.write(0, ControlBit.ENABLE | ControlBit.TARE)
+        assert master.word(0) == ControlBit.ENABLE
+        assert master.float(200) == 1.0
+    assert [command.control_word for command in commands] == [ControlBit.ENABLE | ControlBit.TARE] * 2
+    assert [command.number for command in commands] == [1, 2]
+    master.write(4, 1)
+    assert commands[-1].control_word == ControlBit.ENABLE
+
+
+def test_clearing_enable_clears_word_and_setpoints(bank, master, commands):
+    master.write(0, 1, 1200, 0, 1, 0, 3000)
+    master.write(0, 0)
+    assert (commands[-1].control_word, commands[-1].force_setpoint_n, commands[-1].voltage_setpoint_v) == (0, 0.0, 0.0)
+    assert bank.read_registers(0, 6) == bytes.fromhex("0000 0000 0000 0001 0000 0000")
+    assert (master.float(200), master.float(202), master.float(210)) == (0.0, 0.0, 0.0)
+
+
+def test_a_setpoint_sent_along_with_a_disable_is_dropped(bank, master):
+    master.write(0, 1, 1200)
+    master.write(0, 0, 1200)
+    assert (master.word(1), bank.command.force_setpoint_n) == (0, 0.0)
+    master.write(0, 0, 1200)  # disabled already: this prepares
+    assert master.word(1) == 1200
+
+
+def test_clear_command_is_controls_own_and_not_a_new_command(bank, master, commands):
+    master.write(0, 1, 1200, 50)
+    bank.clear_command()
+    assert (bank.command.control_word, bank.command.force_setpoint_n, bank.command.number) == (0, 0.0, 1)
+    assert bank.command.force_ramp_n_per_s == 5.0
+    assert (master.word(0), master.word(1), master.word(2), master.float(202)) == (0, 0, 50, 0.0)
+    assert len(commands) == 1
+    bank.clear_command()
+
+
+def test_control_may_clear_inside_its_own_call(bank, master):
+    bank.on_command = lambda command: bank.clear_command()
+    master.write(0, 1, 1200)
+    assert (master.word(0), master.word(1), bank.command.control_word) == (0, 0, 0)
+
+
+def test_coils_are_read_changed_and_written(bank, master, commands):
+    master.write(1, 1200)
+    bank.write_bits(0, [True], master.peer)
+    assert (commands[-1].control_word, commands[-1].force_setpoint_n) == (1, 12.0)
+    bank.write_bits(1, [False, True, False], master.peer)
+    assert commands[-1].control_word == ControlBit.ENABLE | ControlBit.TARE
+    assert master.word(0) == 1
+    bank.write_bits(0, [False] * 16, master.peer)
+    assert commands[-1].control_word == 0
+
+
+def test_coils_meet_the_same_refusals_as_registers(bank, master):
+    assert master.refusal(bank.write_bits, 4, [True], master.peer).reason is RefusalReason.UNSUPPORTED_BIT
+    assert master.refusal(bank.write_bits, 100, [False], master.peer).reason is RefusalReason.READ_ONLY
+    assert master.refusal(bank.write_bits, 15, [False, False], master.peer).reason is RefusalReason.ADDRESS
+    assert master.refusal(bank.write_bits, 40001, [False], master.peer).code == 2
+
+
+def test_a_mask_write_goes_through_the_same_checks(bank, master, commands):
+    master.write(1, 0x0101)
+    bank.mask_write(1, 0x00FF, 0x0200, master.peer)
+    assert master.word(1) == 0x0201
+    assert commands[-1].force_setpoint_n == 5.13
+    assert master.refusal(bank.mask_write, 1, 0, 0x7000, master.peer).reason is RefusalReason.OUT_OF_RANGE
+    assert master.refusal(bank.mask_write, 202, 0, 1, master.peer).reason is RefusalReason.HALF_VALUE
+    assert master.refusal(bank.mask_write, 500, 0, 1, master.peer).reason is RefusalReason.ADDRESS
+    bank.mask_write(0, 0xFFFE, 0x0001, master.peer)
+    assert commands[-1].control_word == ControlBit.ENABLE
+
+
+def test_last_writers_are_kept_by_name(bank, master):
+    master.write(0, 1, 1200)
+    master.write_float_cdab(308, 5.0)
+    assert bank.last_writer == dict.fromkeys(("control_word", "force_setpoint", "heartbeat"), (master.peer, 7.0))
+
+
+def test_people_are_told_what_changed_and_not_of_heartbeats(bank, master):
+    told = []
+    bank.on_accepted = lambda sentence, peer: told.append(sentence)
+    master.write(0, 1, 1200)
+    master.write(4, 1, 0)
+    master.write(0, 5, 1300)
+    master.write(0, 0)
+    assert told == [
+        "control_word 0 -> 1, force_setpoint 0.00 N -> 12.00 N, owner nobody -> 10.0.0.1",
+        "force_setpoint 12.00 N -> 13.00 N, tare",
+        "control_word 1 -> 0, force_setpoint 13.00 N -> 0.00 N, owner 10.0.0.1 -> nobody",
+    ]
+
+
+def test_the_command_is_handed_on_before_anybody_is_told(bank, master):
+    order = []
+    bank.on_accepted = lambda sentence, peer: order.append("told")
+    bank.on_command = lambda command: order.append("commanded")
+    master.write(1, 100)
+    assert order == ["commanded", "told"]

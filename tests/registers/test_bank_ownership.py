@@ -1,0 +1,129 @@
+"""One master commands; others read, may stop, and take over only when they say so."""
+
+import pytest
+
+from gateway.registers.ownership import NOT_IPV4, ip_number
+from gateway.registers.words import ControlBit, RefusalReason
+
+TAKE = int(ControlBit.TAKE_OWNERSHIP)
+
+
+def test_the_first_that_commands_owns_and_others_get_06(bank, master, other, commands):
+    master.write(1, 1200)
+    assert bank.owner == "10.0.0.1"
+    assert bank.read_registers(116, 2) == bytes([10, 0, 0, 1])
+    refusal = other.refusal(other.write, 1, 1300)
+    assert (refusal.code, refusal.reason) == (6, RefusalReason.NOT_OWNER)
+    assert refusal.sentence.startswith("W210 10.0.0.1 owns the setpoint, 10.0.0.2 may read and clear enable")
+    assert len(commands) == 1
+
+
+def test_only_the_owners_heartbeat_reaches_control(bank, master, other):
+    master.write(0, 1, 1200)
+    other.refusal(other.write, 4, 9)
+    other.refusal(other.write_float, 208, 9.0)
+    assert bank.command.heartbeat == 0
+
+
+def test_a_second_connection_of_the_owners_host_is_the_owner(bank, master, master_of):
+    master.write(0, 1, 1200)
+    master_of(bank, "10.0.0.1").write(1, 1300)
+    assert bank.command.force_setpoint_n == 13.0
+
+
+STOPS = [
+    lambda peer: peer.write(0, 0),
+    lambda peer: peer.bank.write_bits(0, [False], peer.peer),
+    lambda peer: peer.write(0, 0, 1300, 0, 0, 99),
+    lambda peer: peer.write_float(200, 0.0),
+    lambda peer: peer.bank.mask_write(0, 0xFFFE, 0, peer.peer),
+]
+
+
+@pytest.mark.parametrize("stop", STOPS)
+def test_anybody_may_stop_and_nothing_else_is_taken(bank, master, other, commands, stop):
+    master.write(0, 1, 1200, 300, 0, 7)
+    stop(other)
+    assert (commands[-1].control_word, commands[-1].force_setpoint_n, commands[-1].peer) == (0, 0.0, "10.0.0.2")
+    assert (commands[-1].heartbeat, commands[-1].force_ramp_n_per_s) == (7, 30.0)
+    assert bank.owner is None
+    assert bank.read_registers(116, 2) == bytes(4)
+
+
+def test_a_stop_when_nothing_runs_is_no_error_and_no_command(master, other, commands):
+    master.write(1, 1200)
+    other.write(0, 0)
+    other.bank.write_bits(0, [False], other.peer)
+    assert len(commands) == 1
+    assert other.refusal(other.write, 0, 0, 0).reason is RefusalReason.NOT_OWNER
+
+
+def test_disable_and_neutral_writes_release(bank, master, other):
+    master.write(0, 1, 1200)
+    master.write(0, 0)
+    assert bank.owner is None
+    master.write(1, 500)
+    assert bank.owner == "10.0.0.1"
+    master.write(1, 0)
+    assert bank.owner is None
+    other.write(4, 5)
+    assert bank.owner is None
+
+
+def test_takeover_is_explicit_bumpless_and_visible(bank, master, other, commands):
+    told = []
+    bank.on_accepted = lambda sentence, peer: told.append(sentence)
+    master.write(0, 1, 1200)
+    other.write(0, 1 | TAKE, 1300)
+    assert (bank.owner, bank.read_registers(116, 2)) == ("10.0.0.2", bytes([10, 0, 0, 2]))
+    assert (commands[-1].control_word, commands[-1].force_setpoint_n) == (1 | TAKE, 13.0)
+    assert "owner 10.0.0.1 -> 10.0.0.2" in told[-1]
+    assert other.word(0) == 1
+    assert master.refusal(master.write, 1, 100).reason is RefusalReason.NOT_OWNER
+    bank.write_bits(3, [True], master.peer)
+    assert (bank.owner, bank.command.force_setpoint_n) == ("10.0.0.1", 13.0)
+
+
+def test_a_takeover_that_is_refused_changes_no_owner(bank, master, other):
+    master.write(0, 1, 1200)
+    other.refusal(other.write, 0, 1 | TAKE, 6500)
+    assert bank.owner == "10.0.0.1"
+
+
+def test_an_owner_that_the_rig_names_stays(make_bank, master_of):
+    bank = make_bank(owner="10.0.0.1")
+    owner, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    assert bank.owner == "10.0.0.1"
+    for words in ((1, 100), (0, 1 | TAKE, 100)):
+        assert "this rig names its owner" in other.refusal(other.write, *words).sentence
+    owner.write(0, 1, 1200)
+    other.write(0, 0)
+    bank.release_owner()
+    assert (bank.owner, bank.command.control_word) == ("10.0.0.1", 0)
+
+
+def test_the_lease_end_releases(bank, master, other):
+    master.write(0, 1, 1200)
+    bank.clear_command()
+    bank.release_owner()
+    other.write(0, 1, 1300)
+    assert bank.owner == "10.0.0.2"
+
+
+def test_the_byte_order_proof_needs_no_ownership(master, other):
+    master.write(0, 1, 1200)
+    other.write_float(416, 1234.5)
+
+
+@pytest.mark.parametrize(
+    ("host", "number"),
+    [
+        (None, 0),
+        ("127.0.0.1", 0x7F000001),
+        ("::ffff:10.1.2.3", 0x0A010203),
+        ("fe80::1%eth0", NOT_IPV4),
+        ("serial", NOT_IPV4),
+    ],
+)
+def test_owner_ip(host, number):
+    assert ip_number(host) == number

@@ -1,0 +1,152 @@
+"""Coefficient upload by words: stored as they come, judged at commit; the active set is read back with the same layout."""
+
+import struct
+import zlib
+from collections.abc import Callable
+
+import pytest
+
+from gateway.bsfm.model import Calibration
+from gateway.registers import Refusal, RegisterBank
+from gateway.registers.coefficients import SET_BYTES, CoefficientSet
+from gateway.registers.words import CommitAction, CommitStatus, RefusalReason, UploadReason
+
+CALIBRATION = Calibration(
+    number=16,
+    name="test",
+    order=2,
+    x0_v=0.0,
+    x1_v=8.0,
+    rising_handles_n=(0.0, 20.0, 60.0),
+    rising_weights=(1.0, 0.5, 1.0),
+    falling_handles_n=(0.0, 30.0, 60.0),
+    falling_weights=(1.0, 0.5, 1.0),
+    blend_span_n=3.0,
+    rms_n=0.1,
+    max_n=0.3,
+    date_utc="2025-01-01T00:00:00Z",
+    source="test",
+    rig="demo",
+    data_sha256="",
+)
+
+
+@pytest.fixture
+def bank(make_bank: Callable[..., RegisterBank]) -> RegisterBank:
+    return make_bank(allow_plain_upload=True)
+
+
+def test_single_words_are_stored_and_read_back(bank, master, register_map):
+    for address, word in ((1000, 2), (1006, 0x4140), (1007, 0), (1143, 0xBEEF)):
+        master.write(address, word)
+    assert bank.read_registers(1006, 2) == struct.pack(">f", 12.0)
+    assert master.word(1143) == 0xBEEF
+    assert bank.last_writer == {"staging": (master.peer, 7.0)}
+
+
+def test_staging_needs_no_ownership_and_takes_none(bank, master, other):
+    master.write(0, 1, 1200)
+    other.write(1000, 2)
+    assert bank.owner == "10.0.0.1"
+
+
+def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
+    given = CoefficientSet(
+        2,
+        0.0,
+        8.0,
+        *((float(k), k + 1.0, k + 2.0) for k in (10, 20, 30, 40)),
+        force_low_n=1.0,
+        force_high_n=59.0,
+        blend_span_n=3.0,
+    )
+    words = given.to_words()
+    bank.write_registers(1000, words[:200], master.peer)
+    bank.write_registers(1100, words[200:], master.peer)
+    expected = {
+        "order": 2,
+        "range_high": 8.0,
+        "rising_b_1": 11.0,
+        "rising_b_3": 0.0,
+        "rising_w_0": 20.0,
+        "falling_b_2": 32.0,
+    }
+    expected |= {"falling_w_0": 40.0, "force_low": 1.0, "force_high": 59.0, "blend_span": 3.0}
+    for name, value in expected.items():
+        register = register_map.find(f"{name}@staging")
+        assert register.decode(bank.read_registers(register.address, register.words)) == value, name
+    assert CoefficientSet.from_words(words).rising_handles_n[:3] == given.rising_handles_n
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ((1001, 1), RefusalReason.RESERVED),
+        ((1140, 140, 1), RefusalReason.RESERVED),
+        ((1199, 5), RefusalReason.RESERVED),
+        ((1146, 3), RefusalReason.READ_ONLY),
+        ((1145, 1), RefusalReason.COEFFICIENTS),
+        ((1145, 9), RefusalReason.OUT_OF_RANGE),
+        ((1144, 2, 1), RefusalReason.COEFFICIENTS),
+        ((1149, 3), RefusalReason.COEFFICIENTS),
+        ((1149, 8), RefusalReason.OUT_OF_RANGE),
+    ],
+)
+def test_what_staging_refuses_leaves_no_trace(master, words, reason):
+    assert master.refusal(master.write, *words).reason is reason
+
+
+def test_commit_is_passed_on_with_the_staged_words_and_reads_zero(bank, master):
+    seen = []
+    bank.staging.on_commit = lambda action, words, peer: seen.append((action, len(words), words[-2:], peer))
+    master.write(1144, 5, 1)
+    assert (master.word(1144), master.word(1145)) == (5, 0)
+    master.write(1145, 2)
+    master.write(1145, 0)
+    assert [entry[0] for entry in seen] == [CommitAction.COMMIT, CommitAction.DRY_RUN]
+    assert seen[0][1:] == (290, b"\0\5", master.peer)
+
+
+def test_a_commit_that_its_server_refuses_changes_nothing(bank, master):
+    def refuse(action, words, peer):
+        raise Refusal(RefusalReason.BUSY, 1145, "output enabled")
+
+    bank.staging.on_commit = refuse
+    assert master.refusal(master.write, 1144, 5, 1).code == 6
+
+
+def test_staging_is_locked_while_a_commit_is_under_way(bank, master):
+    for status in (CommitStatus.CHECKING, CommitStatus.WRITING):
+        bank.staging.show_commit(status)
+        refusal = master.refusal(master.write, 1000, 2)
+        assert (refusal.code, refusal.reason) == (6, RefusalReason.BUSY)
+    bank.staging.show_commit(CommitStatus.FAILED, -1, UploadReason.CRC)
+    assert bank.read_registers(1146, 3) == struct.pack(">HhH", 4, -1, 21)
+    master.write(1000, 2)
+
+
+def test_a_slot_is_selected_by_its_number(bank, master):
+    seen = []
+    bank.staging.on_select = lambda slot, peer: seen.append(slot)
+    master.write(1149, 3)
+    assert (seen, master.word(1149)) == ([3], 3)
+
+
+def test_the_active_set_is_read_back_with_its_crc(bank, register_map):
+    bank.set_active_model(CALIBRATION, slot=4)
+    words = bank.read_registers(1500, 100) + bank.read_registers(1600, 40)
+    assert len(words) == SET_BYTES
+    assert words == CoefficientSet.of_calibration(CALIBRATION).to_words()
+    crc = zlib.crc32(words).to_bytes(4, "big")
+    assert bank.read_registers(1640, 1) == (140).to_bytes(2, "big")
+    assert bank.read_registers(1642, 2) == bank.read_registers(414, 2) == crc
+    assert bank.read_registers(1644, 1) == b"\0\4"
+    register = register_map.find("falling_b_1@active")
+    assert register.decode(bank.read_registers(register.address, 2)) == 30.0
+
+
+def test_sets_that_cannot_be_carried_are_said():
+    with pytest.raises(ValueError, match="at most 16"):
+        CoefficientSet(16, 0.0, 1.0, (0.0,) * 17, (), (), (), 0.0, 1.0, 0.0).to_words()
+    with pytest.raises(ValueError, match="a set has 280"):
+        CoefficientSet.from_words(bytes(4))

@@ -1,0 +1,241 @@
+"""Requests per second and CPU per request of our Modbus TCP server, beside a libmodbus C server and stock pymodbus.
+
+    python tools/bench/modbus_server.py [--seconds 3] [--rounds 5] [--connections 16] [--bank simple|real] [--json]
+
+Same load generator for all (modbus_load.c: one outstanding request per connection, one epoll), same run, rounds
+interleaved so that a busy machine hurts all alike; rates are medians over rounds, CPU is the server process's user + system
+time over all its requests. Only ratios mean something: read them, not the absolute numbers.
+What is absent (gcc, libmodbus, uvloop, pymodbus) is skipped, and said.
+"""
+
+import argparse
+import asyncio
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import monotonic
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+GOALS = {"ours on uvloop": 0.9, "ours on asyncio": 0.75}
+CPU_GOAL = 1.2
+YARDSTICK = "libmodbus (C)"
+
+
+def real_bank() -> object:
+    """The bank of the demo rig, as the service builds it."""
+    from gateway.profiles import load_rig
+    from gateway.registers import RegisterBank
+    from gateway.service.rules import bank_rules
+
+    rig = load_rig("demo")
+    return RegisterBank(rig.register_map, bank_rules(rig), now=monotonic)
+
+
+async def serve_ours(bank: str) -> None:
+    from gateway.fieldbus import ModbusTcpServer, ServerSettings
+    from gateway.modbus.memory import MemoryBank
+
+    data = real_bank() if bank == "real" else MemoryBank(2000)
+    server = ModbusTcpServer(
+        data, ServerSettings(connections=256), on_peer_closed=lambda _peer: None, log=lambda *_: None
+    )
+    _host, port = await server.start("127.0.0.1", 0)
+    print(port, flush=True)
+    await asyncio.Event().wait()
+
+
+async def serve_pymodbus() -> None:
+    from pymodbus.server import ModbusTcpServer
+    from pymodbus.simulator import DataType, SimData, SimDevice
+
+    device = SimDevice(1, simdata=[SimData(0, values=0, count=2000, datatype=DataType.REGISTERS)])
+    server = ModbusTcpServer(device, address=("127.0.0.1", 0))
+    await server.serve_forever(background=True)
+    print(server.transport.sockets[0].getsockname()[1], flush=True)
+    await asyncio.Event().wait()
+
+
+def serve(which: str, loop: str, bank: str) -> None:
+    """The server process: prints its port, serves until it is ended."""
+    main = serve_pymodbus() if which == "pymodbus" else serve_ours(bank)
+    if loop == "uvloop":
+        import uvloop
+
+        uvloop.run(main)
+    else:
+        asyncio.run(main)
+
+
+@dataclass
+class Contender:
+    name: str
+    command: list[str]
+    process: subprocess.Popen[str] | None = None
+    stderr: int | None = None
+    port: int = 0
+    rates: list[float] = field(default_factory=list)
+    requests: int = 0
+    cpu_s: float = 0.0
+    faulty: int = 0
+
+    def start(self, stack: ExitStack) -> None:
+        self.process = stack.enter_context(
+            subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=self.stderr, text=True, cwd=ROOT)
+        )
+        stack.callback(self.process.kill)
+        assert self.process.stdout is not None
+        self.port = int(self.process.stdout.readline() or 0)
+        if not self.port:
+            raise SystemExit(f"{self.name}: the server did not start")
+
+    def cpu_now_s(self) -> float:
+        assert self.process is not None
+        after_name = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(after_name[11]) + int(after_name[12])) / os.sysconf("SC_CLK_TCK")
+
+    def round(self, load: Path, seconds: float, connections: int, kind: str) -> None:
+        before_s = self.cpu_now_s()
+        command = [str(load), str(self.port), str(seconds), str(connections), kind]
+        words = subprocess.run(command, check=True, capture_output=True, text=True, timeout=seconds + 30).stdout.split()
+        self.cpu_s += self.cpu_now_s() - before_s
+        self.requests += int(words[0])
+        self.rates.append(int(words[0]) / float(words[1]))
+        self.faulty += int(words[2])
+
+    def clear(self) -> None:
+        self.rates, self.requests, self.cpu_s, self.faulty = [], 0, 0.0, 0
+
+    @property
+    def rate_per_s(self) -> float:
+        return statistics.median(self.rates)
+
+    @property
+    def cpu_us(self) -> float:
+        return 1e6 * self.cpu_s / max(self.requests, 1)
+
+
+def compiled(source: str, into: Path, *libraries: str) -> Path | None:
+    program = into / source.removesuffix(".c")
+    command = ["gcc", "-O2", "-o", str(program), str(HERE / source), *libraries]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        print(f"SKIPPED {source}: {done.stderr.strip().splitlines()[0]}", file=sys.stderr)
+    return None if done.returncode else program
+
+
+def importable(module: str) -> bool:
+    import importlib.util
+
+    found = importlib.util.find_spec(module) is not None
+    if not found:
+        print(f"SKIPPED everything that needs {module}: it is not installed", file=sys.stderr)
+    return found
+
+
+def contenders(into: Path, bank: str) -> list[Contender]:
+    me = [sys.executable, str(Path(__file__).resolve())]
+    found: list[Contender] = []
+    if (server := compiled("libmodbus_server.c", into, "-lmodbus")) is not None:
+        found.append(Contender(YARDSTICK, [str(server)]))
+    if importable("uvloop"):
+        found.append(Contender("ours on uvloop", [*me, "--serve", "ours", "--loop", "uvloop", "--bank", bank]))
+    found.append(Contender("ours on asyncio", [*me, "--serve", "ours", "--loop", "asyncio", "--bank", bank]))
+    if importable("pymodbus"):
+        found.append(
+            Contender("stock pymodbus", [*me, "--serve", "pymodbus", "--loop", "asyncio"], stderr=subprocess.DEVNULL)
+        )
+    return found
+
+
+def measured(load: Path, servers: list[Contender], arguments: argparse.Namespace, kind: str) -> list[dict[str, object]]:
+    """One row for each server. The first, short round warms up and is thrown away."""
+    for server in servers:
+        server.clear()
+        server.round(load, 0.3, arguments.connections, kind)
+        server.clear()
+    for _ in range(arguments.rounds):
+        for server in servers:
+            server.round(load, arguments.seconds / arguments.rounds, arguments.connections, kind)
+    yardstick = next((server for server in servers if server.name == YARDSTICK), None)
+    return [row(server, yardstick, kind) for server in servers]
+
+
+def row(server: Contender, yardstick: Contender | None, kind: str) -> dict[str, object]:
+    goal = GOALS.get(server.name)
+    rate = server.rate_per_s / yardstick.rate_per_s if yardstick else None
+    cpu = server.cpu_us / yardstick.cpu_us if yardstick and yardstick.cpu_us else None
+    reached = None if goal is None or rate is None or cpu is None else rate >= goal and cpu <= CPU_GOAL
+    return {
+        "run": kind,
+        "server": server.name,
+        "requests_per_s": round(server.rate_per_s),
+        "rate_ratio": rate and round(rate, 3),
+        "cpu_us_per_request": round(server.cpu_us, 2),
+        "cpu_ratio": cpu and round(cpu, 3),
+        "rate_goal": goal,
+        "goal_reached": reached,
+        "faulty_answers": server.faulty,
+    }
+
+
+def shown(rows: list[dict[str, object]], title: str) -> None:
+    print(f"\n{title}\n{'server':<18}{'requests/s':>12}{'x libmodbus':>13}{'CPU us/req':>12}{'x libmodbus':>13}  goal")
+    for found in rows:
+        goal, reached = found["rate_goal"], found["goal_reached"]
+        verdict = "" if reached is None else f">= {goal}, CPU <= {CPU_GOAL}: {'reached' if reached else 'MISSED'}"
+        faulty = f"  {found['faulty_answers']} FAULTY ANSWERS" if found["faulty_answers"] else ""
+        cells = [f"{found['requests_per_s']:>12}", f"{found['rate_ratio'] or '-':>13}"]
+        cells += [f"{found['cpu_us_per_request']:>12}", f"{found['cpu_ratio'] or '-':>13}"]
+        print(f"{found['server']:<18}{''.join(cells)}  {verdict}{faulty}")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=3.0, help="load on each server in each of the two runs")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--connections", type=int, default=16)
+    parser.add_argument("--bank", choices=("simple", "real"), default="simple")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--serve", choices=("ours", "pymodbus"), help=argparse.SUPPRESS)
+    parser.add_argument("--loop", choices=("uvloop", "asyncio"), default="asyncio", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.serve:
+        serve(arguments.serve, arguments.loop, arguments.bank)
+        return 0
+    if shutil.which("gcc") is None:
+        print("SKIPPED: the load generator and the libmodbus server need gcc", file=sys.stderr)
+        return 0
+    return compare(arguments)
+
+
+def compare(arguments: argparse.Namespace) -> int:
+    started_s = monotonic()
+    with ExitStack() as stack:
+        into = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        load = compiled("modbus_load.c", into)
+        if load is None:
+            return 1
+        servers = contenders(into, arguments.bank)
+        for server in servers:
+            server.start(stack)
+        titles = {"read": "FC03, 32 registers", "write": "FC16, 13 registers"}
+        results = {kind: measured(load, servers, arguments, kind) for kind in titles}
+    if arguments.json:
+        print(json.dumps([found for rows in results.values() for found in rows], indent=1))
+        return 0
+    for kind, title in titles.items():
+        shown(results[kind], f"{title}, {arguments.connections} connections, bank {arguments.bank}")
+    print(f"\n{monotonic() - started_s:.0f} s on {os.cpu_count()} cores")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
