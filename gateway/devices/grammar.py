@@ -1,11 +1,11 @@
 """A profile's templates at work: numbers into whole lines and back, for both ends of a wire."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 
 from gateway.devices.checksum import sealed, unsealed
 from gateway.devices.exchange import Exchange, VoltageExchange
-from gateway.devices.fields import Value, ValueRefused
+from gateway.devices.fields import Field, Value, ValueRefused
 from gateway.devices.framing import Line
 from gateway.devices.messages import OutputRequest, ReadPressure, ReadVoltage, SetVoltage
 from gateway.devices.profile import DeviceProfile
@@ -14,7 +14,10 @@ from gateway.devices.template import compile_template
 
 @dataclass(frozen=True, slots=True)
 class Grammar:
+    """Remembers which number each template carries: a setpoint passes here on its way to the wire."""
+
     profile: DeviceProfile
+    _numbers: dict[str, tuple[Field | None, int]] = field(default_factory=dict, compare=False)
 
     @property
     def set_voltage(self) -> VoltageExchange:
@@ -35,6 +38,12 @@ class Grammar:
             raise ValueRefused(f"{self.profile.name} has no words for {type(message).__name__}")
         return exchange
 
+    def _number_in(self, template: str) -> tuple[Field | None, int]:
+        """The field that carries a template's number, and its decimals."""
+        if template not in self._numbers:
+            self._numbers[template] = self.profile.number_in(template), self.profile.decimals_in(template)
+        return self._numbers[template]
+
     def line(self, body: bytes) -> bytes:
         """A sentence with its checksum and terminator: what goes on the wire."""
         return sealed(body, self.profile.checksum) + self.profile.terminator_bytes
@@ -46,9 +55,9 @@ class Grammar:
     def number_line(self, template: str, number: float) -> bytes:
         """The line with this number in it, nearest on the template's own grid."""
         values: dict[str, Value] = dict(self.profile.constants)
-        field = self.profile.number_in(template)
-        if field is not None:
-            values[field.name] = round(number, self.profile.decimals_in(template))
+        number_field, decimals = self._number_in(template)
+        if number_field is not None:
+            values[number_field.name] = round(number, decimals)
         return self.line(compile_template(template).encode(values))
 
     def read(self, template: str, body: bytes | None, may_be_blank: str = "") -> dict[str, Value] | None:
@@ -60,15 +69,15 @@ class Grammar:
 
     def number(self, template: str, values: dict[str, Value]) -> float | None:
         """The number among the values, None when the template carries none."""
-        field = self.profile.number_in(template)
-        return float(values[field.name]) if field else None
+        number_field, _ = self._number_in(template)
+        return float(values[number_field.name]) if number_field else None
 
     def setting(self, voltage_v: float) -> float:
         """The device's number for a voltage, on its grid. ValueRefused for nan, inf, and outside its range."""
         exchange = self.set_voltage
         number = exchange.range.scale.to_number(voltage_v)
         if isfinite(number):
-            number = round(number, self.profile.decimals_in(exchange.ask))
+            number = round(number, self._number_in(exchange.ask)[1])
         if not exchange.range.scale.carries(number):  # nan is carried by no range
             low_v, high_v = exchange.range.voltage_v
             raise ValueRefused(f"{voltage_v} V, {self.profile.name} takes {low_v:g} .. {high_v:g} V")

@@ -1,0 +1,28 @@
+"""README's generated part and its promises are those of the code."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from gateway.cli.main import command
+from gateway.profiles import load_register_map
+from gateway.registers import render_block
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
+
+
+def test_the_command_block_is_the_map_s():
+    table = README.split("<!-- command block", 1)[1].split("-->\n", 1)[1].split("<!-- end -->", 1)[0]
+    assert table == render_block(load_register_map("force-v1"), "command"), "run tools/readme"
+
+
+@pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:bin/)?force-gateway ([a-z-]+)(?= |`|\n)", README))))
+def test_every_verb_that_readme_names_exists(verb):
+    assert verb in command.list_commands(None)
+
+
+@pytest.mark.parametrize("path", sorted(set(re.findall(r"(?<![-\w])(?:tools|profiles|tests|gateway)/[\w./-]*\w", README))))
+def test_every_file_that_readme_names_exists(path):
+    assert (ROOT / path).exists()
