@@ -1,0 +1,134 @@
+"""Ladder, minor loops and fits of every copy of the rig, as the paper does them: 0-5-0 V by 0.1 V, ten groups.
+
+A group starts where the one before ended, and the friction remembers no more than a full cycle, so on a quiet twin every
+group after the first is the same (a test says so). The copies therefore run one group after a conditioning cycle and
+read it ten times with new noise; the paper's rig itself (Figs. 4-6) runs all 1010 stairs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.bsfm.branches import Branches
+from gateway.bsfm.fit import fit, fit_orders
+from gateway.bsfm.fit_result import FitResult
+from gateway.bsfm.ladder import Ladder, LadderPlan, ladder_plan
+from gateway.bsfm.model import Bsfm
+from gateway.bsfm.reversal import LinearBlend
+from gateway.twin import Plant, Twin
+from gateway.twin.experiment import Dwell, Floats, staircase
+from gateway.twin.plant import with_value
+from paper.paper_values import GROUPS, LADDER_STEP_V, LADDER_TOP_V
+
+READ_ONCE: Final = Dwell(readings=1)
+TURNS_V: Final = (
+    0.0,
+    4.5,
+    1.5,
+    3.5,
+    2.0,
+    3.0,
+    0.75,
+    4.0,
+    2.25,
+    3.75,
+    0.5,
+    1.75,
+    1.0,
+    2.0,
+)  # partial reversals of all sizes
+STAIR_V: Final = 0.15
+MINOR_READINGS: Final = 5  # per stair, averaged
+SPANS_N: Final = np.arange(0.5, 25.01, 0.5)
+FORMS: Final = {"pfm": "tied", "bfm": "tied", "psfm": "free", "bsfm": "tied"}
+"""The paper's forms: PSFM is piecewise (each direction its own ends), BSFM continuous (shared ends)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """What one copy of the rig gave: its ladder and the models fitted to it."""
+
+    seed: int
+    plant: Plant
+    ladder: Ladder
+    psfm: Branches
+    psfm_same_order: Branches
+    bsfm: Branches
+    ours: Bsfm  # the same branches with a blend span from minor loops
+
+
+def condition(twin: Twin) -> None:
+    """One full cycle: what the friction remembers afterwards is the ladder's own past."""
+    for voltage_v in (LADDER_TOP_V, 0.0):
+        twin.command(voltage_v)
+        twin.advance(1.5)
+
+
+def quiet_twin(plant: Plant) -> Twin:
+    """The rig after a full cycle, without noise. One float twin per copy: below 20 lanes that is faster than lanes."""
+    twin = Twin(with_value(plant, "cell", "noise_n", 0.0), 0)
+    condition(twin)
+    return twin
+
+
+def noise_n(plant: Plant, seed: int, count: int) -> Floats:
+    """Of single readings on the ladder."""
+    return np.asarray(np.random.default_rng([seed, 2, 1]).standard_normal(count) * plant.cell.noise_n)
+
+
+def ladder_of(plan: LadderPlan, force_n: Floats) -> Ladder:
+    return Ladder(np.array(plan.voltage_v), force_n, np.array(plan.direction), np.array(plan.group))
+
+
+def paper_ladder(plant: Plant, seed: int, groups: int = GROUPS) -> Ladder:
+    """All stairs of all groups on one rig."""
+    plan = ladder_plan(LADDER_TOP_V, LADDER_STEP_V, groups)
+    force_n = staircase(quiet_twin(plant), plan.voltage_v, READ_ONCE)
+    return ladder_of(plan, force_n + noise_n(plant, seed, len(plan)))
+
+
+def stairs_between(turns_v: Sequence[float], step_v: float) -> list[float]:
+    """Even stairs from turn to turn."""
+    stairs = [turns_v[0]]
+    for turn_v in turns_v[1:]:
+        count = max(1, round(abs(turn_v - stairs[-1]) / step_v))
+        stairs += [float(v) for v in np.linspace(stairs[-1], turn_v, count + 1)[1:]]
+    return stairs
+
+
+def command_error_n(model: Bsfm, voltage_v: Sequence[float], force_n: Floats) -> Floats:
+    """What a law with this model gets wrong on a walk: volts asked for each force in turn, against those that made it, in N."""
+    state, errors = 1.0, []
+    low_n, high_n = model.force_range_n
+    for before_n, now_n, volts in zip(force_n[:-1], force_n[1:], voltage_v[1:], strict=True):
+        state = model.reversal.advance(state, float(now_n - before_n))
+        asked_v, _ = model.voltage_v(min(max(float(now_n), low_n), high_n), state)
+        errors.append(model.force_n(asked_v, state) - model.force_n(volts, state))
+    return np.array(errors)
+
+
+def with_span(branches: Branches, voltage_v: Sequence[float], force_n: Floats) -> Bsfm:
+    """The branches with the blend span that has the smallest error on the minor loops."""
+    candidates = [Bsfm(branches, LinearBlend(float(span_n))) for span_n in SPANS_N]
+    errors = [float(np.mean(command_error_n(model, voltage_v, force_n) ** 2)) for model in candidates]
+    return candidates[int(np.argmin(errors))]
+
+
+def calibrate(plant: Plant, seed: int) -> Calibrated:
+    """Ladder, minor loops and fits of one copy."""
+    one, whole = (ladder_plan(LADDER_TOP_V, LADDER_STEP_V, groups) for groups in (1, GROUPS))
+    twin, minor_v = quiet_twin(plant), stairs_between(TURNS_V, STAIR_V)
+    group_n, minor_n = (staircase(twin, voltages_v, READ_ONCE) for voltages_v in (one.voltage_v, minor_v))
+    noise = noise_n(plant, seed, len(whole) + len(minor_v))
+    ladder = ladder_of(whole, np.tile(group_n, GROUPS) + noise[: len(whole)])
+    bsfm = fit(ladder, "bsfm", 2, FORMS["bsfm"]).branches
+    psfm, same = (fit(ladder, "psfm", order, FORMS["psfm"]).branches for order in (3, 2))
+    ours = with_span(bsfm, minor_v, minor_n + noise[len(whole) :] / np.sqrt(MINOR_READINGS))
+    return Calibrated(seed, plant, ladder, psfm, same, bsfm, ours)
+
+
+def sweep(ladder: Ladder, orders: Sequence[int]) -> dict[str, list[FitResult]]:
+    """Fits of all four models, by name, orders ascending (Figs. 4, 5, 6)."""
+    return {name: fit_orders(ladder, name, orders, ties) for name, ties in FORMS.items()}

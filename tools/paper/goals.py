@@ -1,0 +1,112 @@
+"""Is the goal met - half the largest error, 0.7 of the settling time - and where not, why: with the limit beside it."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from paper.comparison import ERROR_GOAL, SETTLING_GOAL, Comparison
+from paper.exercises import PACE_N_PER_S, UNBALANCE_N
+from paper.laws import LAG_S, SHAPED_LAG_S
+from paper.paper_values import SETTLING_S
+from paper.rigs import paper_plant
+from paper.study import Study
+from paper.trials import settled_s
+
+MET, MISSED, NO_GOAL = "met", "missed", ""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A comparison with the verdict on ours and on the lead, and the reason where ours misses."""
+
+    comparison: Comparison
+    ours: str
+    lead: str
+    why: str
+
+
+def judged(study: Study) -> list[Judged]:
+    return [_judge(study, comparison) for comparison in study.comparisons]
+
+
+def _judge(study: Study, comparison: Comparison) -> Judged:
+    if comparison.goal is None:
+        return Judged(comparison, NO_GOAL, NO_GOAL, "")
+    ours, lead = (MET if comparison.meets(law) else MISSED for law in ("ours", "lead"))
+    return Judged(comparison, ours, lead, "" if ours == MET else _reason(study, comparison))
+
+
+def _reason(study: Study, comparison: Comparison) -> str:
+    name = comparison.name
+    for beginning, reason in REASONS:
+        if beginning in name:
+            return reason(study, comparison)
+    return "the error is small on both sides"
+
+
+def _settling(study: Study, comparison: Comparison) -> str:
+    band_n = next(band for band in SETTLING_S if f"within {band:g} N" in comparison.name)
+    return (
+        "the feedforward alone moves the force, so the same volts pass the same lags; the controller has no lead. "
+        f"Physics allows {allowed_ratio(study, band_n):.2f} of the paper's time (from no load, mean over the targets)"
+    )
+
+
+def allowed_ratio(study: Study, band_n: float) -> float:
+    """Fastest command over the paper's law on the paper's rig, mean over the targets at which the latter settles."""
+    times_s = study.steps.score(settled_s(band_n), "bsfm")[0]
+    best_s = np.array([row.settled_s for row in study.limits if row.band_n == band_n])
+    settles = ~np.isnan(times_s)
+    return float(np.mean(best_s[settles]) / np.mean(times_s[settles]))
+
+
+def _moving(study: Study, comparison: Comparison) -> str:
+    delay_s = paper_plant().regulator.delay_s
+    parts_n = [PACE_N_PER_S * seconds for seconds in (delay_s + 2 * LAG_S, delay_s + 2 * SHAPED_LAG_S, delay_s)]
+    return (
+        f"the wish moves, and being late is all there is: delay and lags cost {parts_n[0]:.2f} N, with lead "
+        f"{parts_n[1]:.2f} N, the dead time alone {parts_n[2]:.2f} N, which no law avoids without knowing the future. "
+        "Just after a turn the paper's switch jumps ahead by the loop's width, which hides the lag; a blend does not jump"
+    )
+
+
+def _at_rest(study: Study, comparison: Comparison) -> str:
+    noise_n = paper_plant().cell.noise_n
+    return f"nothing to gain: open loop is {comparison.means['bsfm']:.2f} N off, one reading's noise is {noise_n:.2f} N"
+
+
+def _shaken(study: Study, comparison: Comparison) -> str:
+    delay_ms = 1000 * paper_plant().regulator.delay_s
+    return f"{UNBALANCE_N:g} N at 65 Hz, half a period is 8 ms: behind {delay_ms:.0f} ms of dead time no air follows it"
+
+
+def _fast_feed(study: Study, comparison: Comparison) -> str:
+    return "the plate's waves pass at 0.5 Hz; a trim behind 0.22 s of delay and lags stays stable up to about that"
+
+
+REASONS: Final = (
+    ("time to stay", _settling),
+    ("reciprocating", _moving),
+    ("at rest", _at_rest),
+    ("slower than", _fast_feed),
+    ("spindle on", _shaken),
+    ("spindle off", _fast_feed),
+)
+
+
+def summary(study: Study) -> list[str]:
+    """The goal in sentences."""
+    rows = [row for row in judged(study) if row.ours]
+    sentences = []
+    for goal, words in (
+        (ERROR_GOAL, f"at most {ERROR_GOAL:g} of the largest error"),
+        (SETTLING_GOAL, f"at most {SETTLING_GOAL:g} of the settling time"),
+    ):
+        these = [row for row in rows if row.comparison.goal == goal]
+        ours, lead = (sum(getattr(row, law) == MET for row in these) for law in ("ours", "lead"))
+        sentences.append(
+            f"Goal {words}: the gateway's controller meets it in {ours} of {len(these)} measures, with lead it would in {lead}."
+        )
+    allowed = ", ".join(f"{allowed_ratio(study, band_n):.2f} for {band_n:g} N" for band_n in SETTLING_S)
+    return [*sentences, f"Settling time that the regulator allows at best, as a share of the paper's law: {allowed}."]

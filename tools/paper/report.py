@@ -1,0 +1,237 @@
+"""The study as one self-contained HTML file, and its tables in the terminal."""
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Final
+
+from rich.console import Console
+from rich.table import Table
+
+from paper import exercises, rigs
+from paper.comparison import Interval
+from paper.figures import FIGURES
+from paper.goals import MET, MISSED, Judged, judged, summary
+from paper.laws import FASTEST_N_PER_S, RESPONSE_LAG_S, TRIM
+from paper.study import Study
+from paper.trials import settled_s
+from paper.verdict import NO, OUTSIDE, YES, Verdict
+from paper.verdicts import counts, verdicts
+
+CSS: Final = """
+body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; background: #fff; }
+body { max-width: 1200px; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.6rem; margin-bottom: .3rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; border-bottom: 1px solid #dde3ea; }
+p.lead { color: #55606e; margin-top: 0; } figure { margin: 1.2rem 0; } figcaption { color: #55606e; font-size: .9rem; }
+img { max-width: 100%; height: auto; } table { border-collapse: collapse; width: 100%; font-size: .86rem; }
+.scroll { overflow-x: auto; }
+th, td { text-align: left; vertical-align: top; padding: .35rem .55rem; border-bottom: 1px solid #e6eaf0; }
+th { color: #55606e; } td.number { white-space: nowrap; font-variant-numeric: tabular-nums; }
+.yes { color: #12703a; } .no { color: #b23b3b; } .out { color: #7a6a2f; }
+td.verdict { white-space: nowrap; font-weight: 600; }
+"""
+CLASS: Final = {YES: "yes", NO: "no", OUTSIDE: "out", MET: "yes", MISSED: "no", "": ""}
+TABLE_HEAD: Final = ("where", "statement of the paper", "its value", "ours (twin)", "verdict", "why")
+RATIO_HEAD: Final = (
+    "measure",
+    "paper's BSFM",
+    "ours",
+    "ratio [95 %]",
+    "goal",
+    "with lead [95 %]",
+    "goal",
+    "why the goal is missed",
+)
+LIMIT_HEAD: Final = (
+    "step to",
+    "band",
+    "enters at 10 V, at the earliest",
+    "fastest that stays",
+    "by",
+    "paper's law",
+    "ours",
+    "with lead",
+)
+
+
+def spread(value: Interval) -> str:
+    return f"{value.mean:.2f} [{value.low:.2f}, {value.high:.2f}]"
+
+
+def verdict_cells(line: Verdict) -> tuple[str, ...]:
+    return (line.where, line.statement, line.paper, line.ours, line.verdict, line.why)
+
+
+def ratio_cells(row: Judged) -> tuple[str, ...]:
+    found = row.comparison
+    digits = 3 if found.unit == "s" else 2
+    means = tuple(f"{found.means[law]:.{digits}f} {found.unit}" for law in ("bsfm", "ours"))
+    goal = f" (≤ {found.goal:g})" if found.goal else ""
+    return (
+        found.name,
+        *means,
+        spread(found.ratios["ours"]),
+        row.ours + (goal if row.ours else ""),
+        spread(found.ratios["lead"]),
+        row.lead,
+        row.why,
+    )
+
+
+def limit_cells(study: Study) -> list[tuple[str, ...]]:
+
+    times_s = {
+        band_n: {law: study.steps.score(settled_s(band_n), law)[0] for law in ("bsfm", "ours", "lead")}
+        for band_n in (2.0, 1.0)
+    }
+    cases = list(dict.fromkeys(row.target_n for row in study.limits))
+    rows = []
+    for row in sorted(study.limits, key=lambda row: (-row.band_n, row.target_n)):
+        laws = [times_s[row.band_n][law][cases.index(row.target_n)] for law in ("bsfm", "ours", "lead")]
+        pulses = f"10 V for {row.up_ms} ms" + (f", 0 V for {row.down_ms} ms" if row.down_ms else "")
+        times = (seconds(row.entered_s), seconds(row.settled_s), pulses, *map(seconds, laws))
+        rows.append((f"{row.target_n:g} N", f"±{row.band_n:g} N", *times))
+    return rows
+
+
+def seconds(value_s: float) -> str:
+    return "never" if value_s != value_s else f"{value_s:.3f} s"
+
+
+def assumptions(study: Study) -> list[str]:
+    """What was run, and what is ours rather than the paper's."""
+    return [*_rig(study), *_laws(), *_exercises(study.quick)]
+
+
+def _rig(study: Study) -> list[str]:
+    shares = ", ".join(f"{name} {share:.1%}" for (_, name), share in rigs.SPREAD.items())
+    rig = f"""
+        Rig: the twin of profiles/plants/paper-slide.yaml. Ladder 0-5-0 V by 0.1 V, {len(study.ladder)} points
+        (Figs. 4-6). The ratios use {len(study.seeds)} copies; seed 0 is the rig itself. Spread of the others (assumed):
+        {shares}."""
+    norm = """
+        The norm of Fig. 6 is the paper's own, not newtons of anything, and its formula is inferred. RMS and largest
+        residual in N stand beside it."""
+    return [rig, norm]
+
+
+def _laws() -> list[str]:
+    paper = """
+        The paper's law: order-2 BSFM with shared ends, the branch chosen by the direction of the wanted force, open
+        loop. PSFM: order 3, each direction its own ends."""
+    ours = f"""
+        Ours: gateway.control.Controller, reversals blended over a span from minor loops, trim
+        {TRIM.gain_v_per_n_s:g} V/Ns with a dead zone of {TRIM.dead_zone_n:g} N, response lag {RESPONSE_LAG_S:g} s,
+        chosen on copies 0-3. Force ramp {FASTEST_N_PER_S:g} N/s and no soft approach, because the paper's law has none;
+        a rig's defaults (200 N/s, 2 N before contact) are gentler and slower."""
+    lead = """
+        With lead: the same with an input shaper behind it, which inverts the regulator's two lags within 0 .. 9.44 V.
+        It is not part of the gateway; it shows what a lead feedforward would reach."""
+    return [paper, ours, lead]
+
+
+def _exercises(quick: bool) -> list[str]:
+    ends = " and ".join(f"{low:g} .. {high:g} N" for low, high in exercises.RANGES_N)
+    moving = f"""
+        Reciprocating: {ends} at {exercises.PACE_N_PER_S:g} N/s (assumed). Partial reversals: {exercises.holds(quick)} random
+        forces of 3 .. 37 N, {exercises.HOLD_S:g} s each, of which the last {exercises.SETTLED_S:g} s count. Months after
+        the calibration (assumed): friction +25 %, pressure -1.5 %."""
+    plate = f"""
+        Steps of Fig. 8 and tracking start with the pad lifted by {1000 * rigs.LIFTED_M:g} mm. Tracking (assumed): plate
+        bowed by {1000 * exercises.BOW_M:g} mm, robot path ±{1e6 * exercises.PATH_M:g} µm every
+        {1000 * exercises.PATH_LENGTH_M:g} mm, milling marks ±{1e6 * exercises.MARKS_M:g} µm, spindle
+        {exercises.UNBALANCE_N:g} N at 65 Hz. Errors are those of the true contact force; Fig. 9 shows the load cell's
+        readings."""
+    return [moving, plate]
+
+
+# -- HTML
+
+
+def html_table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+    titles = "".join(f"<th>{escape(title)}</th>" for title in head)
+    body = "\n".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>" for row in rows)
+    return f'<div class="scroll"><table><thead><tr>{titles}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+
+
+def _cell(text: str) -> str:
+    word = text.split(" (≤")[0]
+    if word and word in CLASS:
+        return f'<td class="verdict {CLASS[word]}">{escape(text)}</td>'
+    return (
+        f'<td class="number">{escape(text)}</td>'
+        if text[:1].isdigit() and len(text) < 24
+        else f"<td>{escape(text)}</td>"
+    )
+
+
+def html_figure(name: str, png: bytes) -> str:
+    caption, data = escape(FIGURES[name][0]), base64.b64encode(png).decode("ascii")
+    image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
+    return f'<figure id="{name}">{image}<figcaption>{caption}</figcaption></figure>'
+
+
+def html(study: Study, pictures: dict[str, bytes]) -> str:
+    """The whole page. pictures: PNG bytes by short name."""
+    lines, rows = verdicts(study), judged(study)
+    shown = {name: html_figure(name, png) for name, png in pictures.items()}
+    paper_figures = "\n".join(text for name, text in shown.items() if name.startswith("fig"))
+    items = "".join(f"<li>{escape(text)}</li>" for text in assumptions(study))
+    goals = "".join(f"<p>{escape(text)}</p>" for text in summary(study))
+    mode = "quick run: few seeds and orders" if study.quick else f"{len(study.seeds)} seeds, all orders"
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>The paper on the twin</title><style>{CSS}</style></head><body>
+<h1>The paper on the twin</h1>
+<p class="lead">BSFM for a pneumatic constant-force device: each claim run again on a simulated copy of its rig.
+{counts(lines)}. {mode}.</p>
+<h2>Statement by statement</h2>
+{html_table(TABLE_HEAD, map(verdict_cells, lines))}
+<h2>Ours beside the paper's law</h2>
+{goals}
+{shown["ratios"]}
+{html_table(RATIO_HEAD, map(ratio_cells, rows))}
+<p>Ratios: geometric mean over {len(study.seeds)} copies of the rig, 95 % bootstrap interval.
+A goal is met when the whole interval lies within it.
+Settling times: mean over the targets at which all three settle; the paper's law never comes within 1 N at 5 N, ours does.</p>
+<h2>What the regulator's physics allows</h2>
+<p>Dead time 80 ms, two lags of 72 ms, 0 .. 10 V in 10-bit steps, supply 0.85 MPa, pulses no shorter than a 9600-baud command.
+The first bound holds for every command; the second is the best of all bang-bang commands on a grid.</p>
+{shown["limit"]}
+{html_table(LIMIT_HEAD, limit_cells(study))}
+<h2>The figures, redrawn</h2>
+{paper_figures}
+<p>Fig. 10 (surface, roughness) is a result of the process, outside what software can reproduce.</p>
+<h2>What was run, and what is assumed</h2>
+<ul>{items}</ul>
+</body></html>
+"""
+
+
+# -- terminal
+
+
+def print_tables(study: Study, console: Console) -> None:
+    """The same tables as text."""
+    lines = verdicts(study)
+    _print(console, f"the paper on the twin: {counts(lines)}", TABLE_HEAD, map(verdict_cells, lines))
+    _print(
+        console, f"ours beside the paper's law, {len(study.seeds)} seeds", RATIO_HEAD, map(ratio_cells, judged(study))
+    )
+    for sentence in summary(study):
+        console.print(sentence)
+
+
+def _print(console: Console, title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    table = Table(title=title, title_justify="left", show_lines=False, expand=False)
+    for name in head:
+        table.add_column(name, overflow="fold")
+    colours = {"yes": "green", "no": "red", "out": "yellow"}
+    for row in rows:
+        table.add_row(
+            *(
+                f"[{colours[CLASS[w]]}]{cell}[/]" if CLASS.get(w := cell.split(" (≤")[0]) else cell.replace("[", r"\[")
+                for cell in row
+            )
+        )
+    console.print(table)

@@ -1,0 +1,71 @@
+"""All of it in order: ladder and fits of the paper's rig, calibrations of all copies, the exercises, the limit, the ratios."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.bsfm.fit_result import FitResult
+from gateway.bsfm.ladder import Ladder
+from paper import comparison, exercises
+from paper.calibration import Calibrated, calibrate, paper_ladder, sweep
+from paper.comparison import Comparison
+from paper.limit import Fastest, limits
+from paper.paper_values import GROUPS, ORDERS, SETTLING_S, TARGETS_N
+from paper.rigs import copy_of, paper_plant
+from paper.trials import Trial
+
+FEW_ORDERS: Final = (1, 2, 3, 4, 5, 15)
+FEW_SEEDS: Final = 2
+FEW_GROUPS: Final = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """Everything the report is made from. Seed 0 of every trial is the paper's rig itself."""
+
+    seeds: tuple[int, ...]
+    ladder: Ladder
+    fits: dict[str, list[FitResult]]
+    copies: list[Calibrated]
+    validation: Trial
+    steps: Trial
+    in_contact: Trial
+    tracking: Trial
+    limits: list[Fastest]
+    comparisons: list[Comparison]
+    quick: bool
+    took_s: float
+
+
+def study(seed_count: int, quick: bool, say: Callable[[str], None] = lambda text: None) -> Study:
+    """Virtual time only; `say` hears what is going on. quick: fewer groups and orders."""
+    started_s, seeds = time.monotonic(), tuple(range(seed_count))
+    say("ladder of the paper's rig, and fits of all orders")
+    ladder = paper_ladder(paper_plant(), 0, FEW_GROUPS if quick else GROUPS)
+    fits = sweep(ladder, FEW_ORDERS if quick else ORDERS)
+    say(f"ladders and minor loops of {seed_count} copies")
+    copies = [calibrate(copy_of(seed), seed) for seed in seeds]
+    say("validation, steps, tracking")
+    validation, steps = exercises.validation(copies, quick), exercises.steps(copies)
+    in_contact, tracking = exercises.steps_in_contact(copies), exercises.tracking(copies)
+    say("partial reversals, and what the regulator allows")
+    reversals = exercises.partial_reversals(copies, quick)
+    comparisons = compare(validation, reversals, steps, in_contact, tracking)
+    fastest = limits(paper_plant(), TARGETS_N, tuple(SETTLING_S))
+    took_s = time.monotonic() - started_s
+    return Study(
+        seeds, ladder, fits, copies, validation, steps, in_contact, tracking, fastest, comparisons, quick, took_s
+    )
+
+
+def compare(validation: Trial, reversals: Trial, steps: Trial, in_contact: Trial, tracking: Trial) -> list[Comparison]:
+    """Every measure, in the order of the figures."""
+    rows = []
+    for case, (low_n, high_n) in enumerate(exercises.RANGES_N):
+        name = f"reciprocating {low_n:g} .. {high_n:g} N at {exercises.PACE_N_PER_S:g} N/s"
+        rows += comparison.errors(name, validation, exercises.counted, case)
+    for case, name in enumerate(("partial reversals, settled", "the same, months after the calibration")):
+        rows += comparison.errors(name, reversals, exercises.settled, case)
+    rows += comparison.steps_from_no_load(steps) + comparison.steps_in_contact(in_contact)
+    return rows + comparison.tracking(tracking)

@@ -1,0 +1,32 @@
+"""One line of the table, and what its words mean.
+
+Reproduced: the statement holds on the twin, and a number that it names is met within the tolerance written here.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+YES, NO, OUTSIDE = "reproduced", "not reproduced", "outside software"
+NORM_TOLERANCE: Final = 0.2  # of the paper's value: another slide, another loop
+ERROR_TOLERANCE: Final = 0.25
+TIME_TOLERANCE_S: Final = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """where: figure; paper, ours: the values side by side; verdict: one of the three words."""
+
+    where: str
+    statement: str
+    paper: str
+    ours: str
+    verdict: str
+    why: str
+
+
+def word(holds: bool) -> str:
+    return YES if holds else NO
+
+
+def near(ours: float, paper: float, share: float) -> bool:
+    return abs(ours - paper) <= share * paper

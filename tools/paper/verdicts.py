@@ -1,0 +1,29 @@
+"""The table: statement of the paper, its value, ours, and whether that is a reproduction. Each verdict is a computed check."""
+
+from collections.abc import Callable, Sequence
+
+from paper.study import Study
+from paper.verdict import NO, OUTSIDE, YES, Verdict
+from paper.verdicts_fits import per_direction, pooled
+from paper.verdicts_rig import steps, two_steps, validation
+from paper.verdicts_tracking import roughness, spindle, tracking
+
+
+def verdicts(study: Study) -> list[Verdict]:
+    """In the order of the paper's figures."""
+    parts: list[Callable[[Study], list[Verdict]]] = [
+        pooled,
+        per_direction,
+        validation,
+        steps,
+        two_steps,
+        tracking,
+        spindle,
+    ]
+    return [line for part in parts for line in part(study)] + [roughness()]
+
+
+def counts(lines: Sequence[Verdict]) -> str:
+    """How many of each."""
+    numbers = {word: sum(line.verdict == word for line in lines) for word in (YES, NO, OUTSIDE)}
+    return ", ".join(f"{number} {word}" for word, number in numbers.items())
