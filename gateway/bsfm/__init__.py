@@ -9,7 +9,8 @@ from gateway.bsfm.branches import Branches, Crossing
 from gateway.bsfm.curve import ORDER_MAX, RationalBezier
 from gateway.bsfm.inverse import Status
 from gateway.bsfm.model import Bsfm, Calibration
-from gateway.bsfm.reversal import DeadBand, Direction, LinearBlend
+from gateway.bsfm.reversal import FALLING, RISING, DeadBand, Direction, LinearBlend, Memory, Reversal
+from gateway.bsfm.slip import SlipStops
 from gateway.bsfm.validate import (
     CoefficientFault,
     CoefficientLimits,
@@ -20,7 +21,9 @@ from gateway.bsfm.validate import (
 )
 
 __all__ = [
+    "FALLING",
     "ORDER_MAX",
+    "RISING",
     "Branches",
     "Bsfm",
     "Calibration",
@@ -32,7 +35,10 @@ __all__ = [
     "DeadBand",
     "Direction",
     "LinearBlend",
+    "Memory",
     "RationalBezier",
+    "Reversal",
+    "SlipStops",
     "Status",
     "validate",
     "validate_coefficients",

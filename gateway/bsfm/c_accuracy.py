@@ -12,7 +12,7 @@ from gateway.bsfm.branches import Branches
 from gateway.bsfm.c_tables import Tables, rounded
 from gateway.bsfm.float32_model import Float32, Float32Model
 from gateway.bsfm.model import Bsfm, Calibration
-from gateway.bsfm.reversal import RISING
+from gateway.bsfm.reversal import LinearBlend
 
 POINTS = 17
 GRID = 128  # a multiple of POINTS - 1, so that the points of the table are measured too
@@ -34,9 +34,9 @@ class SelfTest:
 
 def self_test_of(calibration: Calibration, tables: Tables) -> SelfTest:
     """ValueError if float32 cannot follow this calibration."""
-    model, single = calibration.model(), Float32Model(tables)
-    grid = tuple(_point(model.branches, tables, i / GRID) for i in range(GRID + 1))
-    reversals = tuple(_replayed(model, tables))
+    branches, single = calibration.model().branches, Float32Model(tables)
+    grid = tuple(_point(branches, tables, i / GRID) for i in range(GRID + 1))
+    reversals = tuple(_replayed(Bsfm(branches, LinearBlend(calibration.blend_span_n)), tables))
     error_n = max(_force_error_n(single, point) for point in grid)
     error_v = max(*(_voltage_error_v(single, point) for point in grid), _reversal_error_v(single, reversals))
     low_n, high_n = tables.reached_n
@@ -79,12 +79,12 @@ def _reversal_error_v(single: Float32Model, reversals: tuple[tuple[float, float]
 
 def _replayed(model: Bsfm, tables: Tables) -> list[tuple[float, float]]:
     """What the double model answers to a rise, partial reversals, a full one, a second rise and a repetition."""
-    last_n, state = tables.reached_n[0], RISING
+    last_n, memory = tables.reached_n[0], model.reversal.start()
     record = []
     for force_n in map(rounded, _commands_n(tables)):
-        state = model.reversal.advance(state, force_n - last_n)
+        memory = model.moved(memory, last_n, force_n)
         last_n = force_n
-        record.append((force_n, rounded(model.voltage_v(force_n, state)[0])))
+        record.append((force_n, rounded(model.voltage_v(force_n, model.share(memory))[0])))
     return record
 
 

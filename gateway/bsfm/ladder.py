@@ -1,4 +1,4 @@
-"""The calibration staircase: which voltages to visit (plan), and what came back (data).
+"""The calibration staircase: what came back from it. Which voltages to visit is gateway.bsfm.ladder_plan's, without numpy.
 
 The paper's ladder is 0 -> 5 -> 0 V in 0.1 V steps, 101 points, ten groups. The top counts as rising, the last 0 V as
 falling: with tied ends both branches pass through them anyway.
@@ -6,41 +6,16 @@ falling: with tied ends both branches pass through them anyway.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import ceil, isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.bsfm.ladder_plan import FALLING, RISING, LadderPlan, ladder_plan
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-RISING, FALLING = 1, -1
-
-
-@dataclass(frozen=True, slots=True)
-class LadderPlan:
-    """Where to go, in order: voltages, the direction in which each is reached, and its group (one way up and down), from 0."""
-
-    voltage_v: tuple[float, ...]
-    direction: tuple[int, ...]
-    group: tuple[int, ...]
-
-    def __len__(self) -> int:
-        return len(self.voltage_v)
-
-
-def ladder_plan(v_max_v: float, step_v: float, groups: int, v_min_v: float = 0.0) -> LadderPlan:
-    """`groups` times v_min -> v_max -> v_min in even steps, shortened if step_v does not divide the way.
-
-    ValueError if that is no ladder.
-    """
-    if not (isfinite(v_max_v) and isfinite(v_min_v) and 0.0 < step_v <= v_max_v - v_min_v and groups >= 1):
-        raise ValueError(f"ladder {v_min_v:g} .. {v_max_v:g} V by {step_v:g} V, {groups} groups: no such ladder")
-    steps = ceil((v_max_v - v_min_v) / step_v - 1.0e-9)
-    up = [v_min_v + (v_max_v - v_min_v) * i / steps for i in range(steps + 1)]
-    voltages = (*up, *up[-2::-1])
-    directions = (RISING,) * (steps + 1) + (FALLING,) * steps
-    return LadderPlan(voltages * groups, directions * groups, tuple(g for g in range(groups) for _ in voltages))
+__all__ = ["FALLING", "RISING", "Floats", "Integers", "Ladder", "LadderPlan", "ladder_plan"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,23 +1,43 @@
-"""The model that control asks: force and blend state in, volts and status out; and the calibration that it is made from."""
+"""The model that control asks: force and share in, volts and status out; and the calibration that it is made from.
+
+The share s in [-1, 1] says where between the branches the plant is; the reversal's memory, moved with the force, gives it.
+A calibration names its reversal by its fields: slip stops where `slip_radii_v` has any, else the linear blend. Upload
+and C code carry the linear blend alone: there a calibration with slip stops acts with its `blend_span_n`, which is fitted to
+the same branches for that purpose.
+"""
 
 from dataclasses import dataclass
+from typing import Final
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.curve import RationalBezier
 from gateway.bsfm.inverse import Status
-from gateway.bsfm.reversal import LinearBlend
+from gateway.bsfm.reversal import LinearBlend, Memory, Reversal
+from gateway.bsfm.slip import SlipStops
+
+_ROUNDS: Final = 100
+_CLOSE_V: Final = 1.0e-14
 
 
 @dataclass(frozen=True, slots=True)
 class Bsfm:
-    """Two increasing branches and what happens between them. ValueError if a branch has no inverse."""
+    """Two increasing branches and what happens between them. ValueError if a branch has no inverse, or no voltage is unique."""
 
     branches: Branches
-    reversal: LinearBlend
+    reversal: Reversal
 
     def __post_init__(self) -> None:
         if not (self.branches.rising.is_increasing() and self.branches.falling.is_increasing()):
             raise ValueError("both branches must increase: force could not be inverted to voltage")
+        self.reversal.check(self.branches)
+
+    def moved(self, memory: Memory, from_n: float, to_n: float) -> Memory:
+        """The reversal's memory after the force has gone from one value to another in one direction."""
+        return self.reversal.moved(self.branches, memory, from_n, to_n)
+
+    def share(self, memory: Memory) -> float:
+        """s of this memory, for the functions below."""
+        return self.reversal.share(memory)
 
     def voltage_v(self, force_n: float, state: float) -> tuple[float, Status]:
         """Feedforward V = (1+s)/2 V_rise(f) + (1-s)/2 V_fall(f) for the blend state s in [-1, 1].
@@ -38,11 +58,32 @@ class Bsfm:
         """Expected force: the branches' forces at this voltage, shared by the blend state.
 
         Exactly the inverse of `voltage_v` at s = -1 and 1 only. Between, the voltages are blended there and the forces
-        here, which differ by a fraction of the loop's width: enough for a residual, and it needs no iteration.
+        here, which differ by a fraction of the loop's width: enough for a residual, and it needs no iteration. The exact
+        inverse is `settled_n`.
         """
         rising_share = 0.5 + 0.5 * _checked(state)
         rising_n, falling_n = self.branches.rising.value(voltage_v), self.branches.falling.value(voltage_v)
         return falling_n + rising_share * (rising_n - falling_n)
+
+    def settled_n(self, voltage_v: float, state: float) -> float:
+        """The force whose `voltage_v` at this share is this voltage, by bracketed Newton between the branches' forces."""
+        rising, falling = self.branches.rising, self.branches.falling
+        share = 0.5 + 0.5 * _checked(state)
+        low_n, high_n = sorted((rising.value(voltage_v), falling.value(voltage_v)))
+        force_n = self.force_n(voltage_v, state)
+        for _ in range(_ROUNDS):
+            rising_v, falling_v = rising.inverse(force_n)[0], falling.inverse(force_n)[0]
+            gap_v = falling_v + share * (rising_v - falling_v) - voltage_v
+            low_n, high_n = (low_n, force_n) if gap_v > 0.0 else (force_n, high_n)
+            steepness = min(rising.slope(rising_v), falling.slope(falling_v))
+            next_n = 0.5 * (low_n + high_n)
+            if steepness > 0.0:
+                newton_n = force_n - gap_v / (share / rising.slope(rising_v) + (1.0 - share) / falling.slope(falling_v))
+                next_n = newton_n if low_n < newton_n < high_n else next_n
+            if abs(gap_v) <= _CLOSE_V or next_n == force_n:
+                break
+            force_n = next_n
+        return force_n
 
     @property
     def force_range_n(self) -> tuple[float, float]:
@@ -57,7 +98,11 @@ class Bsfm:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """An immutable numbered calibration, as stored: plain values, so that YAML and registers can carry it."""
+    """An immutable numbered calibration, as stored: plain values, so that YAML and registers can carry it.
+
+    slip_radii_v, slip_shares: empty for the linear blend over blend_span_n. With slip stops, upload and C code still carry
+    the linear blend over blend_span_n.
+    """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles
     number: int
@@ -76,6 +121,14 @@ class Calibration:
     source: str
     rig: str
     data_sha256: str
+    slip_radii_v: tuple[float, ...] = ()
+    slip_shares: tuple[float, ...] = ()
+
+    @property
+    def reversal(self) -> Reversal:
+        if self.slip_radii_v or self.slip_shares:
+            return SlipStops(self.slip_radii_v, self.slip_shares)
+        return LinearBlend(self.blend_span_n)
 
     def model(self) -> Bsfm:
         """The model of these coefficients. ValueError with a sentence if they are none."""
@@ -86,7 +139,7 @@ class Calibration:
             )
         rising = RationalBezier(self.x0_v, self.x1_v, self.rising_handles_n, self.rising_weights)
         falling = RationalBezier(self.x0_v, self.x1_v, self.falling_handles_n, self.falling_weights)
-        return Bsfm(Branches(rising, falling), LinearBlend(self.blend_span_n))
+        return Bsfm(Branches(rising, falling), self.reversal)
 
 
 def _checked(state: float) -> float:

@@ -4,14 +4,43 @@ The paper switches branches, which costs up to 0.9 V at once and doubles the err
 1] says where between the branches the plant is: +1 on the rising one, -1 on the falling one. A play operator moves it:
 s += 2 df / span, clipped. An exponential blend was rejected: it drifts under chatter.
 
+Policies have one interface (`Reversal`), so that model and control know none of them: a memory moves with the force, and
+says the share s. LinearBlend remembers s alone, gateway.bsfm.slip one number per stop. `start` is where the calibration
+ladder starts, because that is where the policy's branches are true: for two branches that a ladder was fitted to, on the
+rising one.
+
 Noise is kept out before the blend by a dead band, which is a play operator on the force itself: `held` follows the
 force only when it leaves held +- width/2. Width 0 follows exactly.
 """
 
 from dataclasses import dataclass
 from math import isfinite
+from typing import Protocol, TypeAlias
+
+from gateway.bsfm.branches import Branches
 
 RISING, FALLING = 1.0, -1.0
+Memory: TypeAlias = tuple[float, ...]
+"""What a policy remembers of past reversals; made and read by the policy alone."""
+
+
+class Reversal(Protocol):
+    """What happens between the branches. All methods are pure; the memory is immutable."""
+
+    def start(self) -> Memory:
+        """Of a vented tool, where the calibration ladder starts."""
+
+    def at(self, share: float) -> Memory:
+        """A memory with this share; +1 and -1 are the branches, whatever came before."""
+
+    def share(self, memory: Memory) -> float:
+        """s in [-1, 1]: +1 on the rising branch, -1 on the falling one."""
+
+    def moved(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+        """The memory after the force has gone from one value to another without turning round in between."""
+
+    def check(self, branches: Branches) -> None:
+        """ValueError with a sentence where this policy and these branches make no unique voltage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +52,21 @@ class LinearBlend:
     def __post_init__(self) -> None:
         if not (isfinite(self.span_n) and self.span_n >= 0.0):
             raise ValueError(f"blend span {self.span_n!r} N: 0 or more is needed")
+
+    def start(self) -> Memory:
+        return (RISING,)
+
+    def at(self, share: float) -> Memory:
+        return (share,)
+
+    def share(self, memory: Memory) -> float:
+        return memory[0]
+
+    def moved(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+        return (self.advance(memory[0], to_n - from_n),)
+
+    def check(self, branches: Branches) -> None:
+        """Any branches that increase will do: the voltage is explicit."""
 
     def advance(self, state: float, delta_n: float) -> float:
         """The state after the force has moved by delta_n. ValueError unless both are finite; the answer is in [-1, 1]."""

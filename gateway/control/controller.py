@@ -7,31 +7,32 @@ act on their rise; everything else is level. A refused edge changes nothing, say
 cleared, so that the registers do not show an enable that is not there.
 """
 
-from dataclasses import replace
 from math import inf
-from typing import Final
 
 from gateway.bsfm import Bsfm
+from gateway.control.calibrating import RAMPING_DOWN, Calibrating
 from gateway.control.contact import ContactSense
-from gateway.control.decision import Outcome, Standing, output_of, safe_output
-from gateway.control.demand import Demand
+from gateway.control.decision import Outcome, Standing, output_of, safe_output, warning_bits
+from gateway.control.demand import Demand, ramped_down
 from gateway.control.follower import CommandFollower
 from gateway.control.force_law import ModelError
 from gateway.control.inputs import Line, Output
+from gateway.control.ladder_stairs import RunPlan
 from gateway.control.limits import NotFiniteError
 from gateway.control.pursuit import Moment, Pursuit
 from gateway.control.reading import NO_READING, Reader
-from gateway.control.reasons import enable_refused, fault_sentence, stuck_sentence, unreachable_sentence
+from gateway.control.reasons import enable_refused, fault_sentence
 from gateway.control.response import ModelResponse
 from gateway.control.settings import ControlSettings, LeaseAction
 from gateway.control.state_table import ENABLED_STATES, Event, next_state
 from gateway.control.supervision import Finding, Supervisor, finding
+from gateway.control.telling import Telling
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, FaultCode, LimitedBy, Mode, RefusalReason, State, WarningBit
+from gateway.registers.words import ControlBit, FaultCode, RefusalReason, State
 
-_STOP_S: Final = 4.0  # a ramp down takes at most this long (the guardian waits 5 s)
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
+_CALIBRATE = int(ControlBit.START_CALIBRATION)
 
 
 class Controller:
@@ -49,12 +50,13 @@ class Controller:
         self._reader = Reader(settings.supervision)
         self._contact = ContactSense(settings.defaults.contact_threshold_n)
         self._response = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
+        self.calibrating = Calibrating(settings, model)
         self._reading = NO_READING
         self._last_s: float | None = None
         self._fault, self._faulted_s = FaultCode.NONE, -inf
         self._restarted = unclean_restart
         self._stopping = self._ramping_down = self._master_lost = False
-        self._said_unreachable = self._said_stuck = False
+        self._telling = Telling(settings.supervision.stuck_n)
         self._outcome = Outcome()
 
     # -- for the service
@@ -72,6 +74,7 @@ class Controller:
         """Swap the calibration; while enabled the voltage difference fades instead of jumping."""
         self._pursuit.law.use(model, self._follower.demand.gravity_n)
         self._response.use(model)
+        self.calibrating.use(model)
         self.calibration_id = calibration_id
 
     def safe_output(self, fault: FaultCode) -> Output:
@@ -85,6 +88,7 @@ class Controller:
             return self._step(now_s, command, sample, line)
         except Exception:
             self._pursuit.rest()
+            self.calibrating.end()
             if self.state is not State.FAULT:
                 self.state, self._fault, self._faulted_s = State.FAULT, FaultCode.INTERNAL, now_s
             raise
@@ -114,10 +118,11 @@ class Controller:
         self._supervisor.observe(reading, self._response, self._pursuit.law.blend, touching)
         if self.state not in ENABLED_STATES:
             self._supervisor.observe_rest(reading)
-            self._tell_stuck()
+            self._telling.stuck(self._supervisor.is_stuck, reading, self._outcome.events)
 
     def _obey(self, now_s: float, rises: int, falls: int, line: Line) -> None:
-        if falls & _ENABLE and self.state in ENABLED_STATES:
+        stopped = falls & _ENABLE or (falls & _CALIBRATE and self.calibrating.running)
+        if stopped and self.state in ENABLED_STATES:
             self._disable(f"info disabled by {self._follower.who}")
         if rises & _RESET and self.state is State.FAULT:
             self._reset(now_s)
@@ -125,6 +130,9 @@ class Controller:
             self._tare()
         if rises & _ENABLE and self.state not in ENABLED_STATES:
             self._enable(now_s, line)
+        asked = self.calibrating.take_asked()
+        if rises & _CALIBRATE or asked:
+            self._calibrate(now_s, line, asked)
         self._ramping_down = self._ramping_down or self._stopping
 
     # -- edges of the command
@@ -136,7 +144,8 @@ class Controller:
     def _let_go(self, sentence: str) -> None:
         """The output goes to the safe voltage, the command and its owner with it."""
         self._pursuit.rest()
-        self._ramping_down = self._master_lost = self._said_unreachable = False
+        self.calibrating.end()
+        self._ramping_down = self._master_lost = self._telling.said_unreachable = False
         self._outcome.release_owner = True
         self._refuse(sentence)
 
@@ -181,6 +190,18 @@ class Controller:
         self._follower.lease.start(now_s)
         self._outcome.events.append(f"info enabled by {self._follower.who}")
 
+    def _calibrate(self, now_s: float, line: Line, asked: RunPlan | None) -> None:
+        """Bit 5 has risen, or this machine asks."""
+        if self.state is State.OFF:
+            self._enable(now_s, line)
+        if self.state is not State.READY or self.calibrating.is_busy or self._pursuit.law.applied_n > 0.0:
+            self._refuse(f"W305 calibration refused: state {self.state.name}, allowed from OFF or READY with force 0")
+            return
+        if asked and asked.tare:
+            self._tare()
+        self.calibrating.begin(asked or RunPlan(), is_local=asked is not None)
+        self._outcome.events.append(f"info calibration begun by {'this machine' if asked else self._follower.who}")
+
     def _block(self, now_s: float, line: Line) -> RefusalReason:
         """Why an enable would be refused now."""
         if self.state is State.FAULT:
@@ -200,7 +221,7 @@ class Controller:
         found = found or self._supervisor.first_cause(now_s, self._reading, line, expected_n)
         if found:
             self._fail(now_s, found)
-        elif not self._follower.lease.is_lost(now_s, line.owner_connected):
+        elif self.calibrating.is_local or not self._follower.lease.is_lost(now_s, line.owner_connected):
             self._master_lost = self._master_lost and self._ramping_down
         elif not self._master_lost:
             self._lose_master(now_s, line.owner_connected)
@@ -229,10 +250,25 @@ class Controller:
         demand = self._follower.demand
         if not self._ramping_down:
             return demand
-        rate_n_per_s = max(self._settings.defaults.force_ramp_n_per_s, self._settings.limits.force_max_n / _STOP_S)
-        return replace(demand, mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)
+        return ramped_down(demand, self._settings)
+
+    def _climb(self, now_s: float) -> None:
+        """One step of the calibration run, in place of the force law."""
+        if self._ramping_down or self._master_lost:
+            ended: Finding | None = RAMPING_DOWN
+        else:
+            ended = self.calibrating.climb(now_s, self._reading, self._pursuit, self._response)
+        if ended is None:
+            self.state = next_state(self.state, Event.MOVE)
+        elif ended.fault:
+            self._fail(now_s, ended)
+        else:
+            self._disable(ended.sentence)
 
     def _pursue(self, now_s: float, dt_s: float) -> None:
+        if self.calibrating.running:
+            self._climb(now_s)
+            return
         expected_n = self._response.force_n(self._pursuit.law.blend) + self._follower.demand.gravity_n
         held_back = self._supervisor.rise.is_too_high
         moment = Moment(now_s, dt_s, self._reading, self._contact.touching, expected_n, held_back)
@@ -247,23 +283,12 @@ class Controller:
         self.state = next_state(self.state, event)
         if self._ramping_down and self._pursuit.law.applied_n <= 0.0:
             self._disable("info force ramped to 0, output disabled")
-        self._tell_unreachable(expected_n)
+        self._telling.unreachable(self._pursuit, self._measured_n(), expected_n, self._outcome.events)
 
     # -- what people see
 
-    def _tell_unreachable(self, expected_n: float) -> None:
-        unreachable = self._pursuit.unreachable
-        if unreachable and not self._said_unreachable:
-            measured_n = self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
-            sentence = unreachable_sentence(self._pursuit.stage.voltage_v, measured_n, expected_n)
-            self._outcome.events.append(sentence)
-        self._said_unreachable = unreachable
-
-    def _tell_stuck(self) -> None:
-        stuck = self._supervisor.is_stuck
-        if stuck and not self._said_stuck:
-            self._outcome.events.append(stuck_sentence(self._reading.contact_n, self._settings.supervision.stuck_n))
-        self._said_stuck = stuck
+    def _measured_n(self) -> float:
+        return self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
 
     def _standing(self, now_s: float, line: Line) -> Standing:
         enabled = self.state in ENABLED_STATES
@@ -271,17 +296,10 @@ class Controller:
             state=self.state,
             fault=self._fault,
             block=self._block(now_s, line),
-            warnings=self._warnings(int(line.warnings)),
+            warnings=warning_bits(int(line.warnings), self._pursuit, self._restarted, self._master_lost),
             touching=self._contact.touching,
             accepted_n=self._target().force_n if enabled else 0.0,
             expected_cell_n=self._response.force_n(self._pursuit.law.blend),
-        )
-
-    def _warnings(self, word: int) -> int:
-        return (
-            word
-            | (WarningBit.RESTARTED.value if self._restarted else 0)
-            | (WarningBit.TARGET_UNREACHABLE.value if self._pursuit.unreachable else 0)
-            | (WarningBit.TRIM_SATURATED.value if self._pursuit.trim.limited_by else 0)
-            | (WarningBit.MASTER_LOST.value if self._master_lost else 0)
+            calibration_phase=self.calibrating.phase,
+            calibration_progress=self.calibrating.progress,
         )

@@ -35,6 +35,8 @@ class Standing:
     touching: bool
     accepted_n: float
     expected_cell_n: float
+    calibration_phase: int = 0
+    calibration_progress: float = 0.0
 
 
 def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
@@ -66,6 +68,17 @@ def status_bits(standing: Standing, pursuit: Pursuit) -> int:
     )
 
 
+def warning_bits(word: int, pursuit: Pursuit, restarted: bool, master_lost: bool) -> int:
+    """word: what the line and the process warn of."""
+    return (
+        word
+        | (WarningBit.RESTARTED.value if restarted else 0)
+        | (WarningBit.TARGET_UNREACHABLE.value if pursuit.unreachable else 0)
+        | (WarningBit.TRIM_SATURATED.value if pursuit.trim.limited_by else 0)
+        | (WarningBit.MASTER_LOST.value if master_lost else 0)
+    )
+
+
 def output_of(command: Command, standing: Standing, pursuit: Pursuit, reading: Reading, outcome: Outcome) -> Output:
     """The frozen answer. The measured force is nan unless fresh and usable: a stale number with an age is still a lie
     to most readers."""
@@ -88,6 +101,8 @@ def output_of(command: Command, standing: Standing, pursuit: Pursuit, reading: R
         sample_age_s=reading.age_s,
         heartbeat_echo=command.heartbeat,
         sequence_echo=command.command_sequence,
+        calibration_phase=standing.calibration_phase,
+        calibration_progress=standing.calibration_progress,
         enable_block=standing.block,
         clear_command=outcome.clear_command,
         release_owner=outcome.release_owner,

@@ -6,14 +6,17 @@ it pulls back. The load cell sits between slide and payload, so it does not feel
 The setpoint and the published measured force are contact forces; the model (calibrated on the cell) speaks cell force.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos
+from typing import Final
 
 from gateway.control.limits import finite, force_ranged
 from gateway.control.settings import ControlSettings, Defaults
 from gateway.registers.command import Command
 from gateway.registers.words import LimitedBy, Mode
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
+
+STOP_S: Final = 4.0  # a ramp down takes at most this long (the guardian waits 5 s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,3 +65,9 @@ def _gravity_of(command: Command, defaults: Defaults) -> float:
 def _or_default(value: float, default: float, name: str) -> float:
     """0 in these registers means the rig's default (FIELDBUS); a negative one is as meaningless and treated alike."""
     return value if finite(value, name) > 0.0 else default
+
+
+def ramped_down(demand: Demand, settings: ControlSettings) -> Demand:
+    """The same on the way to 0 N, within STOP_S whatever the force is."""
+    rate_n_per_s = max(settings.defaults.force_ramp_n_per_s, settings.limits.force_max_n / STOP_S)
+    return replace(demand, mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)

@@ -2,21 +2,20 @@
 
 Approach: without contact the tool waits at the pre-contact force; from contact the target rises over contact_ramp_s, or
 by the force ramp where that is slower. Lost contact takes the target back at once: a free tool must not shoot out with
-the full force. The direction follows changes of the target (gateway.bsfm.reversal), never the measured force, whose
-noise would chatter; a vented or free tool starts on the rising branch again, because that is where the calibration
-ladder starts.
+the full force. The reversal's memory follows changes of the target (gateway.bsfm.reversal), never the measured force,
+whose noise would chatter; a vented tool starts where the calibration ladder starts, and a tool that has lost contact on the
+rising branch, because it slides outwards.
 """
 
 from math import isfinite
 from typing import Final
 
-from gateway.bsfm import Bsfm, Status
+from gateway.bsfm import RISING, Bsfm, Status
 from gateway.control.demand import Demand
 from gateway.control.limits import TICK_S, Pace, is_below_usable, ramped
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
-_RISING: Final = 1.0
 _CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
 _OK: Final = Status.OK
 
@@ -46,7 +45,7 @@ class Approach:
 
 
 class ForceLaw:
-    """Holds the applied target, its expected course in the plant (reference_n) and the blend state."""
+    """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers."""
 
     def __init__(self, model: Bsfm, limits: Limits, response_lag_s: float) -> None:
         self.model = model
@@ -55,46 +54,52 @@ class ForceLaw:
         self.reset()
 
     def reset(self) -> None:
-        """Vented: nothing applied, next movement rises."""
+        """Vented: nothing applied, nothing remembered."""
         self.applied_n = self.reference_n = 0.0
-        self.blend = _RISING
+        self._memory = self.model.reversal.start()
         self._pace = Pace()
         self._carry_over_v = 0.0
+
+    @property
+    def blend(self) -> float:
+        """Where between the branches the plant is, -1 .. 1."""
+        return self.model.reversal.share(self._memory)
 
     def use(self, model: Bsfm, gravity_n: float) -> None:
         """Swap the model without a bump: the voltage difference is carried over and fades."""
         before_v, _ = self.feedforward(gravity_n)
-        self.model = model
+        self.model, self._memory = model, model.reversal.at(self.blend)
         after_v, _ = self.feedforward(gravity_n)
         self._carry_over_v += before_v - after_v
 
-    def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float) -> float:
-        """Move the applied target towards the goal; returns by how much, N."""
+    def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
+        """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what the payload gives."""
         self._pace.earn(dt_s)
         last_n = self.applied_n
         self.applied_n = ramped(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
         self._pace.spend(moved_n, rate_n_per_s)
-        self._turn(moved_n)
+        self._turn(last_n - gravity_n, self.applied_n - gravity_n)
         self.reference_n += (self.applied_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
         return moved_n
 
-    def _turn(self, moved_n: float) -> None:
-        if moved_n:
-            self.blend = self.model.reversal.advance(self.blend, moved_n)
+    def _turn(self, from_n: float, to_n: float) -> None:
+        """What the slide, whose thrust the model knows, remembers of this movement."""
         if self.applied_n <= 0.0:
-            self.blend = _RISING
+            self._memory = self.model.reversal.start()
+        elif from_n != to_n:
+            self._memory = self.model.moved(self._memory, from_n, to_n)
 
     def fall_back(self, goal_n: float) -> None:
         """Contact lost: at once down to the goal, and on the rising branch for the next contact."""
         self.applied_n = min(self.applied_n, goal_n)
-        self.blend = _RISING
+        self._memory = self.model.reversal.at(RISING)
 
-    def take_over(self, force_n: float) -> None:
+    def take_over(self, force_n: float, blend: float = RISING) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
         self.applied_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
-        self.blend = _RISING
+        self._memory = self.model.reversal.at(blend)
 
     def feedforward(self, gravity_n: float) -> tuple[float, LimitedBy]:
         """Voltage for the applied contact force by the inverse model, and what limited it. ModelError if there is none."""

@@ -50,6 +50,8 @@ class Output:
     sample_age_s: float = nan
     heartbeat_echo: int = 0
     sequence_echo: int = 0
+    calibration_phase: int = 0
+    calibration_progress: float = 0.0
     enable_block: RefusalReason = RefusalReason.NONE  # why an enable would be refused now
     clear_command: bool = False  # service: bank.clear_command()
     release_owner: bool = False  # service: bank.release_owner()

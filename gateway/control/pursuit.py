@@ -75,6 +75,15 @@ class Pursuit:
         self._was_touching = moment.touching
         return event
 
+    def follow(self, voltage_v: float, expected_n: float, blend: float) -> None:
+        """A stair of the calibration ladder: this voltage within the limits, nothing learned, nothing judged."""
+        self.trim.reset()
+        self._band.restart()
+        self._answer.restart()
+        self.law.take_over(expected_n, blend)
+        self.feedforward_v = voltage_v
+        self.limited_by = self.stage.drive(voltage_v)
+
     def _force(self, demand: Demand, moment: Moment) -> Event:
         law = self.law
         goal_n, rate_n_per_s = self._approach.goal(moment.now_s, demand, moment.touching, law.applied_n)
@@ -82,7 +91,7 @@ class Pursuit:
             goal_n = min(goal_n, demand.precontact_n)
         if self._was_touching and not moment.touching:
             law.fall_back(goal_n)
-        moved_n = law.advance(goal_n, rate_n_per_s, moment.dt_s)
+        moved_n = law.advance(goal_n, rate_n_per_s, moment.dt_s, demand.gravity_n)
         self._learn(moment, moved_n)
         self.feedforward_v, by_model = law.feedforward(demand.gravity_n)
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE

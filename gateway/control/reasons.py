@@ -61,6 +61,13 @@ def gain_sentence(rise_n: float, expected_n: float) -> str:
     )
 
 
+def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -> str:
+    return (
+        f"A301 calibration stopped: {voltage_v:.2f} V out, the force rose by {rise_n:.1f} N where {expected_n:.1f} N were "
+        "expected: no air, valve closed or no contact"
+    )
+
+
 def enable_refused(reason: RefusalReason) -> str:
     return f"W301 enable refused: {_BLOCKS[reason]}"
 

@@ -18,6 +18,7 @@ def read_calibration(document: Document) -> tuple[Calibration | None, list[Fault
     if calibration is None:
         return None, faults
     faults = _length_faults(calibration, document) or coefficient_faults(calibration, document, _LARGEST_CELL_N)
+    faults = faults or _reversal_faults(calibration, document)
     return (None, faults) if faults else (calibration, [])
 
 
@@ -43,6 +44,15 @@ def _length_faults(calibration: Calibration, document: Document) -> list[Fault]:
         for name in _ARRAYS
         if len(getattr(calibration, name)) != wanted
     ]
+
+
+def _reversal_faults(calibration: Calibration, document: Document) -> list[Fault]:
+    """Slip stops that are none, or too stiff for these branches."""
+    try:
+        calibration.model()
+    except ValueError as error:
+        return [document.fault(("slip_radii_v",), str(error))]
+    return []
 
 
 def _place(index: int) -> Path:

@@ -15,8 +15,14 @@ from gateway.registers.map import RegisterMap
 from gateway.registers.words import ControlBit
 from gateway.twin import Plant
 
-SUPPORTED_BITS: Final = ControlBit.ENABLE | ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP
-"""Control bits that act; the others are refused (no rig has a valve, a ladder or a self-test behind them yet)."""
+SUPPORTED_BITS: Final = (
+    ControlBit.ENABLE
+    | ControlBit.RESET_FAULT
+    | ControlBit.TARE
+    | ControlBit.TAKE_OWNERSHIP
+    | ControlBit.START_CALIBRATION
+)
+"""Control bits that act; the others are refused (no rig has a valve or a self-test behind them yet)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

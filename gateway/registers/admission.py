@@ -22,6 +22,7 @@ from gateway.registers.words import ControlBit, RefusalReason
 ENABLE: Final = int(ControlBit.ENABLE)
 RESET: Final = int(ControlBit.RESET_FAULT)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
+STARTS: Final = int(ControlBit.ENABLE | ControlBit.START_CALIBRATION)
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 
 _BLOCKED: Final = {
@@ -74,7 +75,7 @@ class Admission:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
         if written & RESET:
             self._check_reset(values, written, word_at)
-        if written & ENABLE and not before & ENABLE:
+        if written & ~before & STARTS:
             self._check_enable(host, written, word_at)
         return Admitted(values, written, 0 if is_stop else written & ~EDGE_BITS, is_stop)
 

@@ -55,4 +55,7 @@ class Status:
     model_residual_n: float = nan
     pressure_pa: float = nan
     missed_ticks: int = 0
+    calibration_phase: int = 0
+    calibration_progress: float = 0.0
+    calibration_stored: int = 0
     enable_block: RefusalReason = RefusalReason.NONE

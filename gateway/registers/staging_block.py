@@ -93,7 +93,7 @@ class StagingBlock:
     def _act(self, peer: Peer) -> None:
         word = self._image.word(self._commit)
         if word > max(CommitAction):
-            text = f"commit = {word}, known are 0 none, 1 commit, 2 dry_run"
+            text = f"commit = {word}, known are 0 none, 1 commit, 2 dry_run, 3 rollback"
             raise Refusal(RefusalReason.OUT_OF_RANGE, self._commit, text, value=word)
         if word and self.on_commit is None:
             text = "nobody takes coefficients here: the active set is unchanged"

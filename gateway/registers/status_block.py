@@ -44,10 +44,13 @@ _SOURCES: Final = {
     "model_residual": "model_residual_n",
     "pressure": "pressure_pa",
     "missed_ticks": "missed_ticks",
+    "calibration_phase": "calibration_phase",
+    "calibration_progress": "calibration_progress",
+    "calibration_stored": "calibration_stored",
 }
 """Register -> field of Status."""
 
-_UNITS_PER_SI: Final = {"": 1.0, "N": 1.0, "mV": 1.0e3, "ms": 1.0e3, "us": 1.0e6, "kPa": 1.0e-3}
+_UNITS_PER_SI: Final = {"": 1.0, "N": 1.0, "mV": 1.0e3, "ms": 1.0e3, "us": 1.0e6, "kPa": 1.0e-3, "permille": 1.0e3}
 BANK_REGISTERS: Final = ("owner_ip", "refusal_address", "refusal_reason", "refusal_value")
 
 

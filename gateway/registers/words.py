@@ -111,12 +111,27 @@ class RefusalReason(IntEnum):
     COEFFICIENTS = 21
 
 
+class CalibrationPhase(IntEnum):
+    """How far the calibration that control_word bit 5 starts is."""
+
+    IDLE = 0
+    ZERO = 1  # rest force and noise
+    CHECK = 2  # sign and scale against the model; settles the friction
+    LADDER = 3
+    MINOR_LOOPS = 4
+    FITTING = 5  # the ladder is done, the output off; a process of its own fits
+    STORED = 6  # calibration_stored is the number
+    STOPPED = 7  # before its end: the data are kept
+    REFUSED = 8  # the fit was refused: see the log
+
+
 class CommitAction(IntEnum):
     """What the commit word of the staging block asks for."""
 
     NONE = 0
     COMMIT = 1
     DRY_RUN = 2  # all checks, nothing stored
+    ROLLBACK = 3  # what was in use before, whatever is staged
 
 
 class CommitStatus(IntEnum):

@@ -12,16 +12,20 @@ from gateway.devices import cell_host, output_host
 from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.modbus import Peer
 from gateway.ports import PortError, SerialPort
-from gateway.profiles import Rig
+from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers import RegisterBank
 from gateway.registers.words import FaultCode, WarningBit
 from gateway.service import banner
+from gateway.service.activation import InUse
 from gateway.service.control_socket import ControlSocket
 from gateway.service.event_log import EventLog
 from gateway.service.gateway import Gateway
 from gateway.service.guardian_line import GuardianLine
-from gateway.service.output_line import OutputLine
+from gateway.service.ladder_keeper import LadderKeeper
+from gateway.service.output_exchange import OutputExchange
+from gateway.service.probe import why_no_words
 from gateway.service.recordings import Recordings
+from gateway.service.rig_calibrations import RigCalibrations
 from gateway.service.rules import bank_rules, server_settings
 from gateway.service.run_flag import RunFlag
 from gateway.service.tick import Tick
@@ -49,7 +53,8 @@ class Cell:
     """Wires one rig's gateway to its edges. `failed` is set when a defect of ours left the loop in an unknown state."""
 
     def __init__(self, rig: Rig, ports: dict[str, str], state: Path, guardian: GuardianLine, log: EventLog) -> None:
-        self._rig = rig
+        self._calibrations = RigCalibrations(rig, state)
+        self._rig = rig = self._calibrations.rig
         self._state = state
         self._guardian = guardian
         self._log = log
@@ -75,16 +80,17 @@ class Cell:
             on_lost=self._on_cell_lost,
             on_open=self._on_cell_open,
         )
-        self._line = OutputLine(host, self._write_output, rig.output.device.reply_timeout_s)
+        self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
         self._tick = Tick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
 
     def _wire(self, cause: FaultCode) -> None:
         rig = self._rig
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
-        self.bank.set_active_model(rig.calibration)
-        self.bank.on_refusal = lambda refusal, peer: self._log(f"refusal {peer}", f"{refusal.sentence}   ({peer})")
-        self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer}", f"{sentence}   ({peer})")
+        self.bank.on_refusal = lambda refusal, peer: self._log(
+            f"refusal {peer.host} {refusal.reason}", f"{refusal.sentence}   ({peer})"
+        )
+        self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer.host}", f"{sentence}   ({peer})")
         self.controller = Controller(
             rig.control, rig.calibration.model(), calibration_id=rig.calibration.number, unclean_restart=bool(cause)
         )
@@ -93,18 +99,22 @@ class Cell:
             self.controller,
             self._line,
             cell_host(rig.load_cell.device, sign=rig.load_cell.sign, unit=rig.load_cell.unit),
-            calibration_id=rig.calibration.number,
             clock=time.monotonic,
             log=self._log,
         )
         self.gateway.recordings = self._recordings
+        self._ladder = LadderKeeper(self.controller, rig, self._state, time.monotonic, self._log)
+        self.gateway.ladder = self._ladder
         self.gateway.restart_cause = cause
         if self._tick.is_fallback:
             self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
         self._server = ModbusTcpServer(
             self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
         )
-        self._control_socket = ControlSocket(self._state, self.bank, self._recordings, self.gateway.health)
+        self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
+        self._control_socket = ControlSocket(
+            self._state, self.bank, self._recordings, self.gateway.health, self._upload, self._ladder
+        )
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: str) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
@@ -114,9 +124,10 @@ class Cell:
         self._tick.start()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._spoke.wait(), _FIRST_WORDS_S)
+        notes = await self._notes(restarted)
         if record:
-            self._recordings.start()
-        await self._control_socket.start()
+            notes += self._record_from_the_start()
+        notes += tuple(filter(None, [await self._control_socket.start()]))
         modbus = await self._listen(bind)
         return banner.Ready(
             rig=self._rig,
@@ -125,22 +136,33 @@ class Cell:
             cell_port=self._cell_port.path,
             voltage_v=self._line.acknowledged_v,
             force_n=self.gateway.sample.force_n if self.gateway.sample else None,
-            notes=self._notes(restarted),
+            notes=notes,
         )
 
-    def _notes(self, restarted: str) -> tuple[str, ...]:
-        notes = list(self._rig.notes)
+    def _record_from_the_start(self) -> tuple[str, ...]:
+        """A disk that takes no recording is no reason not to control."""
+        try:
+            self._recordings.start()
+        except OSError as error:
+            return (f"not recording: {error}",)
+        return ()
+
+    async def _notes(self, restarted: str) -> tuple[str, ...]:
+        notes = [*self._rig.notes, *self._calibrations.notes]
         if restarted:
             notes.append(f"restarted in OFF after: {restarted}")
         if self._line.acknowledged_v is None:
-            notes.append(
-                f"E111 {self._output_port.path}: no answer; power, crossed wires, baud? force-gateway explain E111"
-            )
+            notes.append(await self._why_silent(self._output_port, self._rig.output))
         if self.gateway.sample is None:
-            notes.append(
-                f"E111 {self._cell_port.path}: no valid line; power, crossed wires, stream mode? force-gateway explain E111"
-            )
+            notes.append(await self._why_silent(self._cell_port, self._rig.load_cell))
         return tuple(notes)
+
+    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine) -> str:
+        """The port is ours alone: it is closed while the probe listens at other speeds, and opened again."""
+        port.close()
+        sentence = await why_no_words(line, port.path)
+        await port.open()
+        return sentence
 
     async def _listen(self, bind: list[Any] | None) -> tuple[str, int]:
         host, port = bind or (self._rig.network.bind, self._rig.network.port)
@@ -167,13 +189,15 @@ class Cell:
         """Safe voltage on the wire, then everything closed; the clean-run flag goes last."""
         self._closing = True
         self._tick.close()
+        with contextlib.suppress(PortError):
+            await self._output_port.write_last(self._safe_frame)
         await self._server.close()
         await self._control_socket.close()
         self._recordings.stop()
-        with contextlib.suppress(PortError):
-            await self._output_port.write_last(self._safe_frame)
+        self._ladder.close()
         self._output_port.close()
         self._cell_port.close()
+        self._upload.close()
         self._flag.lower()
 
     def _on_defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -181,14 +205,25 @@ class Cell:
         error = context.get("exception")
         trace = "".join(traceback.format_exception(error)) if isinstance(error, BaseException) else ""
         self._log("internal", f"A499 a defect of ours: {context['message']}\n{trace}")
+        self._guardian.first_cause(
+            f"a defect of ours: {error!r}" if error else f"a defect of ours: {context['message']}"
+        )
         self.failed.set()
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
         self.gateway.on_tick(expirations, late_s)
         self._guardian.heartbeat()
         self._recordings.flush(time.monotonic())
+        self._ladder.flush(time.monotonic())
         if self._line.acknowledged_v is not None and self.gateway.sample is not None:
             self._spoke.set()
+
+    def _on_calibration(self, taken: InUse) -> None:
+        """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
+        self.controller.use(taken.model, taken.calibration.number)
+        self._recordings.calibration_number = taken.calibration.number
+        self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
+        self.gateway.refresh()
 
     def _write_output(self, data: bytes) -> None:
         if not self._closing:

@@ -1,7 +1,8 @@
 """`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
 
-record on|off|status, last writers of each register, and faults of a simulated rig (passed on to the rig's own socket by
-the tools themselves). Mode 0600: whoever may write the state directory may ask.
+record on|off|status, calibration runs, the calibration in use and its change, last writers of each register, and faults
+of a simulated rig (passed on to the rig's own socket by the tools themselves). Mode 0600: whoever may write the state
+directory may ask.
 """
 
 from pathlib import Path
@@ -9,14 +10,26 @@ from typing import Any
 
 from gateway.registers import RegisterBank
 from gateway.service.json_lines import Handler, JsonLineServer
+from gateway.service.ladder_keeper import LadderKeeper
 from gateway.service.publish import LoopHealth
 from gateway.service.recordings import Recordings
+from gateway.service.upload import Upload
 
 
 class ControlSocket(JsonLineServer):
-    def __init__(self, state: Path, bank: RegisterBank, recordings: Recordings, health: LoopHealth) -> None:
+    def __init__(
+        self,
+        state: Path,
+        bank: RegisterBank,
+        recordings: Recordings,
+        health: LoopHealth,
+        upload: Upload,
+        ladder: LadderKeeper,
+    ) -> None:
         handlers: dict[str, Handler] = {
             "record": self._record,
+            "calibration": self._calibration,
+            "calibrate": ladder.answer,
             "last-writer": self._last_writer,
             "health": self._health_figures,
         }
@@ -24,12 +37,24 @@ class ControlSocket(JsonLineServer):
         self._bank = bank
         self._recordings = recordings
         self._health = health
+        self._upload = upload
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:
         is_on = request.get("on")
         if is_on is None:
             return self._recordings.status()
         return self._recordings.start() if is_on else self._recordings.stop()
+
+    def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
+        """{"use": number} or {"rollback": true} begin a change; neither tells what is in use and how the last one went."""
+        if request.get("rollback"):
+            return self._upload.rollback()
+        number = request.get("use")
+        if number is None:
+            return self._upload.status()
+        if type(number) is not int:
+            raise ValueError(f"use = {number}: the number of a calibration is expected")
+        return self._upload.use(number)
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
         return {

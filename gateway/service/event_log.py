@@ -1,9 +1,11 @@
 """Sentences for people, on stderr, without ever making the control loop wait for a terminal.
 
 A paused terminal blocks its writer; so lines go to a thread through a queue. At most 10 lines a second per cause: a
-flooding client cannot fill a disk, and the number of lines left out is said.
+flooding client cannot fill a disk, and the number of lines left out is said. Causes carry addresses, so that they are
+without number; only those of the last second are kept.
 """
 
+import contextlib
 import queue
 import sys
 import threading
@@ -14,6 +16,8 @@ from typing import Self
 
 _LINES_PER_S = 10
 _LONGEST_QUEUE = 1000
+_MOST_CAUSES = 1000
+_END_BOUND_S = 1.0
 
 
 class EventLog:
@@ -35,6 +39,8 @@ class EventLog:
             if count > _LINES_PER_S:
                 self._put(f"... {count - _LINES_PER_S} more lines of {cause!r} left out")
             began_s, count = now_s, 0
+        if cause not in self._windows and len(self._windows) >= _MOST_CAUSES:
+            self._forget_old(now_s)
         self._windows[cause] = (began_s, count + 1)
         if count < _LINES_PER_S:
             self._put(sentence)
@@ -46,8 +52,14 @@ class EventLog:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._lines.put(None)
-        self._thread.join(1.0)
+        """What is said until now is still written, unless the terminal takes nothing for a second."""
+        with contextlib.suppress(queue.Full):
+            self._lines.put(None, timeout=_END_BOUND_S)
+        self._thread.join(_END_BOUND_S)
+
+    def _forget_old(self, now_s: float) -> None:
+        recent = {cause: window for cause, window in self._windows.items() if now_s - window[0] < 1.0}
+        self._windows = recent if len(recent) < _MOST_CAUSES else {}
 
     def _put(self, line: str) -> None:
         try:
@@ -57,4 +69,5 @@ class EventLog:
 
     def _drain(self) -> None:
         while (line := self._lines.get()) is not None:
-            self._write(line + "\n")
+            with contextlib.suppress(OSError, ValueError):  # a terminal that went away
+                self._write(line + "\n")

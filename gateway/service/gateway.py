@@ -17,7 +17,8 @@ from gateway.devices.messages import ForceSample
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command
 from gateway.registers.words import FaultCode, WarningBit
-from gateway.service.output_line import OutputLine
+from gateway.service.ladder_keeper import LadderKeeper
+from gateway.service.output_exchange import OutputExchange
 from gateway.service.publish import LoopHealth, status_of
 from gateway.service.recordings import Recordings
 
@@ -32,10 +33,9 @@ class Gateway:
         self,
         bank: RegisterBank,
         controller: Controller,
-        output: OutputLine,
+        output: OutputExchange,
         cell: CellHost,
         *,
-        calibration_id: int,
         clock: Callable[[], float],
         log: Log,
     ) -> None:
@@ -43,6 +43,7 @@ class Gateway:
         self.controller = controller
         self.output = output
         self.recordings: Recordings | None = None
+        self.ladder: LadderKeeper | None = None
         self.health = LoopHealth()
         self.decision: Output | None = None
         self.sample: ForceSample | None = None
@@ -54,7 +55,6 @@ class Gateway:
         self.warnings = WarningBit(0)
         self.restart_cause = FaultCode.NONE
         self._cell = cell
-        self._calibration_id = calibration_id
         self._clock = clock
         self._log = log
         self._last_tick_s: float | None = None
@@ -92,8 +92,14 @@ class Gateway:
         self.output_lost = FaultCode.NONE
 
     def output_closed(self) -> None:
+        """Decided at once: it may be open again before the next tick, and another device may be behind it then."""
         self.output.opened()
         self.output_lost = FaultCode.OUTPUT_LOST
+        self._step(self._clock())
+
+    def refresh(self) -> None:
+        """Decide and publish now: something besides command and sample has changed."""
+        self._step(self._clock())
 
     def cell_opened(self) -> None:
         self._cell.forget()
@@ -126,12 +132,15 @@ class Gateway:
         decision = self._decide(now_s)
         self.output.want(decision.voltage_v, now_s)
         self.decision = decision
+        if self.ladder:
+            self.ladder.follow(decision)
         if decision.clear_command:
             self.bank.clear_command()
         if decision.release_owner:
             self.bank.release_owner()
         self.health.loop_time_s = self._clock() - now_s
-        status = status_of(decision, self.health, self.output.pressure_pa, self._calibration_id)
+        stored = self.ladder.stored if self.ladder else 0
+        status = status_of(decision, self.health, self.output.pressure_pa, self.controller.calibration_id, stored)
         if decision.warnings & WarningBit.RESTARTED and not decision.fault:
             status = replace(status, fault_code=self.restart_cause)
         self.bank.publish(status)
@@ -141,3 +150,5 @@ class Gateway:
     def _record(self) -> None:
         if self.recordings and self.sample and self.decision:
             self.recordings.append(self.sample, self.decision, self.output.pressure_pa)
+        if self.ladder and self.sample and self.decision:
+            self.ladder.append(self.sample, self.decision, self.output.pressure_pa)

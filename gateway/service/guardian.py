@@ -25,6 +25,7 @@ from gateway.service.safe_line import SafeLine
 
 _START_GRACE_S = 30.0  # imports on a slow machine; nothing but the safe voltage is written before READY
 _STOP_BOUND_S = 5.0
+_STARVED_S = 0.02
 _RESTARTS = 5
 _RESTART_WINDOW_S = 60.0
 
@@ -82,6 +83,8 @@ class Guardian:
     stop_deadline_s: float | None = None
     signals: int = 0
     announced: bool = False
+    link_ended: bool = False
+    starved: bool = False
     restarts_s: list[float] = field(default_factory=list)
     ptys: dict[str, Any] = field(default_factory=dict)
 
@@ -99,7 +102,7 @@ class Guardian:
 
     def _step(self, wake: socket.socket) -> int | None:
         assert self.control
-        sources: list[Any] = [self.control.link, self.control.died, wake]
+        sources: list[Any] = [self.control.died, wake, *([] if self.link_ended else [self.control.link])]
         readable, _, _ = select.select(sources, [], [], self._patience_s())
         if wake in readable:
             self._on_signal(wake.recv(64))
@@ -134,14 +137,15 @@ class Guardian:
         assert self.control
         while select.select([self.control.link], [], [], 0)[0]:
             message = link.receive(self.control.link)
-            if message is None:
+            if message is None:  # it is about to end: its death, or its silence, is what counts now
+                self.link_ended = True
                 return
             self._handle(message)
 
     def _handle(self, message: link.Message) -> None:
         if message.tag == link.HEARTBEAT:
             if self.last_beat_s is not None:  # before READY the start has its own, longer patience
-                self.last_beat_s = time.monotonic()
+                self.last_beat_s, self.starved = time.monotonic(), False
         elif message.tag == link.LINE:
             self._drop_line()
             frame, reply = bytes.fromhex(message.body["safe_frame"]), bytes.fromhex(message.body["safe_reply"])
@@ -180,7 +184,12 @@ class Guardian:
         if self.stop_deadline_s is not None and now_s >= self.stop_deadline_s:
             self.control.kill()
             return self._on_death("did not stop in time")
-        if now_s >= self._beat_deadline_s() and self.stop_deadline_s is None:
+        late_s = now_s - self._beat_deadline_s()
+        if late_s >= 0.0 and self.stop_deadline_s is None:
+            if late_s > _STARVED_S and self.last_beat_s is not None and not self.starved:
+                self.starved = True  # we woke late ourselves: the machine stood still, the child gets one more chance
+                self.last_beat_s = now_s - self.stall_s + _STARVED_S
+                return None
             self.control.kill()
             return self._on_death("stalled")
         return None
@@ -192,7 +201,7 @@ class Guardian:
         self._drop_line()  # our copy of the descriptor carries the port's lock, which the next control process needs
         code = self.control.wait()
         if self.stop_deadline_s is not None:
-            return EXIT_OK if how == "died" and code == 0 else (EXIT_OK if self.signals else EXIT_FAILED)
+            return EXIT_OK
         if not self.announced and code > 0:
             return code  # it told the user why: configuration, device, permission
         return self._restart(how, code, acknowledged)
@@ -214,7 +223,7 @@ class Guardian:
     def _start_control(self, restarted: str) -> None:
         if self.control:
             self.control.close()
-        self.last_beat_s, self.started_s, self.first_cause = None, time.monotonic(), ""
+        self.last_beat_s, self.started_s, self.first_cause, self.link_ended = None, time.monotonic(), "", False
         self.control = spawn_control(
             {
                 "rig": self.options.rig,

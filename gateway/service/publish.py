@@ -31,7 +31,9 @@ class LoopHealth:
         return 0
 
 
-def status_of(output: Output, health: LoopHealth, pressure_pa: float, calibration_id: int) -> Status:
+def status_of(
+    output: Output, health: LoopHealth, pressure_pa: float, calibration_id: int, calibration_stored: int = 0
+) -> Status:
     return Status(
         state=output.state,
         status_word=int(output.status),
@@ -53,5 +55,8 @@ def status_of(output: Output, health: LoopHealth, pressure_pa: float, calibratio
         model_residual_n=output.model_residual_n,
         pressure_pa=pressure_pa,
         missed_ticks=health.missed_ticks,
+        calibration_phase=output.calibration_phase,
+        calibration_progress=output.calibration_progress,
+        calibration_stored=calibration_stored,
         enable_block=output.enable_block,
     )

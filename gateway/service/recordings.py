@@ -17,6 +17,7 @@ class Recordings:
         self._rig = rig
         self._log = log
         self._current: RunRecording | None = None
+        self.calibration_number = rig.calibration.number
 
     def start(self) -> dict[str, Any]:
         """Begin a recording; ValueError when one is running."""
@@ -27,7 +28,7 @@ class Recordings:
             "rig": rig.name,
             "rig_fingerprint": rig.fingerprint,
             "rig_texts": dict(rig.texts),
-            "calibration": rig.calibration.number,
+            "calibration": self.calibration_number,
             "simulated": rig.simulated,
             "seed": rig.seed,
         }

@@ -1,7 +1,8 @@
 """The guardian's last word on the wire: the safe voltage, until the device has acknowledged it.
 
 A dead process may leave half a command behind, so the first safe frame can be swallowed into an unknown command: it is
-repeated until the acknowledgement comes, at most three times, and output is never flushed.
+repeated until the acknowledgement comes, at most three times, and output is never flushed. What the device said before the
+frame is dropped: the unread answer to an older question may look like an acknowledgement (a pressure of 0 is `0` too).
 Standard library only.
 """
 
@@ -31,6 +32,7 @@ class SafeLine:
         """Put the safe voltage on the wire. True when acknowledged, False when the device is silent or the port gone."""
         try:
             for _ in range(_REPEATS):
+                _drop_input(self.descriptor)
                 _write_all(self.descriptor, self.frame, reply_timeout_s)
                 if not self.reply or self._acknowledged(reply_timeout_s):
                     return True
@@ -52,6 +54,11 @@ class SafeLine:
             if self.reply.strip() in re.split(rb"[\r\n]+", seen)[:-1]:
                 return True
         return False
+
+
+def _drop_input(descriptor: int) -> None:
+    while select.select([descriptor], [], [], 0)[0] and os.read(descriptor, 256):
+        pass
 
 
 def _write_all(descriptor: int, data: bytes, timeout_s: float) -> None:

@@ -109,14 +109,17 @@ async def serve(rig: Rig, link: socket.socket, state: Path) -> None:
     """Run until the guardian's end of the link closes."""
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
-    output_pty = PacedPty(rig.output.baud, on_bytes=lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s))
-    cell_pty = PacedPty(rig.load_cell.baud, on_bytes=lambda chunk, now_s: None)
+    output_pty = PacedPty(
+        rig.output.device.serial.baud, on_bytes=lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s)
+    )
+    cell_pty = PacedPty(rig.load_cell.device.serial.baud, on_bytes=lambda chunk, now_s: None)
     simulated = SimulatedRig(rig, send_output=output_pty.send, send_cell=cell_pty.send, now_s=time.monotonic())
     faults = JsonLineServer(state / "rig.sock", {"fault": simulated.fault})
     tick = Tick(1.0 / rig.load_cell.device.rate_hz, lambda *_: simulated.stream(time.monotonic()))
     output_pty.open()
     cell_pty.open()
-    await faults.start()
+    if unserved := await faults.start():
+        sys.stderr.write(f"{unserved}\n")
     tick.start()
     loop.add_reader(link.fileno(), ended.set)
     link.send(json.dumps({"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}}).encode())

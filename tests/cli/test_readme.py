@@ -23,6 +23,8 @@ def test_every_verb_that_readme_names_exists(verb):
     assert verb in command.list_commands(None)
 
 
-@pytest.mark.parametrize("path", sorted(set(re.findall(r"(?<![-\w])(?:tools|profiles|tests|gateway)/[\w./-]*\w", README))))
+@pytest.mark.parametrize(
+    "path", sorted(set(re.findall(r"(?<![-\w])(?:tools|profiles|tests|gateway)/[\w./-]*\w", README)))
+)
 def test_every_file_that_readme_names_exists(path):
     assert (ROOT / path).exists()

@@ -23,6 +23,7 @@ class RunningGateway:
     ready: dict[str, Any]
     state: Path
     client: ModbusTcpClient
+    log: Path
 
     @property
     def port(self) -> int:
@@ -49,11 +50,34 @@ class RunningGateway:
                 return status
             assert time.monotonic() < deadline_s, f"not within {within_s} s: {status}"
 
+    def said(self, words: str, within_s: float = 2.0) -> str:
+        """The line on the gateway's stderr that holds these words."""
+        deadline_s = time.monotonic() + within_s
+        while True:
+            lines = [line for line in self.log.read_text().splitlines() if words in line]
+            if lines:
+                return lines[-1]
+            assert time.monotonic() < deadline_s, f"{words!r} was not said: {self.log.read_text()}"
+            time.sleep(0.01)
+
+    def next_ready(self) -> dict[str, Any]:
+        """The JSON line of a restarted control process."""
+        assert self.process.stdout
+        self.ready = json.loads(self.process.stdout.readline())
+        return self.ready
+
+    def rest(self) -> None:
+        """Disabled, in force mode, without a force: where each test of a shared gateway begins."""
+        assert not self.write(0, 0, 0, 0, 0).isError()
+        self.wait_until(lambda status: status["state"] == 0 and abs(status["force_measured"]) < 200)
+
     def force_n(self) -> float:
         return self.status()["force_measured"] / 100
 
 
 def start(state: Path, *options: str, rig: str = "demo") -> RunningGateway:
+    """A gateway that is READY; what it says on stderr goes to a file beside the state directory."""
+    log = state.with_name(state.name + ".stderr")
     command = [
         sys.executable,
         "-m",
@@ -67,14 +91,17 @@ def start(state: Path, *options: str, rig: str = "demo") -> RunningGateway:
         str(state),
         *options,
     ]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    with log.open("w") as stderr:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
     assert process.stdout
     line = process.stdout.readline()
-    assert line, f"the gateway ended with {process.wait()}"
+    if not line:
+        process.stdout.close()
+        raise AssertionError(f"the gateway ended with {process.wait()}: {log.read_text()}")
     ready = json.loads(line)
     client = ModbusTcpClient("127.0.0.1", port=ready["modbus"][1], timeout=1.0, retries=0)
     assert client.connect()
-    return RunningGateway(process, ready, state, client)
+    return RunningGateway(process, ready, state, client, log)
 
 
 def stop(gateway: RunningGateway) -> int:
@@ -84,6 +111,7 @@ def stop(gateway: RunningGateway) -> int:
     code = gateway.process.wait(15)
     assert gateway.process.stdout
     gateway.process.stdout.close()
+    print(gateway.log.read_text())
     return code
 
 
@@ -92,3 +120,17 @@ def running(tmp_path: Path) -> Iterator[RunningGateway]:
     gateway = start(tmp_path / "state", "--sim")
     yield gateway
     stop(gateway)
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGateway]:
+    """One gateway for all tests of a module; each begins with `rest`."""
+    gateway = start(tmp_path_factory.mktemp("shared") / "state", "--sim")
+    yield gateway
+    stop(gateway)
+
+
+@pytest.fixture
+def rested(shared: RunningGateway) -> RunningGateway:
+    shared.rest()
+    return shared

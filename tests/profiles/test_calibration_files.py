@@ -35,6 +35,8 @@ def test_the_shipped_calibration_makes_a_model() -> None:
         ("rising_handles_n", "[1.0, 65]", "19 rising_handles_n: has 2 entries: order 2 has 3"),
         ("rising_handles_n", "[60, 50, 40]", "20 rising_handles_n[0]: the rising branch is not increasing"),
         ("x1_v", "0", "1 range 0 .. 0 V: 0 <= x0 < x1 <= 10 V is allowed"),
+        ("slip_shares", "[1.0]", "15 slip_radii_v: slip stops: 7 radii and 1 shares: as many of each"),
+        ("slip_radii_v", "[.001, .2, .3, .4, .5, .6, .7]", "15 slip_radii_v: slip stops give way over"),
         ("order", "two", '8 order: "two" is not a whole number'),
     ],
 )  # fmt: skip

@@ -27,7 +27,7 @@ def messages(faults: tuple[object, ...]) -> list[str]:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("force_max_n: 60", "force_max_n: 66", "limits.force_max_n: 66 N is above 65.1 N, where calibration demo ends (8 V)"),
+        ("force_max_n: 60", "force_max_n: 66", "limits.force_max_n: 66 N is above 65.2 N, where calibration demo ends (8 V)"),
         ("voltage_max_v: 8.5", "voltage_max_v: 7.5", "limits.force_max_n: 60 N needs"),
         ("over_force_n: 75", "over_force_n: 60",
          "limits.over_force_n: 60 N is not above force_max_n = 60 N: it would trip in normal work"),
@@ -50,7 +50,7 @@ def messages(faults: tuple[object, ...]) -> list[str]:
          "supervision.sample_timeout_s: 0.01 s is shorter than two ticks of the loop: 0.02 s at 100 Hz"),
         ("lease_s: null", "lease_s: 0.01",
          "supervision.lease_s: 0.01 s is shorter than two ticks of the loop: 0.02 s at 100 Hz"),
-        ("lease_s: null", "stuck_n: 1", "supervision.stuck_n: 1 N is not above the"),
+        ("lease_s: null", "stuck_n: 0.9", "supervision.stuck_n: 0.9 N is not above the"),
         ("plant: paper-slide", "",
          "plant: is missing: a simulated rig needs something to simulate, such as `plant: paper-slide`"),
         ("bind: 127.0.0.1", "bind: 0.0.0.0", "network.bind: 0.0.0.0 can be reached from other machines: say which may connect"),

@@ -28,7 +28,7 @@ BLOCKS = {
     "staging": (1000, 1199),
     "active": (1500, 1699),
 }
-SCALES = {"N": 0.01, "N/s": 0.1, "mV": 1, "deg": 0.1, "ms": 1, "g": 1, "us": 1, "kPa": 1, "": 1}
+SCALES = {"N": 0.01, "N/s": 0.1, "mV": 1, "deg": 0.1, "ms": 1, "g": 1, "us": 1, "kPa": 1, "permille": 1, "": 1}
 
 
 def test_blocks_are_those_of_the_contract(register_map):
@@ -70,6 +70,7 @@ ENUMERATIONS = {
     "limited_by": w.LimitedBy,
     "fault_code": w.FaultCode,
     "refusal_reason": w.RefusalReason,
+    "calibration_phase": w.CalibrationPhase,
     "commit": w.CommitAction,
     "commit_status": w.CommitStatus,
 }

@@ -100,10 +100,11 @@ def stairs_between(turns_v: Sequence[float], step_v: float) -> list[float]:
 
 def command_error_n(model: Bsfm, voltage_v: Sequence[float], force_n: Floats) -> Floats:
     """What a law with this model gets wrong on a walk: volts asked for each force in turn, against those that made it, in N."""
-    state, errors = 1.0, []
+    memory, errors = model.reversal.start(), []
     low_n, high_n = model.force_range_n
     for before_n, now_n, volts in zip(force_n[:-1], force_n[1:], voltage_v[1:], strict=True):
-        state = model.reversal.advance(state, float(now_n - before_n))
+        memory = model.moved(memory, float(before_n), float(now_n))
+        state = model.share(memory)
         asked_v, _ = model.voltage_v(min(max(float(now_n), low_n), high_n), state)
         errors.append(model.force_n(asked_v, state) - model.force_n(volts, state))
     return np.array(errors)

@@ -6,6 +6,7 @@
  *   data         sha256 $sha256
  *   fit          order $order, residual RMS $rms N, largest $largest N
  *   range        $x0 .. $x1 V, $force_min .. $force_max N on both branches, blend span $span N
+ *   reversal     the linear blend over that span: slip stops, where the calibration has them, are not exported
  *   generator    force-gateway $version
  *   accuracy     against the same model in double: force within $error_n N, voltage within $error_v V (measured)
  *

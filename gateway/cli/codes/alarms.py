@@ -195,6 +195,20 @@ OTHERS: Final = (
         "What killed the control process is still there.",
         "Read the first A401 line, not the last; then start again.",
     ),
+    Entry(
+        "A330",
+        "calibration stopped",
+        "A calibration run ended before its last stair; the output went to the safe voltage and the data are kept.",
+        "Nobody followed the run any more (a closed terminal), or the recording could not be written.",
+        "force-gateway calibrate --resume goes on with the groups that are missing; df -h shows a full disk.",
+    ),
+    Entry(
+        "A331",
+        "fit ended without a result",
+        "The ladder was run and recorded, but the process that fits it ended without saying anything.",
+        "It was killed, or the machine ran out of memory.",
+        "force-gateway fit RECORDING --store does the same in the foreground.",
+    ),
 )
 
 FAULT_CODES: Final = {FaultCode[entry.name]: entry.code for entry in FAULTS}

@@ -201,6 +201,13 @@ ENTRIES: Final = (
         "The tool is stuck in contact, a valve is open, or the zero has moved.",
         "Free the tool; if nothing touches it, tare.",
     ),
+    Entry(
+        "W305",
+        "calibration refused",
+        "A calibration ladder was asked for (control_word bit 5, or calibrate) and not begun.",
+        "The output is enabled with a force, a fault is latched, or another calibration or its fit is running.",
+        "Write 0 to control_word (and reset a fault), wait for phase stored, then ask again.",
+    ),
 )
 
 REFUSAL_CODES: Final = {RefusalReason[entry.name]: entry.code for entry in ENTRIES if entry.name} | {

@@ -3,10 +3,15 @@
 A serial device at 9600 baud takes 15 ms for a setting and its echo, the loop decides every 4-10 ms: a queue would make
 the wire an ever older past. Setpoints go before pressure polls; polls fill the idle wire and keep a silent device from
 going unnoticed. Time comes in as an argument, so that tests run it in virtual time.
+
+An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
+it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
+an honest device would look like one that alters its settings. So after a time-out an answer that is no echo of what was
+asked last is believed by nobody: the line is left alone for one reply time, then asked anew. A falling voltage never waits.
 """
 
 from collections.abc import Callable
-from math import nan
+from math import inf, nan
 
 from gateway.devices import OutputHost
 from gateway.devices.messages import (
@@ -25,7 +30,7 @@ _FAILURES_BEFORE_FAULT = 3  # SAFETY: T_dac is three writes or 100 ms; one bad e
 _PRESSURE_PERIOD_S = 0.1
 
 
-class OutputLine:
+class OutputExchange:
     """Asks the device through `write`, keeps what it answered.
 
     acknowledged_v: confirmed by the device, None before the first; unanswered_since_s: send time of the oldest question
@@ -46,6 +51,10 @@ class OutputLine:
         self._host.forget()
         self._wanted_v: float | None = None
         self._in_flight: OutputRequest | None = None
+        self._asked_v = inf
+        self._standing_v: float | None = None
+        self._is_overdue = False  # a question was given up, its answer may still come
+        self._quiet_until_s = 0.0
         self._sent_s = 0.0
         self._next_pressure_s = 0.0
         self._failures = 0
@@ -68,22 +77,29 @@ class OutputLine:
         """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""
         if self._in_flight is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
-            self._in_flight = None
+            self._in_flight, self._is_overdue = None, True
             self._next_pressure_s = now_s  # ask again at once: three tries fit into the bound on silence
         self._pump(now_s)
 
     def _pump(self, now_s: float) -> None:
-        if self._in_flight is not None:
+        wanted_v = self._wanted_v
+        if wanted_v is None or self._in_flight is not None:
             return
-        if self._wanted_v is not None and not self._stands(self._wanted_v):
-            self._send(SetVoltage(self._wanted_v), now_s)
-        elif now_s >= self._next_pressure_s and self._wanted_v is not None:
+        if now_s < self._quiet_until_s and wanted_v >= self._asked_v:
+            return
+        if not self._stands(wanted_v):
+            self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
+            self._asked_v, self._standing_v = wanted_v, None
+            self._send(SetVoltage(wanted_v), now_s)
+        elif now_s >= self._next_pressure_s:
             self._next_pressure_s = now_s + _PRESSURE_PERIOD_S
             self._send(ReadPressure(), now_s)
 
     def _stands(self, voltage_v: float) -> bool:
-        """Within half a step of the device there is nothing to send."""
-        return self.acknowledged_v is not None and abs(voltage_v - self.acknowledged_v) <= 0.5 * self._host.resolution_v
+        """Within half a step of what surely stands there is nothing to send. After a question without an answer nothing
+        surely stands: a device whose answer was lost may have obeyed, and must hear the safe voltage."""
+        standing_v = self._standing_v
+        return standing_v is not None and abs(voltage_v - standing_v) <= 0.5 * self._host.resolution_v
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
         self._in_flight, self._sent_s = request, now_s
@@ -94,9 +110,13 @@ class OutputLine:
     def _on_reply(self, reply: OutputReply, now_s: float) -> None:
         if isinstance(reply, Garbage):
             self.garbage_bytes += len(reply.data)
+            self._is_overdue = self._is_overdue and self._in_flight is not None  # unasked: that was it
             return
         asked, self._in_flight = self._in_flight, None
         self.unanswered_since_s = None
+        if self._is_overdue and not self._echoes(asked, reply):
+            self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
+            return
         self.round_trip_s = now_s - self._sent_s
         if isinstance(reply, Pressure):
             self.pressure_pa = reply.pressure_pa
@@ -104,11 +124,17 @@ class OutputLine:
         elif isinstance(reply, Refused):
             self._failed(FaultCode.OUTPUT_REFUSED)
         elif isinstance(reply, Accepted) and isinstance(asked, SetVoltage):
-            self._check_echo(asked.voltage_v, reply.voltage_v)
+            self._check_echo(asked, reply)
 
-    def _check_echo(self, asked_v: float, accepted_v: float) -> None:
-        self.acknowledged_v = accepted_v
-        if abs(accepted_v - asked_v) <= 0.6 * self._host.resolution_v:
+    def _echoes(self, asked: OutputRequest | None, reply: OutputReply) -> bool:
+        """Half a step is the device's rounding."""
+        if not (isinstance(asked, SetVoltage) and isinstance(reply, Accepted)):
+            return False
+        return abs(reply.voltage_v - asked.voltage_v) <= 0.6 * self._host.resolution_v
+
+    def _check_echo(self, asked: SetVoltage, reply: Accepted) -> None:
+        self.acknowledged_v = self._standing_v = reply.voltage_v
+        if self._echoes(asked, reply):
             self._failures, self.fault = 0, FaultCode.NONE
         else:
             self._failed(FaultCode.OUTPUT_ALTERED)

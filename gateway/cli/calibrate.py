@@ -1,0 +1,138 @@
+"""`calibrate`: the guided ladder on the gateway that runs, from the questions to the number of a new calibration."""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import endpoint, json_option, state_directory, state_options
+
+_QUESTIONS: Final = (
+    "Does the tool press on the workpiece, or on a stop, that takes {force:.0f} N?",
+    "Are hands and people away, and does nothing else command this tool?",
+    "Is the air on, with supply enough for {top:g} V?",
+)
+
+
+@click.command()
+@click.option("--groups", type=click.IntRange(1, 100), help="How often the ladder is climbed  [default: 5]")
+@click.option("--step", "step_v", type=click.FloatRange(min=0.01), help="Height of a stair in V  [default: 0.2]")
+@click.option("--v-max", "v_max_v", type=click.FloatRange(min=0.1), help="Top in V  [default: as the rig allows]")
+@click.option(
+    "--minor", "minor_points", type=click.IntRange(0, 2000), help="Points of the reversal part  [default: 150]"
+)
+@click.option("--quick", is_flag=True, help="1 V stairs, 2 groups, short reversal part: under a minute.")
+@click.option("--tare", is_flag=True, help="Take the force at rest as zero first (only with the tool unloaded).")
+@click.option("--plan", "plan_file", type=click.Path(path_type=Path, exists=True, dir_okay=False), help="Plan as YAML.")
+@click.option("--resume", is_flag=True, help="Go on with the groups that the last stopped run did not climb.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option(
+    "--gateway", callback=endpoint, metavar="HOST:PORT", help="By Modbus (the rig's own plan), not on this machine."
+)
+@state_options
+@json_option
+def command(
+    *, state: Path | None, rig: str, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **wanted: Any
+) -> None:
+    """Measure a ladder and make a numbered calibration of it.
+
+    Runs on the gateway of this machine. Ctrl-C goes to 0 V and keeps the data. Nothing is activated: that is
+    `calibration use N`.
+    """
+    from gateway.cli.calibrating.follow import follow
+    from gateway.cli.calibrating.sources import LocalRun, RemoteRun
+
+    if gateway:
+        if any(wanted.values()):
+            raise click.UsageError("by Modbus (--gateway) the gateway runs its own plan: leave the plan's options out")
+        run: LocalRun | RemoteRun = RemoteRun(gateway)
+    else:
+        directory = state_directory(state, rig)
+        run = LocalRun(directory, *_plan(directory, wanted))
+    _ask(run.preview(), yes)
+    _tell(follow(run), as_json)
+
+
+def _plan(directory: Path, wanted: dict[str, Any]) -> tuple[dict[str, Any], list[int]]:
+    """The plan's fields, and the recordings that it goes on from."""
+    from gateway.control.ladder_stairs import QUICK
+
+    fields: dict[str, Any] = {}
+    earlier: list[int] = []
+    if wanted["resume"]:
+        from gateway.cli.calibrating.resume import resumed
+
+        fields, earlier = resumed(directory)
+    if wanted["quick"]:
+        fields |= {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
+    if wanted["plan_file"]:
+        fields |= _from_file(wanted["plan_file"])
+    names = ("groups", "step_v", "v_max_v", "minor_points")
+    fields |= {name: wanted[name] for name in names if wanted[name] is not None}
+    return fields | ({"tare": True} if wanted["tare"] else {}), earlier
+
+
+def _from_file(path: Path) -> dict[str, Any]:
+    import yaml
+
+    try:
+        fields = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise CliError(f"{path}: {error}", exit_codes.CONFIGURATION) from None
+    if not isinstance(fields, dict):
+        raise CliError(f"{path}: a plan has lines such as `groups: 5`", exit_codes.CONFIGURATION)
+    return fields
+
+
+def _ask(preview: dict[str, Any], yes: bool) -> None:
+    """What will happen and how long it takes; then the preconditions, each of which may end it here."""
+    if preview:
+        top = f"{preview['v_max_v']:.1f} V (about {preview['force_max_n']:.0f} N)"
+        where = ", on a simulated rig" if preview["simulated"] else ""
+        stairs = f"{preview['rig']}: {preview['stairs']} stairs up to {top}"
+        click.echo(f"{stairs}, about {_minutes(preview['eta_s'])}{where}", err=True)
+    if yes:
+        return
+    for question in _QUESTIONS:
+        words = question.format(force=preview.get("force_max_n", 60.0), top=preview.get("v_max_v", 8.0))
+        if not click.confirm(words, err=True):
+            raise CliError("not begun: nothing has moved")
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.1f} min"
+
+
+def _tell(end: dict[str, Any], as_json: bool) -> None:
+    """The table and the number, or why there is none."""
+    from gateway.cli.fit import show
+
+    document = _document(end)
+    if as_json:
+        click.echo(json.dumps(end | {"fit": document}))
+    elif document:
+        show(document)
+    elif end["phase"] == "stored":
+        click.echo(
+            f"calibration {end['stored']} is stored, not active; force-gateway calibration use {end['stored']} there"
+        )
+    if end["phase"] == "stored":
+        return
+    kept = (
+        f"\nthe data are kept in {end['recording']}; force-gateway calibrate --resume goes on"
+        if end.get("recording")
+        else ""
+    )
+    if end["phase"] == "refused":
+        raise CliError(str(end.get("sentence") or "the fit was refused: see the gateway's log"), exit_codes.DATA)
+    raise CliError(f"{str(end.get('sentence') or 'calibration stopped').removeprefix('info ')}{kept}")
+
+
+def _document(end: dict[str, Any]) -> dict[str, Any]:
+    if not end.get("document"):
+        return {}
+    document: dict[str, Any] = json.loads(Path(end["document"]).read_text(encoding="utf-8"))
+    return document

@@ -1,0 +1,85 @@
+"""Follows a run to its end with a progress bar; Ctrl-C ends it at 0 V, a second one leaves at once."""
+
+import time
+from math import isnan
+from typing import Any, Final
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgressColumn, TextColumn
+
+from gateway.cli.calibrating.sources import ENDED, LocalRun, Look, RemoteRun
+from gateway.cli.errors import CliError
+
+_POLL_S: Final = 0.2
+_BEGIN_S: Final = 2.0
+_LOST: Final = (
+    "the run has ended with it, at the safe voltage; what was recorded is kept: force-gateway calibrate --resume"
+)
+_NAMES: Final = {
+    "idle": "starting",
+    "zero": "zero and noise",
+    "check": "sign and scale",
+    "ladder": "ladder",
+    "minor_loops": "reversals",
+    "fitting": "fitting",
+    "stored": "stored",
+    "refused": "fit refused",
+    "stopped": "stopped",
+}
+
+
+class NotBegunError(CliError):
+    """Nothing has moved."""
+
+
+def follow(run: LocalRun | RemoteRun) -> dict[str, Any]:
+    """Begin the run and wait for its end; how it ended."""
+    run.begin()
+    with _progress() as progress:
+        task = progress.add_task("starting", total=1.0, force="", eta="")
+        try:
+            _wait(run, progress, task)
+        except KeyboardInterrupt:
+            run.stop()
+            _wait(run, progress, task)
+        except NotBegunError:
+            raise
+        except CliError as error:
+            raise CliError(f"{error.format_message()}\n{_LOST}", error.exit_code) from None
+    return run.end()
+
+
+def _progress() -> Progress:
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description:<22}"),
+        BarColumn(bar_width=None),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[force]:>18}"),
+        TextColumn("{task.fields[eta]:>9}"),
+        console=Console(stderr=True),
+        expand=True,
+    )
+
+
+def _wait(run: LocalRun | RemoteRun, progress: Progress, task: TaskID) -> None:
+    began_s = time.monotonic()
+    while True:
+        look = run.look()
+        name = f"{_NAMES.get(look.phase, look.phase)}{look.detail}"
+        progress.update(task, completed=look.progress, description=name, force=_force(look), eta=_eta(look))
+        if look.phase in ENDED:
+            return
+        if look.phase == "idle" and time.monotonic() - began_s > _BEGIN_S:
+            raise NotBegunError("W305 the gateway has not begun the calibration; its log says why")
+        time.sleep(_POLL_S)
+
+
+def _force(look: Look) -> str:
+    return "" if isnan(look.force_n) else f"{look.voltage_v:5.2f} V {look.force_n:7.2f} N"
+
+
+def _eta(look: Look) -> str:
+    if isnan(look.eta_s) or look.eta_s <= 0.0:
+        return ""
+    return f"{int(look.eta_s) // 60}:{int(look.eta_s) % 60:02d} left"

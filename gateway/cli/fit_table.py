@@ -1,0 +1,112 @@
+"""A fit's document as a table and a few sentences for the terminal."""
+
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+
+def fit_table(document: dict[str, Any]) -> Table:
+    """One row per model and order; the chosen one stands out, those that may not drive a plant step back."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="dim", caption_justify="left")
+    table.add_column("model")
+    for name in ("order", "coeffs", "RMS N", "max N", "held-out RMS N"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("verdict")
+    table.add_column("paper's\nnorm *", justify="right", style="dim")
+    before = ""
+    for fit in document["fits"]:
+        if before and fit["model"] != before:
+            table.add_section()
+        before = fit["model"]
+        table.add_row(*_cells(fit), style="bold green" if fit["chosen"] else None if fit["usable"] else "dim")
+    return table
+
+
+def _cells(fit: dict[str, Any]) -> list[str | Text]:
+    error = f" ± {fit['heldout_error_n']:.3f}" if fit["heldout_error_n"] is not None else ""
+    heldout = f"{fit['heldout_rms_n']:.3f}{error}" if fit["heldout_rms_n"] is not None else "-"
+    return [
+        f"{'▸ ' if fit['chosen'] else '  '}{fit['model'].upper()}",
+        str(fit["order"]),
+        str(fit["coefficients"]),
+        f"{fit['rms_n']:.3f}",
+        f"{fit['max_n']:.2f}",
+        heldout,
+        "chosen" if fit["chosen"] else _verdict(fit),
+        f"{fit['paper_norm']:.4f}",
+    ]
+
+
+def _verdict(fit: dict[str, Any]) -> str:
+    """Short words; the report has the sentences."""
+    if fit["usable"]:
+        return "ok"
+    flaws = [] if fit["monotone"] else ["dips"]
+    flaws += ["crosses"] if fit["crossing"] else []
+    flaws += [] if fit["steep"] or not fit["monotone"] else ["flat"]
+    return ", ".join(flaws)
+
+
+def summary(document: dict[str, Any]) -> list[Text]:
+    """What was fitted, what was chosen and why, what was noticed, and where the report is."""
+    ladder, chosen, reversal = document["ladder"], document["chosen"], document["reversal"]
+    low_v, high_v = ladder["voltage_v"]
+    low_n, high_n = chosen["force_range_n"]
+    rig = document["rig"] or "not named"
+    lines = [
+        Text(
+            "* the paper's normalised figure, no force; dips: a branch is not increasing; flat: below 0.5 N/V somewhere",
+            style="dim",
+        ),
+        Text(),
+        Text(
+            f"ladder    {ladder['points']} stairs in {_groups(ladder['groups'])}, {low_v:g} .. {high_v:g} V, rig {rig}"
+        ),
+        Text(
+            f"chosen    {chosen['model'].upper()} of order {chosen['order']}: {chosen['rms_n']:.3f} N RMS, "
+            f"{chosen['max_n']:.2f} N max, {low_n:.1f} .. {high_n:.1f} N",
+            style="bold",
+        ),
+        Text(f"          {_reason(chosen)}"),
+        Text(f"reversal  {_reversal(reversal)}"),
+    ]
+    lines += [Text(f"note      {note}", style="yellow") for note in document["notes"]]
+    if document.get("calibration"):
+        lines.append(
+            Text(
+                f"stored    calibration {document['calibration']}; force-gateway calibration use {document['calibration']}"
+            )
+        )
+    if document.get("report"):
+        lines.append(Text(f"report    {document['report']}"))
+    return lines
+
+
+def _reason(chosen: dict[str, Any]) -> str:
+    if chosen["constrained"]:
+        return "the best that increases everywhere and does not cross; better free optima do not"
+    return "fewest coefficients within one standard error of the best held-out error that may drive a plant"
+
+
+def _reversal(reversal: dict[str, Any]) -> str:
+    if not reversal["identified"]:
+        return f"linear blend over {reversal['span_n']:g} N, assumed"
+    slip = reversal["policy"] == "slip-stops"
+    policy = "slip stops" if slip else f"linear blend over {reversal['span_n']:g} N"
+    other = (
+        ""
+        if reversal["slip_heldout_n"] is None
+        else (
+            f" (held out {reversal['slip_heldout_n']:.2f} N by slip stops, {reversal['blend_heldout_n']:.2f} N by the blend)"
+        )
+    )
+    return (
+        f"{policy}: {reversal['rms_n']:.2f} N RMS on {reversal['points']} minor-loop points, "
+        f"{reversal['switched_rms_n']:.2f} N if branches were switched{other}"
+    )
+
+
+def _groups(count: int) -> str:
+    return "1 group" if count == 1 else f"{count} groups"

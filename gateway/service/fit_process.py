@@ -1,0 +1,64 @@
+"""The fit of a recorded ladder, in a process of its own: `python -m gateway.service.fit_process '{"recording": ...}'`.
+
+Reads the recording, checks, fits, chooses, validates, stores a numbered calibration and its report, and prints one JSON
+line. It activates nothing. It runs at the lowest ordinary priority, whatever its parent had: control must not feel it.
+"""
+
+import contextlib
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+
+def step_back() -> None:
+    """Out of a parent's real-time class, and behind everybody else."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    with contextlib.suppress(OSError):
+        os.nice(10)
+
+
+def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]:
+    """{"stored": number, "report": path, "document": path} or {"refused": sentence}."""
+    from gateway.bsfm.evaluation import Question
+    from gateway.bsfm.ladder_fault import LadderError
+    from gateway.profiles import ProfileError, load_rig
+    from gateway.recording import RecordingError
+    from gateway.service.calibration_store import CalibrationStore, StoreError
+    from gateway.service.ladder_fit import calibration_of, fit_recording, write_report, write_whole
+    from gateway.service.ladder_source import Background, read_source
+
+    try:
+        rig = load_rig(rig_name)
+        store = CalibrationStore(state, rig.calibration)
+        standing = store.standing().calibration or rig.calibration
+        question = Question(reference_span_n=standing.blend_span_n)
+        fit = fit_recording(read_source(recording), question, Background(rig=rig_name, state=state))
+        number = store.add(calibration_of(fit, rig.load_cell.range_n))
+        report, document = (store.directory / f"{number:04d}.{suffix}" for suffix in ("html", "json"))
+        fit.document.update(calibration=number, report=str(report))
+        write_report(fit, report)
+        write_whole(document, json.dumps(fit.document, indent=1))
+    except LadderError as error:
+        return {"refused": f"E421 {recording}: {error}"}
+    except RecordingError as error:
+        return {"refused": f"E403 {error}"}
+    except (ProfileError, StoreError) as error:
+        return {"refused": str(error)}
+    except OSError as error:
+        return {"refused": f"E106 {error.filename or recording}: {error.strerror}"}
+    return {"stored": number, "report": str(report), "document": str(document)}
+
+
+def main(arguments: list[str]) -> int:
+    step_back()
+    asked = json.loads(arguments[0])
+    result = fit_and_store(Path(asked["recording"]), asked["rig"], Path(asked["state"]))
+    sys.stdout.write(json.dumps(result) + "\n")
+    return 0 if "stored" in result else 65
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

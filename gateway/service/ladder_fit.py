@@ -1,0 +1,120 @@
+"""From a recording to a fit, a report and, where asked for, a numbered calibration. Imports numpy and scipy.
+
+Everything is worked out before anything is written; the report is written beside its name and renamed, the calibration
+as the store does it. So a refused ladder, a full disk or a kill leaves no half of either.
+"""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, validate_coefficients
+from gateway.bsfm.evaluation import Evaluation, Question, evaluate
+from gateway.bsfm.fit_problem import Floats
+from gateway.bsfm.ladder_check import CheckedLadder
+from gateway.bsfm.ladder_fault import Flaw, LadderError
+from gateway.bsfm.slip_fit import residuals_n
+from gateway.bsfm.slip_problem import Walk
+from gateway.recording import Recording
+from gateway.service.ladder_source import Background, checked_source
+from gateway.service.reporting.document import Document, document_of, residual_of
+from gateway.service.reporting.fit_page import fit_page
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LadderFit:
+    """A fit that may be reported and stored."""
+
+    recording: Recording
+    evaluation: Evaluation
+    document: Document
+
+
+def fit_recording(recording: Recording, question: Question, background: Background) -> LadderFit:
+    """Check, fit, hold out, choose. LadderError with a sentence where the data must not be fitted."""
+    evaluation = evaluate(checked_source(recording, background), question)
+    document = document_of(evaluation, recording.path, recording.header)
+    document["data_sha256"] = data_sha256(evaluation.checked)
+    return LadderFit(recording, evaluation, document)
+
+
+def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
+    """The chosen model as a calibration without a number. LadderError where its coefficients may not drive the rig."""
+    chosen, model = fit.document["chosen"], fit.document["model"]
+    coefficients = Coefficients.of(fit.evaluation.model.branches, fit.evaluation.span_n)
+    away_n = model_error_n(fit.evaluation)
+    faults = validate_coefficients(coefficients, CoefficientLimits(cell_range_n=cell_range_n))
+    if faults:
+        raise LadderError(Flaw.NO_FIT, f"E401 the chosen model may not drive the rig: {faults[0].text}")
+    return Calibration(
+        number=0,
+        name=f"{chosen['model']}-{chosen['order']}",
+        order=len(coefficients.rising_weights) - 1,
+        x0_v=coefficients.x0_v,
+        x1_v=coefficients.x1_v,
+        rising_handles_n=_plain(coefficients.rising_handles_n),
+        rising_weights=_plain(coefficients.rising_weights),
+        falling_handles_n=_plain(coefficients.falling_handles_n),
+        falling_weights=_plain(coefficients.falling_weights),
+        blend_span_n=float(fit.evaluation.span_n),
+        rms_n=float(np.sqrt(np.mean(away_n * away_n))),
+        max_n=float(np.abs(away_n).max()),
+        date_utc=datetime.now(UTC).strftime("%Y-%m-%d"),
+        source=_source(fit),
+        rig=str(fit.document["rig"] or ""),
+        data_sha256=fit.document["data_sha256"],
+        slip_radii_v=_plain(model["slip_radii_v"]),
+        slip_shares=_plain(model["slip_shares"]),
+    )
+
+
+def model_error_n(evaluation: Evaluation) -> Floats:
+    """Model minus measured on the ladder, N: of what is to be activated, with the memory of its stops where it has any."""
+    ladder = evaluation.checked.ladder
+    if evaluation.reversal and evaluation.reversal.slip:
+        return residuals_n(evaluation.model, Walk(ladder.voltage_v, ladder.force_n))
+    return -residual_of(evaluation)
+
+
+def _plain(values: Iterable[float]) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _source(fit: LadderFit) -> str:
+    ladder, fingerprint = fit.document["ladder"], str(fit.document["rig_fingerprint"] or "unknown")[:12]
+    low_v, high_v = ladder["voltage_v"]
+    return (
+        f"recording {fit.recording.path.name}: {ladder['points']} stairs {low_v:g}-{high_v:g}-{low_v:g} V, {ladder['groups']} "
+        f"groups, {ladder['minor_points']} minor-loop points; rig fingerprint {fingerprint}"
+    )
+
+
+def write_report(fit: LadderFit, target: Path) -> None:
+    """The HTML report, whole or not at all."""
+    write_whole(target, fit_page(fit.evaluation, fit.document))
+
+
+def write_whole(target: Path, text: str) -> None:
+    """Beside its name, then renamed. OSError, and what was there before stays."""
+    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def data_sha256(checked: CheckedLadder) -> str:
+    """Of every settled point that the fit has used, as text with fixed digits."""
+    ladder = checked.ladder
+    rows = zip(ladder.voltage_v, ladder.force_n, ladder.direction, ladder.group, strict=True)
+    text = "".join(f"{volts:.4f},{newtons:.6f},{way},{group}\n" for volts, newtons, way, group in rows)
+    text += "".join(
+        f"{volts:.4f},{newtons:.6f}\n" for volts, newtons in zip(checked.minor_v, checked.minor_n, strict=True)
+    )
+    return sha256(text.encode()).hexdigest()

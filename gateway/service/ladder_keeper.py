@@ -1,0 +1,215 @@
+"""Keeps a calibration run of the controller: starts it for this machine, records it, and has it fitted when it is done.
+
+The recording is one of its own, beside whatever else is recorded, with the plan in its header; it stays whatever becomes
+of the run. A run that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S:
+a closed terminal must not leave a tool climbing stairs.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.control import Controller
+from gateway.control.inputs import Output
+from gateway.control.ladder_run import LadderRun
+from gateway.control.ladder_stairs import RunPlan
+from gateway.devices.messages import ForceSample
+from gateway.profiles import Rig
+from gateway.recording import Recorder
+from gateway.registers.words import CalibrationPhase, RefusalReason, State
+from gateway.service.fit_child import FitChild, Result
+from gateway.service.run_recording import COLUMNS, RunRecording
+
+FOLLOWED_S: Final = 3.0
+Answer = dict[str, Any]
+
+
+class LadderKeeper:
+    """stored: number of the calibration that the last run gave, 0 for none. Called from the loop only."""
+
+    def __init__(
+        self, controller: Controller, rig: Rig, state: Path, clock: Callable[[], float], log: Callable[[str, str], None]
+    ) -> None:
+        self.stored = 0
+        self._controller = controller
+        self._calibrating = controller.calibrating
+        self._rig = rig
+        self._state = state
+        self._clock = clock
+        self._log = log
+        self._continues: tuple[int, ...] = ()
+        self._recording: RunRecording | None = None
+        self._path: Path | None = None
+        self._child: FitChild | None = None
+        self._result: Result = {}
+        self._ended = ""
+        self._decision: Output | None = None
+        self._followed_s = 0.0
+
+    # -- asked by this machine
+
+    def answer(self, request: Answer) -> Answer:
+        """{"plan": {...}, "continues": [numbers]} starts, with "dry_run": true it is only tried; {"stop": true} stops; neither
+        tells how it is. ValueError refuses."""
+        self._followed_s = self._clock()
+        if request.get("dry_run"):
+            return self._tried(_plan_of(request.get("plan")))
+        if request.get("stop"):
+            self._calibrating.ask_stop("info calibration stopped at this machine")
+        elif "plan" in request:
+            self._start(request["plan"], tuple(int(number) for number in request.get("continues", ())))
+        return self.status()
+
+    def _tried(self, plan: RunPlan) -> Answer:
+        """What a plan would do; ValueError where the rig does not allow it."""
+        run = LadderRun(plan, self._rig.control, self._controller.calibrating.model)
+        top_v = max(stair.voltage_v for stair in run.stairs)
+        top_n = self._controller.calibrating.model.force_n(top_v, 1.0)
+        return {
+            "stairs": len(run.stairs),
+            "eta_s": run.eta_s,
+            "v_max_v": top_v,
+            "force_max_n": top_n,
+            "simulated": self._rig.simulated,
+            "rig": self._rig.name,
+        }
+
+    def _start(self, fields: Any, continues: tuple[int, ...]) -> None:
+        plan = _plan_of(fields)
+        decision = self._decision
+        if self._calibrating.running or self._child:
+            raise ValueError("W305 a calibration is running: wait for its end, or stop it")
+        if decision is None or decision.state not in (State.OFF, State.READY):
+            raise ValueError(
+                f"W305 calibration needs state OFF or READY, it is {decision.state.name if decision else 'none'}"
+            )
+        if decision.enable_block:
+            raise ValueError(
+                f"W305 calibration refused: {_WORDS.get(decision.enable_block, decision.enable_block.name)}"
+            )
+        self._calibrating.ask(plan)
+        self._continues, self._ended, self._result = continues, "", {}
+
+    def status(self) -> Answer:
+        calibrating, decision = self._calibrating, self._decision
+        run = calibrating.run
+        stair = run.stairs[min(run.done, len(run.stairs) - 1)] if run else None
+        return {
+            "running": calibrating.running,
+            "phase": calibrating.phase.name.lower(),
+            "progress": calibrating.progress,
+            "eta_s": round(calibrating.eta_s, 1),
+            "stair": run.done if run else 0,
+            "stairs": len(run.stairs) if run else 0,
+            "group": stair.group + 1 if stair else 0,
+            "groups": run.plan.groups if run else 0,
+            "noise_n": run.noise_n if run else None,
+            "voltage_v": decision.voltage_v if decision else None,
+            "force_n": decision.force_measured_n
+            if decision and decision.force_measured_n == decision.force_measured_n
+            else None,
+            "recording": str(self._path) if self._path else None,
+            "ended": self._ended,
+            "result": self._result,
+        }
+
+    # -- from the loop
+
+    def follow(self, decision: Output) -> None:
+        """After each step of the controller."""
+        self._decision = decision
+        calibrating = self._calibrating
+        if calibrating.running and self._recording is None:
+            self._begin()
+        elif self._recording is not None and not calibrating.running:
+            self._end(decision)
+        elif calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
+            calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
+
+    def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
+        """The cell's own force, without the payload's weight: that is what the model speaks."""
+        if self._recording and self._calibrating.running:
+            self._recording.append(sample, replace(decision, force_measured_n=self._calibrating.cell_n), pressure_pa)
+
+    def flush(self, now_s: float) -> None:
+        if self._recording:
+            self._recording.recorder.flush(now_s)
+
+    def close(self) -> None:
+        if self._recording:
+            self._recording.recorder.close()
+        if self._child:
+            self._child.close()
+
+    def _begin(self) -> None:
+        """A disk that takes no recording ends the run: a ladder without data is wear for nothing."""
+        run, rig = self._calibrating.run, self._rig
+        assert run
+        header = {
+            "rig": rig.name,
+            "rig_fingerprint": rig.fingerprint,
+            "rig_file": str(rig.file),
+            "rig_texts": dict(rig.texts),
+            "calibration": self._controller.calibration_id,
+            "simulated": rig.simulated,
+            "seed": rig.seed,
+            "ladder": asdict(run.plan) | {"stairs": len(run.stairs)},
+            "continues": list(self._continues),
+        }
+        try:
+            recorder = Recorder(self._state / "recordings", header, COLUMNS)
+        except OSError as error:
+            self._calibrating.ask_stop(f"A330 calibration stopped: the recording cannot be written: {error.strerror}")
+            return
+        self._recording, self._path = RunRecording(recorder), recorder.path
+        self._continues = ()
+
+    def _end(self, decision: Output) -> None:
+        assert self._recording
+        recorder, self._recording = self._recording.recorder, None
+        recorder.close()
+        self._ended = decision.events[0] if decision.events else ""
+        if recorder.failure:
+            self._ended = recorder.failure
+            self._calibrating.phase = CalibrationPhase.STOPPED
+        elif self._calibrating.phase is CalibrationPhase.FITTING:
+            self._child = FitChild(recorder.path, self._rig.file, self._state, self._on_result)
+
+    def _on_result(self, result: Result) -> None:
+        self._child, self._result = None, result
+        if "stored" in result:
+            self.stored = int(result["stored"])
+            self._calibrating.phase = CalibrationPhase.STORED
+            self._log("calibration", f"info calibration {self.stored} stored, not active; report {result['report']}")
+        else:
+            self._calibrating.phase = CalibrationPhase.REFUSED
+            self._log("calibration", str(result.get("refused")))
+
+
+_WORDS: Final = {
+    RefusalReason.FAULT_LATCHED: "a fault is latched, reset it first",
+    RefusalReason.NOT_READY: "not ready: force at rest too high, or first words of a device pending",
+    RefusalReason.OUTPUT_FAULT: "the output device does not answer",
+    RefusalReason.CELL_SILENT: "no fresh sample of the load cell",
+}
+_FIELDS: Final = {
+    "v_max_v": (float, int, type(None)),
+    "step_v": (float, int),
+    "groups": (int,),
+    "minor_points": (int,),
+    "first_group": (int,),
+    "tare": (bool,),
+}
+
+
+def _plan_of(fields: Any) -> RunPlan:
+    """A plan from JSON; ValueError for a name or a type that it does not have."""
+    if not isinstance(fields, dict):
+        raise ValueError("plan: a JSON object is expected")
+    for name, value in fields.items():
+        if name not in _FIELDS:
+            raise ValueError(f"plan has no {name}; it has {', '.join(_FIELDS)}")
+        if not isinstance(value, _FIELDS[name]) or (isinstance(value, bool) and name != "tare"):
+            raise ValueError(f"plan: {name} = {value!r} is not {_FIELDS[name][0].__name__}")
+    return RunPlan(**fields)

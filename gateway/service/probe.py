@@ -1,0 +1,98 @@
+"""Why does a device say nothing that makes sense? Listen at every usual speed, and say what was heard in numbers.
+
+Opens the port by itself, so the caller closes its own first. Used when a line stays without valid words at the start, and
+by `check --probe`.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.devices import SerialSettings, cell_host, output_host
+from gateway.devices.messages import Accepted, ForceSample, Pressure, ReadVoltage, Refused
+from gateway.ports import PortError, SerialPort
+from gateway.profiles import CellLine, OutputLine
+
+BAUDS: Final = (9600, 19200, 38400, 115200)
+_LISTEN_S: Final = 0.4  # forty frames of a 100 Hz stream, or several questions and answers at 9600 baud
+_QUESTIONS: Final = 2
+_ENOUGH: Final = 3
+_VALID: Final = (Accepted, Pressure, Refused, ForceSample)  # a device that refuses in its own words is heard
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What came at one speed: bytes in all, and lines that the device's grammar knows."""
+
+    baud: int
+    bytes: int
+    valid: int
+
+
+async def why_no_words(line: OutputLine | CellLine, path: str) -> str:
+    """One sentence, E110 or E111 (or E10x when the port cannot be opened)."""
+    try:
+        heard = [await _listen(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
+    except PortError as error:
+        return str(error)
+    return _sentence(path, heard[0], heard[1:])
+
+
+async def achieved(line: OutputLine | CellLine, path: str) -> Heard:
+    """What is heard at the speed that the rig says."""
+    return await _listen(line, path, line.baud)
+
+
+def _sentence(path: str, here: Heard, elsewhere: list[Heard]) -> str:
+    if here.valid:
+        return f"{path}: valid lines at {here.baud}; the device was silent a moment ago"
+    saw = f"{here.bytes} bytes, 0 valid lines at {here.baud}"
+    found = max(elsewhere, key=lambda heard: heard.valid)
+    if found.valid:
+        return (
+            f"E110 {path}: {saw}; at {found.baud} the same device gives valid lines: set baud: {found.baud} in the rig"
+        )
+    if here.bytes or any(heard.bytes for heard in elsewhere):
+        tried = ", ".join(str(heard.baud) for heard in elsewhere)
+        return f"E110 {path}: {saw}, nor at {tried}: another device on this port, or another parity?"
+    return f"E111 {path}: silence at every speed; power, crossed wires, stream mode? force-gateway explain E111"
+
+
+async def _listen(line: OutputLine | CellLine, path: str, baud: int) -> Heard:
+    ask, count = _ends(line)
+    enough = asyncio.Event()
+    total = valid = 0
+
+    def on_bytes(chunk: bytes, now_s: float) -> None:
+        nonlocal total, valid
+        total += len(chunk)
+        valid += count(chunk, now_s)
+        if valid >= _ENOUGH:
+            enough.set()
+
+    settings: SerialSettings = line.settings.at(baud)
+    port = SerialPort(path, settings, on_bytes=on_bytes, on_lost=lambda _: None, on_open=lambda _: None)
+    await port.open()
+    try:
+        for _ in range(_QUESTIONS):  # the first one may end half a line that somebody left in the device
+            port.write(ask())
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(enough.wait(), _LISTEN_S / _QUESTIONS)
+    finally:
+        port.close()
+    return Heard(baud, total, valid)
+
+
+def _ends(line: OutputLine | CellLine) -> tuple[Callable[[], bytes], Callable[[bytes, float], int]]:
+    """How to ask this device for a word (a stream is not asked), and how many valid ones a chunk completes."""
+    if isinstance(line, OutputLine):
+        output = output_host(line.device)
+        return lambda: output.request(ReadVoltage()), lambda chunk, now_s: _valid(output.receive(chunk, now_s))
+    cell = cell_host(line.device, line.sign, line.unit)
+    return cell.poll, lambda chunk, now_s: _valid(cell.receive(chunk, now_s))
+
+
+def _valid(messages: Sequence[object]) -> int:
+    return sum(isinstance(message, _VALID) for message in messages)

@@ -1,0 +1,1 @@
+"""Reports for people: self-contained HTML with inline SVG, made without a template engine, readable offline and in print."""

@@ -1,0 +1,150 @@
+"""`calibration` on a state directory: what is in it, which one is used, how two differ, and taking one along."""
+
+import fcntl
+import json
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import load_calibration
+from gateway.service.calibration_store import CalibrationStore, as_text
+from tests.service.coefficients import calibration, mark_of
+
+
+@pytest.fixture
+def state(tmp_path: Path) -> Path:
+    """Marks 16 and 24 as calibrations 2 and 3 of the demo rig, 3 in use from slot 4."""
+    store = CalibrationStore(tmp_path / "state", load_calibration("demo"))
+    store.use(store.add(calibration(16)))
+    store.use(store.add(calibration(24, rms_n=-1.0, max_n=-1.0)), 4)
+    return tmp_path / "state"
+
+
+def active(state: Path) -> int | None:
+    return CalibrationStore(state, load_calibration("demo")).standing().selection.number
+
+
+def test_list_shows_all_and_which_one_is_used(state, call):
+    done = call("calibration", "list", "--state", state)
+    assert done.exit_code == 0
+    lines = done.output.splitlines()
+    assert [line[:10].split() for line in lines[1:]] == [["1"], ["2"], ["*", "3"]]
+    assert "the rig's own" in lines[1]
+    assert "0.0 .. 52.0 N       0.125   0.500         mark 16 · a test, mark 16" in lines[2]
+    assert "0.0 .. 53.0 N           -       -  4      mark 24" in lines[3]
+    facts = json.loads(call("calibration", "list", "--state", state, "--json").output)
+    assert facts["active"] == 3
+    assert [(entry["number"], entry["active"], entry["slots"]) for entry in facts["calibrations"]] == [
+        (2, False, []),
+        (3, True, [4]),
+    ]
+
+
+def test_an_empty_state_has_the_rigs_own(tmp_path, call):
+    done = call("calibration", "list", "--state", tmp_path / "nothing")
+    assert done.output.splitlines()[1].startswith("* 1 ")
+    assert not (tmp_path / "nothing").exists()
+    shown = call("calibration", "show", "--state", tmp_path / "nothing")
+    assert 'name: "demo"' in shown.output
+
+
+def test_a_damaged_calibration_is_listed_with_its_fault(state, call):
+    (state / "calibrations" / "0003.yaml").write_bytes(b"number: 3\n")
+    done = call("calibration", "list", "--state", state)
+    assert done.exit_code == 0
+    assert "3       unusable: E432 " in done.output
+    assert done.stderr.startswith("E432 ")
+    assert done.output.count("* 2 ") == 1
+
+
+def test_use_and_rollback_without_a_gateway_act_at_the_next_start(state, call):
+    done = call("calibration", "use", 2, "--state", state)
+    assert done.output == "calibration 2 (mark 16) will be used from the next start: no gateway runs\n"
+    assert active(state) == 2
+    assert json.loads(call("calibration", "rollback", "--state", state, "--json").output)["active"] == 3
+    assert active(state) == 3
+    call("calibration", "use", 1, "--state", state)
+    assert active(state) is None
+
+
+def test_what_cannot_be_used_changes_nothing(state, call):
+    done = call("calibration", "use", 9, "--state", state)
+    assert done.exit_code == 65
+    assert done.stderr.startswith("E433 there is no calibration 9 in ")
+    store = CalibrationStore(state)
+    wide = calibration(4, rising_handles_n=(0.0, 25.0, 120.0), falling_handles_n=(0.0, 60.0, 120.0))
+    done = call("calibration", "use", store.add(wide), "--state", state)
+    assert done.exit_code == 65
+    assert done.stderr.startswith("E401 index 2, handle_range: ") and "active set 3 unchanged" in done.stderr
+    assert active(state) == 3
+    done = call("calibration", "rollback", "--state", state / "elsewhere")
+    assert done.exit_code == 65
+    assert "nothing to go back to" in done.stderr
+
+
+def test_a_directory_in_use_is_never_changed_behind_the_gateways_back(state, call):
+    """A gateway holds the lock and does not answer: nothing is done."""
+    with (state / "lock").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = call("calibration", "use", 2, "--state", state)
+    assert done.exit_code == 69
+    assert done.stderr.startswith("E140 ")
+    assert active(state) == 3
+
+
+def test_show_is_a_file_that_loads(state, call, tmp_path):
+    for which, mark in ((), 24), ((2,), 16):
+        text = call("calibration", "show", *which, "--state", state).output
+        (tmp_path / "shown.yaml").write_text(text, encoding="utf-8")
+        assert load_calibration(tmp_path / "shown.yaml").name == f"mark {mark}"
+    assert json.loads(call("calibration", "show", 2, "--json", "--state", state).output)["order"] == 2
+
+
+def test_compare_tells_the_differences_of_the_branches(state, call, tmp_path):
+    """Marks 16 and 24 differ by 1 N at the top: linear in the voltage, the same on both branches."""
+    facts = json.loads(call("calibration", "compare", 2, 3, "--state", state, "--json").output)
+    for branch in ("rising", "falling"):
+        assert facts[branch]["max_n"] == pytest.approx(1.0)
+        assert facts[branch]["at_v"] == 8.0
+        assert facts[branch]["rms_n"] == pytest.approx(3**-0.5, rel=5e-3)
+    back = json.loads(call("calibration", "compare", 3, 2, "--state", state, "--json").output)
+    assert back["rising"]["max_n"] == pytest.approx(-1.0)
+    plot = tmp_path / "plot.html"
+    told = call("calibration", "compare", "2", "demo", "--state", state, "--plot", plot)
+    assert told.output.startswith("A  calibration 2 (mark 16, 2026-11-21)\nB  calibration 1 (demo, ")
+    assert plot.read_text(encoding="utf-8").count("<svg") == 2
+
+
+def test_only_the_common_voltages_are_compared(state, call, tmp_path):
+    for name, low_v, high_v in (("half", 4.0, 9.0), ("apart", 8.5, 9.5)):
+        (tmp_path / f"{name}.yaml").write_text(as_text(calibration(16, x0_v=low_v, x1_v=high_v)), encoding="utf-8")
+    facts = json.loads(call("calibration", "compare", 2, tmp_path / "half.yaml", "--state", state, "--json").output)
+    assert facts["voltage_range_v"] == [4.0, 8.0]
+    done = call("calibration", "compare", 2, tmp_path / "apart.yaml", "--state", state)
+    assert done.exit_code == 65
+    assert "no voltage in common" in done.stderr
+
+
+def test_export_as_yaml_comes_back_the_same(state, call, tmp_path):
+    target = tmp_path / "out.yaml"
+    assert call("calibration", "export", 2, "--yaml", target, "--state", state).exit_code == 0
+    assert mark_of(load_calibration(target)) == 16
+    assert call("calibration", "export", 2, "--state", state).output == target.read_text(encoding="utf-8")
+    done = call("calibration", "export", 3, "--yaml", target, "--state", state)
+    assert (done.exit_code, done.stderr[:5]) == (1, "E405 ")
+    assert call("calibration", "export", 3, "--yaml", target, "--force", "--state", state).exit_code == 0
+    assert load_calibration(target).name == "mark 24"
+
+
+def test_export_as_c_writes_a_header_and_a_source(state, call, tmp_path):
+    done = call("calibration", "export", 2, "--c", tmp_path / "c", "--state", state)
+    assert done.exit_code == 0, done.output
+    assert sorted(path.name for path in (tmp_path / "c").iterdir()) == ["bsfm_mark_16.c", "bsfm_mark_16.h"]
+    done = call("calibration", "export", 2, "--c", tmp_path / "c", "--state", state)
+    assert (done.exit_code, done.stderr[:5]) == (1, "E405 ")
+    assert call("calibration", "export", 2, "--c", "x", "--yaml", "y", "--state", state).exit_code == 2
+
+
+def test_a_state_of_a_rig_that_cannot_be_read_works_without_its_own_calibration(state, call):
+    done = call("calibration", "list", "--state", state, "--rig", "no-such-rig")
+    assert [line[:10].split() for line in done.output.splitlines()[1:]] == [["2"], ["*", "3"]]

@@ -1,0 +1,217 @@
+"""`upload` against the real bank: a PLC's way of a calibration, printed, tried, refused, committed and read back."""
+
+import json
+import struct
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gateway.bsfm import CoefficientLimits
+from gateway.cli.uploading import place
+from gateway.modbus import MbapFramer, Peer, answer
+from gateway.registers import BankRules, RegisterBank, RegisterMap
+from gateway.registers.coefficients import CoefficientSet
+from gateway.registers.command import Status
+from gateway.registers.words import CommitStatus
+from gateway.service.activation import Activation, InUse
+from gateway.service.calibration_store import CalibrationStore, as_text
+from gateway.service.upload import Upload, UploadRules
+from tests.service.coefficients import calibration
+from tests.service.disk import disk
+
+OWN = calibration(8, number=1)
+
+
+class Gateway:
+    """Bank, store and upload service, as a cell wires them; `thread` is what the server's loop has beside it."""
+
+    def __init__(self, state: Path, register_map: RegisterMap, **rules: object) -> None:
+        given = {"rig_name": "demo", "force_max_n": 60.0, "allow_plain_upload": True} | rules
+        self.bank = RegisterBank(register_map, BankRules(**given), now=lambda: 0.0)
+        self.store = CalibrationStore(state, OWN)
+        activation = Activation(self.store, CoefficientLimits(cell_range_n=100.0))
+        self.log: list[str] = []
+        self.upload = Upload(
+            self.bank.staging,
+            activation,
+            self.store.standing(),
+            UploadRules.of("demo", register_map, lambda: "2026-11-22"),
+            lambda cause, sentence: self.log.append(sentence),
+        )
+        self.upload.on_use = self._on_use
+        self.bank.set_active_model(OWN)
+        self.bank.publish(Status(calibration_id=1))
+
+    def _on_use(self, taken: InUse) -> None:
+        self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
+        self.bank.publish(Status(calibration_id=taken.calibration.number))
+
+    def words(self, address: int, count: int) -> bytes:
+        return self.bank.read_registers(address, count)
+
+
+@pytest.fixture
+def gateway(tmp_path: Path, register_map: RegisterMap) -> Gateway:
+    return Gateway(tmp_path / "state", register_map)
+
+
+@pytest.fixture
+def address(gateway: Gateway, serve):
+    yield serve(gateway.bank).address
+    gateway.upload.close()
+    for thread in threading.enumerate():
+        if thread.name.startswith("calibration"):
+            thread.join(10)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.yaml"
+    path.write_text(as_text(calibration(16)), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("fc06", [[], ["--fc06"]])
+@pytest.mark.parametrize("order", [1, 2, 15])
+def test_an_upload_is_stored_used_and_read_back(gateway, address, call, tmp_path, order, fc06):
+    path = tmp_path / "set.yaml"
+    given = calibration(order, order=order)
+    path.write_text(as_text(given), encoding="utf-8")
+    done = call("upload", path, "--slot", 5, *fc06, "--gateway", address)
+    assert done.exit_code == 0, done.output
+    assert done.output == f"mark {order} is in use as calibration 2, slot 5: durable, and read back word by word\n"
+    assert gateway.store.slot(5) == 2
+    assert (
+        CoefficientSet.of_calibration(gateway.store.load(2)).to_words()
+        == CoefficientSet.of_calibration(given).to_words()
+    )
+
+
+def test_a_shipped_calibration_has_a_name_only(gateway, address, call):
+    done = call("upload", "demo", "--json", "--gateway", address)
+    assert json.loads(done.output) == {"sent": True, "committed": True, "active": 2, "slot": 0}
+
+
+def test_a_dry_run_is_the_gateways_own(gateway, address, call, file):
+    done = call("upload", file, "--dry-run", "--gateway", address)
+    assert done.output == "mark 16 passes every check; nothing was stored, active set 1 unchanged\n"
+    assert gateway.store.list() == []
+    assert gateway.log[0].startswith("info dry run by 127.0.0.1")
+
+
+def test_what_the_gateway_refuses_is_told_in_words(gateway, address, call, tmp_path):
+    path = tmp_path / "wide.yaml"
+    wide = calibration(4, rising_handles_n=(0.0, 25.0, 120.0), falling_handles_n=(0.0, 60.0, 120.0))
+    path.write_text(as_text(wide), encoding="utf-8")
+    for options in ((), ("--dry-run",)):
+        done = call("upload", path, *options, "--gateway", address)
+        assert done.exit_code == 65
+        assert done.stderr == "E401 index 2, rising handle 2: handle range; active set 1 unchanged\n"
+    assert gateway.store.list() == []
+
+
+def test_a_full_disk_is_the_gateways_failure(gateway, address, call, file):
+    with disk(5):
+        done = call("upload", file, "--gateway", address)
+    assert done.exit_code == 1
+    assert done.stderr == "E431 the gateway could not store the set, its log says why; active set 1 unchanged\n"
+    assert gateway.log[-1].startswith("E431 calibration not stored: No space left on device")
+
+
+def test_a_file_with_a_fault_is_told_before_anything_is_sent(call, tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text(as_text(calibration(4, rising_weights=(1.0, -1.0, 1.0))), encoding="utf-8")
+    done = call("upload", path, "--gateway", "127.0.0.1:9")
+    assert done.exit_code == 65
+    assert "rising_weights[1]: rising weight 1 = -1: 0.001 .. 1000 is allowed" in done.stderr
+
+
+def test_a_rig_that_takes_no_plain_upload_says_so(tmp_path, register_map, serve, call, file):
+    gateway = Gateway(tmp_path / "closed", register_map, allow_plain_upload=False)
+    done = call("upload", file, "--gateway", serve(gateway.bank).address)
+    assert done.exit_code == 1
+    assert done.stderr.startswith("W211 ")
+    gateway.upload.close()
+
+
+def test_a_gateway_that_is_busy_says_so(gateway, address, call, file):
+    gateway.bank.staging.show_commit(CommitStatus.WRITING)
+    done = call("upload", file, "--gateway", address)
+    assert done.exit_code == 1
+    assert done.stderr.startswith("W219 ")
+
+
+def test_a_commit_that_never_ends_is_waited_for_with_a_bound(gateway, address, call, file, monkeypatch):
+    monkeypatch.setattr("gateway.cli.uploading._PATIENCE_S", 0.05)
+    gateway.upload.apart = lambda work, done: None
+    done = call("upload", file, "--gateway", address)
+    assert done.exit_code == 1
+    assert done.stderr == "E431 after 0.05 s the gateway is still checking: a disk that hangs?\n"
+
+
+def test_another_set_than_the_one_sent_is_noticed(gateway, address, call, file):
+    gateway.upload.on_use = lambda taken: gateway.bank.set_active_model(
+        replace(taken.calibration, blend_span_n=9.0), taken.pointer.active.slot_word
+    )
+    done = call("upload", file, "--gateway", address)
+    assert done.exit_code == 1
+    assert done.stderr.startswith("E434 committed, but another set is in use now (1 words differ, the first at 1638)")
+
+
+# -- frames
+
+
+def frames_of(call, *options: object) -> list[dict]:
+    return json.loads(call("upload", *options, "--print-frames", "--dry-run", "--json").output)["frames"]
+
+
+@pytest.mark.parametrize("fc06", [[], ["--fc06"]])
+def test_printed_frames_played_by_anybody_make_the_upload(gateway, call, file, fc06):
+    """What is printed is enough: the bytes go through the server's own framing into a bank that has seen no client."""
+    gateway.upload.apart = lambda work, done: done(work())
+    frames = frames_of(call, file, "--slot", 6, *fc06)
+    framer = MbapFramer()
+    answers = []
+    for frame in frames:
+        (adu,) = framer.feed(bytes.fromhex(frame["frame"]))
+        answers.append(answer(adu.pdu, gateway.bank, Peer("10.0.0.9")))
+    assert all(told[0] < 0x80 for told in answers)
+    assert struct.unpack(">HHH", answers[-1][2:]) == (CommitStatus.COMMITTED, 0, 0)
+    assert gateway.store.slot(6) == 2
+    assert gateway.words(1500, 100) == CoefficientSet.of_calibration(calibration(16)).to_words()[:200]
+    assert len(frames) == (145 if fc06 else 5)
+
+
+def test_printing_with_a_dry_run_needs_no_gateway(call, file):
+    done = call("upload", file, "--print-frames", "--dry-run", "--gateway", "127.0.0.1:9")
+    assert done.exit_code == 0
+    lines = done.output.splitlines()
+    assert lines[0] == "frame 1 of 5  FC16 write 70 words at 1000 (41001): order, range, rising branch"
+    assert lines[1].startswith("    00 01 00 00 00 93 01 10 03 E8 00 46 8C 00 02 00 00")
+    assert "    1010  4250 0000  rising_b_2 = 52 N" in lines
+    assert "    1012  0000 x 26  rising_b_3 .. rising_b_15 = 0" in lines
+    assert "    1145  0001       commit = 1" in lines
+    assert not [line for line in lines if len(line) > 120 and "commit_status" not in line]
+
+
+def test_printing_alone_sends_as_well(gateway, address, call, file):
+    done = call("upload", file, "--print-frames", "--gateway", address)
+    assert done.output.startswith("frame 1 of 5")
+    assert done.output.endswith("durable, and read back word by word\n")
+    assert gateway.store.slot(0) == 2
+
+
+def test_no_request_is_longer_than_modbus_allows(call, file):
+    assert all(
+        len(bytes.fromhex(frame["frame"])) <= 260 and len(frame["words"]) <= 123 for frame in frames_of(call, file)
+    )
+
+
+@pytest.mark.parametrize(
+    ("index", "words"),
+    [(0, "index 0, rising handle 0"), (50, "index 50, falling weight 2"), (-1, "the whole set"), (64, "the whole set")],
+)
+def test_an_index_is_told_as_a_place(index, words):
+    assert place(index) == words

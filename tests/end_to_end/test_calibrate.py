@@ -1,0 +1,83 @@
+"""A calibration on the whole simulated gateway: from the command line to a stored number, and from a register bit."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from gateway.bsfm import Bsfm
+from gateway.profiles import load_calibration, load_rig
+from gateway.recording import read_recording
+from gateway.service.calibration_store import CalibrationStore
+
+OFF, READY, RAMPING = 0, 1, 2
+PHASE, CHECK, LADDER, STOPPED = 126, 2, 3, 7
+START_CALIBRATION = 1 << 5
+
+
+def calibrated(state: Path, *options: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "gateway", "calibrate", "--yes", "--state", str(state), *options]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+
+def volts_along(model: Bsfm, forces_n: list[float]) -> list[float]:
+    """What control would put out on the way through these forces."""
+    memory, at_n, volts = model.reversal.start(), model.force_range_n[0], []
+    for force_n in forces_n:
+        memory, at_n = model.moved(memory, at_n, force_n), force_n
+        volts.append(model.voltage_v(force_n, model.share(memory))[0])
+    return volts
+
+
+def test_a_quick_ladder_gives_a_numbered_calibration_that_agrees_with_the_shipped_one(running) -> None:
+    before = running.words(122, 1)
+    done = calibrated(running.state, "--step", "1", "--groups", "2", "--minor", "13", "--json")
+    assert done.returncode == 0, done.stderr
+    end = json.loads(done.stdout)
+    assert running.words(PHASE, 3) == [6, 1000, end["stored"]]
+    assert running.words(122, 1) == before  # stored, not active
+    assert running.status()["state"] == OFF
+    assert running.status()["output_voltage"] == 0
+    stored = CalibrationStore(running.state, load_rig("demo").calibration).load(end["stored"])
+    shipped = load_calibration("demo").model()
+    asked = [5.0, 15.0, 30.0, 45.0, 60.0, 45.0, 30.0, 15.0, 5.0]
+    assert volts_along(stored.model(), asked) == pytest.approx(volts_along(shipped, asked), abs=0.15)
+    assert stored.rms_n < 0.4
+    assert stored.data_sha256 == end["fit"]["data_sha256"]
+    assert Path(end["report"]).read_text(encoding="utf-8").startswith("<!doctype html>")
+    header = read_recording(Path(end["recording"])).header
+    assert header["ladder"]["groups"] == 2
+    assert header["rig_fingerprint"][:12] in stored.source
+
+
+def test_a_register_bit_starts_it_and_clearing_it_ends_it_with_the_data_kept(running) -> None:
+    assert not running.write(0, START_CALIBRATION).isError()
+    running.wait_until(lambda status: status["state"] == RAMPING, within_s=3.0)
+    running.wait_until(lambda status: status["output_voltage"] > 500, within_s=5.0)
+    assert running.words(PHASE, 1) == [CHECK]
+    refused = calibrated(running.state)
+    assert "W305" in refused.stderr
+    assert refused.returncode == 1
+    running.write(0, 0)
+    status = running.wait_until(lambda status: status["state"] == OFF)
+    assert status["output_voltage"] == 0
+    assert running.words(PHASE, 1) == [STOPPED]
+    assert read_recording(running.state / "recordings" / "0001.fgr").header["ladder"]["stairs"] > 100
+
+
+def test_a_person_who_goes_away_ends_the_run(running) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gateway", "calibrate", "--yes", "--quick", "--state", str(running.state)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    running.wait_until(lambda status: status["output_voltage"] > 500, within_s=15.0)
+    process.kill()
+    process.wait()
+    killed_s = time.monotonic()
+    running.wait_until(lambda status: status["state"] == OFF, within_s=6.0)
+    assert time.monotonic() - killed_s < 5.0
+    assert running.words(PHASE, 1) == [STOPPED]

@@ -1,0 +1,57 @@
+"""The verbs against a whole gateway: an upload, another calibration and back, while it presses."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from gateway.profiles import load_calibration
+from gateway.service.calibration_store import CalibrationStore
+from tests.end_to_end.conftest import start, stop
+from tests.service.coefficients import calibration
+
+RAMPING, HOLDING = 2, 3
+
+
+def verb(*words: object, code: int = 0) -> Any:
+    done = subprocess.run(
+        [sys.executable, "-m", "gateway", *map(str, words), "--json"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    return json.loads(done.stdout) if done.stdout else done.stderr
+
+
+def test_upload_use_and_rollback_while_the_gateway_presses(running, tmp_path: Path):
+    at, in_state = ("--gateway", f"127.0.0.1:{running.port}"), ("--state", running.state)
+    running.write(0, 1, 2000)
+    running.wait_until(lambda status: status["state"] == HOLDING)
+    assert verb("upload", "demo", "--slot", 3, *at) == {"sent": True, "committed": True, "active": 2, "slot": 3}
+    assert running.words(1644, 1) == [3]
+    assert verb("calibration", "use", 1, *in_state)["built_in"]
+    assert (running.words(122, 1), running.words(1644, 1)) == ([1], [0xFFFF])
+    assert verb("calibration", "rollback", *in_state)["active"] == 2
+    assert (running.words(122, 1), running.words(1644, 1)) == ([2], [3])
+    assert verb("calibration", "use", 7, *in_state, code=65).startswith("E433 there is no calibration 7")
+    assert running.words(122, 1) == [2]
+    status = running.status()
+    assert status["state"] in (RAMPING, HOLDING)
+    assert abs(status["force_measured"] - 2000) <= 150
+    assert CalibrationStore(running.state).standing().selection.number == 2
+
+
+def test_a_gateway_starts_with_what_was_last_in_use_and_says_what_it_had_to_pass_over(tmp_path: Path):
+    store = CalibrationStore(tmp_path / "state", load_calibration("demo"))
+    for mark in (16, 24):
+        store.use(store.add(calibration(mark)), mark // 8)
+    gateway = start(tmp_path / "state", "--sim")
+    seen = gateway.words(122, 1), gateway.words(1644, 1), gateway.ready["notes"]
+    stop(gateway)
+    assert seen[:2] == ([3], [3])
+    assert seen[2] == [f"calibration 3 of 2026-11-21 from {store.directory}"]
+    (store.directory / "0003.yaml").write_bytes(b"number: 3\n")
+    gateway = start(tmp_path / "state", "--sim")
+    seen = gateway.words(122, 1), gateway.words(1644, 1), gateway.ready["notes"]
+    stop(gateway)
+    assert seen[:2] == ([2], [2])
+    assert seen[2][0].startswith("E432 ") and "0003.yaml" in seen[2][0]

@@ -1,0 +1,54 @@
+"""A recording of a running gateway, from its command line, and what is left of it after kill -9."""
+
+import csv
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+BATCH_S = 0.1
+
+
+def gateway_says(*words: str | Path) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "gateway", *map(str, words)], capture_output=True, text=True, check=False, timeout=30
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+def exported(state: Path, number: int) -> list[dict[str, str]]:
+    text = gateway_says("recordings", "export", str(number), "--csv", "-o", "-", "--state", state)
+    lines = [line for line in text.splitlines() if line and not line.startswith("#") and "," in line]
+    return list(csv.DictReader(io.StringIO("\n".join(lines))))
+
+
+def test_on_and_off_records_what_was_pressed(running):
+    state = running.state
+    assert "recording to" in gateway_says("record", "on", "--state", state)
+    running.write(0, 1, 1500)
+    running.wait_until(lambda status: status["state"] == 3)
+    assert "rows" in gateway_says("record", "off", "--state", state)
+    rows = exported(state, 1)
+    assert len(rows) > 50
+    assert {float(row["setpoint_n"]) for row in rows[-10:]} == {15.0}
+    assert abs(float(rows[-1]["force_n"]) - 15.0) <= 1.0
+    times_s = [float(row["time_s"]) for row in rows]
+    assert times_s == sorted(times_s)
+
+
+def test_kill_minus_nine_loses_at_most_one_batch(running):
+    state = running.state
+    gateway_says("record", "on", "--state", state)
+    began_s = time.monotonic()
+    running.write(0, 1, 1200)
+    running.wait_until(lambda status: status["state"] == 3)
+    os.kill(running.ready["pids"]["control"], signal.SIGKILL)
+    lasted_s = time.monotonic() - began_s
+    rows = exported(state, 1)
+    assert float(rows[-1]["time_s"]) >= lasted_s - BATCH_S - 0.05
+    assert abs(float(rows[-1]["force_n"]) - 12.0) <= 1.0
+    assert "1" in gateway_says("recordings", "list", "--state", state)

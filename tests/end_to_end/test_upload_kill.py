@@ -1,0 +1,228 @@
+"""kill -9 at any point of a commit: the old set or the new one is in use, never a mixture, and what was acknowledged stays."""
+
+import contextlib
+import os
+import signal
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from random import Random
+
+import psutil
+import pytest
+
+from gateway.profiles import load_calibration
+from gateway.registers.coefficients import SET_BYTES, CoefficientSet
+from gateway.service.calibration_store import CalibrationStore
+from tests.end_to_end.conftest import RunningGateway, start, stop
+from tests.service.coefficients import calibration, mark_of, staged
+
+KILLS = 50
+PER_STATE = 25
+COMMITTED = 3
+RAMPING, HOLDING = 2, 3
+
+
+class Nursery:
+    def __init__(self, process: "subprocess.Popen[str]") -> None:
+        self._process = process
+
+    def start(self, *words: object) -> int:
+        """A child's process id."""
+        assert self._process.stdin
+        self._process.stdin.write(" ".join(map(str, words)) + "\n")
+        self._process.stdin.flush()
+        return int(self.line().removeprefix("child "))
+
+    def line(self) -> str:
+        assert self._process.stdout
+        return self._process.stdout.readline().strip()
+
+    def until_gone(self) -> list[int]:
+        """Marks of commits that have returned."""
+        lines = list(iter(self.line, "gone"))
+        return [int(line) for line in lines]
+
+
+@pytest.fixture
+def nursery() -> Iterator[Nursery]:
+    root = Path(__file__).parents[2]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.end_to_end.commit_nursery"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=root,
+    )
+    with process:
+        yield Nursery(process)
+        assert process.stdin
+        process.stdin.close()
+        assert process.wait(10) == 0
+
+
+def active_mark(state: Path) -> int:
+    """The mark in use; everything in the store is whole, and every part of a calibration is of one mark."""
+    store = CalibrationStore(state)
+    assert not [entry.fault for entry in store.list() if entry.fault]
+    standing = store.standing()
+    assert standing.notes == ()
+    assert standing.calibration is not None
+    mark = mark_of(standing.calibration)
+    assert standing.selection.slot == mark % 8
+    assert store.slot(mark % 8) == standing.selection.number
+    return mark
+
+
+def test_killed_at_every_call_of_a_commit(nursery: Nursery, tmp_path: Path):
+    for n in count(1):
+        state = tmp_path / str(n)
+        store = CalibrationStore(state)
+        store.use(store.add(calibration(1)), 1)
+        nursery.start(state, 2, n)
+        if nursery.until_gone() == [2]:
+            assert active_mark(state) == 2
+            break
+        assert active_mark(state) in (1, 2)
+        store.use(store.add(calibration(3)), 3)
+        assert active_mark(state) == 3
+    print(f"killed at each of {n - 1} calls")
+    assert n > 14
+
+
+def test_killed_at_any_time_in_a_row_of_commits(nursery: Nursery, tmp_path: Path, budget: int):
+    seed = int.from_bytes(os.urandom(4), "big")
+    print(f"seed {seed}")
+    rng = Random(seed)
+    commits, unsaid, mark, began_s = 0, 0, 0, time.monotonic()
+    for kill in range(KILLS * budget):
+        state = tmp_path / str(kill // PER_STATE)
+        mark = mark + 1 if kill % PER_STATE else 1
+        pid = nursery.start(state, mark)
+        first = int(nursery.line())
+        time.sleep(rng.uniform(0.0, 0.02))
+        os.kill(pid, signal.SIGKILL)
+        said = [first, *nursery.until_gone()]
+        assert said == list(range(mark, mark + len(said)))
+        mark = active_mark(state)
+        assert mark in (said[-1], said[-1] + 1), f"kill {kill}: {said[-1]} was acknowledged, {mark} is in use"
+        commits += len(said)
+        unsaid += mark == said[-1] + 1
+    spent_s = time.monotonic() - began_s
+    print(f"{KILLS * budget} kills in {commits} commits, 0 torn, {unsaid} done but not yet said; {spent_s:.1f} s")
+
+
+# -- the whole gateway
+
+
+def control_process(gateway: RunningGateway) -> psutil.Process:
+    for child in psutil.Process(gateway.process.pid).children():
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if "gateway.service.control_process" in child.cmdline():
+                return child
+    raise AssertionError("there is no control process")
+
+
+def words_of(mark: int) -> bytes:
+    return staged(CoefficientSet.of_calibration(calibration(mark)), slot=mark % 8)
+
+
+def stage(gateway: RunningGateway, staged_set: bytes) -> None:
+    words = struct.unpack(">145H", staged_set)
+    for at in (0, 100):
+        assert not gateway.write(1000 + at, *words[at : at + 100]).isError()
+
+
+def active_set(gateway: RunningGateway) -> bytes:
+    words = gateway.words(1500, 100) + gateway.words(1600, 40)
+    return struct.pack(f">{SET_BYTES // 2}H", *words)
+
+
+def await_commit(gateway: RunningGateway) -> None:
+    deadline_s = time.monotonic() + 5.0
+    while gateway.words(1146, 1)[0] != COMMITTED:
+        assert time.monotonic() < deadline_s
+
+
+def kill_all(gateway: RunningGateway) -> None:
+    processes = [*psutil.Process(gateway.process.pid).children(recursive=True), psutil.Process(gateway.process.pid)]
+    for process in processes:
+        process.kill()
+    stop(gateway)
+    assert not psutil.wait_procs(processes, timeout=10)[1]
+
+
+def reconnect(gateway: RunningGateway) -> None:
+    deadline_s = time.monotonic() + 20.0
+    while True:
+        gateway.client.close()
+        try:
+            assert gateway.client.connect()
+            gateway.status()
+            return
+        except Exception:
+            assert time.monotonic() < deadline_s
+            time.sleep(0.02)
+
+
+def test_the_gateway_killed_in_a_commit_comes_back_with_the_old_set_or_the_new_one(tmp_path: Path, budget: int):
+    """Three kills of the control process for each gateway, for the guardian gives up after five; then one of them all."""
+    seed = int.from_bytes(os.urandom(4), "big")
+    print(f"seed {seed}")
+    rng = Random(seed)
+    mark, seen = 1, {"old": 0, "new": 0}
+    gateway = start(tmp_path / "state", "--sim")
+    try:
+        stage(gateway, words_of(mark))
+        gateway.write(1145, 1)
+        await_commit(gateway)
+        for _ in range(max(1, budget // 4)):
+            for _ in range(3):
+                stage(gateway, words_of(mark + 1))
+                control = control_process(gateway)
+                gateway.write(1145, 1)
+                time.sleep(rng.uniform(0.0, 0.012))
+                control.kill()
+                reconnect(gateway)
+                found = active_set(gateway)
+                assert found in (words_of(mark)[:SET_BYTES], words_of(mark + 1)[:SET_BYTES])
+                is_new = found == words_of(mark + 1)[:SET_BYTES]
+                seen["new" if is_new else "old"] += 1
+                mark += is_new
+                assert gateway.words(1644, 1) == [mark % 8]
+                assert gateway.status()["state"] == 0
+            kill_all(gateway)
+            gateway = start(tmp_path / "state", "--sim")
+            assert active_set(gateway) == words_of(mark)[:SET_BYTES]
+    finally:
+        stop(gateway)
+    print(f"after the kills {seen}")
+
+
+def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
+    demo = load_calibration("demo")
+    low_n, middle_n, high_n = demo.rising_handles_n
+    better = replace(demo, rising_handles_n=(low_n, 1.05 * middle_n, high_n))
+    words = staged(CoefficientSet.of_calibration(better), slot=7)
+    running.write(0, 1, 2000)
+    running.wait_until(lambda status: status["state"] == HOLDING)
+    stage(running, words)
+    before = running.status()
+    running.write(1145, 1)
+    await_commit(running)
+    assert running.words(122, 1) == [2], "the new number is there with the word committed"
+    assert (active_set(running), running.words(1644, 1)) == (words[:SET_BYTES], [7])
+    bump_mv = abs(running.status()["output_voltage"] - before["output_voltage"])
+    assert bump_mv <= 30
+    worst, deadline_s = 0, time.monotonic() + 2.0
+    while time.monotonic() < deadline_s:
+        status = running.status()
+        assert status["state"] in (RAMPING, HOLDING)
+        worst = max(worst, abs(status["force_measured"] - 2000))
+    print(f"bump {bump_mv} mV, worst error in the 2 s after it {worst / 100:.2f} N")
+    assert worst <= 150

@@ -1,0 +1,145 @@
+"""The line between guardian and control: messages stay whole, a descriptor arrives open, an end is an end."""
+
+import asyncio
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.service import link
+from gateway.service.guardian_line import GuardianLine
+
+Pair = tuple[socket.socket, socket.socket]
+
+
+@pytest.fixture
+def ends() -> Iterator[Pair]:
+    ours, theirs = link.pair()
+    yield ours, theirs
+    ours.close()
+    theirs.close()
+
+
+def test_a_message_arrives_whole_with_its_body(ends: Pair) -> None:
+    link.send(ends[0], link.READY, {"stall_s": 0.1, "banner": "x" * 5000})
+    link.send(ends[0], link.HEARTBEAT)
+    first, second = link.receive(ends[1]), link.receive(ends[1])
+    assert first and first.tag == link.READY
+    assert first.body["stall_s"] == 0.1
+    assert len(first.body["banner"]) == 5000
+    assert second == link.Message(link.HEARTBEAT)
+
+
+def test_a_descriptor_is_the_same_open_file_at_the_other_end(ends: Pair, tmp_path: Path) -> None:
+    with (tmp_path / "port").open("w+b") as port:
+        link.send(ends[0], link.LINE, {"safe_frame": "00"}, port.fileno())
+        message = link.receive(ends[1])
+        assert message
+        (passed,) = message.descriptors
+        os.write(passed, b"SET 0\r\n")
+        os.close(passed)
+        assert port.seek(0) == 0
+        assert port.read() == b"SET 0\r\n"
+    assert message.body == {"safe_frame": "00"}
+
+
+def test_a_descriptor_outlives_the_one_that_was_passed(ends: Pair) -> None:
+    """What the guardian needs: control is dead, its descriptor closed, the port still open here."""
+    reader, writer = os.pipe()
+    link.send(ends[0], link.LINE, {}, writer)
+    os.close(writer)
+    message = link.receive(ends[1])
+    assert message
+    os.write(message.descriptors[0], b"safe")
+    os.close(message.descriptors[0])
+    assert os.read(reader, 16) == b"safe"
+    assert os.read(reader, 16) == b""
+    os.close(reader)
+
+
+def test_the_end_of_the_line_is_none_and_not_an_exception(ends: Pair) -> None:
+    link.send(ends[0], link.HEARTBEAT)
+    ends[0].close()
+    assert link.receive(ends[1]) == link.Message(link.HEARTBEAT)
+    assert link.receive(ends[1]) is None
+
+
+def test_a_peer_killed_with_unread_messages_is_an_end_too(ends: Pair) -> None:
+    """Unix sockets answer ECONNRESET when the peer died with data unread."""
+    link.send(ends[1], link.STOP)
+    ends[0].close()
+    assert link.receive(ends[1]) is None
+
+
+def test_control_hears_stop_and_the_end_of_its_guardian(ends: Pair) -> None:
+    async def scene() -> tuple[bool, bool]:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        link.send(ends[0], link.STOP)
+        async with asyncio.timeout(2):
+            await guardian.told_to_stop.wait()
+        was_gone = guardian.is_gone
+        guardian.told_to_stop.clear()
+        ends[0].close()
+        async with asyncio.timeout(2):
+            await guardian.told_to_stop.wait()
+        guardian.heartbeat()  # nobody listens: no exception
+        guardian.first_cause("nobody hears it")
+        is_gone = guardian.is_gone
+        guardian.close()
+        return was_gone, is_gone
+
+    assert asyncio.run(scene()) == (False, True)
+
+
+def test_control_hands_over_its_port_with_the_safe_frame(ends: Pair) -> None:
+    reader, writer = os.pipe()
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        guardian.hand_over(writer, b"SET 0\r\n", b"0\r\n")
+        guardian.close()
+
+    asyncio.run(scene())
+    message = link.receive(ends[0])
+    assert message and message.tag == link.LINE
+    assert bytes.fromhex(message.body["safe_frame"]) == b"SET 0\r\n"
+    assert bytes.fromhex(message.body["safe_reply"]) == b"0\r\n"
+    for descriptor in (*message.descriptors, reader, writer):
+        os.close(descriptor)
+    assert len(message.descriptors) == 1
+
+
+def test_control_asks_for_the_simulated_ports_and_gets_them_or_the_reason(ends: Pair) -> None:
+    async def scene(answer: dict[str, object]) -> dict[str, str] | None:
+        ours, theirs = link.pair()
+        theirs.setblocking(False)
+        guardian = GuardianLine(theirs)
+        asking = asyncio.ensure_future(guardian.simulated_ports("demo"))
+        await asyncio.sleep(0)
+        question = link.receive(ours)
+        assert question == link.Message(link.NEED_RIG, {"rig": "demo"})
+        link.send(ours, link.RIG, answer)
+        async with asyncio.timeout(2):
+            ports = await asking
+        guardian.close()
+        ours.close()
+        return ports
+
+    ptys = {"output": "/dev/pts/1", "load_cell": "/dev/pts/2"}
+    assert asyncio.run(scene({"ptys": ptys})) == ptys
+    assert asyncio.run(scene({"failed": 78})) is None
+
+
+def test_a_guardian_that_does_not_read_does_not_stop_the_loop(ends: Pair) -> None:
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        for _ in range(10_000):
+            guardian.heartbeat()
+        guardian.close()
+
+    asyncio.run(scene())

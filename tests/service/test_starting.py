@@ -1,0 +1,116 @@
+"""What a start says and leaves behind: the banner, the JSON line, the flag of an unclean run, the rules for the bank."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gateway.control.settings import LeaseAction
+from gateway.registers.words import FaultCode
+from gateway.service.banner import Ready, banner, info
+from gateway.service.cell import _cause_of_restart
+from gateway.service.rules import bank_rules, server_settings
+from gateway.service.run_flag import RunFlag
+from tests.service.rigs import demo, with_supervision
+
+
+def ready(**changes: object) -> Ready:
+    facts = {
+        "rig": demo(),
+        "modbus": ("127.0.0.1", 5020),
+        "output_port": "/dev/pts/4",
+        "cell_port": "/dev/pts/6",
+        "voltage_v": 0.0,
+        "force_n": 0.004,
+    }
+    return Ready(**(facts | changes))  # type: ignore[arg-type]
+
+
+def test_the_banner_says_where_and_what_and_how_to_try() -> None:
+    text = banner(ready())
+    for words in (
+        "rig demo (simulated, seed 7)",
+        "calibration demo: bsfm n=2",
+        "127.0.0.1:5020   units 0, 1, 255",
+        "/dev/pts/4       smc-itv-rc 9600  ok   0.000 V",
+        "/dev/pts/6       stream-st-gs 115200  ok   0.00 N",
+        "none (demo): a command lasts until the next one",
+        "mbpoll -1 -p 5020 -r 1 127.0.0.1 1 1200",
+        "READY  loop 100 Hz · Ctrl-C ramps the force to 0 and stops · not a safety device",
+    ):
+        assert words in text
+    assert text.splitlines()[-1].startswith("READY")
+
+
+def test_a_silent_device_is_not_shown_as_zero() -> None:
+    text = banner(ready(voltage_v=None, force_n=None, notes=("E111 /dev/pts/6: silence at every speed",)))
+    assert text.count("silent") == 2
+    assert "  note         E111 /dev/pts/6" in text
+
+
+def test_the_command_to_try_names_another_gateway() -> None:
+    text = banner(ready(modbus=("10.0.0.9", 502)))
+    assert "mbpoll -1 -p 502 -r 1 10.0.0.9 1 1200" in text
+    assert "--gateway 10.0.0.9:502" in text
+    assert "--gateway" not in banner(ready())
+
+
+def test_a_lease_is_told_with_its_length_and_what_follows() -> None:
+    rig = with_supervision(demo(), lease_s=0.2, lease_action=LeaseAction.RAMP)
+    assert "lease        200 ms, then ramp" in banner(ready(rig=rig))
+    assert "none: a command lasts until the next one" in banner(ready(rig=replace(demo(), simulated=False)))
+
+
+def test_the_json_line_is_json_and_tells_the_ports() -> None:
+    facts = json.loads(json.dumps(info(ready(modbus=("127.0.0.1", 40123), notes=("a",)))))
+    assert facts["ready"] is True
+    assert facts["modbus"] == ["127.0.0.1", 40123]
+    assert facts["ptys"] == {"output": "/dev/pts/4", "load_cell": "/dev/pts/6"}
+    assert facts["notes"] == ["a"]
+    assert info(ready(rig=replace(demo(), simulated=False)))["ptys"] == {}
+
+
+def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
+    flag = RunFlag(tmp_path)
+    assert not flag.raise_flag()
+    assert RunFlag(tmp_path).raise_flag(), "the one before was killed"
+    flag.lower()
+    assert not RunFlag(tmp_path).raise_flag()
+    flag.lower()
+    flag.lower()  # twice is no trouble
+
+
+@pytest.mark.parametrize(
+    ("restarted", "was_unclean", "cause"),
+    [
+        ("", False, FaultCode.NONE),
+        ("", True, FaultCode.INTERNAL),
+        ("control process stalled (SIGKILL)", True, FaultCode.LOOP_STALLED),
+        ("control process died (SIGKILL)", True, FaultCode.INTERNAL),
+        ("control process died (exit 1)", False, FaultCode.INTERNAL),
+    ],
+)
+def test_the_cause_of_an_unclean_end_is_readable(restarted: str, was_unclean: bool, cause: FaultCode) -> None:
+    assert _cause_of_restart(restarted, was_unclean=was_unclean) is cause
+
+
+def test_the_bank_holds_to_the_rigs_limits() -> None:
+    rig = demo()
+    rig = replace(rig, network=replace(rig.network, owner="10.0.0.7", require_byte_order_echo=True))
+    rules = bank_rules(rig)
+    limits = rig.control.limits
+    assert (rules.rig_name, rules.force_max_n) == ("demo", limits.force_max_n)
+    assert (rules.voltage_min_v, rules.voltage_max_v) == (limits.voltage_min_v, limits.voltage_max_v)
+    assert rules.cell_range_n == rig.load_cell.range_n
+    assert rules.supported_bits == rig.supported_bits
+    assert (rules.owner, rules.require_byte_order_echo) == ("10.0.0.7", True)
+    assert rules.allow_plain_upload == rig.network.allow_plain_upload
+
+
+def test_the_server_holds_to_the_rigs_network() -> None:
+    rig = demo()
+    network = replace(rig.network, units=(7,), connections=3, per_address=2, idle_s=9.0, requests_per_s=11.0)
+    settings = server_settings(replace(rig, network=network))
+    assert (settings.units, settings.connections, settings.per_address) == ((7,), 3, 2)
+    assert (settings.idle_s, settings.requests_per_s, settings.allow) == (9.0, 11.0, network.allow)
