@@ -2,8 +2,9 @@
 
     python tools/bench/model.py [--json] [--rounds 7]
 
-Rows: plain Python (the control loop's way), numpy scalars, numpy arrays per element, numba where it is installed.
-Each figure is the lowest of several rounds: the lowest is the code, the rest the machine. C joins as one more of `SOURCES`.
+Rows: plain Python (the control loop's way), numpy scalars, numpy arrays per element, numba and C where they can be had.
+Each figure is the lowest of several rounds: the lowest is the code, the rest the machine. More about the C code, beside a
+cubic in C: model_c.py.
 """
 
 import argparse
@@ -15,11 +16,14 @@ from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import which
 from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import model_c
+
 from gateway.bsfm import RationalBezier
 
 ORDERS = (2, 5, 15)
@@ -110,7 +114,25 @@ def numba_compiled(rounds: int) -> Iterator[Cost]:
         yield Cost("numba", "forward", order, nanoseconds(fast, FORWARD_V, rounds))
 
 
-SOURCES: tuple[Callable[[int], Iterator[Cost]], ...] = (plain_python, numpy_scalars, numpy_arrays, numba_compiled)
+def compiled_c(_rounds: int) -> Iterator[Cost]:
+    """The exported C, gcc -O2; nothing where there is no compiler, and said."""
+    if which("gcc") is None:
+        print("SKIPPED: C needs gcc", file=sys.stderr)
+        return
+    for cost in model_c.costs("gcc"):
+        if cost.name.startswith("order_") and cost.order in ORDERS or cost.name == "demo":
+            yield Cost("C, gcc -O2", "cubic", 3, cost.cubic_ns)
+            yield Cost("C, gcc -O2", "forward", cost.order, cost.forward_ns)
+            yield Cost("C, gcc -O2", "inverse", cost.order, cost.inverse_ns)
+
+
+SOURCES: tuple[Callable[[int], Iterator[Cost]], ...] = (
+    plain_python,
+    numpy_scalars,
+    numpy_arrays,
+    numba_compiled,
+    compiled_c,
+)
 
 
 def measure(rounds: int) -> list[Cost]:
