@@ -63,10 +63,12 @@ class Activation:
         return self.take(self.store.add(fresh) if number is None else number, slot)
 
     def _holds(self, number: int, fresh: Calibration) -> bool:
+        """A stored set with slip stops is another one: an upload carries the linear blend alone."""
         try:
-            return _words(self.store.load(number)) == _words(fresh)
+            stored = self.store.load(number)
         except StoreError:
             return False
+        return not stored.slip_radii_v and _words(stored) == _words(fresh)
 
     def _fault(self, calibration: Calibration) -> StagedFault | None:
         for found in validate_coefficients(Coefficients.of_calibration(calibration), self.limits):
