@@ -27,6 +27,7 @@ def test_mbpoll_commands_twelve_newton_and_reads_it_back_within_a_second(running
         took_s = reaching_twelve_s(running, address)
     print(f"within 1 N of 12 N after {took_s:.3f} s")
     assert took_s <= 1.0
+    running.wait_until(lambda status: status["state"] == HOLDING)  # at the band's edge the noise decides
     shown = subprocess.run(
         ["mbpoll", "-1", "-r", "103", "-c", "1", *address], check=True, capture_output=True, text=True
     ).stdout

@@ -9,6 +9,7 @@ Each copy is calibrated with its cell's noise: ladder 0-5-0 V, ten groups, order
 points. Then every policy commands the same setpoints without any feedback, each until the twin has settled; errors are true
 force minus setpoint, over all copies. The walk of partial reversals is not the one that was fitted. "largest step" is of the
 voltage between two setpoints, which are 1 N apart, or 0.1 N in chatter. METHOD's plant was another one, and without noise.
+The twin's friction is Maxwell slip on the travel, which is kin to the model: a real rig will not fit it as well.
 """
 
 import argparse
@@ -75,6 +76,8 @@ def calibrated(plant: Plant, seed: int) -> dict[str, Bsfm]:
     minor = Walk(np.array(minor_v), minor_n + noise[len(whole) :] / np.sqrt(MINOR_READINGS))
     branches = fit(ladder, "bsfm", 2, "tied").branches
     fits = [fit_stops(branches, [minor]), fit_joint(branches, [walk_of(ladder), minor])]
+    if not fits[1].joint:
+        raise SystemExit(f"copy {seed}: the joint fit led to no usable model")
     return dict(zip(METHOD, (row.model for row in judged(branches, fits, minor, minor)), strict=True))
 
 
