@@ -8,7 +8,7 @@ from gateway.control.controller import Controller
 from gateway.control.decision import safe_output
 from gateway.control.inputs import NO_COMMAND, Line, Output
 from gateway.control.reasons import FAULT_CODES
-from gateway.control.settings import ControlSettings, Defaults, LeaseAction, Limits, Supervision, Trim
+from gateway.control.settings import ControlSettings, Defaults, LeadSettings, LeaseAction, Limits, Supervision, Trim
 
 __all__ = [
     "FAULT_CODES",
@@ -16,6 +16,7 @@ __all__ = [
     "ControlSettings",
     "Controller",
     "Defaults",
+    "LeadSettings",
     "LeaseAction",
     "Limits",
     "Line",

@@ -99,7 +99,7 @@ class Controller:
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
         self._last_s = now_s
         self._outcome = Outcome()
-        self._pursuit.stage.earn(dt_s)
+        self._pursuit.elapse(dt_s)
         self._response.advance(self._pursuit.stage.voltage_v, dt_s)
         rises, falls = self._follower.take(now_s, command)
         self._sense(now_s, sample)

@@ -1,4 +1,5 @@
-"""One step towards what is demanded, while enabled: force law plus trim, or the direct voltage, through the voltage stage.
+"""One step towards what is demanded, while enabled: force law plus trim through the lead, or the direct voltage,
+through the voltage stage.
 
 READY, RAMPING and HOLDING are decided here, as events of the state table. When the trim may learn: in contact, on a new
 usable sample, in force mode, with no other limit acting, and with the target less than QUIET_N ahead of where the plant
@@ -13,6 +14,8 @@ from gateway.bsfm import Bsfm
 from gateway.control.band import Band
 from gateway.control.demand import Demand
 from gateway.control.force_law import Approach, ForceLaw
+from gateway.control.lead import Lead
+from gateway.control.limits import TICK_S
 from gateway.control.reading import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import Event
@@ -41,7 +44,10 @@ class Pursuit:
     """Owns the applied target, the trim, the band and the voltage on the output."""
 
     def __init__(self, settings: ControlSettings, model: Bsfm) -> None:
-        self.law = ForceLaw(model, settings.limits, settings.supervision.response_lag_s)
+        self.lead = Lead(settings.lead, settings.limits)
+        # the trim compares with a force that comes as much sooner as the lead makes it: it must not learn the push
+        lag_s = max(TICK_S, settings.supervision.response_lag_s - self.lead.gained_s)
+        self.law = ForceLaw(model, settings.limits, lag_s)
         self.trim = TrimIntegral(settings.trim)
         self.stage = VoltageStage(settings.limits)
         self.feedforward_v = 0.0
@@ -58,6 +64,11 @@ class Pursuit:
     @property
     def unreachable(self) -> bool:
         return self._band.unreachable or self._answer.unreachable
+
+    def elapse(self, dt_s: float) -> None:
+        """dt_s has passed with the present voltage on the output, whoever drives it."""
+        self.stage.earn(dt_s)
+        self.lead.advance(self.stage.voltage_v, dt_s)
 
     def rest(self) -> None:
         """Disabled: the safe voltage at once, everything learned forgotten."""
@@ -93,9 +104,12 @@ class Pursuit:
             law.fall_back(goal_n)
         moved_n = law.advance(goal_n, rate_n_per_s, moment.dt_s, demand.gravity_n)
         self._learn(moment, moved_n)
-        self.feedforward_v, by_model = law.feedforward(demand.gravity_n)
+        model_v, by_model = law.feedforward(demand.gravity_n)
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
-        by_stage = self.stage.drive(self.feedforward_v + self.trim.value_v if has_model else 0.0)
+        wanted_v = model_v + self.trim.value_v
+        push_v = self.lead.led_v(wanted_v) - wanted_v if has_model else 0.0
+        self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
+        by_stage = self.stage.drive(wanted_v + push_v if has_model else 0.0)
         self.limited_by = strongest(by_stage, self.trim.limited_by, by_model, demand.force_limited_by)
         self._answer.restart()
         return self._judge_force(demand, moment, goal_n)

@@ -50,6 +50,15 @@ class Trim:
     memory_n: Annotated[float, Gt(0)] = 20.0  # travel of the target over which a correction fades to 37 %
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeadSettings:
+    """The lags of the regulator, which the force law inverts so that steps settle faster. 0 and 0: off."""
+
+    __pydantic_config__ = STRICT
+    lag_s: Annotated[float, Ge(0), Le(2)] = 0.0  # of the regulator; rather too short than too long; 0: no lead
+    second_lag_s: Annotated[float, Ge(0), Le(2)] = 0.0  # behind the first; 0: there is one lag only
+
+
 class LeaseAction(StrEnum):
     FAULT = "fault"  # safe voltage at once, latched
     HOLD = "hold"  # keep the last setpoint, raise a warning
@@ -81,3 +90,4 @@ class ControlSettings:
     defaults: Defaults = Defaults()
     trim: Trim = Trim()
     supervision: Supervision = Supervision()
+    lead: LeadSettings = LeadSettings()

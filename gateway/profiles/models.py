@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import AfterValidator, Field, PlainValidator, WithJsonSchema
 
-from gateway.control.settings import STRICT, Defaults, Limits, Supervision, Trim
+from gateway.control.settings import STRICT, Defaults, LeadSettings, Limits, Supervision, Trim
 
 Baud = Literal[9600, 19200, 38400, 115200]
 
@@ -108,6 +108,7 @@ class RigFile:
     limits: Limits
     defaults: Defaults = field(default_factory=Defaults)
     trim: Trim = field(default_factory=Trim)
+    lead: LeadSettings = field(default_factory=LeadSettings)
     supervision: Supervision = field(default_factory=Supervision)
     network: Network = field(default_factory=Network)
     accept_no_device_watchdog: bool = False  # true: enable although the output device has no watchdog of its own

@@ -143,7 +143,11 @@ def _assembled(file: RigFile, parts: Parts, register_map: RegisterMap, path: Pat
         stand_in=None if parts.plant else load_plant(STAND_IN_PLANT),
         calibration=parts.calibration,
         control=ControlSettings(
-            limits=file.limits, defaults=file.defaults, trim=file.trim, supervision=file.supervision
+            limits=file.limits,
+            defaults=file.defaults,
+            trim=file.trim,
+            lead=file.lead,
+            supervision=file.supervision,
         ),
         network=file.network,
         supported_bits=SUPPORTED_BITS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from paper.comparison import Comparison, Interval, compared, interval
-from paper.laws import LAG_S, TICK_S, Shaper, Switched
+from paper.laws import Switched
 from paper.verdict import YES, near, word
 
 from gateway.bsfm import Branches, RationalBezier
@@ -11,19 +11,6 @@ from gateway.bsfm import Branches, RationalBezier
 BRANCHES = Branches(
     RationalBezier(0.0, 5.0, (0.0, 36.0), (1.0, 1.0)), RationalBezier(0.0, 5.0, (4.0, 40.0), (1.0, 1.0))
 )
-
-
-def lagged(commands_v: list[float], lag_s: float) -> list[float]:
-    """Two equal lags, held inputs, in steps a tenth of a tick."""
-    first = second = 0.0
-    found = []
-    for volts in commands_v:
-        for _ in range(10):
-            decay, share = np.exp(-0.1 * TICK_S / lag_s), 0.1 * TICK_S / lag_s
-            second = volts + decay * ((second - volts) + share * (first - volts))
-            first = volts + decay * (first - volts)
-        found.append(float(second))
-    return found
 
 
 def test_the_switched_law_stays_on_its_branch_until_the_wish_turns() -> None:
@@ -37,31 +24,6 @@ def test_the_switched_law_stays_on_its_branch_until_the_wish_turns() -> None:
 def test_the_open_loop_does_not_listen_to_the_load_cell() -> None:
     quiet, loud = Switched(BRANCHES), Switched(BRANCHES)
     assert [quiet.command_v(n, 0.0) for n in (5.0, 9.0)] == [loud.command_v(n, 1.0e3) for n in (5.0, 9.0)]
-
-
-def test_a_shaper_that_asks_for_the_regulators_own_lag_changes_nothing() -> None:
-    shaper = Shaper(shaped_s=LAG_S)
-    wishes_v = [2.0] * 10 + [4.0] * 10 + [1.0] * 10
-    assert [shaper.shaped_v(volts) for volts in wishes_v] == pytest.approx(wishes_v)
-
-
-def test_the_shaped_command_makes_the_regulator_faster_and_ends_where_it_was_asked() -> None:
-    shaper = Shaper()
-    response_v = lagged([shaper.shaped_v(3.0) for _ in range(100)], LAG_S)
-    plain_v = lagged([3.0] * 100, LAG_S)
-    reached = [next(i for i, volts in enumerate(series) if volts > 2.7) for series in (response_v, plain_v)]
-    assert reached[0] < 0.5 * reached[1]
-    assert max(response_v) < 3.1
-    assert response_v[-1] == pytest.approx(3.0, abs=1.0e-3)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_shaper_never_leaves_the_range_and_its_model_is_what_the_regulator_does(seed: int) -> None:
-    shaper = Shaper()
-    wishes_v = np.repeat(np.random.default_rng(seed).uniform(0.0, 8.0, 8), 12)
-    given = [shaper.shaped_v(float(volts)) for volts in wishes_v]
-    assert 0.0 <= min(given) <= max(given) <= shaper.top_v
-    assert lagged(given, LAG_S)[-1] == pytest.approx(shaper.second_v, abs=1.0e-9)
 
 
 def test_an_interval_of_equal_ratios_is_a_point_and_turns_over_with_its_ratios() -> None:

@@ -1,7 +1,7 @@
 """Ours beside the paper's law: the same copies, the same noise, as ratios with intervals.
 
 One ratio per seed; their geometric mean (a ratio of 2 and one of 1/2 cancel), with the 95 % percentile bootstrap over
-seeds. "ours" is the gateway's controller as shipped; "lead" adds the input shaper, which it does not have.
+seeds. "ours" is the gateway's controller as shipped.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from paper.trials import Trial, largest_n, rms_n, settled_s
 
 RESAMPLES: Final = 4000
 ERROR_GOAL, SETTLING_GOAL = 0.5, 0.7
-LAWS: Final = ("bsfm", "ours", "lead")
+LAWS: Final = ("bsfm", "ours")
 
 
 @dataclass(frozen=True, slots=True)

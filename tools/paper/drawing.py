@@ -1,7 +1,6 @@
 """How the figures look. matplotlib is imported by these modules only (drawing, figures*), and drawn without a screen.
 
-Colours mean the same everywhere: grey the data, blue the paper's BSFM, orange PSFM, green the gateway's controller, pink
-the same with lead.
+Colours mean the same everywhere: grey the data, blue the paper's BSFM, orange PSFM, green the gateway's controller.
 """
 
 from io import BytesIO
@@ -19,15 +18,13 @@ COLOUR: Final = {
     "psfm 2": "#f0a07c",
     "bsfm": "#2a78d6",
     "ours": "#1a9850",
-    "lead": "#c64f95",
     "pfm": "#4a3aa7",
     "bfm": "#e0a100",
 }
 LABEL: Final = {
     "psfm": "PSFM, order 3",
     "bsfm": "BSFM, order 2 (the paper's law)",
-    "ours": "ours: blend + trim",
-    "lead": "ours + lead (not in the gateway)",
+    "ours": "ours: blend + lead + trim",
 }
 STYLE: Final = {
     "font.size": 9,

@@ -131,7 +131,7 @@ def settled(series: Floats) -> Floats:
 # -- Fig. 9
 
 
-def tracking(copies: Sequence[Calibrated], laws: tuple[str, ...] = ("bsfm", "ours", "lead")) -> Trial:
+def tracking(copies: Sequence[Calibrated], laws: tuple[str, ...] = ("bsfm", "ours")) -> Trial:
     """Contact from the lifted pad, then feed along the plate. Cases are CONDITIONS."""
     longest_s = FEED_FROM_S + TRAVEL_M / min(TRACKING_FEEDS_M_PER_S)
     wishes = [_constant(force_n, longest_s) for force_n, _, _ in CONDITIONS]

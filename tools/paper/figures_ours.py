@@ -16,12 +16,9 @@ def ratio_figure(study: Study) -> Figure:
     figure, axes = sheet(1, 1, (9.0, 0.36 * len(rows) + 1.1))
     panel = axes[0][0]
     for at, row in enumerate(rows):
-        for name, shift in (("ours", 0.13), ("lead", -0.13)):
-            ratio = row.ratios[name]
-            panel.plot(
-                (ratio.low, ratio.high), (at + shift,) * 2, color=COLOUR[name], linewidth=2.5, solid_capstyle="butt"
-            )
-            panel.plot(ratio.mean, at + shift, "o", color=COLOUR[name], markersize=5, label="" if at else LABEL[name])
+        ratio, colour = row.ratios["ours"], COLOUR["ours"]
+        panel.plot((ratio.low, ratio.high), (at, at), color=colour, linewidth=2.5, solid_capstyle="butt")
+        panel.plot(ratio.mean, at, "o", color=colour, markersize=5, label="" if at else LABEL["ours"])
         if row.goal is not None:
             panel.plot((row.goal,) * 2, (at - 0.4, at + 0.4), color=RED, linewidth=1.2, label="" if at else "goal")
     panel.axvline(1.0, color="0.3", linewidth=0.9)
@@ -38,10 +35,10 @@ def ratio_figure(study: Study) -> Figure:
 
 
 def limit_figure(study: Study, target_n: float = 20.0, band_n: float = 1.0) -> Figure:
-    """One step in detail: the paper's, the shaped and the fastest command with the forces they make."""
+    """One step in detail: the paper's, our and the fastest command with the forces they make."""
     figure, axes = sheet(2, 1, (9.0, 5.0), sharex=True)
     case, plant = paper_values.TARGETS_N.index(target_n), paper_plant()
-    for name in ("bsfm", "lead"):
+    for name in ("bsfm", "ours"):
         record = study.steps.of(name, 0, case)
         axes[0][0].step(record.tick_s, record.command_v[:, 0], where="post", color=COLOUR[name], label=LABEL[name])
         axes[1][0].plot(record.step_s, record.force_n[:, 0], color=COLOUR[name])

@@ -22,7 +22,7 @@ def figure_7(study: Study) -> Figure:
             linewidth=width,
             label=LABEL[name],
         )
-    for panel, names in ((middle, ("psfm", "bsfm")), (bottom, ("bsfm", "ours", "lead"))):
+    for panel, names in ((middle, ("psfm", "bsfm")), (bottom, ("bsfm", "ours"))):
         for name in names:
             width = 2.6 if name == "psfm" else 1.1
             error_n = study.validation.of(name).error_n[:, 0]
@@ -44,18 +44,16 @@ def figure_7(study: Study) -> Figure:
 
 
 def figure_8(study: Study) -> Figure:
-    figure, axes = sheet(2, 2, (9.0, 6.4), sharex=True, sharey=True)
-    for panel, name, letter in zip(axes.ravel(), ("bsfm", "psfm", "ours", "lead"), "abcd", strict=True):
+    figure, axes = sheet(1, 3, (9.0, 3.6), sharex=True, sharey=True)
+    for panel, name, letter in zip(axes.ravel(), ("bsfm", "psfm", "ours"), "abc", strict=True):
         for case, target_n in enumerate(paper_values.TARGETS_N):
             record = study.steps.of(name, 0, case)
             panel.axhspan(target_n - 1.0, target_n + 1.0, color="0.93", linewidth=0.0)
             panel.plot(record.step_s, record.force_n[:, 0], color=COLOUR[name])
         panel.set(xlim=(0.0, 1.0), title=f"({letter}) {LABEL[name]}")
         panel.grid(axis="y", visible=False)
-    for panel in axes[:, 0]:
-        panel.set(ylabel="force (N)", yticks=[0, *paper_values.TARGETS_N])
-    for panel in axes[1]:
-        panel.set_xlabel("time after the command (s); grey: target ±1 N")
+        panel.set_xlabel("time (s); grey: target ±1 N")
+    axes[0][0].set(ylabel="force (N)", yticks=[0, *paper_values.TARGETS_N])
     return figure
 
 
@@ -64,7 +62,7 @@ def settling_figure(study: Study) -> Figure:
     for panel, (band_n, (low_s, mean_s, high_s)) in zip(axes[0], paper_values.SETTLING_S.items(), strict=True):
         panel.axhspan(low_s, high_s, color="#2a78d6", alpha=0.1, linewidth=0.0, label="the paper's range")
         panel.axhline(mean_s, color="#2a78d6", alpha=0.5, linewidth=1.0, linestyle=":", label="the paper's mean")
-        for name, marker in (("bsfm", "o"), ("ours", "s"), ("lead", "D")):
+        for name, marker in (("bsfm", "o"), ("ours", "s")):
             times_s = study.steps.score(settled_s(band_n), name)[0]
             panel.plot(
                 paper_values.TARGETS_N, times_s, marker + "-", color=COLOUR[name], markersize=4, label=LABEL[name]

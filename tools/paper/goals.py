@@ -5,9 +5,10 @@ from typing import Final
 
 import numpy as np
 
+from gateway.control.lead import Lead
 from paper.comparison import ERROR_GOAL, SETTLING_GOAL, Comparison
 from paper.exercises import PACE_N_PER_S, UNBALANCE_N
-from paper.laws import LAG_S, SHAPED_LAG_S
+from paper.laws import LAG_S, RESPONSE_LAG_S, TRIM, settings
 from paper.paper_values import SETTLING_S
 from paper.rigs import paper_plant
 from paper.study import Study
@@ -18,11 +19,10 @@ MET, MISSED, NO_GOAL = "met", "missed", ""
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A comparison with the verdict on ours and on the lead, and the reason where ours misses."""
+    """A comparison with the verdict on ours, and the reason where it misses."""
 
     comparison: Comparison
     ours: str
-    lead: str
     why: str
 
 
@@ -32,9 +32,9 @@ def judged(study: Study) -> list[Judged]:
 
 def _judge(study: Study, comparison: Comparison) -> Judged:
     if comparison.goal is None:
-        return Judged(comparison, NO_GOAL, NO_GOAL, "")
-    ours, lead = (MET if comparison.meets(law) else MISSED for law in ("ours", "lead"))
-    return Judged(comparison, ours, lead, "" if ours == MET else _reason(study, comparison))
+        return Judged(comparison, NO_GOAL, "")
+    ours = MET if comparison.meets("ours") else MISSED
+    return Judged(comparison, ours, "" if ours == MET else _reason(study, comparison))
 
 
 def _reason(study: Study, comparison: Comparison) -> str:
@@ -48,7 +48,7 @@ def _reason(study: Study, comparison: Comparison) -> str:
 def _settling(study: Study, comparison: Comparison) -> str:
     band_n = next(band for band in SETTLING_S if f"within {band:g} N" in comparison.name)
     return (
-        "the feedforward alone moves the force, so the same volts pass the same lags; the controller has no lead. "
+        "the lead is told the nominal lags, and a copy's own differ. "
         f"Physics allows {allowed_ratio(study, band_n):.2f} of the paper's time (from no load, mean over the targets)"
     )
 
@@ -63,10 +63,12 @@ def allowed_ratio(study: Study, band_n: float) -> float:
 
 def _moving(study: Study, comparison: Comparison) -> str:
     delay_s = paper_plant().regulator.delay_s
-    parts_n = [PACE_N_PER_S * seconds for seconds in (delay_s + 2 * LAG_S, delay_s + 2 * SHAPED_LAG_S, delay_s)]
+    chosen = settings(RESPONSE_LAG_S, TRIM)
+    left_s = 2 * LAG_S - Lead(chosen.lead, chosen.limits).gained_s
+    parts_n = [PACE_N_PER_S * seconds for seconds in (delay_s + left_s, delay_s)]
     return (
-        f"the wish moves, and being late is all there is: delay and lags cost {parts_n[0]:.2f} N, with lead "
-        f"{parts_n[1]:.2f} N, the dead time alone {parts_n[2]:.2f} N, which no law avoids without knowing the future. "
+        f"the wish moves, and being late is all there is: delay and what the lead leaves of the lags cost "
+        f"{parts_n[0]:.2f} N, the dead time alone {parts_n[1]:.2f} N, which no law avoids without knowing the future. "
         "Just after a turn the paper's switch jumps ahead by the loop's width, which hides the lag; a blend does not jump"
     )
 
@@ -104,9 +106,7 @@ def summary(study: Study) -> list[str]:
         (SETTLING_GOAL, f"at most {SETTLING_GOAL:g} of the settling time"),
     ):
         these = [row for row in rows if row.comparison.goal == goal]
-        ours, lead = (sum(getattr(row, law) == MET for row in these) for law in ("ours", "lead"))
-        sentences.append(
-            f"Goal {words}: the gateway's controller meets it in {ours} of {len(these)} measures, with lead it would in {lead}."
-        )
+        met = sum(row.ours == MET for row in these)
+        sentences.append(f"Goal {words}: the gateway's controller meets it in {met} of {len(these)} measures.")
     allowed = ", ".join(f"{allowed_ratio(study, band_n):.2f} for {band_n:g} N" for band_n in SETTLING_S)
     return [*sentences, f"Settling time that the regulator allows at best, as a share of the paper's law: {allowed}."]

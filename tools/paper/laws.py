@@ -1,19 +1,15 @@
 """Who turns a wanted force into volts, ten milliseconds at a time. One object per lane.
 
 - Switched: the paper's way. Inverse of the branch of the present direction, open loop, branches switched at a reversal.
-- Ours: gateway.control.Controller as shipped: blended reversal and the load-cell trim, with the rig's lag told to it and
-  its ramps opened as far as the registers allow (the paper's law has none).
-- Led: Ours with an input shaper behind it, which the gateway does not have: what a lead feedforward would reach.
+- Ours: gateway.control.Controller as shipped: blended reversal, lead and the load-cell trim, with the rig's lags told to
+  it and its ramps opened as far as the registers allow (the paper's law has none).
 """
 
-from dataclasses import dataclass
 from typing import Final, Protocol
-
-import numpy as np
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.model import Bsfm
-from gateway.control import Controller, ControlSettings, Defaults, Limits, Line, Supervision, Trim
+from gateway.control import Controller, ControlSettings, Defaults, LeadSettings, Limits, Line, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -21,15 +17,12 @@ from paper.calibration import Calibrated
 
 TICK_S: Final = 0.01
 OFF_TICKS: Final = 20  # samples that the controller sees before it is enabled
-LAG_S: Final = 0.072  # each of the regulator's two, nominal: what the shaper is told
+LAG_S: Final = 0.072  # each of the regulator's two, nominal: what the lead is told
 FASTEST_N_PER_S: Final = 3276.7  # what the force_ramp register can say
 TRIM: Final = Trim(gain_v_per_n_s=0.4, limit_v=0.5, dead_zone_n=0.05)
-RESPONSE_LAG_S: Final = 0.155
-"""Chosen with TRIM on copies 0-3 (0.05 .. 0.2 s, 0.3 .. 0.7 V/Ns). The area of delay and lags is 0.224 s, yet the trim
-starts to learn only when this lag has left 3 N, and a longer one would teach it the tail of its own reference."""
-SHAPED_LAG_S: Final = 0.025
-SHAPED_RESPONSE_LAG_S: Final = 0.13
-LAW_NAMES: Final = ("psfm", "psfm 2", "bsfm", "ours", "lead")
+RESPONSE_LAG_S: Final = 0.224  # the area of delay and lags
+LEAD: Final = LeadSettings(lag_s=LAG_S, second_lag_s=LAG_S)
+LAW_NAMES: Final = ("psfm", "psfm 2", "bsfm", "ours")
 
 
 class Law(Protocol):
@@ -61,6 +54,7 @@ def settings(response_lag_s: float, trim: Trim, precontact_n: float = 60.0) -> C
         limits=Limits(force_max_n=60.0, over_force_n=75.0, voltage_max_v=8.5, voltage_slew_v_per_s=1.0e4),
         defaults=Defaults(force_ramp_n_per_s=FASTEST_N_PER_S, precontact_force_n=precontact_n),
         trim=trim,
+        lead=LEAD,
         supervision=Supervision(response_lag_s=response_lag_s, sample_quantum_n=1.0e-3),
     )
 
@@ -90,55 +84,9 @@ class Ours:
             self._command = Command(word, desired_n, number=number, received_s=now_s)
 
 
-@dataclass(slots=True)
-class Shaper:
-    """Lead by inversion of the two lags, within what the regulator can be told (0 .. top_v).
-
-    It carries a model of the lags, driven by the very command it gives, and gives the command that makes their output
-    follow two lags of `shaped_s` instead. A clipped command is in the model, too, so nothing winds up.
-    """
-
-    lag_s: float = LAG_S
-    shaped_s: float = SHAPED_LAG_S
-    top_v: float = 9.44  # 0.85 MPa of supply
-    first_v: float = 0.0
-    second_v: float = 0.0
-
-    def shaped_v(self, wanted_v: float) -> float:
-        ahead_v = self.first_v - self.second_v
-        pull = self.lag_s / self.shaped_s
-        asked_v = self.first_v + ahead_v + pull * (pull * (wanted_v - self.second_v) - 2.0 * ahead_v)
-        given_v = min(max(asked_v, 0.0), self.top_v)
-        self._follow(given_v)
-        return given_v
-
-    def _follow(self, given_v: float) -> None:
-        """Exact for a command held over one tick: both lags are equal."""
-        share = TICK_S / self.lag_s
-        decay = float(np.exp(-share))
-        first_v, second_v = self.first_v - given_v, self.second_v - given_v
-        self.second_v = given_v + decay * (second_v + share * first_v)
-        self.first_v = given_v + decay * first_v
-
-
-class Led:
-    """Another law with the shaper behind it."""
-
-    def __init__(self, law: Law) -> None:
-        self._law, self._shaper = law, Shaper()
-
-    def command_v(self, desired_n: float, measured_n: float) -> float:
-        return self._shaper.shaped_v(self._law.command_v(desired_n, measured_n))
-
-
-def led(model: Bsfm) -> Led:
-    """Ours and the shaper, the controller told of the shorter lag."""
-    return Led(Ours(model, settings(SHAPED_RESPONSE_LAG_S, TRIM)))
-
-
 def law(name: str, calibrated: Calibrated) -> Law:
     """A fresh law by its name in LAW_NAMES."""
     branches = {"psfm": calibrated.psfm, "psfm 2": calibrated.psfm_same_order, "bsfm": calibrated.bsfm}
     if name in branches:
         return Switched(branches[name])
-    return Ours(calibrated.ours) if name == "ours" else led(calibrated.ours)
+    return Ours(calibrated.ours)

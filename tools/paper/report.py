@@ -12,7 +12,7 @@ from paper import exercises, rigs
 from paper.comparison import Interval
 from paper.figures import FIGURES
 from paper.goals import MET, MISSED, Judged, judged, summary
-from paper.laws import FASTEST_N_PER_S, RESPONSE_LAG_S, TRIM
+from paper.laws import FASTEST_N_PER_S, LEAD, RESPONSE_LAG_S, TRIM
 from paper.study import Study
 from paper.trials import settled_s
 from paper.verdict import NO, OUTSIDE, YES, Verdict
@@ -38,8 +38,6 @@ RATIO_HEAD: Final = (
     "ours",
     "ratio [95 %]",
     "goal",
-    "with lead [95 %]",
-    "goal",
     "why the goal is missed",
 )
 LIMIT_HEAD: Final = (
@@ -50,7 +48,6 @@ LIMIT_HEAD: Final = (
     "by",
     "paper's law",
     "ours",
-    "with lead",
 )
 
 
@@ -72,8 +69,6 @@ def ratio_cells(row: Judged) -> tuple[str, ...]:
         *means,
         spread(found.ratios["ours"]),
         row.ours + (goal if row.ours else ""),
-        spread(found.ratios["lead"]),
-        row.lead,
         row.why,
     )
 
@@ -81,13 +76,12 @@ def ratio_cells(row: Judged) -> tuple[str, ...]:
 def limit_cells(study: Study) -> list[tuple[str, ...]]:
 
     times_s = {
-        band_n: {law: study.steps.score(settled_s(band_n), law)[0] for law in ("bsfm", "ours", "lead")}
-        for band_n in (2.0, 1.0)
+        band_n: {law: study.steps.score(settled_s(band_n), law)[0] for law in ("bsfm", "ours")} for band_n in (2.0, 1.0)
     }
     cases = list(dict.fromkeys(row.target_n for row in study.limits))
     rows = []
     for row in sorted(study.limits, key=lambda row: (-row.band_n, row.target_n)):
-        laws = [times_s[row.band_n][law][cases.index(row.target_n)] for law in ("bsfm", "ours", "lead")]
+        laws = [times_s[row.band_n][law][cases.index(row.target_n)] for law in ("bsfm", "ours")]
         pulses = f"10 V for {row.up_ms} ms" + (f", 0 V for {row.down_ms} ms" if row.down_ms else "")
         times = (seconds(row.entered_s), seconds(row.settled_s), pulses, *map(seconds, laws))
         rows.append((f"{row.target_n:g} N", f"±{row.band_n:g} N", *times))
@@ -120,14 +114,11 @@ def _laws() -> list[str]:
         The paper's law: order-2 BSFM with shared ends, the branch chosen by the direction of the wanted force, open
         loop. PSFM: order 3, each direction its own ends."""
     ours = f"""
-        Ours: gateway.control.Controller, reversals blended over a span from minor loops, trim
-        {TRIM.gain_v_per_n_s:g} V/Ns with a dead zone of {TRIM.dead_zone_n:g} N, response lag {RESPONSE_LAG_S:g} s,
-        chosen on copies 0-3. Force ramp {FASTEST_N_PER_S:g} N/s and no soft approach, because the paper's law has none;
+        Ours: gateway.control.Controller, reversals blended over a span from minor loops, lead for two lags of
+        {LEAD.lag_s:g} s, trim {TRIM.gain_v_per_n_s:g} V/Ns with a dead zone of {TRIM.dead_zone_n:g} N, response lag
+        {RESPONSE_LAG_S:g} s. Force ramp {FASTEST_N_PER_S:g} N/s and no soft approach, because the paper's law has none;
         a rig's defaults (200 N/s, 2 N before contact) are gentler and slower."""
-    lead = """
-        With lead: the same with an input shaper behind it, which inverts the regulator's two lags within 0 .. 9.44 V.
-        It is not part of the gateway; it shows what a lead feedforward would reach."""
-    return [paper, ours, lead]
+    return [paper, ours]
 
 
 def _exercises(quick: bool) -> list[str]:
@@ -193,7 +184,7 @@ def html(study: Study, pictures: dict[str, bytes]) -> str:
 {html_table(RATIO_HEAD, map(ratio_cells, rows))}
 <p>Ratios: geometric mean over {len(study.seeds)} copies of the rig, 95 % bootstrap interval.
 A goal is met when the whole interval lies within it.
-Settling times: mean over the targets at which all three settle; the paper's law never comes within 1 N at 5 N, ours does.</p>
+Settling times: mean over the targets at which both settle; the paper's law never comes within 1 N at 5 N, ours does.</p>
 <h2>What the regulator's physics allows</h2>
 <p>Dead time 80 ms, two lags of 72 ms, 0 .. 10 V in 10-bit steps, supply 0.85 MPa, pulses no shorter than a 9600-baud command.
 The first bound holds for every command; the second is the best of all bang-bang commands on a grid.</p>
