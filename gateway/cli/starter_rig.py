@@ -44,6 +44,10 @@ trim: # slow correction by the load cell on top of the model; gain 0 switches it
   gain_v_per_n_s: 0.3
   limit_v: 0.4
 
+# lead: # the regulator's own lags: setpoints arrive sooner. Rather too short than too long: too long overshoots
+#   lag_s: 0.05
+#   second_lag_s: 0.05
+
 supervision:
   lease_s: 0.2 # EDIT: the master changes the heartbeat register at least this often; null: a command lasts
   lease_action: fault # fault (safe voltage, latched), hold, ramp (to 0 N, then off)

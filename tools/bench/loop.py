@@ -171,6 +171,36 @@ def quantile(values: list[float], share: float) -> float:
     return sorted(values)[min(len(values) - 1, int(share * len(values)))]
 
 
+def bare_hops(count: int) -> list[float]:
+    """From a write on a pty until another thread sees it, nothing else: what the machine itself takes at this moment."""
+    master, client = pty.openpty()
+    tty.setraw(client)
+    seen: list[float] = []
+    arrived = threading.Event()
+
+    def listen() -> None:
+        for _ in range(count):
+            select.select([master], [], [])
+            seen.append(time.perf_counter())
+            os.read(master, 64)
+            arrived.set()
+
+    thread = threading.Thread(target=listen)
+    thread.start()
+    hops = []
+    for _ in range(count):
+        time.sleep(0.02)
+        arrived.clear()
+        sent_s = time.perf_counter()
+        os.write(client, b"SET 512\r\n")
+        arrived.wait()
+        hops.append(seen[-1] - sent_s)
+    thread.join()
+    os.close(master)
+    os.close(client)
+    return hops
+
+
 def bench_latency(loop_hz: int, count: int, rigs: Path) -> None:
     devices = Devices()
     devices.start()
@@ -184,6 +214,10 @@ def bench_latency(loop_hz: int, count: int, rigs: Path) -> None:
     verdict = "reached" if p99 <= GOAL_P99_S else "MISSED"
     print(f"setpoint to first byte, idle unpaced pty, {len(found)} of {count} setpoints:")
     print(f"  p50 {p50 * 1e6:.0f} us, p99 {p99 * 1e6:.0f} us, max {max(found) * 1e6:.0f} us")
+    hops = bare_hops(100)
+    print(
+        f"  a bare pty hop, beside it: p50 {quantile(hops, 0.5) * 1e6:.0f} us, p99 {quantile(hops, 0.99) * 1e6:.0f} us"
+    )
     print(f"  goal p99 <= {GOAL_P99_S * 1e6:.0f} us: {verdict}; ratio to the goal {p99 / GOAL_P99_S:.2f}")
 
 
