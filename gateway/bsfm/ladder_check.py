@@ -61,6 +61,7 @@ class CheckedLadder:
     slope_n_per_v: float
     notes: tuple[str, ...]
     closed: bool = True  # the loop's top is in it, where both branches meet
+    only_walk: bool = False  # its ladder is the coarse cycle of a resumed run to which only the reversal part was left
 
 
 def checked_ladder(
@@ -81,15 +82,25 @@ def checked_ladder(
     said += [*clipped, *_unsettled(points)]
     _check_increasing(ladder)
     return CheckedLadder(
-        ladder, walk.minor_v, walk.minor_n, points.noise_n, slope_n_per_v, tuple(said), closed=not clipped
+        ladder,
+        walk.minor_v,
+        walk.minor_n,
+        points.noise_n,
+        slope_n_per_v,
+        tuple(said),
+        not clipped,
+        _is_only_walk(facts),
     )
 
 
 def joined(parts: Sequence[CheckedLadder]) -> CheckedLadder:
     """The groups of several recordings as one ladder; walk, noise and slope are the last one's."""
+    ladders = [part.ladder for part in parts if not part.only_walk]
+    if not ladders:
+        said = "only the reversal part of a resumed run: the recordings with its groups must lie beside it"
+        raise LadderError(Flaw.CUT_SHORT, said)
     if len(parts) == 1:
         return parts[0]
-    ladders = [part.ladder for part in parts]
     firsts = np.cumsum([0, *(int(ladder.group.max()) + 1 for ladder in ladders[:-1])])
     whole = Ladder(
         np.concatenate([ladder.voltage_v for ladder in ladders]),
@@ -111,6 +122,12 @@ def _check_rig(facts: Mapping[str, object], expected: Expectation) -> list[str]:
             f"voltage; give --rig {recorded} if that is the one meant",
         )
     return [] if recorded else ["the table does not say on which rig it was recorded (`# rig: NAME`)"]
+
+
+def _is_only_walk(facts: Mapping[str, object]) -> bool:
+    """By the plan in the recording's header: the group to go on from is beyond the last one."""
+    plan = facts.get("ladder")
+    return isinstance(plan, Mapping) and plan.get("first_group", 0) >= plan.get("groups", 1)
 
 
 def _points(rows: Rows) -> Points:

@@ -7,6 +7,7 @@ the same branches for that purpose.
 """
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Final
 
 from gateway.bsfm.branches import Branches
@@ -21,10 +22,14 @@ _CLOSE_V: Final = 1.0e-14
 
 @dataclass(frozen=True, slots=True)
 class Bsfm:
-    """Two increasing branches and what happens between them. ValueError if a branch has no inverse, or no voltage is unique."""
+    """Two increasing branches and what happens between them. ValueError if a branch has no inverse, or no voltage is unique.
+
+    limits_n: forces that whoever made the set allows, None for all that the rig allows. Control holds to them.
+    """
 
     branches: Branches
     reversal: Reversal
+    limits_n: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not (self.branches.rising.is_increasing() and self.branches.falling.is_increasing()):
@@ -101,7 +106,8 @@ class Calibration:
     """An immutable numbered calibration, as stored: plain values, so that YAML and registers can carry it.
 
     slip_radii_v, slip_shares: empty for the linear blend over blend_span_n. With slip stops, upload and C code still carry
-    the linear blend over blend_span_n.
+    the linear blend over blend_span_n. force_limits_n: lowest and highest force that the set may be used for, as uploaded;
+    empty where nothing but the branches' reach and the rig bounds it.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles
@@ -123,12 +129,33 @@ class Calibration:
     data_sha256: str
     slip_radii_v: tuple[float, ...] = ()
     slip_shares: tuple[float, ...] = ()
+    force_limits_n: tuple[float, ...] = ()
 
     @property
     def reversal(self) -> Reversal:
         if self.slip_radii_v or self.slip_shares:
             return SlipStops(self.slip_radii_v, self.slip_shares)
         return LinearBlend(self.blend_span_n)
+
+    @property
+    def kind(self) -> str:
+        """Which of the four models its coefficients are, and the order: `bsfm n=2`."""
+        one_curve = (self.rising_handles_n, self.rising_weights) == (self.falling_handles_n, self.falling_weights)
+        polynomial = len({*self.rising_weights, *self.falling_weights}) == 1
+        return f"{'p' if polynomial else 'b'}{'' if one_curve else 's'}fm n={self.order}"
+
+    @property
+    def reversal_kind(self) -> str:
+        """`slip, 8 stops` or `blend 12.7 N`."""
+        return f"slip, {len(self.slip_radii_v)} stops" if self.slip_radii_v else f"blend {self.blend_span_n:.3g} N"
+
+    @property
+    def allowed_n(self) -> tuple[float, float]:
+        """The set's own force limits, else what both branches reach."""
+        if self.force_limits_n:
+            return self.force_limits_n[0], self.force_limits_n[-1]
+        rising, falling = self.rising_handles_n, self.falling_handles_n
+        return max(rising[0], falling[0]), min(rising[-1], falling[-1])
 
     def model(self) -> Bsfm:
         """The model of these coefficients. ValueError with a sentence if they are none."""
@@ -139,7 +166,17 @@ class Calibration:
             )
         rising = RationalBezier(self.x0_v, self.x1_v, self.rising_handles_n, self.rising_weights)
         falling = RationalBezier(self.x0_v, self.x1_v, self.falling_handles_n, self.falling_weights)
-        return Bsfm(Branches(rising, falling), self.reversal)
+        return Bsfm(Branches(rising, falling), self.reversal, self._limits_n())
+
+    def _limits_n(self) -> tuple[float, float] | None:
+        if not self.force_limits_n:
+            return None
+        if len(self.force_limits_n) != 2 or not all(map(isfinite, self.force_limits_n)):
+            raise ValueError(f"force limits {self.force_limits_n}: none, or lowest and highest force in N")
+        low_n, high_n = self.force_limits_n
+        if low_n >= high_n:
+            raise ValueError(f"force limits {low_n:g} .. {high_n:g} N: the highest must be above the lowest")
+        return low_n, high_n
 
 
 def _checked(state: float) -> float:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from gateway.bsfm.blend_span import chosen_span, command_error_n
 from gateway.bsfm.branches import Branches
@@ -26,21 +25,16 @@ from gateway.bsfm.ladder import Ladder
 from gateway.bsfm.model import Bsfm
 from gateway.bsfm.reversal import LinearBlend
 from gateway.bsfm.slip import SlipStops, half_width_bound_v
-from gateway.bsfm.slip_problem import SlipProblem, Walk, branches_of, free_numbers
+from gateway.bsfm.slip_problem import SlipProblem, Walk
+from gateway.bsfm.slip_search import SlipSearch
 
 RADII: Final = 12
 SMALLEST_HALF_WIDTHS, LARGEST_RANGE_SHARE = 0.5, 0.4
 SMALLEST_SHARE: Final = 0.01
-RIDGE: Final = 0.1
 HUBER: Final = 1.345
 SIGMA_OF_MAD: Final = 1.4826
 SMALLEST_SIGMA_N: Final = 1.0e-6
 SLOPE_FLOOR_N_PER_V: Final = 0.5
-SLOPE_WANTED_N_PER_V: Final = 0.7
-PENALTY: Final = 10.0
-PENALTY_GRID: Final = 33
-STEPS_MAX: Final = 60
-REFUSED_N: Final = 1.0e3  # residual of branches that are no model
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +76,7 @@ def walk_of(ladder: Ladder) -> Walk:
 def fit_stops(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
     """The stops alone. ValueError when there is no point, or no loop between the branches."""
     problem = SlipProblem(list(walks), _radii_v(branches))
-    problem.weight = problem.weight * _huber(problem, problem.errors_n(branches, problem.shares(branches)))
+    problem.weight = problem.weight * _huber(problem, problem.errors_n(branches))
     return _result(problem, branches, joint=False)
 
 
@@ -94,8 +88,8 @@ def fit_joint(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
     problem = SlipProblem(list(walks), _radii_v(branches))
     trust, moved = problem.weight, branches
     for _ in range(2):
-        moved = _moved(problem, moved)
-        problem.weight = trust * _huber(problem, problem.errors_n(moved, problem.shares(moved)))
+        moved = SlipSearch(problem, moved).best()
+        problem.weight = trust * _huber(problem, problem.errors_n(moved))
     if not verdicts_of(moved, SLOPE_FLOOR_N_PER_V).usable:
         return stops_only
     joint = _result(problem, moved, joint=True)
@@ -135,33 +129,6 @@ def _radii_v(branches: Branches) -> Floats:
         raise ValueError("the branches are one curve: there is no loop that slip stops could select in")
     radii: Floats = np.geomspace(SMALLEST_HALF_WIDTHS * half_v, max(LARGEST_RANGE_SHARE * range_v, 2 * half_v), RADII)
     return radii
-
-
-def _moved(problem: SlipProblem, start: Branches) -> Branches:
-    """The branches that leave the smallest weighted error, with the best shares for each trial."""
-    log_weights = 2 * start.rising.order
-    grid_v = np.linspace(start.rising.x0, start.rising.x1, PENALTY_GRID)
-    refused = np.full(len(problem.weight) + 3 * PENALTY_GRID + log_weights, REFUSED_N)
-
-    def residuals(numbers: Floats) -> Floats:
-        try:
-            trial = branches_of(numbers, start)
-        except ValueError:  # weights beyond a double
-            return refused
-        if not (trial.rising.is_increasing() and trial.falling.is_increasing()):
-            return refused
-        error_n = problem.weight * problem.errors_n(trial, problem.shares(trial))
-        return np.concatenate([error_n, _penalties(trial, grid_v), RIDGE * numbers[-log_weights:]])
-
-    found = least_squares(residuals, free_numbers(start), x_scale="jac", max_nfev=STEPS_MAX)
-    return branches_of(found.x, start)
-
-
-def _penalties(branches: Branches, grid_v: Floats) -> Floats:
-    """What a plant would not bear: slopes below the wanted one in N/V, the falling branch below the rising one in N."""
-    rising, falling = branches.rising, branches.falling
-    flat = [np.maximum(0.0, SLOPE_WANTED_N_PER_V - curve.slope(grid_v)) for curve in (rising, falling)]
-    return PENALTY * np.concatenate([*flat, np.maximum(0.0, rising.value(grid_v) - falling.value(grid_v))])
 
 
 def _huber(problem: SlipProblem, error_n: Floats) -> Floats:

@@ -68,6 +68,19 @@ def inverses(curve: RationalBezier, force_n: Floats) -> Floats:
     return voltage_v
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class System:
+    """matrix @ c = wanted where the model is exact, in newtons: (rows, shares) and (rows,). Volts of each row on both branches,
+    slope: what tells volts in newtons; widest_v: half the loop at its widest."""
+
+    rising_v: Floats
+    falling_v: Floats
+    slope: Floats
+    matrix: Floats
+    wanted: Floats
+    widest_v: float
+
+
 class SlipProblem:
     """Walks over a set of radii. `weight`, (rows,), is the square root of the trust in each row."""
 
@@ -80,26 +93,39 @@ class SlipProblem:
 
     def shares(self, branches: Branches) -> Floats:
         """The best c for these branches: non-negative, sum 1, no stiffer than a model may be."""
-        matrix, wanted = self._system(branches)
-        stiffness = _half_width_v(branches) / (self.radii_v * MARGIN * STIFFEST)
-        rows = np.column_stack([self.weight[:, None] * matrix, np.zeros(len(matrix))])
-        sum_row, stiff_row = HEAVY * np.append(np.ones(len(stiffness)), 0.0), HEAVY * np.append(stiffness, 1.0)
-        found, _ = nnls(np.vstack([rows, sum_row, stiff_row]), np.append(self.weight * wanted, [HEAVY, HEAVY]))
+        return self.best_shares(self.system(branches))
+
+    def best_shares(self, system: System) -> Floats:
+        rows = np.column_stack([self.weight[:, None] * system.matrix, np.zeros(len(system.matrix))])
+        bound = np.concatenate([rows, self.heavy_rows(system)])
+        found, _ = nnls(bound, np.append(self.weight * system.wanted, [HEAVY, HEAVY]))
         shares: Floats = found[:-1] / found[:-1].sum()
         return shares
 
-    def errors_n(self, branches: Branches, shares: Floats) -> Floats:
-        """Model minus walk: V(f) - V, in newtons."""
-        matrix, wanted = self._system(branches)
-        errors: Floats = matrix @ shares - wanted
+    def heavy_rows(self, system: System) -> Floats:
+        """Sum of the shares is 1; their stiffness and a slack, the last column, are 1: (2, shares + 1)."""
+        stiffness = system.widest_v / (self.radii_v * MARGIN * STIFFEST)
+        return HEAVY * np.array([np.append(np.ones(len(stiffness)), 0.0), np.append(stiffness, 1.0)])
+
+    def errors_n(self, branches: Branches, shares: Floats | None = None) -> Floats:
+        """Model minus walk: V(f) - V, in newtons. shares: None for the best."""
+        system = self.system(branches)
+        errors: Floats = system.matrix @ (self.best_shares(system) if shares is None else shares) - system.wanted
         return errors
 
-    def _system(self, branches: Branches) -> tuple[Floats, Floats]:
-        """(rows, shares) and (rows,): matrix @ c = wanted where the model is exact, in newtons."""
-        rising_v, falling_v = inverses(branches.rising, self.force_n), inverses(branches.falling, self.force_n)
-        middle_v, half_v = 0.5 * (rising_v + falling_v), 0.5 * (rising_v - falling_v)
-        slope = 0.5 * (branches.rising.slope(rising_v) + branches.falling.slope(falling_v))
-        return (slope * half_v)[:, None] * self.places, slope * (self.voltage_v - middle_v)
+    def system(self, branches: Branches, slope: Floats | None = None) -> System:
+        """slope: N/V that tell each row's volts in newtons, None for these branches' own."""
+        rows = len(self.force_n)
+        forces = np.append(self.force_n, _forces_of(branches))
+        rising_v, falling_v = inverses(branches.rising, forces), inverses(branches.falling, forces)
+        half_v = 0.5 * (rising_v - falling_v)
+        least_v = BOUND_RESOLUTION * (branches.rising.x1 - branches.rising.x0)
+        widest_v = max(float(half_v[rows:].max()), least_v) * (1.0 + BOUND_SHARE)
+        rising_v, falling_v, half_v = rising_v[:rows], falling_v[:rows], half_v[:rows]
+        if slope is None:
+            slope = np.asarray(0.5 * (branches.rising.slope(rising_v) + branches.falling.slope(falling_v)))
+        wanted = slope * (self.voltage_v - 0.5 * (rising_v + falling_v))
+        return System(rising_v, falling_v, slope, (slope * half_v)[:, None] * self.places, wanted, widest_v)
 
 
 def free_numbers(branches: Branches) -> Floats:
@@ -130,10 +156,8 @@ def branches_of(numbers: Floats, frame: Branches) -> Branches:
     )
 
 
-def _half_width_v(branches: Branches) -> float:
-    """Of the loop at its widest; at least what the proof in gateway.bsfm.slip takes for the narrowest."""
+def _forces_of(branches: Branches) -> Floats:
+    """All that the loop reaches, evenly: where its width is looked at."""
     low_n = min(branches.rising.handles[0], branches.falling.handles[0])
     high_n = max(branches.rising.handles[-1], branches.falling.handles[-1])
-    forces = np.linspace(low_n, high_n, GRID)
-    half_v = 0.5 * float((inverses(branches.rising, forces) - inverses(branches.falling, forces)).max())
-    return max(half_v, BOUND_RESOLUTION * (branches.rising.x1 - branches.rising.x0)) * (1.0 + BOUND_SHARE)
+    return np.linspace(low_n, high_n, GRID)

@@ -40,7 +40,7 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
         return
     for note in standing.notes:
         click.echo(note, err=True)
-    click.echo("  NUMBER  made        model      forces              rms N   max N  slots  name")
+    click.echo("  NUMBER  made        model     reversal        forces              rms N   max N  slots  name")
     if store.built_in:
         mark = "*" if standing.selection.number is None else " "
         click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, ())} (the rig's own)")
@@ -173,10 +173,11 @@ def _facts(entry: "Entry", standing: "Standing") -> dict[str, Any]:
 
 
 def _line(calibration: "Calibration", slots: "list[int] | tuple[()]") -> str:
-    low_n, high_n = calibration.model().force_range_n
+    low_n, high_n = calibration.allowed_n
+    forces = f"{low_n:.1f} .. {high_n:.1f} N"
     rms, worst = (f"{error_n:.3f}" if error_n >= 0.0 else "-" for error_n in (calibration.rms_n, calibration.max_n))
     return (
-        f"{calibration.date_utc:<12}bsfm n={calibration.order:<3} {f'{low_n:.1f} .. {high_n:.1f} N':<18}{rms:>7} {worst:>7}"
+        f"{calibration.date_utc:<12}{calibration.kind:<10}{calibration.reversal_kind:<16}{forces:<18}{rms:>7} {worst:>7}"
         f"  {','.join(map(str, slots)):<5}  {calibration.name} · {calibration.source}"
     )
 

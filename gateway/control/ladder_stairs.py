@@ -12,7 +12,7 @@ from typing import Final
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.ladder_plan import FALLING, RISING, ladder_plan
-from gateway.control.settings import Limits
+from gateway.control.settings import STRICT, Limits
 from gateway.registers.words import CalibrationPhase
 
 TURNS: Final = (0.0, 0.875, 0.25, 0.625, 0.375, 0.5625, 0.125, 0.75, 0.4375, 0.6875, 0.0625, 0.3125, 0.1875, 0.375)
@@ -24,9 +24,10 @@ MOST_STAIRS: Final = 20_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunPlan:
-    """v_max_v None: as high as model and limits allow. first_group: a resumed run goes on from there. tare: take the rest
-    force as zero first. minor_points: 0 leaves the reversal part out."""
+    """v_max_v None: as high as model and limits allow. first_group: a resumed run goes on from there; as large as groups where
+    only the reversal part is missing. tare: take the rest force as zero first. minor_points: 0 leaves the reversal part out."""
 
+    __pydantic_config__ = STRICT
     v_max_v: float | None = None
     step_v: float = 0.2
     groups: int = 5
@@ -55,7 +56,7 @@ def stairs_of(plan: RunPlan, limits: Limits, model: Bsfm) -> tuple[Stair, ...]:
     ladder = ladder_plan(top_v, plan.step_v, plan.groups)
     groups = zip(ladder.voltage_v, ladder.direction, ladder.group, strict=True)
     return (
-        *_check_stairs(top_v, model),
+        *check_stairs(top_v, model),
         *(
             Stair(volts, way, group, CalibrationPhase.LADDER)
             for volts, way, group in groups
@@ -92,7 +93,8 @@ def _check(plan: RunPlan, top_v: float) -> None:
         raise ValueError(
             f"step = {plan.step_v:g} V, allowed 0.01 .. {top_v / 3.0:.2f} V (three stairs each way at least)"
         )
-    if not 0 <= plan.first_group < plan.groups <= 100:
+    last_start = plan.groups if plan.minor_points else plan.groups - 1
+    if not (1 <= plan.groups <= 100 and 0 <= plan.first_group <= last_start):
         raise ValueError(f"groups = {plan.groups} from {plan.first_group}, allowed 1 .. 100")
     if not 0 <= plan.minor_points <= 2000:
         raise ValueError(f"minor_points = {plan.minor_points}, allowed 0 .. 2000")
@@ -100,7 +102,8 @@ def _check(plan: RunPlan, top_v: float) -> None:
         raise ValueError(f"{2.0 * top_v / plan.step_v * plan.groups:.0f} stairs: at most {MOST_STAIRS}")
 
 
-def _check_stairs(top_v: float, model: Bsfm) -> tuple[Stair, ...]:
+def check_stairs(top_v: float, model: Bsfm) -> tuple[Stair, ...]:
+    """The coarse cycle at the beginning of a run, up to top_v."""
     first_v, _ = model.branches.rising.inverse(FIRST_STAIR_N + model.branches.rising.value(0.0))
     voltages = [min(first_v, 0.2 * top_v), *(share * top_v for share in CHECK_SHARES)]
     ways = [RISING if b > a else FALLING for a, b in zip([0.0, *voltages], voltages, strict=False)]

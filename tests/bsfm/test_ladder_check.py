@@ -7,7 +7,7 @@ import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.bsfm.ladder import FALLING, RISING
-from gateway.bsfm.ladder_check import CheckedLadder, Expectation, checked_ladder
+from gateway.bsfm.ladder_check import CheckedLadder, Expectation, checked_ladder, joined
 from gateway.bsfm.ladder_fault import Flaw, LadderError
 
 TOP_V, STEP_V, NEWTON_PER_VOLT = 8.0, 0.4, 8.0
@@ -71,6 +71,18 @@ def test_a_coarse_cycle_before_the_ladder_is_left_out_and_said() -> None:
     checked = judged(recorded([0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0, *stairs()]))
     assert checked.ladder.groups == (0, 1, 2)
     assert "settled the friction" in checked.notes[0]
+
+
+def test_a_resumed_reversal_part_adds_its_walk_and_no_group() -> None:
+    cycle, walk = [0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0], [2.8, 5.6, 4.0, 2.0, 3.6, 4.8, 3.2, 1.0]
+    rest = checked_ladder(recorded(cycle + walk), ON_DEMO | {"ladder": {"first_group": 2, "groups": 2}}, KNOWN)
+    assert rest.only_walk
+    whole = joined([judged(recorded(stairs(2))), rest])
+    assert whole.ladder.groups == (0, 1)
+    assert len(whole.ladder) == 2 * 41, "the coarse cycle is no group"
+    assert whole.minor_v == pytest.approx([0.0, *walk])
+    with pytest.raises(LadderError, match="must lie beside it"):
+        joined([rest])
 
 
 def test_one_row_per_stair_is_paired_by_its_turns_whichever_row_the_force_stands_in() -> None:

@@ -13,7 +13,8 @@ from gateway.bsfm.fit_problem import Floats
 from gateway.bsfm.fit_result import verdicts_of
 from gateway.bsfm.ladder import Ladder, ladder_plan
 from gateway.bsfm.slip_fit import SLOPE_FLOOR_N_PER_V, Walk, fit_joint, fit_stops, judged, residuals_n, walk_of
-from gateway.bsfm.slip_problem import branches_of, free_numbers, inverses, places
+from gateway.bsfm.slip_problem import SlipProblem, branches_of, free_numbers, inverses, places
+from gateway.bsfm.slip_search import SlipSearch
 
 RISING = RationalBezier(0.0, 5.0, (0.8, 17.0, 39.0), (1.0, 1.0, 1.1))
 FALLING = RationalBezier(0.0, 5.0, (0.8, 25.0, 43.0), (1.0, 1.0, 1.0))
@@ -69,6 +70,25 @@ def test_the_joint_fit_finds_branches_that_no_staircase_shows() -> None:
         < 0.4
     )
     assert verdicts_of(found.branches, SLOPE_FLOOR_N_PER_V).usable
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_the_searchs_gradient_is_that_of_its_residuals(order) -> None:
+    """Kaufman's Jacobian leaves out only what is orthogonal to the residuals."""
+    problem = SlipProblem([walk_of(ladder()), walk(TURNS_V, 1)], np.geomspace(0.3, 2.0, 6))
+    search = SlipSearch(problem, fit(ladder(), "bsfm", order, "tied").branches)
+    at = free_numbers(search._start) * 1.01
+    gradient = search.jacobian(at).T @ search.residuals(at)
+
+    def half_square(numbers: Floats) -> float:
+        return 0.5 * float(np.sum(search.residuals(numbers) ** 2))
+
+    steps = 1.0e-5 * np.maximum(1.0, np.abs(at))
+    slopes = [
+        (half_square(at + step * unit) - half_square(at - step * unit)) / (2.0 * step)
+        for step, unit in zip(steps, np.eye(len(at)), strict=True)
+    ]
+    assert gradient == pytest.approx(slopes, abs=0.01 * np.abs(slopes).max())
 
 
 def test_on_another_walk_slip_beats_the_blend_and_the_blend_beats_switching() -> None:

@@ -219,6 +219,13 @@ def test_a_resumed_run_leaves_out_the_groups_that_are_done() -> None:
     assert len(whole) - len(rest) == 9
 
 
+def test_a_resumed_run_may_have_only_the_reversal_part_left() -> None:
+    rest = stairs_of(replace(SHORT, first_group=2), settings().limits, bsfm())
+    assert {stair.phase for stair in rest} == {CalibrationPhase.CHECK, CalibrationPhase.MINOR_LOOPS}
+    with pytest.raises(ValueError, match="groups = 2 from 2"):
+        stairs_of(replace(SHORT, first_group=2, minor_points=0), settings().limits, bsfm())
+
+
 def test_the_top_stays_below_the_over_force_trip() -> None:
     limits, model = settings().limits, bsfm()
     top_v = highest_voltage_v(limits, model)

@@ -16,7 +16,8 @@ from gateway.bsfm.fit import fit, fit_orders
 from gateway.bsfm.fit_result import FitResult
 from gateway.bsfm.ladder import Ladder, LadderPlan, ladder_plan
 from gateway.bsfm.model import Bsfm
-from gateway.bsfm.reversal import LinearBlend
+from gateway.bsfm.slip_fit import fit_joint, walk_of
+from gateway.bsfm.slip_problem import Walk
 from gateway.twin import Plant, Twin
 from gateway.twin.experiment import Dwell, Floats, staircase
 from gateway.twin.plant import with_value
@@ -41,7 +42,6 @@ TURNS_V: Final = (
 )  # partial reversals of all sizes
 STAIR_V: Final = 0.15
 MINOR_READINGS: Final = 5  # per stair, averaged
-SPANS_N: Final = np.arange(0.5, 25.01, 0.5)
 FORMS: Final = {"pfm": "tied", "bfm": "tied", "psfm": "free", "bsfm": "tied"}
 """The paper's forms: PSFM is piecewise (each direction its own ends), BSFM continuous (shared ends)."""
 
@@ -56,7 +56,7 @@ class Calibrated:
     psfm: Branches
     psfm_same_order: Branches
     bsfm: Branches
-    ours: Bsfm  # the same branches with a blend span from minor loops
+    ours: Bsfm  # branches and slip stops of one fit to ladder and minor loops, as `force-gateway fit` chooses it
 
 
 def condition(twin: Twin) -> None:
@@ -98,25 +98,6 @@ def stairs_between(turns_v: Sequence[float], step_v: float) -> list[float]:
     return stairs
 
 
-def command_error_n(model: Bsfm, voltage_v: Sequence[float], force_n: Floats) -> Floats:
-    """What a law with this model gets wrong on a walk: volts asked for each force in turn, against those that made it, in N."""
-    memory, errors = model.reversal.start(), []
-    low_n, high_n = model.force_range_n
-    for before_n, now_n, volts in zip(force_n[:-1], force_n[1:], voltage_v[1:], strict=True):
-        memory = model.moved(memory, float(before_n), float(now_n))
-        state = model.share(memory)
-        asked_v, _ = model.voltage_v(min(max(float(now_n), low_n), high_n), state)
-        errors.append(model.force_n(asked_v, state) - model.force_n(volts, state))
-    return np.array(errors)
-
-
-def with_span(branches: Branches, voltage_v: Sequence[float], force_n: Floats) -> Bsfm:
-    """The branches with the blend span that has the smallest error on the minor loops."""
-    candidates = [Bsfm(branches, LinearBlend(float(span_n))) for span_n in SPANS_N]
-    errors = [float(np.mean(command_error_n(model, voltage_v, force_n) ** 2)) for model in candidates]
-    return candidates[int(np.argmin(errors))]
-
-
 def calibrate(plant: Plant, seed: int) -> Calibrated:
     """Ladder, minor loops and fits of one copy."""
     one, whole = (ladder_plan(LADDER_TOP_V, LADDER_STEP_V, groups) for groups in (1, GROUPS))
@@ -126,7 +107,8 @@ def calibrate(plant: Plant, seed: int) -> Calibrated:
     ladder = ladder_of(whole, np.tile(group_n, GROUPS) + noise[: len(whole)])
     bsfm = fit(ladder, "bsfm", 2, FORMS["bsfm"]).branches
     psfm, same = (fit(ladder, "psfm", order, FORMS["psfm"]).branches for order in (3, 2))
-    ours = with_span(bsfm, minor_v, minor_n + noise[len(whole) :] / np.sqrt(MINOR_READINGS))
+    walk_n = minor_n + noise[len(whole) :] / np.sqrt(MINOR_READINGS)
+    ours = fit_joint(bsfm, [walk_of(ladder), Walk(np.array(minor_v), walk_n)]).model
     return Calibrated(seed, plant, ladder, psfm, same, bsfm, ours)
 
 

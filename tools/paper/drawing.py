@@ -24,7 +24,7 @@ COLOUR: Final = {
 LABEL: Final = {
     "psfm": "PSFM, order 3",
     "bsfm": "BSFM, order 2 (the paper's law)",
-    "ours": "ours: blend + lead + trim",
+    "ours": "ours: slip + lead + trim",
 }
 STYLE: Final = {
     "font.size": 9,

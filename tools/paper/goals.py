@@ -3,26 +3,25 @@
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from gateway.control.lead import Lead
+from paper.bounds import allowed_ratio, bound, delay_s, shaken_n
 from paper.comparison import ERROR_GOAL, SETTLING_GOAL, Comparison
 from paper.exercises import PACE_N_PER_S, UNBALANCE_N
 from paper.laws import LAG_S, RESPONSE_LAG_S, TRIM, settings
 from paper.paper_values import SETTLING_S
 from paper.rigs import paper_plant
 from paper.study import Study
-from paper.trials import settled_s
 
 MET, MISSED, NO_GOAL = "met", "missed", ""
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A comparison with the verdict on ours, and the reason where it misses."""
+    """A comparison with the verdict on ours, what bounds every law here, and the reason where ours misses."""
 
     comparison: Comparison
     ours: str
+    bound: str
     why: str
 
 
@@ -32,9 +31,9 @@ def judged(study: Study) -> list[Judged]:
 
 def _judge(study: Study, comparison: Comparison) -> Judged:
     if comparison.goal is None:
-        return Judged(comparison, NO_GOAL, "")
+        return Judged(comparison, NO_GOAL, "", "")
     ours = MET if comparison.meets("ours") else MISSED
-    return Judged(comparison, ours, "" if ours == MET else _reason(study, comparison))
+    return Judged(comparison, ours, bound(study, comparison), "" if ours == MET else _reason(study, comparison))
 
 
 def _reason(study: Study, comparison: Comparison) -> str:
@@ -46,30 +45,17 @@ def _reason(study: Study, comparison: Comparison) -> str:
 
 
 def _settling(study: Study, comparison: Comparison) -> str:
-    band_n = next(band for band in SETTLING_S if f"within {band:g} N" in comparison.name)
-    return (
-        "the lead is told the nominal lags, and a copy's own differ. "
-        f"Physics allows {allowed_ratio(study, band_n):.2f} of the paper's time (from no load, mean over the targets)"
-    )
-
-
-def allowed_ratio(study: Study, band_n: float) -> float:
-    """Fastest command over the paper's law on the paper's rig, mean over the targets at which the latter settles."""
-    times_s = study.steps.score(settled_s(band_n), "bsfm")[0]
-    best_s = np.array([row.settled_s for row in study.limits if row.band_n == band_n])
-    settles = ~np.isnan(times_s)
-    return float(np.mean(best_s[settles]) / np.mean(times_s[settles]))
+    return "the lead is told the nominal lags, and a copy's own differ"
 
 
 def _moving(study: Study, comparison: Comparison) -> str:
-    delay_s = paper_plant().regulator.delay_s
     chosen = settings(RESPONSE_LAG_S, TRIM)
     left_s = 2 * LAG_S - Lead(chosen.lead, chosen.limits).gained_s
-    parts_n = [PACE_N_PER_S * seconds for seconds in (delay_s + left_s, delay_s)]
+    parts_n = [PACE_N_PER_S * seconds for seconds in (delay_s() + left_s, delay_s())]
     return (
         f"the wish moves, and being late is all there is: delay and what the lead leaves of the lags cost "
         f"{parts_n[0]:.2f} N, the dead time alone {parts_n[1]:.2f} N, which no law avoids without knowing the future. "
-        "Just after a turn the paper's switch jumps ahead by the loop's width, which hides the lag; a blend does not jump"
+        "Just after a turn the paper's switch jumps ahead by the loop's width, which hides the lag; slip stops do not jump"
     )
 
 
@@ -79,8 +65,11 @@ def _at_rest(study: Study, comparison: Comparison) -> str:
 
 
 def _shaken(study: Study, comparison: Comparison) -> str:
-    delay_ms = 1000 * paper_plant().regulator.delay_s
-    return f"{UNBALANCE_N:g} N at 65 Hz, half a period is 8 ms: behind {delay_ms:.0f} ms of dead time no air follows it"
+    shaken, goal_n = shaken_n(study), ERROR_GOAL * comparison.means["bsfm"]
+    return (
+        f"{UNBALANCE_N:g} N at 65 Hz, half a period is 8 ms: behind {1000 * delay_s():.0f} ms of dead time no air follows it. "
+        f"It takes {shaken:.2f} N of the {goal_n:.2f} N that the goal leaves; what is slower is met, one row below"
+    )
 
 
 def _fast_feed(study: Study, comparison: Comparison) -> str:

@@ -1,7 +1,7 @@
 """Who turns a wanted force into volts, ten milliseconds at a time. One object per lane.
 
 - Switched: the paper's way. Inverse of the branch of the present direction, open loop, branches switched at a reversal.
-- Ours: gateway.control.Controller as shipped: blended reversal, lead and the load-cell trim, with the rig's lags told to
+- Ours: gateway.control.Controller as shipped: slip-selected reversal, lead and the load-cell trim, with the rig's lags told to
   it and its ramps opened as far as the registers allow (the paper's law has none).
 """
 

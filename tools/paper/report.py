@@ -38,6 +38,7 @@ RATIO_HEAD: Final = (
     "ours",
     "ratio [95 %]",
     "goal",
+    "computed limit, as a share of the paper's",
     "why the goal is missed",
 )
 LIMIT_HEAD: Final = (
@@ -69,6 +70,7 @@ def ratio_cells(row: Judged) -> tuple[str, ...]:
         *means,
         spread(found.ratios["ours"]),
         row.ours + (goal if row.ours else ""),
+        row.bound,
         row.why,
     )
 
@@ -114,7 +116,7 @@ def _laws() -> list[str]:
         The paper's law: order-2 BSFM with shared ends, the branch chosen by the direction of the wanted force, open
         loop. PSFM: order 3, each direction its own ends."""
     ours = f"""
-        Ours: gateway.control.Controller, reversals blended over a span from minor loops, lead for two lags of
+        Ours: gateway.control.Controller, reversals by slip stops fitted to ladder and minor loops, lead for two lags of
         {LEAD.lag_s:g} s, trim {TRIM.gain_v_per_n_s:g} V/Ns with a dead zone of {TRIM.dead_zone_n:g} N, response lag
         {RESPONSE_LAG_S:g} s. Force ramp {FASTEST_N_PER_S:g} N/s and no soft approach, because the paper's law has none;
         a rig's defaults (200 N/s, 2 N before contact) are gentler and slower."""

@@ -23,12 +23,13 @@ def resumed(state: Path) -> tuple[dict[str, Any], list[int]]:
     earlier = [int(number) for number in last.header.get("continues", ())]
     if _whole_groups(last):
         earlier.append(ladders[-1].number)
-    plan["first_group"] = min(climbed, int(plan["groups"]) - 1)
+    plan["first_group"] = min(climbed, int(plan["groups"]) - (not plan["minor_points"]))
     return plan, earlier
 
 
 def _whole_groups(recording: Recording) -> int:
     try:
-        return len(checked_ladder(recording.columns, recording.header).ladder.groups)
+        checked = checked_ladder(recording.columns, recording.header)
     except LadderError:
         return 0
+    return 0 if checked.only_walk else len(checked.ladder.groups)
