@@ -51,6 +51,7 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
     show_default=True,
     help="What to do.",
 )
+@click.option("--columns", metavar="MAP", help="time_s=1:ms,command_v=2,force_n=3:kgf, or a YAML file of such lines.")
 @click.option("--force-unit", metavar="UNIT", help="What the force is in (N, kgf, gf, lbf), if the table does not say.")
 @click.option(
     "--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML report; default beside the recording."
@@ -63,7 +64,7 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
 def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:
     """Fit the four models to a recorded ladder, and say which to use.
 
-    RECORDING is a number of `recordings list`, a .fgr file or a CSV with time_s, command_v, force_n.
+    RECORDING is a number of `recordings list`, a .fgr file, or a CSV or Parquet table with time_s, command_v, force_n.
     """
     from rich.console import Console
 
@@ -88,6 +89,7 @@ def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
     from gateway.bsfm.evaluation import Question
     from gateway.bsfm.fit_result import ModelName, Ties
     from gateway.bsfm.ladder_fault import LadderError
+    from gateway.recording.mapping_file import column_mapping
     from gateway.service.ladder_fit import fit_recording
     from gateway.service.ladder_source import Background, find_source, read_source
 
@@ -96,13 +98,14 @@ def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
         raise CliError(
             f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA
         )
+    mapping = column_mapping(options["columns"])
     models = tuple(ModelName(model) for model in options["models"])
     question = Question(
         models=models, orders=options["orders"], ties=Ties(options["ties"]), outliers=options["outliers"]
     )
     background = Background(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
     try:
-        return fit_recording(read_source(path), question, background)
+        return fit_recording(read_source(path, mapping), question, background)
     except LadderError as error:
         raise CliError(f"E421 {path}: {error}", exit_codes.DATA) from None
 

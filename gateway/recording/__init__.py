@@ -1,14 +1,20 @@
-"""Recordings of a run: a binary file that survives a kill -9, its readers, and CSV and Parquet made from it.
+"""Recordings of a run: a binary file that survives a kill -9, its readers, and CSV and Parquet made from it; and tables
+from anywhere else, by a column mapping.
 
-Importing this room costs no numpy and no pyarrow: the recorder runs inside the control process.
+Importing this room costs no numpy and no pyarrow: the recorder runs inside the control process. What does is imported by
+its module: `measurement.measurement_of` (numpy), `mapping_file.column_mapping` (the strict YAML reader).
 """
 
 from gateway.recording.errors import RecordingError
 from gateway.recording.export import export_csv, export_parquet, write_csv
+from gateway.recording.mapping import ColumnMapping, ColumnSource
 from gateway.recording.reader import Entry, Recording, find_recording, list_recordings, read_recording
 from gateway.recording.recorder import Recorder
+from gateway.recording.tables import read_table
 
 __all__ = [
+    "ColumnMapping",
+    "ColumnSource",
     "Entry",
     "Recorder",
     "Recording",
@@ -18,5 +24,6 @@ __all__ = [
     "find_recording",
     "list_recordings",
     "read_recording",
+    "read_table",
     "write_csv",
 ]

@@ -6,7 +6,7 @@ disk) cost themselves only. numpy is imported when a file is read, not with the 
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -27,7 +27,8 @@ _ROW_ITEM: Final = _FLOAT64.size
 class Recording:
     """One recording: header as written, one float64 array per column, all of length rows.
 
-    truncated: bytes were dropped, `notes` says which; a gap in the middle shows in time_s.
+    truncated: bytes were dropped, `notes` says which; a gap in the middle shows in time_s. lines: in a text file, the
+    line that each row stood on.
     """
 
     path: Path
@@ -36,6 +37,11 @@ class Recording:
     rows: int
     truncated: bool
     notes: tuple[str, ...] = ()
+    lines: "Sequence[int] | NDArray[np.int64] | None" = None
+
+    def place(self, row: int) -> str:
+        """Where a row (from 0) stands, for messages: `file:line`, or the number of the row where there are no lines."""
+        return f"{self.path}, row {row + 1}" if self.lines is None else f"{self.path}:{self.lines[row]}"
 
 
 @dataclass(frozen=True, slots=True)

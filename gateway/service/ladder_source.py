@@ -7,9 +7,8 @@ from typing import Final
 from gateway.bsfm import Calibration
 from gateway.bsfm.ladder_check import CheckedLadder, Expectation, checked_ladder, joined
 from gateway.profiles import ProfileError, Rig, load_rig
-from gateway.recording import Recording, find_recording, list_recordings, read_recording
-from gateway.recording.csv_table import read_csv
-from gateway.recording.layout import MAGIC
+from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
+from gateway.recording.layout import SUFFIX
 from gateway.service.calibration_store import CalibrationStore
 
 _STAND_IN: Final = "demo"  # whose calibration a table without a known rig is compared with
@@ -26,11 +25,15 @@ class Background:
     force_unit: str | None = None
 
 
-def read_source(path: Path) -> Recording:
-    """A recording of ours or a CSV, by its first bytes. RecordingError and OSError as the readers."""
-    with path.open("rb") as stream:
-        is_ours = stream.read(len(MAGIC)) == MAGIC
-    return read_recording(path) if is_ours else read_csv(path)
+def read_source(path: Path, mapping: ColumnMapping | None = None) -> Recording:
+    """A recording of ours, Parquet or a CSV, by its first bytes. RecordingError and OSError as the readers.
+
+    Cells that are no number are told and left out: a fit takes stairs, not every row. A force whose unit the mapping says
+    is in newtons from here on, and known to be.
+    """
+    recording = read_table(path, mapping, lenient=True)
+    says_unit = mapping and any(source.name == "force_n" and source.unit for source in mapping.sources)
+    return replace(recording, header=recording.header | {"force_unit": "N"}) if says_unit else recording
 
 
 def find_source(name: str, state: Path) -> Path:
@@ -40,7 +43,7 @@ def find_source(name: str, state: Path) -> Path:
 
 def with_earlier(recording: Recording) -> list[Recording]:
     """The recordings that a resumed run goes on from, oldest first, and itself. An exported table stands alone."""
-    numbers = recording.header.get("continues", ())
+    numbers = recording.header.get("continues", ()) if recording.path.suffix == SUFFIX else ()
     earlier = numbers if isinstance(numbers, list) else ()
     beside = recording.path.parent
     return [*(read_recording(beside / f"{int(number):04d}{recording.path.suffix}") for number in earlier), recording]
@@ -58,7 +61,7 @@ def expectation(recording: Recording, background: Background) -> tuple[Expectati
     """What to compare the data with, and sentences about what could not be compared."""
     recorded = str(recording.header.get("rig", "")).strip()
     asked = background.rig or rig_of_state(background.state)
-    rig, said = _known_rig(asked or recorded, str(recording.header.get("rig_file", "")))
+    rig, said = known_rig(asked or recorded, str(recording.header.get("rig_file", "")))
     reference = _reference(rig, background.state)
     fingerprint = recording.header.get("rig_fingerprint")
     if rig is not None and fingerprint and fingerprint != rig.fingerprint and recorded == rig.name:
@@ -82,7 +85,7 @@ def rig_of_state(state: Path | None) -> str | None:
     return next((str(entry.header["rig"]) for entry in reversed(entries) if entry.header.get("rig")), None)
 
 
-def _known_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
+def known_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
     """By name, else by the file that the recording names, if that is (still) the one."""
     if not name:
         return None, []

@@ -1,0 +1,44 @@
+"""What was measured, as the diagnosis takes it: one recording, checked, in SI units where the model needs them.
+
+The columns of the contract that drive the model or are judged stand by themselves; everything else is a covariate under
+the name and in the unit that its column has (temperature_c, supply_kpa, ...). `command_v` of a row holds from its time
+until the next row; `force_n` of a row was read before its command acted.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Flags: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """One recording. All arrays have the shape (rows,); rows are in order of time, which strictly rises from 0.
+
+    usable: rows whose force may be judged (a finite, valid reading, and a drive that is known at that time).
+    repeated: rows whose reading is exactly the one before, where that is no chance (see the reader).
+    """
+
+    name: str
+    time_s: Floats
+    force_n: Floats
+    usable: Flags
+    repeated: Flags
+    command_v: Floats | None = None
+    pressure_pa: Floats | None = None
+    position_m: Floats | None = None
+    covariates: Mapping[str, Floats] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> int:
+        return int(self.time_s.size)
+
+    @property
+    def duration_s(self) -> float:
+        return float(self.time_s[-1]) if self.rows else 0.0

@@ -1,0 +1,78 @@
+"""Which readings may be judged: valid by the quality column, and not the one before written down again."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+OVERLOAD: Final = 1.5
+"""Our recorder writes 0 ok, 1 unsteady (normal while the force moves) and 2 overload; only the last is no reading."""
+_MOST_VALUES: Final = 8
+_RARE_SHARE: Final = 0.2
+_LEAST_REPEATS: Final = 3
+_LEAST_SHARE: Final = 0.002
+_ENOUGH: Final = 10
+_FINE_STEPS: Final = 5.0
+
+
+def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
+    """Rows whose reading is valid, and what was made of the column.
+
+    A foreign table may mean 0 or 1 (or 192) by good: the most frequent value is taken for it, as long as the others are
+    rare. Where they are not, 0 and 1 are both kept, as our recorder means them.
+    """
+    known = np.isfinite(quality)
+    values, counts = np.unique(quality[known], return_counts=True)
+    if not values.size:
+        return np.ones(quality.size, dtype=bool), ["quality holds no numbers and was not used"]
+    if values.size > _MOST_VALUES:
+        return np.ones(quality.size, dtype=bool), [
+            f"quality takes {values.size} values: no flag, so no row was left out for it"
+        ]
+    good = float(values[counts.argmax()])
+    valid = known & (quality == good)
+    if is_ours or (~valid).mean() > _RARE_SHARE:
+        good, valid = 0.0, known & (quality < OVERLOAD)
+    bad = int((~valid).sum())
+    what = "overload or unknown" if good == 0.0 and (is_ours or values.size > 2) else f"quality is not {good:g}"
+    return valid, [f"{bad} rows are not judged: {what} by the quality column"] if bad else []
+
+
+def repeated_readings(force_n: Floats) -> tuple[Flags, list[str]]:
+    """Rows whose reading is bit for bit the one before, where that is more frequent than the resolution explains.
+
+    The number of steps of 0 that a resolution brings is read off those of one and two counts, whose logarithm falls
+    with the square of the step. The ends of the range and 0 are left aside: a force that rests there repeats by itself.
+    """
+    none = np.zeros(force_n.size, dtype=bool)
+    finite = force_n[np.isfinite(force_n)]
+    if finite.size < 2:
+        return none, []
+    resting = (force_n == finite.max()) | (force_n == finite.min()) | (force_n == 0.0)
+    same = np.append(False, force_n[1:] == force_n[:-1]) & ~resting
+    repeats, expected = int(same.sum()), _equal_by_resolution(force_n, resting)
+    enough = max(_LEAST_REPEATS, _LEAST_SHARE * finite.size)
+    if expected is None or repeats < enough or repeats < expected + 4.0 * np.sqrt(expected + 1.0) + enough:
+        return none, []
+    return same, [
+        f"{repeats} readings ({repeats / finite.size:.1%}) repeat the one before: logged twice, or not renewed"
+    ]
+
+
+def _equal_by_resolution(force_n: Floats, resting: Flags) -> float | None:
+    """How many equal neighbours the resolution explains; None when it may explain any number."""
+    steps = np.abs(np.diff(force_n))[~resting[1:]]
+    steps = steps[np.isfinite(steps) & (steps > 0.0)]
+    if steps.size < _ENOUGH:
+        return None  # a force that hardly moves
+    unit = float(np.quantile(steps, 0.001))
+    counts = np.round(steps / unit)
+    ones, twos = int((counts == 1).sum()), int((counts == 2).sum())
+    if np.median(counts) >= _FINE_STEPS:
+        return 0.5 * max(ones, twos)
+    if twos < _ENOUGH:
+        return None
+    return float(0.75 * ones * max(ones / twos, 1.0) ** (1.0 / 3.0))  # half again as many, for a force that creeps

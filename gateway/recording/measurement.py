@@ -1,0 +1,154 @@
+"""From a recording to what the diagnosis takes: checked against the contract, in SI units, every decision noted.
+
+Refused is what only the user can know (no force, nothing that drives, times that run backwards, too little); what the
+table itself decides is repaired or set aside, with a sentence. A force or a command that never changes is no fault here:
+whether it shows anything is the diagnosis' question. This module imports numpy; the room's other readers do not.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.measurement import Flags, Floats, Measurement
+from gateway.recording.covariates import covariates, filled_in, is_constant, is_ours
+from gateway.recording.errors import RecordingError
+from gateway.recording.judged_rows import repeated_readings, valid_by_quality
+from gateway.recording.mapping import EXAMPLE, listed, quantity_of
+from gateway.recording.reader import Recording
+from gateway.recording.time_axis import TimeAxis, time_axis
+from gateway.units import linear_conversion
+
+FEWEST_ROWS: Final = 50
+SHORTEST_S: Final = 1.0
+_DRIVES: Final = ("command_v", "pressure_kpa")
+_NEEDED: Final = f"at least {FEWEST_ROWS} usable rows over {SHORTEST_S:g} s are needed, 60 s at 200 Hz are good"
+_HIGHEST_COMMAND_V: Final = 50.0
+_PASCAL: Final = linear_conversion("pressure", "kpa", "pa")[0]
+_METRE: Final = linear_conversion("length", "mm", "m")[0]
+
+
+def measurement_of(recording: Recording) -> Measurement:
+    """The checked measurement. RecordingError in the user's words, with row and column where there is one."""
+    _check_columns(recording)
+    axis = time_axis(recording)
+    columns = {name: values[axis.kept] for name, values in recording.columns.items()}
+    notes = [*recording.notes, *axis.notes]
+    usable, told = _usable(columns, axis)
+    notes += told
+    drive, driven, told = _drive(columns, axis.time_s)
+    notes += told
+    usable &= driven
+    _check_enough(recording, axis, usable, notes)
+    repeated, told = repeated_readings(columns["force_n"])
+    position_m, said = _position_m(columns, axis.time_s)
+    others, heard = covariates(columns, axis.time_s, columns["force_n"])
+    return Measurement(
+        name=recording.path.name,
+        time_s=axis.time_s,
+        force_n=columns["force_n"],
+        usable=usable,
+        repeated=repeated,
+        command_v=drive.get("command_v"),
+        pressure_pa=drive.get("pressure_pa"),
+        position_m=position_m,
+        covariates=others,
+        notes=(*notes, *told, *said, *heard),
+    )
+
+
+def _check_columns(recording: Recording) -> None:
+    """time_s, force_n and something that drives must be there."""
+    names = recording.columns
+    missing = [name for name in ("time_s", "force_n") if name not in names]
+    if not any(name in names for name in _DRIVES):
+        missing.append("command_v (or pressure_kpa)")
+    if missing:
+        raise RecordingError(
+            f"{recording.path}: no column {' and no column '.join(missing)}; there: {listed(list(names))}."
+            f"{_meant(recording, missing)} Say which is which: {EXAMPLE}"
+        )
+    if recording.rows < FEWEST_ROWS:
+        raise RecordingError(f"{recording.path}: {recording.rows} rows: {_NEEDED}")
+
+
+def _meant(recording: Recording, missing: list[str]) -> str:
+    """A column that has the name in another unit: time_ms for time_s."""
+    wanted = {name.split(" ")[0] for name in missing} | (
+        {"pressure_kpa"} if "command_v (or pressure_kpa)" in missing else set()
+    )
+    near = []
+    for name in recording.columns:
+        found = quantity_of(name)
+        for target in sorted(wanted):
+            quantity = quantity_of(target)
+            stem = target.removesuffix(f"_{quantity[1]}") if quantity else target
+            if found and quantity and found[0] == quantity[0] and name.lower() == f"{stem}_{found[1]}":
+                near.append(f"{target}={name}:{found[1]}")
+    return f" Meant is probably --columns {','.join(near)}." if near else ""
+
+
+def _usable(columns: Mapping[str, Floats], axis: TimeAxis) -> tuple[Flags, list[str]]:
+    """A finite, valid reading, not too soon after a gap."""
+    read = np.isfinite(columns["force_n"])
+    notes = [] if read.all() else [f"{int((~read).sum())} rows without a force are not judged"]
+    usable = read & ~axis.after_gap
+    if "quality" in columns:
+        valid, told = valid_by_quality(columns["quality"], is_ours(columns))
+        return usable & valid, notes + told
+    return usable, notes
+
+
+def _drive(columns: Mapping[str, Floats], time_s: Floats) -> tuple[dict[str, Floats], Flags, list[str]]:
+    """Command and pressure without holes, the rows at which what drives is known, and what was filled."""
+    notes: list[str] = []
+    drive: dict[str, Floats] = {}
+    driven = np.zeros(time_s.size, dtype=bool)
+    command_v = columns.get("command_v")
+    if command_v is not None and np.isfinite(command_v).any():
+        drive["command_v"], driven, notes = _held(command_v)
+    elif command_v is not None:
+        notes.append("command_v holds no value and was left out")
+    pressure_kpa = columns.get("pressure_kpa")
+    if pressure_kpa is None or not np.isfinite(pressure_kpa).any():
+        return drive, driven, notes + ([] if pressure_kpa is None else ["pressure_kpa holds no value and was left out"])
+    known = np.isfinite(pressure_kpa)
+    drive["pressure_pa"] = (pressure_kpa if known.all() else filled_in(pressure_kpa, time_s)) * _PASCAL
+    if not known.all():
+        notes.append(f"pressure_kpa is missing in {int((~known).sum())} rows: drawn straight from those around")
+    return drive, driven if "command_v" in drive else known, notes
+
+
+def _held(command_v: Floats) -> tuple[Floats, Flags, list[str]]:
+    """A command stands until the next one: a row without one has the one before."""
+    known = np.isfinite(command_v)
+    latest = np.maximum.accumulate(np.where(known, np.arange(command_v.size), -1))
+    held = command_v[np.where(latest < 0, int(np.argmax(known)), latest)]
+    notes = [] if known.all() else [f"{int((~known).sum())} rows without a command keep the one before"]
+    if np.abs(held).max() > _HIGHEST_COMMAND_V:
+        notes.append(f"command_v goes to {np.abs(held).max():.5g}: is it in mV? then --columns command_v=...:mv")
+    return held, latest >= 0, notes
+
+
+def _position_m(columns: Mapping[str, Floats], time_s: Floats) -> tuple[Floats | None, list[str]]:
+    """The measured position; None when it says nothing about the direction of motion."""
+    values = columns.get("position_mm")
+    if values is None:
+        return None, []
+    known = np.isfinite(values)
+    if not known.any() or is_constant(values):
+        state = "never changes" if known.any() else "holds no value"
+        return None, [f"position_mm {state} and was left out: the direction of motion is inferred"]
+    if known.all():
+        return values * _METRE, []
+    told = f"position_mm is missing in {int((~known).sum())} rows: drawn straight from those around"
+    return filled_in(values, time_s) * _METRE, [told]
+
+
+def _check_enough(recording: Recording, axis: TimeAxis, usable: Flags, notes: list[str]) -> None:
+    rows = int(usable.sum())
+    duration_s = float(axis.time_s[-1]) if axis.time_s.size else 0.0
+    if rows >= FEWEST_ROWS and duration_s >= SHORTEST_S:
+        return
+    why = f"; {'; '.join(notes)}" if notes else ""
+    raise RecordingError(f"{recording.path}: {rows} usable rows in {duration_s:.4g} s: {_NEEDED}{why}")

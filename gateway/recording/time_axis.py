@@ -1,0 +1,97 @@
+"""The time stamps of a recording, checked: which rows stay, and where rows are missing.
+
+A time that runs backwards is refused, never sorted: it is two files in one, a clock that was set, or the wrong column,
+and each of them makes another order right.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.recording.errors import RecordingError
+from gateway.recording.reader import Recording
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+LARGEST_UNKNOWN_SHARE: Final = 0.2
+GAP_STEPS: Final = 10.0
+"""A step longer than this many median steps, and than GAP_S, is a gap: what was commanded in it is not known."""
+GAP_S: Final = 0.05
+SETTLING_S: Final = 0.5
+"""How long after a gap the force still depends on what happened in it (slowest regulator lag of the catalogue, thrice)."""
+_COARSE_S: Final = 1.0
+_SAME_S: Final = 1.0e-9  # what adding and scaling leaves of two equal stamps
+
+
+@dataclass(frozen=True, slots=True)
+class TimeAxis:
+    """kept: rows of the recording that stay, in order; time_s: theirs, from 0; after_gap: too soon after a gap."""
+
+    kept: NDArray[np.int64]
+    time_s: Floats
+    after_gap: Flags
+    notes: tuple[str, ...]
+
+
+def time_axis(recording: Recording) -> TimeAxis:
+    """RecordingError that names the row, for times that run backwards or are mostly missing."""
+    stamps = recording.columns["time_s"]
+    known = np.isfinite(stamps)
+    notes = _unknown(recording, known)
+    rows = np.flatnonzero(known).astype(np.int64)
+    steps = np.diff(stamps[rows])
+    if (steps < -_SAME_S).any():
+        at = int(np.flatnonzero(steps < -_SAME_S)[0])
+        before, after = stamps[rows[at]], stamps[rows[at + 1]]
+        raise RecordingError(
+            f"{recording.place(int(rows[at + 1]))}, column time_s: {after:.12g} after {before:.12g}: time runs backwards "
+            f"({int((steps < -_SAME_S).sum())} times in the file). Two recordings in one file, a clock that was set, or the "
+            "wrong column? Split it there, or name the column with --columns time_s=..."
+        )
+    last_of_stamp = np.append(steps > _SAME_S, True)[: rows.size]
+    if not last_of_stamp.all():
+        first = recording.place(int(rows[np.argmin(last_of_stamp) + 1]))
+        notes.append(
+            f"{int((~last_of_stamp).sum())} rows repeat the time stamp before (the first: {first}): the last of each stays"
+        )
+    kept = rows[last_of_stamp]
+    time_s = stamps[kept] - stamps[kept[0]] if kept.size else stamps[kept]
+    after_gap, told = _after_gaps(time_s)
+    return TimeAxis(kept, time_s, after_gap, (*notes, *told))
+
+
+def _unknown(recording: Recording, known: Flags) -> list[str]:
+    unknown = int((~known).sum())
+    if not unknown:
+        return []
+    place = recording.place(int(np.flatnonzero(~known)[0]))
+    if unknown > LARGEST_UNKNOWN_SHARE * known.size:
+        raise RecordingError(f"{place}, column time_s: no number; so in {unknown} of {known.size} rows: not a time")
+    return [f"{unknown} rows without a time (the first: {place}) are left out"]
+
+
+def _after_gaps(time_s: Floats) -> tuple[Flags, list[str]]:
+    flags = np.zeros(time_s.size, dtype=bool)
+    steps = np.diff(time_s)
+    if not steps.size:
+        return flags, []
+    median_s = float(np.median(steps))
+    ends = np.flatnonzero((steps > GAP_STEPS * median_s) & (steps > GAP_S)) + 1
+    upto = np.searchsorted(time_s, time_s[ends] + SETTLING_S)
+    edges = np.zeros(time_s.size + 1)
+    np.add.at(edges, ends, 1.0)
+    np.add.at(edges, upto, -1.0)
+    flags = np.cumsum(edges)[:-1] > 0.0
+    notes = []
+    if ends.size:
+        longest_s = float(steps[ends - 1].max())
+        notes.append(
+            f"{ends.size} gaps in time (the longest {longest_s:.3g} s, at {time_s[ends[0] - 1]:.3f} s the first): "
+            f"{int(flags.sum())} rows up to {SETTLING_S:g} s after them are not judged"
+        )
+    if median_s >= _COARSE_S:
+        notes.append(f"one row every {median_s:.3g} s: are the times in ms? then --columns time_s=...:ms")
+    return flags, notes

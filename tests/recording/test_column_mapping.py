@@ -1,0 +1,128 @@
+"""`--columns`: which column is which, in which unit; and what is told when it cannot be so."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.recording import ColumnMapping, ColumnSource, RecordingError
+from gateway.recording.mapping import picked, quantity_of
+from gateway.recording.mapping_file import column_mapping, read_mapping
+from gateway.units import LINEAR, linear_conversion
+
+
+def test_text_names_number_header_and_unit() -> None:
+    assert ColumnMapping.parse("time_s=1:ms, force_n=Kraft:kN,humidity=7").sources == (
+        ColumnSource("time_s", 1, "ms"),
+        ColumnSource("force_n", "Kraft", "kn"),
+        ColumnSource("humidity", 7),
+    )
+
+
+def test_a_file_says_the_same_as_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "zillen.yaml"
+    path.write_text("time_s: 1:ms\nforce_n: {column: 7, unit: n}\nposition_mm: 5\ntilt_deg: Angle of tool\n")
+    text = "time_s=1:ms,force_n=7:n,position_mm=5,tilt_deg=Angle of tool"
+    assert column_mapping(str(path)) == column_mapping(text)
+    assert column_mapping(None) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_s", "'time_s' is not NAME=COLUMN"),
+        ("", "no column is named"),
+        ("time_s=1,time_s=2", "time_s stands twice"),
+        ("time_s=1:fortnight", "'fortnight' is no unit for time_s; allowed: s, ms, us, min, h"),
+        ("force_n=2:bar", "'bar' is no unit for force_n; allowed: n, mn, kn, kgf, gf, lbf"),
+        ("humidity=2:percent", "humidity ends with no unit"),
+        ("time_s=:ms", "names no column"),
+    ],
+)
+def test_a_wrong_text_is_told_with_what_is_allowed(text: str, words: str) -> None:
+    with pytest.raises(RecordingError, match=r"^--columns: ") as caught:
+        ColumnMapping.parse(text)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_s: [1, 2]\n", "map.yaml:1:9"),
+        ("time_s: 1\ntime_s: 2\n", "map.yaml:2:1"),
+        ("force_n: {column: 2, units: n}\n", "is no column"),
+        ("force_n: 2:bar\n", "map.yaml: 'bar' is no unit"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_place(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "map.yaml").write_text(text)
+    with pytest.raises(RecordingError) as caught:
+        read_mapping(tmp_path / "map.yaml")
+    assert words in str(caught.value)
+
+
+def test_a_missing_file_is_told(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="cannot be read: No such file"):
+        column_mapping(str(tmp_path / "none.yml"))
+
+
+def test_unnamed_columns_stay_away_and_others_keep_their_names() -> None:
+    names = ("t", "", "humidity", "F")
+    found = picked(names, ColumnMapping.parse("time_s=t:ms,force_n=4"), "x.csv")
+    assert [(pick.index, pick.name) for pick in found] == [(0, "time_s"), (3, "force_n"), (2, "humidity")]
+
+
+def test_a_mapped_name_wins_over_the_same_header() -> None:
+    found = picked(("time_s", "force_n", "better"), ColumnMapping.parse("force_n=better"), "x.csv")
+    assert [(pick.index, pick.name) for pick in found] == [(2, "force_n"), (0, "time_s")]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_s=4", "x.csv: time_s=4: the table has the columns 1 .. 3"),
+        ("time_s=0", "the table has the columns 1 .. 3"),
+        ("force_n=forze", "no such header; did you mean force?"),
+        ("force_n=zzz", "no such header; there: t, force"),
+    ],
+)
+def test_a_column_that_is_not_there_is_told(text: str, words: str) -> None:
+    with pytest.raises(RecordingError) as caught:
+        picked(("t", "force", ""), ColumnMapping.parse(text), "x.csv")
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "given", "wanted", "value", "expected"),
+    [
+        ("time", "ms", "s", 1500.0, 1.5),
+        ("time", "min", "s", 2.0, 120.0),
+        ("force", "kgf", "n", 1.0, 9.80665),
+        ("force", "lbf", "n", 1.0, 4.4482216152605),
+        ("pressure", "bar", "kpa", 1.0, 100.0),
+        ("pressure", "psi", "kpa", 1.0, 6.894757293168361),
+        ("pressure", "mbar", "kpa", 1013.25, 101.325),
+        ("length", "um", "mm", 250.0, 0.25),
+        ("length", "cm", "mm", 1.0, 10.0),
+        ("temperature", "f", "c", 212.0, 100.0),
+        ("temperature", "k", "c", 273.15, 0.0),
+        ("turning", "hz", "rpm", 200.0, 12000.0),
+        ("speed", "m_min", "mm_s", 6.0, 100.0),
+        ("angle", "rad", "deg", 3.141592653589793, 180.0),
+    ],
+)
+def test_units_by_their_definitions(quantity: str, given: str, wanted: str, value: float, expected: float) -> None:
+    factor, offset = linear_conversion(quantity, given, wanted)
+    assert factor * value + offset == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_the_same_unit_changes_no_bit() -> None:
+    assert {linear_conversion(quantity, unit, unit) for quantity, units in LINEAR.items() for unit in units} == {
+        (1.0, 0.0)
+    }
+
+
+def test_the_longest_ending_is_the_unit() -> None:
+    assert quantity_of("feed_mm_s") == ("speed", "mm_s")
+    assert quantity_of("time_s") == ("time", "s")
+    assert quantity_of("oil_temperature_c") == ("temperature", "c")
+    assert quantity_of("quality") is None
