@@ -2,21 +2,43 @@
 
 `Twin(plant, seed)` takes voltages and lets time pass; `Plant` names the physics, one field per effect, each with a null
 value that is the default; `stack` runs many plants in one twin, as numpy lanes. Modules in the order of the signal:
-regulator, slide (with friction), load_cell; simulation joins them; experiment does to the twin what one does to a rig.
+regulator, slide (with friction), contact, load_cell; simulation joins them; the formulas of single effects stand in
+terms_*.py; experiment does to the twin what one does to a rig.
+
+`Replay(drive).run(plants)` runs plants over a recording, for the diagnosis. It is loaded when it is asked for, and with it
+scipy when it runs: the real-time twin knows neither.
 """
+
+from typing import TYPE_CHECKING, Any
 
 from gateway.twin.plant import UNLIMITED, Contact, Cylinder, Friction, LoadCell, Plant, Regulator, stack
 from gateway.twin.simulation import STEP_S, Twin
+from gateway.twin.surroundings import Surroundings
+
+if TYPE_CHECKING:
+    from gateway.twin.replay import Drive, Replay, Response
 
 __all__ = [
     "STEP_S",
     "UNLIMITED",
     "Contact",
     "Cylinder",
+    "Drive",
     "Friction",
     "LoadCell",
     "Plant",
     "Regulator",
+    "Replay",
+    "Response",
+    "Surroundings",
     "Twin",
     "stack",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("Drive", "Replay", "Response"):
+        from gateway.twin import replay
+
+        return getattr(replay, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

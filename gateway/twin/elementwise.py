@@ -62,5 +62,23 @@ def quantised(value: Real, step: Real) -> Real:
     """The nearest multiple of `step`; a step of 0 leaves the value alone."""
     if type(value) is float and type(step) is float:
         return value if step == 0.0 else math.floor(value / step + 0.5) * step
+    if type(step) is float:
+        return value if step == 0.0 else np.floor(value / step + 0.5) * step
     divisor = np.where(np.equal(step, 0.0), 1.0, step)
     return np.where(np.equal(step, 0.0), value, np.floor(value / divisor + 0.5) * divisor)
+
+
+def sine(value: Real) -> Real:
+    """sin by the same routine for both."""
+    result = np.sin(value)
+    return result if isinstance(value, np.ndarray) else float(result)
+
+
+def root(value: Real) -> Real:
+    """The square root of what is not negative."""
+    return np.sqrt(value) if isinstance(value, np.ndarray) else math.sqrt(value)
+
+
+def chosen(condition: Real, yes: Real, no: Real) -> Real:
+    """`where` for a condition that may be a numpy bool."""
+    return np.where(condition, yes, no) if isinstance(condition, np.ndarray) else yes if condition else no

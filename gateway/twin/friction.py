@@ -13,15 +13,63 @@ function is the smallest of its pieces, so D is the largest of their ELEMENTS + 
 tolerance, stable for any step.
 """
 
+import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from gateway.twin.elementwise import Real, clip, larger, sign
-from gateway.twin.plant import Friction
+from gateway.twin.elementwise import Real, clip, exponential, larger, sign, sine
+from gateway.twin.sections import Friction
+from gateway.twin.surroundings import Moment
+from gateway.twin.terms import switched_on
 
+_RADIAN_PER_DEGREE: Final = math.pi / 180.0
 ELEMENTS: Final = 3
 RIGID_M: Final = 1.0e-9
+BREAKAWAY_M: Final = 2.0e-5  # motion after which a rest is forgotten, where presliding is shorter
+DRY: Final = (
+    "coulomb_n",
+    "load_dependent_n_per_n",
+    "asymmetry_n",
+    "stribeck_n",
+    "dwell_stiction_n",
+    "side_load_n_s_per_mm",
+    "side_load_tilt_n",
+    "side_load_n_per_mm",
+)
+"""Fields without which there is no dry friction at all."""
+
+
+def side_load_n(friction: Friction, moment: Moment) -> Real:
+    """side-load: what the surroundings add to the limit, N; a column that is not known adds nothing."""
+    load: Real = 0.0
+    if moment.feed_mm_s is not None:
+        load = load + friction.side_load_n_s_per_mm * abs(moment.feed_mm_s)
+    if moment.tilt_deg is not None:
+        load = load + friction.side_load_tilt_n * abs(sine(moment.tilt_deg * _RADIAN_PER_DEGREE))
+    if moment.aside_mm is not None:
+        load = load + friction.side_load_n_per_mm * abs(moment.aside_mm)
+    return load
+
+
+def two_sided(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
+    """asymmetric-friction: (limit, centre) of a friction that is larger moving out than moving in, neither below 0.
+
+    Friction is then centre + limit x strain. Rejected: a limit that jumps with the direction, which chatters at rest.
+    """
+    out, back = larger(limit + asymmetry_n, 0.0), larger(limit - asymmetry_n, 0.0)
+    return 0.5 * (out + back), 0.5 * (out - back)
+
+
+def rested(stiction_n: Real, full_n: Real, share: Real) -> Real:
+    """dwell-stiction grows towards `full_n` by this share of what is missing."""
+    return stiction_n + share * (full_n - stiction_n)
+
+
+def moved(stiction_n: Real, travel_m: Real, breakaway_m: Real) -> Real:
+    """What motion leaves of it."""
+    return stiction_n * exponential(-abs(travel_m) / breakaway_m)
 
 
 class Elements:
@@ -31,7 +79,12 @@ class Elements:
         self._friction = friction
         self._stribeck_travel_m = friction.stribeck_speed_m_per_s * step_s
         self._stribeck = bool(np.any(friction.stribeck_n))
-        dry = self._stribeck or np.any(friction.coulomb_n) or np.any(friction.load_dependent_n_per_n)
+        dry = switched_on(friction, DRY)
+        self._coulomb_n = friction.coulomb_n
+        self.asymmetric, self.ages = bool(np.any(friction.asymmetry_n)), bool(np.any(friction.dwell_stiction_n))
+        self._rest_share = 1.0 - exponential(-step_s / friction.dwell_stiction_s)
+        self._breakaway_m = larger(friction.presliding_m, BREAKAWAY_M)
+        self._stiction_n = zero
         count = (ELEMENTS if np.any(friction.presliding_m) else 1) if dry else 0
         yields_m = [larger(friction.presliding_m * ((j + 1) / count), RIGID_M) for j in range(count)]
         self._inverse_per_m = [1.0 / yield_m for yield_m in yields_m]
@@ -44,11 +97,26 @@ class Elements:
     def limit_n(self, thrust_n: Real, last_travel_m: Real) -> Real:
         """Largest friction at this thrust (never negative), N; the speed that shapes it is the last step's."""
         friction = self._friction
-        limit = friction.coulomb_n + friction.load_dependent_n_per_n * thrust_n
+        limit = self._coulomb_n + friction.load_dependent_n_per_n * thrust_n
         if self._stribeck:
             ratio = last_travel_m / self._stribeck_travel_m
             limit = limit + friction.stribeck_n / (1.0 + ratio * ratio)
+        if self.ages:
+            limit = limit + self._stiction_n
         return limit
+
+    def load_sideways(self, load_n: Real) -> None:
+        """Raise the limit by a side load, until the next one."""
+        self._coulomb_n = self._friction.coulomb_n + load_n
+
+    def age(self, travel_m: Real, limit: Real) -> None:
+        """Rest raises the limit, motion lowers it again. What a rising limit holds it does not push: the strains give."""
+        kept = self._stiction_n
+        grown = rested(kept, self._friction.dwell_stiction_n, self._rest_share)
+        ratio = larger(limit, 1.0e-12) / larger(limit + (grown - kept), 1.0e-12)
+        self._stiction_n = moved(grown, travel_m, self._breakaway_m)
+        self.strains = [strain * ratio for strain in self.strains]
+        self._total = self._total * ratio
 
     def travel_m(self, drive_n: Real, stiffness_n_per_m: Real, limit: Real) -> Real:
         """How far `drive_n` moves the slide against a spring and this friction."""
@@ -72,6 +140,24 @@ class Elements:
         ]
         if strains:
             self.strains, self._total = strains, sum(strains[1:], start=strains[0])
+
+    def become(self, other: "Elements") -> None:
+        """Take over the strains of another slide at rest; nothing when its elements are others."""
+        if self.strains and len(other.strains) == len(self.strains):
+            self.strains, self._total = other.strains, other._total
+
+    def state(self) -> list[Real]:
+        """What the elements remember: the stiction after a rest, and the strains."""
+        return [self._stiction_n, *self.strains]
+
+    def resume(self, state: Sequence[Real]) -> None:
+        """Go on from what `state` gave."""
+        self._stiction_n, *self.strains = state
+        self._total = sum(self.strains[1:], start=self.strains[0]) if self.strains else self._total
+
+    def bear(self, other: "Elements") -> None:
+        """Take over the side load of another slide."""
+        self._coulomb_n = other._coulomb_n
 
     @property
     def mean(self) -> Real:

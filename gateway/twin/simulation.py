@@ -4,16 +4,20 @@ Pressure does not feel the slide: the regulator's own loop (tens of ms) holds it
 gives 1 mm, and no figure of the paper shows otherwise. Time and chance are arguments: `advance(dt_s)` and `seed`.
 """
 
+import math
 from typing import Final
 
 import numpy as np
 from numpy.random import default_rng
 
+from gateway.twin.contact import ContactState
 from gateway.twin.elementwise import Real
+from gateway.twin.friction import side_load_n
 from gateway.twin.load_cell import LoadCellState
 from gateway.twin.plant import Plant, lane_count, plain
 from gateway.twin.regulator import RegulatorState
 from gateway.twin.slide import SlideState
+from gateway.twin.surroundings import Moment, Surroundings
 
 STEP_S: Final = 1.0e-3
 _ROUNDING: Final = 1.0e-6  # of a step: ten times 0.001 s are ten steps
@@ -32,9 +36,12 @@ class Twin:
         """Back to the start: state, time, faults and noise."""
         lanes = lane_count(self.plant)
         zero: Real = 0.0 if lanes is None else np.zeros(lanes)
+        self._moment = Moment(command_v=zero)
         self._regulator = RegulatorState(self.plant.regulator, STEP_S, zero)
         self._slide = SlideState(self.plant, STEP_S, zero)
+        self._contact = ContactState(self.plant.contact, STEP_S, self._moment, zero)
         self._cell = LoadCellState(self.plant.cell, STEP_S, zero)
+        self._cell.look(self._moment)
         self._rng = default_rng(self._seed)
         self._steps = 0
         self._owed_steps = 0.0
@@ -44,8 +51,9 @@ class Twin:
         """Apply a command voltage, V; it holds until the next one. ValueError when it is not finite."""
         if not np.all(np.isfinite(voltage_v)):
             raise ValueError(f"command {voltage_v} V is not finite")
-        lanes = isinstance(voltage_v, np.ndarray)
-        self._regulator.command(voltage_v if lanes else float(voltage_v))
+        voltage_v = voltage_v if isinstance(voltage_v, np.ndarray) else float(voltage_v)
+        self._regulator.command(voltage_v)
+        self._moment.command_v = voltage_v
 
     def advance(self, dt_s: float) -> None:
         """Let time pass. Parts of a step are kept for the next call, so that only the sum counts."""
@@ -55,15 +63,29 @@ class Twin:
         steps = int(self._owed_steps + _ROUNDING)
         self._owed_steps -= steps
         regulator, slide, cell = self._regulator.step, self._slide.step, self._cell.step
-        for _ in range(steps):
-            cell(slide(regulator()))
+        if self._contact.is_on:
+            self._advance_contact(steps)
+        else:
+            for _ in range(steps):
+                cell(slide(regulator()))
         self._steps += steps
         if steps:
             self._reading = None
 
+    def _advance_contact(self, steps: int) -> None:
+        """The same with effects of contact and tool, which look at the time and at the surroundings."""
+        regulator, slide, contact, cell = self._regulator.step, self._slide.step, self._contact.step, self._cell.step
+        moment = self._moment
+        turn_rad = 0.0 if moment.spindle_rpm is None else moment.spindle_rpm * (2.0 * math.pi / 60.0 * STEP_S)
+        for step in range(self._steps + 1, self._steps + steps + 1):
+            moment.time_s = step * STEP_S
+            moment.spindle_rad = moment.spindle_rad + turn_rad
+            cell(contact(slide(regulator())))
+
     def read(self) -> Real:
         """A reading of the load cell now, N: each call draws new noise."""
-        self._reading = self._cell.read(self._rng)
+        self._moment.time_s = self._steps * STEP_S
+        self._reading = self._cell.read(self._rng, self._moment)
         return self._reading
 
     @property
@@ -83,7 +105,7 @@ class Twin:
     @property
     def force_n(self) -> Real:
         """True contact force, without cell, noise or sign."""
-        return self._slide.force_n
+        return self._contact.force_n if self._contact.is_on else self._slide.force_n
 
     @property
     def friction_n(self) -> Real:
@@ -107,6 +129,17 @@ class Twin:
         if not np.all(np.isfinite(height_m)):
             raise ValueError(f"surface height {height_m} m is not finite")
         self._slide.set_surface(height_m if isinstance(height_m, np.ndarray) else float(height_m))
+
+    def set_surroundings(self, around: Surroundings) -> None:
+        """Input: temperature, supply, spindle, feed, tilt, place; they hold until the next ones. None: not known.
+
+        The position is taken from where its effects are nothing. ValueError when a value is not finite.
+        """
+        self._moment.look(around)
+        self._regulator.supply_kpa = self._moment.supply_kpa
+        self._slide.set_side_load(side_load_n(self.plant.friction, self._moment))
+        self._contact.look(self._slide.force_n)
+        self._cell.look(self._moment)
 
     def set_disturbance(self, force_n: Real) -> None:
         """Input: an outside force on the slide, N towards the workpiece (a spindle's vibration); 0 is null.

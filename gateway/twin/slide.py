@@ -8,10 +8,13 @@ add 6 mN. Implicit Euler damps: at 1 ms the 40 Hz of 0.6 kg on 4e4 N/m get a dam
 A null mass gives the quasi-static solution.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from gateway.twin.elementwise import Real, any_below, clip, larger, smaller
-from gateway.twin.friction import Elements
+from gateway.twin.friction import Elements, two_sided
 from gateway.twin.plant import Plant
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
@@ -57,7 +60,7 @@ class SlideState:
         self._pressed_n_per_m = drag_n_per_m + self._pad_step_n_per_m
         self._stop_in_reach = stop_in_reach(plant, contact.gap_m)
         self._elements = Elements(plant.friction, step_s, zero)
-        self._limit_n: Real = zero
+        self._limit_n = self._centre_n = zero
         self._travel_m: Real = zero
         self.position_m: Real = zero
         self.force_n: Real = zero
@@ -69,7 +72,7 @@ class SlideState:
     @property
     def friction_n(self) -> Real:
         """Friction on the slide, positive against motion outward."""
-        return self._limit_n * self._elements.mean
+        return self._centre_n + self._limit_n * self._elements.mean
 
     def set_contact(self, on: bool) -> None:
         """Take the workpiece away, or bring it back to where the gap says: the slide is pushed back to touch it."""
@@ -83,6 +86,29 @@ class SlideState:
         self._gap_m = self._plant.contact.gap_m - height_m
         self._stop_in_reach = stop_in_reach(self._plant, self._gap_m)
 
+    def set_side_load(self, load_n: Real) -> None:
+        """What presses the slide sideways raises its friction by this much, N; 0 is null."""
+        self._elements.load_sideways(load_n)
+
+    def settle(self, pressure_pa: Real) -> None:
+        """Come to rest under this pressure at once: one step without inertia and drag, which are nothing at rest."""
+        friction = replace(self._plant.friction, viscous_n_s_per_m=0.0, stribeck_n=0.0, dwell_stiction_n=0.0)
+        contact = replace(self._plant.contact, mass_kg=0.0, pad_damping_n_s_per_m=0.0)
+        still = SlideState(replace(self._plant, friction=friction, contact=contact), self._step_s, self._zero)
+        still._steady_n, still._gap_m, still._touching = self._steady_n, self._gap_m, self._touching
+        still._elements.bear(self._elements)
+        self.force_n, self.position_m = still.step(pressure_pa), still.position_m
+        self._elements.become(still._elements)
+
+    def state(self) -> list[Real]:
+        """What the slide remembers: position, m, travel of the last step, m, stiction, N, and strains."""
+        return [self.position_m, self._travel_m, *self._elements.state()]
+
+    def resume(self, state: Sequence[Real]) -> None:
+        """Go on from what `state` gave."""
+        self.position_m, self._travel_m, *rest = state
+        self._elements.resume(rest)
+
     def set_disturbance(self, force_n: Real) -> None:
         """An outside force on the slide, positive towards the workpiece; 0 is null."""
         self._steady_n = self._weight_n + force_n
@@ -92,8 +118,14 @@ class SlideState:
         elements = self._elements
         thrust = self._area_m2 * pressure_pa
         self._limit_n = limit = elements.limit_n(thrust, self._travel_m)
-        travel = self._solve(thrust + self._steady_n + self._inertia_n_per_m * self._travel_m, limit)
+        drive = thrust + self._steady_n + self._inertia_n_per_m * self._travel_m
+        if elements.asymmetric:
+            self._limit_n, self._centre_n = limit, centre = two_sided(limit, self._plant.friction.asymmetry_n)
+            drive = drive - centre
+        travel = self._solve(drive, limit)
         elements.move(travel)
+        if elements.ages:
+            elements.age(travel, limit)
         self.position_m = self.position_m + travel
         self._travel_m = travel
         return self.force_n

@@ -1,0 +1,77 @@
+"""Replay, stage 2: the slide's force on the grid for each different combination of pressure, cylinder, friction and pad.
+
+Three ways to the same closed form of friction.py, the cheapest that a plant allows:
+    - rigid friction (no presliding) is a play of the force between thrust - limit and thrust + limit (replay_play.py);
+    - presliding where the pad is never left and no stop is met: all lanes at once (replay_elastic.py);
+    - anything else (Stribeck, dwell stiction, a gap, a stop): the twin's own slide, step by step (replay_stepped.py).
+Measured motion leaves the pad out (replay_measured.py).
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.twin.plant import Plant
+from gateway.twin.replay_cache import Cache
+from gateway.twin.replay_drive import Drive, Floats
+from gateway.twin.replay_elastic import elastic
+from gateway.twin.replay_grid import Grid
+from gateway.twin.replay_load import Load, loaded
+from gateway.twin.replay_measured import Motions
+from gateway.twin.replay_play import played
+from gateway.twin.replay_stepped import stepped
+
+Way: TypeAlias = Callable[[list[Load], Grid], list[Floats]]
+
+
+class Slides:
+    """The slide's force on the grid by plant, N."""
+
+    def __init__(self, drive: Drive, grid: Grid) -> None:
+        self._grid = grid
+        self._motions = None if drive.motion == "inferred" else Motions(drive, grid)
+        self._driven = drive.command_v is not None
+        self._forces = Cache()
+
+    def of(self, plants: Sequence[Plant], pressures: Sequence[Floats], which: NDArray[np.intp]) -> list[Floats]:
+        """One force per plant; equal ones are the same array."""
+        keys = [self._key(plant) for plant in plants]
+        missing: dict[Hashable, Load] = {}
+        for key, plant, place in zip(keys, plants, which, strict=True):
+            if key not in missing and self._forces.get(key) is None:
+                missing[key] = loaded(plant, pressures[place], self._grid.moment)
+        fresh = dict(zip(missing, self._computed(list(missing.values())), strict=True))
+        for key, force in fresh.items():
+            self._forces.put(key, force)
+        return [fresh[key] if key in fresh else self._known(key) for key in keys]
+
+    def _known(self, key: Hashable) -> Floats:
+        found = self._forces.get(key)
+        assert found is not None
+        return found
+
+    def _key(self, plant: Plant) -> Hashable:
+        contact = plant.contact
+        pad = (contact.pad_stiffness_n_per_m, contact.gap_m, contact.mass_kg, contact.tilt_deg)
+        return (plant.regulator if self._driven else None, plant.cylinder, plant.friction, pad)
+
+    def _computed(self, loads: list[Load]) -> list[Floats]:
+        if self._motions is not None:
+            return [self._motions.force_n(load) for load in loads]
+        found: dict[int, Floats] = {}
+        ways = {id(load): self._way(load) for load in loads}
+        for way in (played, elastic, stepped):
+            batch = [load for load in loads if ways[id(load)] == way]
+            if batch:
+                found |= zip(map(id, batch), way(batch, self._grid), strict=True)
+        return [found[id(load)] for load in loads]
+
+    @staticmethod
+    def _way(load: Load) -> Way:
+        contact, friction = load.plant.contact, load.plant.friction
+        if load.is_rigid and (contact.gap_m == 0.0 or friction.viscous_n_s_per_m == 0.0):
+            return played
+        ordinary = friction.stribeck_n == 0.0 and friction.dwell_stiction_n == 0.0
+        return elastic if ordinary and load.stays_on_the_pad else stepped

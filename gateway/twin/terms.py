@@ -1,0 +1,44 @@
+"""What a term is: one small formula for one effect, with the fields that switch it on and the column that it needs.
+
+The running twin asks once which terms are on, and then calls those only: an effect that is off costs nothing. Replay
+calls the same formulas with whole series.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from gateway.twin.elementwise import Real
+from gateway.twin.surroundings import Moment
+
+Formula: TypeAlias = Callable[[Any, Real, Moment], Real]
+"""(section of the plant, force or pressure, moment) -> force or pressure with the effect."""
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """switches: fields of which one must differ from 0; column: of Moment, which must be known; None: needs none."""
+
+    switches: tuple[str, ...]
+    column: str | None
+    formula: Formula
+
+
+def switched_on(section: Any, names: Sequence[str]) -> bool:
+    """Is one of these fields, in any lane, not 0?"""
+    for name in names:
+        value = getattr(section, name)
+        if np.any(value) if isinstance(value, np.ndarray) else value != 0.0:
+            return True
+    return False
+
+
+def active(terms: Sequence[Term], section: Any, moment: Moment) -> tuple[Formula, ...]:
+    """The formulas that are on for this section, in order."""
+    return tuple(
+        term.formula
+        for term in terms
+        if switched_on(section, term.switches) and (term.column is None or getattr(moment, term.column) is not None)
+    )

@@ -1,0 +1,45 @@
+"""The regulator's effects beyond steps, play and lags: each a formula for one step or for a whole series."""
+
+import math
+from typing import Final
+
+from gateway.twin.elementwise import Real, chosen, larger, root, sine
+from gateway.twin.sections import Regulator
+
+ATMOSPHERE_PA: Final = 1.0e5
+CHOKED_RATIO: Final = 0.528  # of the pressures at a hole, below which the flow is that of sound
+
+
+def bent_command(regulator: Regulator, voltage_v: Real) -> Real:
+    """command-nonlinearity: u + bow 4 u (1 - u) + s 8 u (1 - u) (2 u - 1), exact at both ends of the scale."""
+    share = voltage_v / regulator.full_scale_v
+    middle = 4.0 * share * (1.0 - share)
+    return voltage_v + regulator.full_scale_v * middle * (
+        regulator.command_bow + regulator.command_s * 2.0 * (2.0 * share - 1.0)
+    )
+
+
+def drooped(regulator: Regulator, pressure_pa: Real, supply_kpa: Real) -> Real:
+    """supply-droop: what a stronger air line adds, where the regulator gives pressure at all; never below 0."""
+    excess_pa = supply_kpa * 1.0e3 - regulator.droop_reference_pa
+    gained = pressure_pa * (1.0 + regulator.droop_share_per_pa * excess_pa) + regulator.droop_pa_per_pa * excess_pa
+    return chosen(pressure_pa > 0.0, larger(gained, 0.0), pressure_pa)
+
+
+def leaked(regulator: Regulator, pressure_pa: Real) -> Real:
+    """leak: what is lost at the valve's resistance to the flow through a hole, after ISO 6358; never below 0.
+
+    The flow grows with the absolute pressure, and below a pressure ratio of 0.528 (choked) with nothing else; it is
+    scaled to 1 at 0.3 MPa.
+    """
+    absolute_pa = larger(pressure_pa, 0.0) + ATMOSPHERE_PA
+    beyond = larger(ATMOSPHERE_PA / absolute_pa - CHOKED_RATIO, 0.0) / (1.0 - CHOKED_RATIO)
+    flow = absolute_pa / (0.3e6 + ATMOSPHERE_PA) * root(larger(1.0 - beyond * beyond, 0.0))
+    return larger(pressure_pa - regulator.leak_flow_pa * flow, 0.0)
+
+
+def hunted(regulator: Regulator, pressure_pa: Real, time_s: Real) -> Real:
+    """regulator-hunting: a limit cycle on the pressure while there is pressure; never below 0."""
+    angle_rad = (2.0 * math.pi) * regulator.hunting_hz * time_s + regulator.hunting_phase_rad
+    hunting = larger(pressure_pa + regulator.hunting_pa * sine(angle_rad), 0.0)
+    return chosen(pressure_pa > 0.0, hunting, pressure_pa)
