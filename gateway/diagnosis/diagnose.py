@@ -1,0 +1,126 @@
+"""The diagnosis of recordings: what the model gets wrong, the cause with its confidence, the gain on unseen data.
+
+The way: choose how motion is known, fit the base model, take out what the readings themselves tell, search for effects,
+look at what is left, and judge. `confirmed` is a strong word: it needs an empty screen and a residual that reaches a
+noise floor which is known, from replicate cycles or from the user.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
+from gateway.diagnosis.bench import Bench
+from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
+from gateway.diagnosis.direct import Direct, coarse, repeats, spikes
+from gateway.diagnosis.effect import Effect, Parameter
+from gateway.diagnosis.judgement import judged
+from gateway.diagnosis.measurement import Measurement
+from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.refine import Fitted
+from gateway.diagnosis.result import Diagnosis
+from gateway.diagnosis.screen import screen
+from gateway.diagnosis.search import search
+from gateway.twin.plant import Plant, with_value
+from gateway.twin.replay_drive import Motion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """without: an effect of the base model to switch off, to see it found again. noise_floor_n: known floor, N.
+
+    clock: seconds from anywhere, for the account of where the time went; None: no account.
+    """
+
+    without: str | None = None
+    noise_floor_n: float | None = None
+    clock: Callable[[], float] | None = None
+
+
+def diagnose(
+    measurements: Sequence[Measurement], plant: Plant | None = None, options: Options | None = None
+) -> Diagnosis:
+    """Diagnose recordings of one machine under one model (an offset for each). `plant` None: the shipped slide's start.
+
+    Errors: ValueError without measurements; KeyError for an effect name in `without` that the catalogue does not have.
+    """
+    if not measurements:
+        raise ValueError("a diagnosis needs at least one recording")
+    options = options or Options()
+    hidden = frozenset({options.without} if options.without else ())
+    account = _Account(options.clock)
+    start = _prepared(plant or DEFAULT_PLANT, hidden)
+    bench, base, whiten = _based(measurements, start, hidden)
+    account("base fit")
+    bench, base, found_direct = _direct(bench, base, whiten, start)
+    effects = _competitors(base.free, hidden)
+    found = search(bench, base, effects, whiten, account)
+    left = screen(bench, found.fitted, found.whiten, [each.leftover for each in found.nameless])
+    account("screen")
+    result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
+    account("judgement")
+    return replace(result, spent_s=account.spent_s)
+
+
+class _Account:
+    """Seconds per stage, by the caller's clock."""
+
+    def __init__(self, clock: Callable[[], float] | None) -> None:
+        self._clock = clock
+        self._last_s = clock() if clock else 0.0
+        self.spent_s: dict[str, float] = {}
+
+    def __call__(self, stage: str) -> None:
+        if self._clock:
+            now_s = self._clock()
+            self.spent_s[stage] = self.spent_s.get(stage, 0.0) + now_s - self._last_s
+            self._last_s = now_s
+
+
+def _prepared(plant: Plant, hidden: frozenset[str]) -> Plant:
+    """The plant without noise, and without the effects that are to be found again."""
+    plant = with_value(plant, "cell", "noise_n", 0.0)
+    for name in hidden:
+        for parameter in BY_NAME[name].parameters:
+            if not parameter.shape:
+                plant = with_value(plant, parameter.section, parameter.name, float(parameter.null))
+    return plant
+
+
+def _based(measurements: Sequence[Measurement], start: Plant, hidden: frozenset[str]) -> tuple[Bench, Fitted, Whitener]:
+    """The bench and base model that fit best, over the ways in which motion may be known."""
+    measured = any(each.position_m is not None for each in measurements)
+    motions: tuple[Motion, ...] = ("inferred", "measured", "measured-reversed") if measured else ("inferred",)
+    tries = []
+    for motion in motions:
+        bench = Bench(measurements, motion)
+        whiten = white(bench, bench.measured_n)
+        free = base_parameters(bench, hidden - {"coulomb-friction"})  # friction tells which way is which
+        tries.append((fit_base(bench, start, free, whiten), motion, bench, whiten))
+    fitted, motion, bench, whiten = min(tries, key=lambda each: each[0].chi2)
+    free = base_parameters(bench, hidden)
+    if free != fitted.free:
+        fitted = fit_base(bench, start, free, whiten)
+    return bench, fitted, whiten
+
+
+def _direct(bench: Bench, base: Fitted, whiten: Whitener, start: Plant) -> tuple[Bench, Fitted, tuple[Direct, ...]]:
+    """What the readings tell by themselves; rows that are no witness are left out and the base is fitted again."""
+    lattice = coarse(bench, base.residual_n, start.cell.quantum_n)
+    found = [lattice] if lattice else []
+    quantum_n = lattice.values[0][1] if lattice else 0.0
+    for direct in (spikes(bench, base.residual_n, quantum_n), None if lattice else repeats(bench, base.residual_n)):
+        if direct is not None:
+            found.append(direct)
+            bench.leave_out(direct.rows)
+            base = refit(bench, base, whiten)
+    return bench, base, tuple(found)
+
+
+def _competitors(free: Sequence[Parameter], hidden: frozenset[str]) -> tuple[Effect, ...]:
+    """Effects that may be found: all that the base model does not fit anyway."""
+    taken = {parameter.path for parameter in free}
+    return tuple(
+        effect
+        for effect in EFFECTS
+        if not effect.direct and (effect.name in hidden or not taken & {p.path for p in effect.parameters})
+    )

@@ -1,0 +1,233 @@
+"""From what the search found to the answer: gains on unseen blocks, intervals, the verdict.
+
+The search whitens, for a test needs to know what noise can do. The reported model is the one of the two fits, whitened or
+plain, that predicts the held-out blocks better: where a cause is missing from the catalogue, a whitened fit would
+sacrifice the slow part of the force to details. Standard errors are the larger of the whitened fit's own and the
+jackknife's over blocks, which believes in no noise model.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.random import default_rng
+
+from gateway.diagnosis.bench import Bench
+from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
+from gateway.diagnosis.direct import Direct
+from gateway.diagnosis.effect import Effect, Parameter
+from gateway.diagnosis.floor import replicate_floor_n
+from gateway.diagnosis.gram import HeldOut, covariance, held_out
+from gateway.diagnosis.identifiability import invisible
+from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.result import (
+    Baseline,
+    Cause,
+    Diagnosis,
+    Estimate,
+    Extended,
+    Gain,
+    Leftover,
+    Rejected,
+    Trace,
+    Verdict,
+)
+from gateway.diagnosis.search import Accepted, Found
+from gateway.twin.plant import Plant, with_value
+
+_REACHED: Final = 1.05  # residual over floor that counts as reached
+_ABOVE: Final = 1.1  # residual over a known floor that asks for a cause
+_BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
+_LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
+_DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
+_SEED: Final = 43
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """The models that are reported: base, extended, and the extended one without each accepted effect."""
+
+    base: Fitted
+    fitted: Fitted
+    without: tuple[Fitted, ...]
+    whiten: Whitener
+    held_out: HeldOut
+
+
+def judged(
+    bench: Bench,
+    found: Found,
+    direct: Sequence[Direct],
+    left: Sequence[Leftover],
+    effects: Sequence[Effect],
+    given_floor_n: float | None,
+) -> Diagnosis:
+    """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
+    reported = _reported(bench, found)
+    known_n = given_floor_n if given_floor_n is not None else _replicates(bench)
+    rms_n = bench.rms_n(reported.base.residual_n)
+    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n)
+    reaches = reported.held_out.rms_n <= _REACHED * floor_n
+    causes = _causes(bench, found, reported, floor_n) + _direct_causes(bench, reported, direct, floor_n)
+    causes.sort(key=lambda cause: -cause.gain.share_of_excess)
+    names = frozenset(cause.name for cause in causes)
+    fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in effects}
+    unexplained = known_n is not None and rms_n > _ABOVE * known_n
+    return Diagnosis(
+        verdict=_verdict(causes, left, reached=known_n is not None and reaches, unexplained=unexplained),
+        baseline=Baseline(rms_n, floor_n, int(bench.judged.sum()), sum(each.duration_s for each in bench.measurements)),
+        causes=tuple(causes),
+        leftover=tuple(left),
+        not_identifiable=invisible(bench, effects, found.first.wave, found.first.normal, names | fixed),
+        rejected=_rejected(bench, found, names),
+        extended=Extended(reported.held_out.rms_n, reaches),
+        base=_plant(reported.base),
+        plant=_extended(reported, causes),
+        base_parameters=_estimates(bench, reported.base, reported.base.free, reported.whiten),
+        traces=_traces(bench, reported),
+        experiments=_experiments(causes),
+        notes=tuple(note for each in bench.measurements for note in each.notes),
+    )
+
+
+def _reported(bench: Bench, found: Found) -> Reported:
+    """Every model twice, whitened and plain; the kind whose extended model predicts better.
+
+    Dependences without a name count again: the reported errors are those of the simulation, and of nothing beside it.
+    """
+    bench.put_back()
+    plain = white(bench, found.fitted.residual_n)
+    models = [found.base, found.fitted, *(_without(each, found) for each in found.accepted)]
+    problems = [Problem(each.point, each.free) for each in models]
+    kinds = [(whiten, refine(bench, problems, whiten, waves=3)) for whiten in (found.whiten, plain)]
+    errors = [held_out(bench, fits[1], whiten) for whiten, fits in kinds]
+    best = 1 if errors[1].rms_n < _BETTER * errors[0].rms_n else 0
+    whiten, fits = kinds[best]
+    return Reported(fits[0], fits[1], tuple(fits[2:]), whiten, errors[best])
+
+
+def _without(accepted: Accepted, found: Found) -> Fitted:
+    return found.base if len(found.accepted) == 1 else accepted.contest.beside
+
+
+def _verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
+    if not causes:
+        return Verdict.UNKNOWN if left or unexplained else Verdict.NOTHING_FOUND
+    alone = all(len(cause.group) == 1 for cause in causes)
+    return Verdict.CONFIRMED if reached and not left and alone else Verdict.PARTIAL
+
+
+def _replicates(bench: Bench) -> float | None:
+    floors = [floor for each in bench.measurements if (floor := replicate_floor_n(each)) is not None]
+    return max(floors) if len(floors) == len(bench.measurements) else None
+
+
+def _causes(bench: Bench, found: Found, reported: Reported, floor_n: float) -> list[Cause]:
+    return [
+        Cause(
+            accepted.effect.name,
+            accepted.contest.group(accepted.effect.name),
+            accepted.contest.shares.get(accepted.effect.name, 0.0),
+            _estimates(bench, reported.fitted, accepted.form.parameters, reported.whiten),
+            _gain(held_out(bench, without, reported.whiten), reported.held_out, floor_n),
+        )
+        for accepted, without in zip(found.accepted, reported.without, strict=True)
+    ]
+
+
+def _gain(before: HeldOut, after: HeldOut, floor_n: float) -> Gain:
+    blocks = before.errors.size
+    weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=400)
+    rms_before = np.sqrt((weights @ before.errors) / (weights @ before.counts))
+    rms_after = np.sqrt((weights @ after.errors) / (weights @ after.counts))
+    low, high = np.quantile(rms_before - rms_after, (0.025, 0.975))
+    return Gain(before.rms_n, after.rms_n, (float(low), float(high)), _share(before.rms_n, after.rms_n, floor_n))
+
+
+def _share(before_n: float, after_n: float, floor_n: float) -> float:
+    excess = before_n**2 - min(floor_n, after_n) ** 2
+    return float(min(max((before_n**2 - after_n**2) / excess, 0.0), 1.0)) if excess > 0.0 else 0.0
+
+
+def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], floor_n: float) -> list[Cause]:
+    """Findings of the readings themselves, as far as they matter beside the extended model."""
+    residual = bench.raw_n - bench.simulate([reported.fitted.point])[0]
+    after_n = float(np.sqrt(np.mean(residual[bench.judged] ** 2)))
+    causes = []
+    for each in direct:
+        before_n = float(np.sqrt(np.mean(residual[bench.judged | each.rows] ** 2)))
+        if each.name == "sensor-quantisation":
+            before_n, now_n = after_n, float(np.sqrt(max(after_n**2 - each.values[0][1] ** 2 / 12.0, 0.0)))
+        else:
+            now_n = after_n
+        if before_n**2 - now_n**2 > _LEAST_DIRECT * before_n**2 or each.name == "repeated-samples":
+            gain = Gain(before_n, now_n, (before_n - now_n, before_n - now_n), _share(before_n, now_n, floor_n))
+            causes.append(Cause(each.name, (each.name,), 0.99, _direct_estimates(each), gain))
+    return causes
+
+
+def _direct_estimates(direct: Direct) -> dict[str, Estimate]:
+    return {
+        parameter.name: Estimate(parameter.section, value, parameter.unit, _interval(value, error))
+        for parameter, value, error in direct.values
+    }
+
+
+def _interval(value: float, error: float) -> tuple[float, float]:
+    return value - _DEVIATIONS * error, value + _DEVIATIONS * error
+
+
+def _estimates(bench: Bench, fitted: Fitted, parameters: Sequence[Parameter], whiten: Whitener) -> dict[str, Estimate]:
+    own = np.sqrt(np.maximum(np.diag(covariance(fitted, whiten)), 0.0))
+    errors = np.maximum(own, held_out(bench, fitted, whiten).jackknife)[len(fitted.point.offsets_n) :]
+    estimates = {}
+    for parameter, error in zip(fitted.free, errors, strict=True):
+        if parameter in parameters:
+            value = fitted.point.value(parameter)
+            estimates[parameter.name] = Estimate(
+                parameter.section, value, parameter.unit, _interval(value, float(error))
+            )
+    return estimates
+
+
+def _plant(fitted: Fitted) -> Plant:
+    return with_value(fitted.point.plant, "cell", "zero_n", float(np.mean(fitted.point.offsets_n)))
+
+
+def _extended(reported: Reported, causes: Sequence[Cause]) -> Plant:
+    """The extended plant, with what the readings told by themselves."""
+    plant = _plant(reported.fitted)
+    for cause in causes:
+        if BY_NAME[cause.name].direct:
+            for name, estimate in cause.parameters.items():
+                plant = with_value(plant, estimate.section, name, estimate.value)
+    return plant
+
+
+def _rejected(bench: Bench, found: Found, accepted: frozenset[str]) -> tuple[Rejected, ...]:
+    """Losers of the first contest and of the last, by what they would save of the held-out RMS."""
+    gains: dict[str, float] = {}
+    for contest in (found.first, found.last):
+        before_n = held_out(bench, contest.beside, found.whiten).rms_n
+        for finalist in contest.finalists:
+            name = finalist.effect.name
+            if name not in accepted:
+                gains[name] = before_n - held_out(bench, finalist.fitted, found.whiten).rms_n
+    return tuple(Rejected(name, gain) for name, gain in sorted(gains.items(), key=lambda item: -item[1]))
+
+
+def _traces(bench: Bench, reported: Reported) -> tuple[Trace, ...]:
+    before, after = bench.simulate([reported.base.point, reported.fitted.point])
+    return tuple(
+        Trace(bench.measurements[segment.recording], before[segment.rows], after[segment.rows])
+        for segment in bench.segments
+        if segment.is_force
+    )
+
+
+def _experiments(causes: Sequence[Cause]) -> tuple[str, ...]:
+    """What to record to tell the members of each group apart."""
+    names = [name for cause in causes if len(cause.group) > 1 for name in cause.group]
+    return tuple(dict.fromkeys(BY_NAME[name].experiment for name in names))

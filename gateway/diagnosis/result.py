@@ -1,0 +1,126 @@
+"""What a diagnosis answers. Field names are those of the JSON contract (format 1); arrays for the report stand apart."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.twin.plant import Plant
+
+Interval = tuple[float, float]
+
+
+class Verdict(StrEnum):
+    """How the recording and the model stand to each other."""
+
+    NOTHING_FOUND = "nothing-found"
+    CONFIRMED = "confirmed"
+    PARTIAL = "partial"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """The refitted base model against the recording. noise_floor_n: standard deviation that no model could explain."""
+
+    rms_n: float
+    noise_floor_n: float
+    samples: int
+    duration_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A parameter of an effect. section: where it stands in a plant file (`regulator`, `cell`, ...)."""
+
+    section: str
+    value: float
+    unit: str
+    ci95: Interval
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """What the effect is worth on blocks that the fit did not see; ci95 is that of before minus after, N.
+
+    share_of_excess: share of the squared error above the noise floor that the effect explains, 0..1.
+    """
+
+    held_out_rms_before_n: float
+    held_out_rms_after_n: float
+    ci95: Interval
+    share_of_excess: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """An accepted effect. group: names that this recording cannot tell apart, its own included; confidence 0..1."""
+
+    name: str
+    group: tuple[str, ...]
+    confidence: float
+    parameters: Mapping[str, Estimate]
+    gain: Gain
+
+
+@dataclass(frozen=True, slots=True)
+class Leftover:
+    """What no effect explains: the column or quantity it depends on, its shape in words, its share of the excess."""
+
+    depends_on: str
+    shape: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class NotIdentifiable:
+    """An effect that this recording cannot show, why, and what to record."""
+
+    name: str
+    why: str
+    experiment: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """An effect that competed and lost; gain: held-out RMS before minus after, N."""
+
+    name: str
+    gain: float
+
+
+@dataclass(frozen=True, slots=True)
+class Extended:
+    """The extended model on blocks that it did not see."""
+
+    held_out_rms_n: float
+    reaches_noise_floor: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """Arrays of one recording for the report: simulated readings of the base and the extended model, N, shape (rows,)."""
+
+    measurement: Measurement
+    before_n: Floats
+    after_n: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnosis:
+    """The whole answer. base and plant: the refitted base model and the extended one (its intervals in `causes`)."""
+
+    verdict: Verdict
+    baseline: Baseline
+    causes: tuple[Cause, ...]
+    leftover: tuple[Leftover, ...]
+    not_identifiable: tuple[NotIdentifiable, ...]
+    rejected: tuple[Rejected, ...]
+    extended: Extended
+    base: Plant
+    plant: Plant
+    base_parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    traces: tuple[Trace, ...] = ()
+    experiments: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    spent_s: Mapping[str, float] = field(default_factory=dict)

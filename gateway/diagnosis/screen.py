@@ -1,0 +1,120 @@
+"""A look at what the model leaves: does it depend on anything at all?
+
+Each question is a handful of columns beside the model; the answer counts only beyond chance over all questions asked, on the
+whitened residual. The measured force is never a regressor: its own noise would answer (false findings in nearly every
+run of a prototype); the simulated force is. What has no shape at all is asked of the power, block by block.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.bench import BLOCKS, Bench
+from gateway.diagnosis.gram import Normal
+from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.questions import Question, questions
+from gateway.diagnosis.refine import Fitted
+from gateway.diagnosis.result import Leftover
+
+_LEVEL: Final = 1.0e-3  # of a false answer over all questions
+_LEAST_SHARE: Final = 0.01  # of the whitened squared residual
+_MOST: Final = 6
+_AROUND: Final = 14  # lines to either side that a wandering line stands out of
+_STANDS_OUT: Final = 16.0  # times their mean
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A question that the residual answers. gain: chi-square beside the model; share: of the whitened squared residual."""
+
+    question: Question
+    gain: float
+    share: float
+    log_chance: float
+
+    @property
+    def leftover(self) -> Leftover:
+        return Leftover(self.question.depends_on, self.question.shape, min(self.share, 1.0))
+
+
+def best_answer(
+    bench: Bench, fitted: Fitted, whiten: Whitener, given: Collection[Leftover], *, outside: bool
+) -> Answer | None:
+    """The most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
+    white = whiten(fitted.residual_n)
+    known = {(each.depends_on, each.shape) for each in given}
+    asked = [
+        each
+        for each in questions(bench, fitted.residual_n, white)
+        if (each.outside or not outside) and (each.depends_on, each.shape) not in known
+    ]
+    return _best(bench, fitted, whiten, asked)
+
+
+def _best(bench: Bench, fitted: Fitted, whiten: Whitener, asked: Sequence[Question]) -> Answer | None:
+    from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
+
+    white = whiten(fitted.residual_n)
+    total = max(float(white @ white), 1.0)
+    columns = whiten(bench.reduced(np.vstack([each.columns for each in asked])))
+    normal = Normal(whiten(fitted.jacobian), columns, white)
+    tried = sum(each.among for each in asked)
+    answers, at = [], 0
+    for question in asked:
+        indices = list(range(at, at + question.columns.shape[0]))
+        at += len(indices)
+        usable = [k for k in indices if normal.power[k] > 1.0e-6 * max(normal.raw_power[k], 1.0e-300)]
+        gain = normal.add(usable).gain if usable else 0.0
+        chance = float(chi2_law.logsf(gain, len(indices))) + float(np.log(question.among))
+        answers.append(Answer(question, gain, gain / total, chance))
+    telling = [each for each in answers if each.log_chance < np.log(_LEVEL / tried) and each.share >= _LEAST_SHARE]
+    return min(telling, key=lambda each: each.log_chance, default=None)
+
+
+def screen(bench: Bench, fitted: Fitted, whiten: Whitener, given: Sequence[Leftover]) -> tuple[Leftover, ...]:
+    """What the search gave already, then everything that the residual still depends on, the most telling first.
+
+    Each answer is taken out before the next question.
+    """
+    leftovers = list(given)
+    while len(leftovers) < _MOST:
+        answer = best_answer(bench, fitted, whiten, leftovers, outside=False)
+        if answer is None:
+            break
+        leftovers.append(answer.leftover)
+        taken = np.vstack([fitted.jacobian, bench.reduced(answer.question.columns)])
+        fitted = Fitted(fitted.point, fitted.free, fitted.residual_n, fitted.chi2, taken)
+    return (*leftovers, *_unsteady(bench, whiten(fitted.residual_n)))
+
+
+def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
+    """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
+    from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
+
+    for segment in bench.segments:
+        if segment.is_force:
+            part = white[segment.rows]
+            levels = np.array([np.mean(block**2) for block in np.array_split(part, BLOCKS)])
+            usual = float(np.median(levels))
+            apart = np.sum((levels / levels.mean() - 1.0) ** 2) * part.size / BLOCKS / 2.0
+            if chi2_law.sf(apart, BLOCKS - 1) < _LEVEL:
+                share = float(np.sum(np.maximum(levels - usual, 0.0)) / np.sum(levels))
+                yield Leftover("time", "louder at some times than at others", share)
+            if (share := _wandering(part)) > _LEAST_SHARE:
+                yield Leftover("time", "a line that wanders, or comes and goes", share)
+
+
+def _wandering(part: Floats) -> float:
+    """Share of the power in lines that stand out of their surroundings in single blocks."""
+    standing, total = 0.0, 0.0
+    for block in np.array_split(part, BLOCKS):
+        power = np.abs(np.fft.rfft(block * np.hanning(block.size))) ** 2
+        total += float(power.sum())
+        best = int(np.argmax(power[3:-3])) + 3
+        around = np.r_[power[max(best - _AROUND, 1) : best - 2], power[best + 3 : best + _AROUND]]
+        if around.size and power[best] > _STANDS_OUT * float(around.mean()):
+            standing += float(power[best - 2 : best + 3].sum())
+    return standing / max(total, 1.0e-300)

@@ -1,0 +1,173 @@
+"""The search: add the winner of a contest while it pays, then let every accepted effect compete for its place again.
+
+Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
+not see whose 95 % interval is positive; at least 2 % of the held-out squared error; and, for every effect after the
+first, a few percent of what the others explain: no form is exact, and what a cause's wrong form leaves must not be
+named. A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.random import default_rng
+
+from gateway.diagnosis.base_fit import refit
+from gateway.diagnosis.bench import Bench
+from gateway.diagnosis.candidates import remainder, wave
+from gateway.diagnosis.contest import Contest, Finalist, finalist, hold, significant
+from gateway.diagnosis.effect import Effect, Form, Parameter
+from gateway.diagnosis.gram import held_out, orthonormal
+from gateway.diagnosis.noise import Whitener, coloured
+from gateway.diagnosis.point import without
+from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.scene import scene_of
+from gateway.diagnosis.screen import Answer, best_answer
+
+MOST_EFFECTS: Final = 5
+_DISCREPANT: Final = 3.0  # chi-square per row of the winner
+_CLEARLY: Final = 1.05  # a nameless dependence must explain this much more than the best effect ...
+_MARGIN: Final = 10.0  # ... and this much more in chi-square
+_SEED: Final = 21
+_LEAST_GAIN: Final = 0.02  # of the held-out squared error
+_LEAST_BESIDE: Final = 0.04  # of the chi-square that the effects before it explain
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """An effect of the extended model, and the contest in which it holds its place."""
+
+    effect: Effect
+    form: Form
+    contest: Contest
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What the search ends with. nameless: dependences taken out; first: the contest beside the base model alone."""
+
+    base: Fitted
+    fitted: Fitted
+    accepted: tuple[Accepted, ...]
+    nameless: tuple[Answer, ...]
+    whiten: Whitener
+    first: Contest
+    last: Contest
+
+
+Clock = Callable[[str], None]
+
+
+def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whitener, clock: Clock) -> Found:
+    """All effects that the recording shows, one after the other. `base` is the refitted base model."""
+    base, whiten, contest = _opened(bench, base, effects, whiten)
+    clock("first contest")
+    first, fitted, accepted = contest, base, list[Accepted]()
+    nameless: list[Answer] = []
+    while len(accepted) + len(nameless) < MOST_EFFECTS:
+        winner = _acceptable(bench, fitted, base, contest, whiten)
+        answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
+        if answer is not None and (winner is None or answer.gain > _CLEARLY * winner.gain + _MARGIN):
+            nameless.append(answer)
+            bench.take_out(answer.question.columns)
+            fitted = refit(bench, fitted, whiten)
+        elif winner is not None:
+            accepted.append(Accepted(winner.effect, winner.form, contest))
+            fitted = winner.fitted
+        else:
+            break
+        fitted, whiten, contest = _opened(bench, fitted, _others(effects, accepted), whiten)
+        base = _revalued(bench, base, whiten)
+        clock(f"contest {len(accepted) + len(nameless) + 1}")
+    if len(accepted) > 1:
+        fitted, accepted = _exchanged(bench, fitted, accepted, effects, whiten)
+        clock("exchange")
+    return Found(base, fitted, tuple(accepted), tuple(nameless), whiten, first, contest)
+
+
+def _opened(
+    bench: Bench, fitted: Fitted, effects: Sequence[Effect], whiten: Whitener
+) -> tuple[Fitted, Whitener, Contest]:
+    """Noise as the remainder shows it, the model at its optimum under that noise, and the contest beside it.
+
+    Where even the winner leaves several times that noise, no model is near the truth yet, and a whitening that believes
+    in one would look at the fastest details only: the noise is then what the best model leaves.
+    """
+    scene = scene_of(bench, fitted, whiten)
+    found = wave(bench, fitted, effects, scene)
+    whiten = coloured(bench, *remainder(found, fitted))
+    fitted = refit(bench, fitted, whiten)
+    contest = hold(bench, fitted, effects, scene, whiten)
+    if contest.finalists and contest.winner.fitted.chi2 > _DISCREPANT * int(bench.usable.sum()):
+        best = min((each.fitted for each in contest.finalists), key=lambda each: bench.rms_n(each.residual_n))
+        whiten = coloured(bench, best.residual_n, orthonormal(best.jacobian))
+        fitted = refit(bench, fitted, whiten, waves=5)
+        contest = hold(bench, fitted, effects, scene, whiten)
+    return fitted, whiten, contest
+
+
+def _revalued(bench: Bench, fitted: Fitted, whiten: Whitener) -> Fitted:
+    """The same model at its optimum under another noise."""
+    return refit(bench, fitted, whiten, waves=2)
+
+
+def _others(effects: Sequence[Effect], accepted: Sequence[Accepted]) -> list[Effect]:
+    taken = {each.effect.name for each in accepted}
+    return [effect for effect in effects if effect.name not in taken]
+
+
+def _acceptable(bench: Bench, fitted: Fitted, base: Fitted, contest: Contest, whiten: Whitener) -> Finalist | None:
+    """The first finalist that keeps every rule; None when nobody does."""
+    for each in contest.finalists[:2]:
+        explained = max(base.chi2 - fitted.chi2, 0.0)
+        if (
+            significant(each, contest.starts)
+            and each.gain > _LEAST_BESIDE * explained
+            and _worth(bench, fitted, each.fitted, whiten)
+        ):
+            return each
+    return None
+
+
+def _worth(bench: Bench, before: Fitted, after: Fitted, whiten: Whitener) -> bool:
+    """Does the second model save enough of the held-out squared error, and not only in a few blocks?"""
+    error_before = held_out(bench, before, whiten).errors
+    error_after = held_out(bench, after, whiten).errors
+    saved = error_before - error_after
+    weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
+    low = float(np.quantile(weights @ saved, 0.025))
+    return low > 0.0 and float(np.sum(saved)) > _LEAST_GAIN * float(np.sum(error_before))
+
+
+def _exchanged(
+    bench: Bench, fitted: Fitted, accepted: list[Accepted], effects: Sequence[Effect], whiten: Whitener
+) -> tuple[Fitted, list[Accepted]]:
+    """Take each accepted effect out and let all that are not in the model compete for its place.
+
+    It competes itself with the optimum that it has already reached.
+    """
+    for index in range(len(accepted) - 1, -1, -1):
+        if len(accepted) < 2:
+            break
+        holder, beside = accepted[index], accepted[:index] + accepted[index + 1 :]
+        lone = _reduced(bench, fitted, holder, beside, whiten)
+        scene = scene_of(bench, lone, whiten)
+        held = finalist(bench, holder.effect, holder.form, fitted, lone, whiten)
+        contest = hold(bench, lone, _others(effects, beside), scene, whiten, holder=held)
+        winner = contest.winner
+        if not significant(winner, contest.starts):
+            fitted, accepted = lone, beside
+        else:
+            fitted = winner.fitted
+            accepted = [*accepted[:index], Accepted(winner.effect, winner.form, contest), *accepted[index + 1 :]]
+    return fitted, accepted
+
+
+def _reduced(bench: Bench, fitted: Fitted, taken: Accepted, beside: Sequence[Accepted], whiten: Whitener) -> Fitted:
+    """The model without one effect, refitted."""
+    kept = {parameter.path for each in beside for parameter in each.form.parameters}
+    gone: tuple[Parameter, ...] = tuple(each for each in taken.form.parameters if each.path not in kept)
+    paths = {each.path for each in gone}
+    free = tuple(each for each in fitted.free if each.path not in paths)
+    return refine(bench, [Problem(without(fitted.point, gone), free)], whiten, waves=4)[0]
