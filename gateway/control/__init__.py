@@ -4,6 +4,9 @@
 supervision that shares nothing with it but the readings, over a state table. What a rig file may set is in `settings`.
 """
 
+from gateway.control.compensation import NO_COMPENSATION, Compensation, OutsideForce, Timing
+from gateway.control.compensation_cell import CellMap
+from gateway.control.compensation_command import CommandMap, sent
 from gateway.control.controller import Controller
 from gateway.control.decision import safe_output
 from gateway.control.inputs import NO_COMMAND, Line, Output
@@ -13,6 +16,10 @@ from gateway.control.settings import ControlSettings, Defaults, LeadSettings, Le
 __all__ = [
     "FAULT_CODES",
     "NO_COMMAND",
+    "NO_COMPENSATION",
+    "CellMap",
+    "CommandMap",
+    "Compensation",
     "ControlSettings",
     "Controller",
     "Defaults",
@@ -21,7 +28,10 @@ __all__ = [
     "Limits",
     "Line",
     "Output",
+    "OutsideForce",
     "Supervision",
+    "Timing",
     "Trim",
     "safe_output",
+    "sent",
 ]

@@ -10,7 +10,8 @@ cleared, so that the registers do not show an enable that is not there.
 from math import inf
 
 from gateway.bsfm import Bsfm
-from gateway.control.calibrating import RAMPING_DOWN, Calibrating
+from gateway.control.calibrating import RAMPING_DOWN, AnyPlan, Calibrating
+from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.contact import ContactSense
 from gateway.control.decision import Outcome, Standing, output_of, safe_output, warning_bits
 from gateway.control.demand import Demand, ramped_down
@@ -39,15 +40,25 @@ class Controller:
     """The force controller of one rig. Times are monotonic seconds; calls may come microseconds apart."""
 
     def __init__(
-        self, settings: ControlSettings, model: Bsfm, *, calibration_id: int, unclean_restart: bool = False
+        self,
+        settings: ControlSettings,
+        model: Bsfm,
+        *,
+        calibration_id: int,
+        unclean_restart: bool = False,
+        compensation: Compensation = NO_COMPENSATION,
     ) -> None:
+        """model: as volts are sent (compensation_command.sent), here as in `use`."""
+        settings = compensation.settings(settings)
+        self._compensation, self._outside_n = compensation, 0.0
         self.calibration_id = calibration_id
         self.state = State.OFF
         self._settings = settings
         self._follower = CommandFollower(settings)
-        self._pursuit = Pursuit(settings, model)
+        self._follower.use(model)
+        self._pursuit = Pursuit(settings, model, compensation.timing)
         self._supervisor = Supervisor(settings)
-        self._reader = Reader(settings.supervision)
+        self._reader = Reader(settings.supervision, compensation.cell)
         self._contact = ContactSense(settings.defaults.contact_threshold_n)
         self._response = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
         self.calibrating = Calibrating(settings, model)
@@ -71,8 +82,10 @@ class Controller:
         self._stopping = True
 
     def use(self, model: Bsfm, calibration_id: int) -> None:
-        """Swap the calibration; while enabled the voltage difference fades instead of jumping."""
-        self._pursuit.law.use(model, self._follower.demand.gravity_n)
+        """Swap the calibration; while enabled the voltage difference fades instead of jumping, and a force above the new
+        set's limits is left by the ramp."""
+        self._pursuit.law.use(model, self._given_n)
+        self._follower.use(model)
         self._response.use(model)
         self.calibrating.use(model)
         self.calibration_id = calibration_id
@@ -102,7 +115,8 @@ class Controller:
         self._pursuit.elapse(dt_s)
         self._response.advance(self._pursuit.stage.voltage_v, dt_s)
         rises, falls = self._follower.take(now_s, command)
-        self._sense(now_s, sample)
+        self._outside_n = self._compensation.outside_n(command.tilt_angle_rad, line.feed_mm_s)
+        self._sense(now_s, sample, line)
         self._obey(now_s, rises, falls, line)
         if self.state in ENABLED_STATES:
             self._supervise(now_s, line)
@@ -110,8 +124,14 @@ class Controller:
             self._pursue(now_s, dt_s)
         return output_of(command, self._standing(now_s, line), self._pursuit, self._reading, self._outcome)
 
-    def _sense(self, now_s: float, sample: ForceSample | None) -> None:
-        self._reading = reading = self._reader.read(now_s, sample, self._follower.demand.gravity_n)
+    @property
+    def _given_n(self) -> float:
+        """Contact force that the slide need not give."""
+        return self._follower.demand.gravity_n + self._outside_n
+
+    def _sense(self, now_s: float, sample: ForceSample | None, line: Line) -> None:
+        around = (line.temperature_c, self._pursuit.stage.voltage_v)
+        self._reading = reading = self._reader.read(now_s, sample, self._follower.demand.gravity_n, around)
         if not reading.is_new:
             return
         touching = self._contact.update(reading)
@@ -190,7 +210,7 @@ class Controller:
         self._follower.lease.start(now_s)
         self._outcome.events.append(f"info enabled by {self._follower.who}")
 
-    def _calibrate(self, now_s: float, line: Line, asked: RunPlan | None) -> None:
+    def _calibrate(self, now_s: float, line: Line, asked: AnyPlan | None) -> None:
         """Bit 5 has risen, or this machine asks."""
         if self.state is State.OFF:
             self._enable(now_s, line)
@@ -269,9 +289,11 @@ class Controller:
         if self.calibrating.running:
             self._climb(now_s)
             return
-        expected_n = self._response.force_n(self._pursuit.law.blend) + self._follower.demand.gravity_n
+        expected_n = self._response.force_n(self._pursuit.law.blend) + self._given_n
         held_back = self._supervisor.rise.is_too_high
-        moment = Moment(now_s, dt_s, self._reading, self._contact.touching, expected_n, held_back)
+        moment = Moment(
+            now_s, dt_s, self._reading, self._contact.touching, expected_n, held_back, outside_n=self._outside_n
+        )
         try:
             event = self._pursuit.step(self._target(), moment)
         except ModelError as error:
@@ -299,7 +321,7 @@ class Controller:
             warnings=warning_bits(int(line.warnings), self._pursuit, self._restarted, self._master_lost),
             touching=self._contact.touching,
             accepted_n=self._target().force_n if enabled else 0.0,
-            expected_cell_n=self._response.force_n(self._pursuit.law.blend),
+            expected_cell_n=self._response.force_n(self._pursuit.law.blend) + self._outside_n,
             calibration_phase=self.calibrating.phase,
             calibration_progress=self.calibrating.progress,
         )

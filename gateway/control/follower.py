@@ -1,8 +1,11 @@
 """Follows the command block: which bits rose and fell, what is demanded, and whether the heartbeat moved."""
 
+from dataclasses import replace
+
+from gateway.bsfm import Bsfm
 from gateway.control.demand import Demand, demand_of
 from gateway.control.lease import Lease
-from gateway.control.limits import NotFiniteError
+from gateway.control.limits import NotFiniteError, narrowed
 from gateway.control.settings import ControlSettings
 from gateway.registers.command import Command
 
@@ -15,8 +18,14 @@ class CommandFollower:
         self.demand: Demand = demand_of(self.command, settings)
         self.not_finite = ""
         self.lease = Lease(settings.supervision.lease_s)
-        self._settings = settings
+        self._settings = self._rig_settings = settings
         self._adopt_heartbeat = False
+
+    def use(self, model: Bsfm) -> None:
+        """Hold to the force limits of this calibration, too: the demand of the last command may become a smaller one."""
+        limits = narrowed(self._rig_settings.limits, model.limits_n)
+        self._settings = replace(self._rig_settings, limits=limits)
+        self._demand()
 
     def expect_clearing(self) -> None:
         """The bank is asked to zero the command: the next heartbeat value is its doing and not a beat."""
@@ -32,11 +41,14 @@ class CommandFollower:
             self._adopt_heartbeat = False
             self.lease.adopt(command.heartbeat)
         self.lease.observe(now_s, command.heartbeat)
+        self._demand()
+        return after & ~before, before & ~after
+
+    def _demand(self) -> None:
         try:
-            self.demand, self.not_finite = demand_of(command, self._settings), ""
+            self.demand, self.not_finite = demand_of(self.command, self._settings), ""
         except NotFiniteError as error:
             self.not_finite = str(error)
-        return after & ~before, before & ~after
 
     @property
     def who(self) -> str:

@@ -11,8 +11,9 @@ from math import isfinite
 from typing import Final
 
 from gateway.bsfm import RISING, Bsfm, Status
+from gateway.control.delayed import Delayed
 from gateway.control.demand import Demand
-from gateway.control.limits import TICK_S, Pace, is_below_usable, ramped
+from gateway.control.limits import TICK_S, Pace, is_below_usable, narrowed, ramped
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
@@ -47,15 +48,19 @@ class Approach:
 class ForceLaw:
     """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers."""
 
-    def __init__(self, model: Bsfm, limits: Limits, response_lag_s: float) -> None:
+    def __init__(self, model: Bsfm, limits: Limits, response_lag_s: float, delay_s: float = 0.0) -> None:
+        """delay_s: before the force begins to follow at all, not part of response_lag_s."""
         self.model = model
-        self._limits = limits
+        self._rig_limits = limits
+        self._limits = narrowed(limits, model.limits_n)
         self._lag_s = response_lag_s
+        self._delayed = Delayed(delay_s)
         self.reset()
 
     def reset(self) -> None:
         """Vented: nothing applied, nothing remembered."""
         self.applied_n = self.reference_n = 0.0
+        self._delayed.restart(0.0)
         self._memory = self.model.reversal.start()
         self._pace = Pace()
         self._carry_over_v = 0.0
@@ -69,18 +74,21 @@ class ForceLaw:
         """Swap the model without a bump: the voltage difference is carried over and fades."""
         before_v, _ = self.feedforward(gravity_n)
         self.model, self._memory = model, model.reversal.at(self.blend)
+        self._limits = narrowed(self._rig_limits, model.limits_n)
         after_v, _ = self.feedforward(gravity_n)
         self._carry_over_v += before_v - after_v
 
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
-        """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what the payload gives."""
+        """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what does not come from
+        the slide: the payload's weight, forces from outside."""
         self._pace.earn(dt_s)
         last_n = self.applied_n
         self.applied_n = ramped(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
         self._pace.spend(moved_n, rate_n_per_s)
         self._turn(last_n - gravity_n, self.applied_n - gravity_n)
-        self.reference_n += (self.applied_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
+        heard_n = self._delayed.advance(self.applied_n, dt_s)
+        self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
         return moved_n
 
@@ -99,6 +107,7 @@ class ForceLaw:
     def take_over(self, force_n: float, blend: float = RISING) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
         self.applied_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
+        self._delayed.restart(self.applied_n)
         self._memory = self.model.reversal.at(blend)
 
     def feedforward(self, gravity_n: float) -> tuple[float, LimitedBy]:

@@ -17,7 +17,8 @@ class Line:
 
     acknowledged_v: voltage that the device confirmed last, None before the first; unanswered_since_s: monotonic time of the
     oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered, lost);
-    owner_connected: False once the owning master's last connection has closed; late_s: how late this step runs.
+    owner_connected: False once the owning master's last connection has closed; late_s: how late this step runs;
+    temperature_c, feed_mm_s: of the load cell and under the tool, for compensation; nan: nobody knows.
     """
 
     acknowledged_v: float | None = None
@@ -28,6 +29,8 @@ class Line:
     owner_connected: bool = True
     late_s: float = 0.0
     warnings: WarningBit = _NO_WARNING
+    temperature_c: float = nan
+    feed_mm_s: float = nan
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,11 +51,15 @@ class LadderStep(NamedTuple):
 
 
 class LadderRun:
-    """rest_v: where the output stands while nothing is asked. ValueError for a plan that the rig does not allow."""
+    """stairs: others than the plan's own. ValueError for a plan that the rig does not allow."""
 
-    def __init__(self, plan: RunPlan, settings: ControlSettings, model: Bsfm) -> None:
+    end_phase: Final = CalibrationPhase.FITTING
+
+    def __init__(
+        self, plan: RunPlan, settings: ControlSettings, model: Bsfm, stairs: tuple[Stair, ...] | None = None
+    ) -> None:
         self.plan = plan
-        self.stairs = stairs_of(plan, settings.limits, model)
+        self.stairs = stairs_of(plan, settings.limits, model) if stairs is None else stairs
         self.found: Finding | None = None
         self.noise_n = self.rest_n = 0.0
         self.unsettled = 0
@@ -72,6 +76,16 @@ class LadderRun:
         return self.done >= len(self.stairs)
 
     @property
+    def is_waiting(self) -> bool:
+        """Rest force and noise are not known yet."""
+        return self._stair_s is None
+
+    @property
+    def ended(self) -> str:
+        """What is said at its end."""
+        return f"info calibration ladder done: {self.done} stairs, {self.unsettled} of them never settled"
+
+    @property
     def eta_s(self) -> float:
         dwell_s = self._dwelt_s / self.done if self.done else GUESSED_DWELL_S
         rest_s = 0.0 if self._stair_s is not None else ZERO_S
@@ -80,7 +94,7 @@ class LadderRun:
     @property
     def direction(self) -> float:
         """Which branch the plant is on, as a blend state."""
-        return float(self._stair.direction) if self._stair_s is not None else 1.0
+        return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
 
     @property
     def _stair(self) -> Stair:
@@ -160,7 +174,7 @@ class LadderRun:
             self.found = Finding(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
 
     def _answer(self, row: LadderRow | None) -> LadderStep:
-        if self._stair_s is None:
+        if self._stair_s is None or not self.stairs:
             return LadderStep(self._rest_v, CalibrationPhase.ZERO, 0.0, self.eta_s)
         progress = self.done / len(self.stairs)
         volts = self._rest_v if self.is_done else self._stair.voltage_v

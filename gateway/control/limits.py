@@ -6,6 +6,7 @@ tick when nothing moves, and so lets a new command act at the moment it arrives 
 beat the limit. On the wire: a rise between any two writes is at most slew x (time between them + one tick).
 """
 
+from dataclasses import replace
 from math import isfinite
 from typing import Final
 
@@ -33,6 +34,14 @@ def force_ranged(target_n: float, limits: Limits) -> Limited:
     target_n = finite(target_n, "force_setpoint_n")
     ranged_n = max(0.0, min(limits.force_max_n, target_n))
     return ranged_n, LimitedBy.NONE if ranged_n == target_n else LimitedBy.FORCE_RANGE
+
+
+def narrowed(limits: Limits, own_n: tuple[float, float] | None) -> Limits:
+    """The rig's limits with the smaller of its largest force and a calibration's. The smallest force of a set bounds setpoints,
+    in the bank: here it would keep a tool from its pre-contact force."""
+    if own_n is None:
+        return limits
+    return replace(limits, force_max_n=min(limits.force_max_n, finite(own_n[1], "force_high_n")))
 
 
 def is_below_usable(target_n: float, limits: Limits) -> bool:

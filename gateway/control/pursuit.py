@@ -12,6 +12,7 @@ from typing import Final
 
 from gateway.bsfm import Bsfm
 from gateway.control.band import Band
+from gateway.control.compensation import Timing
 from gateway.control.demand import Demand
 from gateway.control.force_law import Approach, ForceLaw
 from gateway.control.lead import Lead
@@ -30,7 +31,7 @@ _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mod
 @dataclass(frozen=True, slots=True)
 class Moment:
     """What one step knows. expected_n: the model's contact force at the lagged voltage; held_back: the first rise looks
-    wrong."""
+    wrong; outside_n: contact force that neither slide nor payload gives (compensation)."""
 
     now_s: float
     dt_s: float
@@ -38,16 +39,17 @@ class Moment:
     touching: bool
     expected_n: float
     held_back: bool = False
+    outside_n: float = 0.0
 
 
 class Pursuit:
     """Owns the applied target, the trim, the band and the voltage on the output."""
 
-    def __init__(self, settings: ControlSettings, model: Bsfm) -> None:
+    def __init__(self, settings: ControlSettings, model: Bsfm, timing: Timing | None = None) -> None:
         self.lead = Lead(settings.lead, settings.limits)
         # the trim compares with a force that comes as much sooner as the lead makes it: it must not learn the push
-        lag_s = max(TICK_S, settings.supervision.response_lag_s - self.lead.gained_s)
-        self.law = ForceLaw(model, settings.limits, lag_s)
+        delay_s, response_s = (timing.delay_s, timing.lags_s) if timing else (0.0, settings.supervision.response_lag_s)
+        self.law = ForceLaw(model, settings.limits, max(TICK_S, response_s - self.lead.gained_s), delay_s)
         self.trim = TrimIntegral(settings.trim)
         self.stage = VoltageStage(settings.limits)
         self.feedforward_v = 0.0
@@ -102,9 +104,10 @@ class Pursuit:
             goal_n = min(goal_n, demand.precontact_n)
         if self._was_touching and not moment.touching:
             law.fall_back(goal_n)
-        moved_n = law.advance(goal_n, rate_n_per_s, moment.dt_s, demand.gravity_n)
+        given_n = demand.gravity_n + moment.outside_n
+        moved_n = law.advance(goal_n, rate_n_per_s, moment.dt_s, given_n)
         self._learn(moment, moved_n)
-        model_v, by_model = law.feedforward(demand.gravity_n)
+        model_v, by_model = law.feedforward(given_n)
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
         wanted_v = model_v + self.trim.value_v
         push_v = self.lead.led_v(wanted_v) - wanted_v if has_model else 0.0

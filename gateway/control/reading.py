@@ -1,9 +1,11 @@
-"""What a sample means at the time of a step: zeroed, gravity compensated, with its age and whether it can be used."""
+"""What a sample means at the time of a step: corrected for known defects of the cell, zeroed, gravity compensated, with its
+age and whether it can be used."""
 
 from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Final
 
+from gateway.control.compensation_cell import CellMap
 from gateway.control.settings import Supervision
 from gateway.control.tare import Zero
 from gateway.devices.messages import ForceSample, Quality
@@ -31,18 +33,25 @@ NO_READING: Final = Reading()
 class Reader:
     """Turns samples into readings; a sample given twice is not new the second time."""
 
-    def __init__(self, supervision: Supervision) -> None:
+    def __init__(self, supervision: Supervision, cell: CellMap | None = None) -> None:
+        """cell: its known defects; None: the reading is the force."""
         self.zero = Zero(supervision)
+        self._cell = cell
         self._saturation_n = supervision.saturation_n
         self._timeout_s = supervision.sample_timeout_s
         self._last_s = nan
 
-    def read(self, now_s: float, sample: ForceSample | None, gravity_n: float) -> Reading:
+    def read(
+        self, now_s: float, sample: ForceSample | None, gravity_n: float, around: tuple[float, float] = (nan, 0.0)
+    ) -> Reading:
+        """around: temperature of the cell in degrees C (nan: not known) and voltage on the output."""
         if sample is None:
             return NO_READING
         force_n = sample.force_n
         overload = sample.quality is Quality.OVERLOAD or abs(force_n) >= self._saturation_n
         usable = isfinite(force_n) and not overload
+        if self._cell is not None and usable:
+            force_n = self._cell.force_n(force_n, *around)
         interval_s = self._interval_s(sample.time_s)
         if interval_s > 0.0 and usable:
             self.zero.observe(force_n)

@@ -11,7 +11,7 @@ Nothing here imports scipy: `check` answers at once.
 from gateway.profiles.faults import Fault, ProfileError
 from gateway.profiles.find import root, shipped
 from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
-from gateway.profiles.models import Network
+from gateway.profiles.models import Network, ResidualWatch
 from gateway.profiles.plants import Origin, PlantProfile
 from gateway.profiles.report import Report, check_report, load_rig
 from gateway.profiles.rig import CellLine, OutputLine, Rig
@@ -26,6 +26,7 @@ __all__ = [
     "PlantProfile",
     "ProfileError",
     "Report",
+    "ResidualWatch",
     "Rig",
     "check_report",
     "load_calibration",

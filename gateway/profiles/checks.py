@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.bsfm.model import Calibration
+from gateway.control.compensation import Compensation
 from gateway.control.settings import Defaults, Limits, Supervision, Trim
 from gateway.devices import DeviceProfile
 from gateway.profiles.models import CellFile, Network, OutputFile
@@ -40,6 +41,8 @@ class Parts:
     cell_device: DeviceProfile | None = None
     plant: PlantProfile | None = None
     calibration: Calibration | None = None
+    extended: PlantProfile | None = None
+    compensation: Compensation | None = None
 
 
 Check = Callable[[Parts], Found]
@@ -192,6 +195,14 @@ def plant_has_air(parts: Parts) -> Found:
         yield "limits.voltage_max_v", f"{volt(most_v)} asks for {asked}, the plant's supply has {there}: {end}"
 
 
+def compensation_compensates(parts: Parts) -> Found:
+    if parts.extended is None or parts.compensation is None or not parts.compensation.is_null:
+        return
+    limited = parts.compensation.limited
+    why = "; ".join(f"{name}: {reason}" for name, reason in limited) or "it has no effect that control could take back"
+    yield "compensation", f"{parts.extended.name} leaves nothing to compensate ({why}): leave this line out"
+
+
 FAULTS: Final[tuple[Check, ...]] = (
     voltages_fit,
     forces_fit,
@@ -201,5 +212,6 @@ FAULTS: Final[tuple[Check, ...]] = (
     calibration_fits_the_cell,
     times_fit,
     a_simulated_rig_has_a_plant,
+    compensation_compensates,
 )
 WARNINGS: Final[tuple[Check, ...]] = (a_real_rig_is_wise, contact_can_be_felt, plant_has_air)

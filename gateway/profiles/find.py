@@ -12,6 +12,7 @@ FOLDERS: Final = {
     "plant": "plants",
     "calibration": "calibrations",
     "registers": "registers",
+    "plan": "plans",
 }
 """Kind of profile -> its folder."""
 
@@ -26,7 +27,7 @@ def root() -> Path:
 
 
 def shipped(kind: str) -> list[str]:
-    """Names of the shipped profiles of a kind (rig, device, plant, calibration, registers)."""
+    """Names of the shipped profiles of a kind (rig, device, plant, calibration, registers, plan)."""
     return sorted(path.stem for path in (root() / FOLDERS[kind]).glob("*.yaml"))
 
 

@@ -89,6 +89,16 @@ class Network:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ResidualWatch:
+    """The process that compares what is measured with the rig's plant while the gateway works."""
+
+    __pydantic_config__ = STRICT
+    enabled: bool | None = None  # null: in a simulated rig only; a real one says true once `plant` is its own
+    window_s: Annotated[float, Ge(5), Le(600)] = 60.0  # time that one judgement looks back
+    every_s: Annotated[float, Ge(1), Le(600)] = 20.0  # time between looks; longer where a judgement takes longer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RigFile:
     """One cell: which devices on which ports, with which map, plant, calibration, limits and loop rate."""
 
@@ -101,8 +111,9 @@ class RigFile:
     seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 0  # of the simulation's noise
     loop_hz: Annotated[float, Ge(50), Le(250)] = 100.0  # rate of the control loop's tick; setpoints act on arrival
     registers: Annotated[str, MinLen(1)] = "force-v1"  # the Modbus map
-    plant: Annotated[str, MinLen(1)] | None = None  # what is simulated; a real rig needs it for `run --sim` only
+    plant: Annotated[str, MinLen(1)] | None = None  # what is simulated; in a real rig for `--sim` and residual_watch
     calibration: Annotated[str, MinLen(1)]  # voltage-force model to start with
+    compensation: Annotated[str, MinLen(1)] | None = None  # an extended plant, of which control takes back what it can
     output: OutputFile
     load_cell: CellFile
     limits: Limits
@@ -111,4 +122,5 @@ class RigFile:
     lead: LeadSettings = field(default_factory=LeadSettings)
     supervision: Supervision = field(default_factory=Supervision)
     network: Network = field(default_factory=Network)
+    residual_watch: ResidualWatch = field(default_factory=ResidualWatch)
     accept_no_device_watchdog: bool = False  # true: enable although the output device has no watchdog of its own

@@ -6,16 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
 
+from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.settings import ControlSettings, Defaults, Limits, Supervision, Trim
 from gateway.devices import DeviceProfile
 from gateway.profiles import checks, line_checks, network_checks
 from gateway.profiles.calibrations import read_calibration
 from gateway.profiles.checks import Check, Parts
+from gateway.profiles.compensating import compensation_of, compensation_words, in_simulation, without_compensable
 from gateway.profiles.device_files import read_device
 from gateway.profiles.faults import Fault, Findings, ProfileError
 from gateway.profiles.load import asked_for, load_plant, open_profile, read_named, written_at
 from gateway.profiles.models import CellFile, Network, OutputFile, RigFile
-from gateway.profiles.plants import read_plant
+from gateway.profiles.plants import PlantProfile, read_plant
 from gateway.profiles.register_files import read_registers
 from gateway.profiles.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
 from gateway.profiles.text import Document
@@ -96,6 +98,8 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     def named(kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]) -> T | None:
         return read_named(kind, written_at(document, path, folder), read, findings)
 
+    plant = named("plant", ("plant",), read_plant)
+    extended = named("plant", ("compensation",), read_plant)
     loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else 100.0
     return Parts(
         name=str(document.at("name")),
@@ -113,8 +117,18 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         calibration=named("calibration", ("calibration",), read_calibration),
         output_device=named("device", ("output", "device"), read_device),
         cell_device=named("device", ("load_cell", "device"), read_device),
-        plant=named("plant", ("plant",), read_plant),
+        plant=plant,
+        extended=extended,
+        compensation=_compensation(plant, extended),
     )
+
+
+def _compensation(plant: PlantProfile | None, extended: PlantProfile | None) -> Compensation | None:
+    """Of what differs from the rig's plant, and of what control could take back of that one, too."""
+    if extended is None:
+        return None
+    base = (plant or load_plant(STAND_IN_PLANT)).plant
+    return compensation_of(without_compensable(base), extended.plant)
 
 
 def _part(document: Document, key: str, kind: type[T]) -> T | None:
@@ -129,6 +143,8 @@ def _part(document: Document, key: str, kind: type[T]) -> T | None:
 
 def _assembled(file: RigFile, parts: Parts, register_map: RegisterMap, path: Path, findings: Findings) -> Rig:
     assert parts.output_device and parts.cell_device and parts.calibration  # or there were faults
+    compensation = parts.compensation or NO_COMPENSATION
+    compensation = in_simulation(compensation) if file.simulated else compensation
     return Rig(
         name=file.name,
         description=file.description,
@@ -150,10 +166,13 @@ def _assembled(file: RigFile, parts: Parts, register_map: RegisterMap, path: Pat
             supervision=file.supervision,
         ),
         network=file.network,
+        residual_watch=file.residual_watch,
         supported_bits=SUPPORTED_BITS,
         accept_no_device_watchdog=file.accept_no_device_watchdog,
         texts={name: text.decode("utf-8-sig") for name, text in findings.texts.items()},
         fingerprint=_fingerprint(findings.texts.values()),
+        notes=compensation_words(compensation) if parts.compensation else (),
+        compensation=compensation,
     )
 
 

@@ -6,10 +6,13 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
-from gateway.bsfm.model import Calibration
+from gateway.bsfm.model import Bsfm, Calibration
+from gateway.control.compensation import NO_COMPENSATION, Compensation
+from gateway.control.compensation_command import sent
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
-from gateway.profiles.models import Network
+from gateway.profiles.compensating import in_simulation
+from gateway.profiles.models import Network, ResidualWatch
 from gateway.profiles.plants import PlantProfile
 from gateway.registers.map import RegisterMap
 from gateway.registers.words import ControlBit
@@ -75,16 +78,29 @@ class Rig:
     calibration: Calibration
     control: ControlSettings
     network: Network
+    residual_watch: ResidualWatch
     supported_bits: ControlBit
     accept_no_device_watchdog: bool
     texts: Mapping[str, str]
     fingerprint: str
     notes: tuple[str, ...] = ()
+    compensation: Compensation = NO_COMPENSATION
 
     @property
     def plant(self) -> Plant | None:
         """What is simulated; None for a real rig that names no plant."""
         return self.plant_profile.plant if self.plant_profile else None
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether a residual watch runs beside the gateway: there is a plant, and it is (said to be) this machine's."""
+        enabled = self.residual_watch.enabled
+        return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
+
+    def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
+        """The calibration's model as control uses it here: a bent command map is straightened, but for a calibration that was
+        made on this very rig, for that has measured it."""
+        return model if calibration.rig == self.name else sent(model, self.compensation.command)
 
     def ports(self) -> dict[str, str]:
         """The serial ports of a real rig, by line; empty for a simulated one."""
@@ -98,6 +114,9 @@ class Rig:
         notes, network = self.notes, self.network
         if self.plant_profile is None and self.stand_in is not None:
             notes = (*notes, f"rig {self.name} names no plant: {self.stand_in.name} is simulated in its place")
+        compensation = in_simulation(self.compensation)
+        if compensation.outside is not self.compensation.outside:
+            notes = (*notes, "no force from outside is simulated, so none is compensated")
         if not ip_address(network.bind).is_loopback:
             notes = (*notes, f"bound to 127.0.0.1: a simulated rig does not take the cell's address {network.bind}")
             network = replace(network, bind="127.0.0.1")
@@ -109,4 +128,5 @@ class Rig:
             plant_profile=self.plant_profile or self.stand_in,
             network=network,
             notes=notes,
+            compensation=compensation,
         )

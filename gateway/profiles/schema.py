@@ -14,6 +14,8 @@ from functools import cache
 from typing import Any, Final
 
 from gateway.bsfm.model import Calibration
+from gateway.control.experiment_plan import ExperimentPlan
+from gateway.control.ladder_stairs import RunPlan
 from gateway.devices import DeviceProfile
 from gateway.profiles.find import FOLDERS, root
 from gateway.profiles.models import RigFile
@@ -56,7 +58,7 @@ def field_comments(kind: type) -> dict[str, str]:
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """The JSON schema of a kind of profile: rig, device, plant, calibration or registers. KeyError for any other."""
+    """The JSON schema of a kind of profile: rig, device, plant, calibration, registers or plan. KeyError for any other."""
     head = {"$schema": DIALECT, "title": f"force-gateway {kind}"}
     return head | _MAKERS[kind]() | {"title": head["title"]}
 
@@ -122,12 +124,20 @@ def _with_origin(leaf: dict[str, Any]) -> dict[str, Any]:
     return about | form | {"x-source": True} | null
 
 
+def plan_schema() -> dict[str, Any]:
+    """The schema of a plan file: an experiment, or a ladder."""
+    experiment, ladder = dataclass_schema(ExperimentPlan), dataclass_schema(RunPlan)
+    definitions = experiment.pop("$defs", {}) | ladder.pop("$defs", {})
+    return {"anyOf": [experiment, ladder], "$defs": definitions}
+
+
 _MAKERS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
     "rig": lambda: dataclass_schema(RigFile),
     "device": lambda: dataclass_schema(DeviceProfile),
     "plant": plant_schema,
     "calibration": lambda: dataclass_schema(Calibration),
     "registers": register_map_schema,
+    "plan": plan_schema,
 }
 
 

@@ -229,6 +229,32 @@ def test_a_calibration_is_swapped_without_a_bump():
     assert bench.controller.calibration_id == 2
 
 
+def test_a_set_with_a_lower_force_limit_is_swapped_in_by_the_ramp_and_out_again():
+    bench = enabled()
+    bench.force(20.0)
+    bench.run(1.0)
+    before_v = bench.last.voltage_v
+    bench.controller.use(replace(bsfm(), limits_n=(1.0, 15.0)), 2)
+    assert bench.step().voltage_v == pytest.approx(before_v, abs=0.5), "2 N of the ramp at most"
+    output = bench.run(1.5)
+    assert output.force_accepted_n == 15.0
+    assert output.limited_by is LimitedBy.FORCE_RANGE
+    assert abs(bench.plant.force_n - 15.0) < 1.0
+    bench.controller.use(bsfm(), 3)
+    output = bench.run(1.5)
+    assert (output.force_accepted_n, output.limited_by) == (20.0, LimitedBy.NONE)
+    assert abs(bench.plant.force_n - 20.0) < 1.0
+
+
+def test_the_smallest_force_of_a_set_does_not_keep_the_tool_from_its_first_contact():
+    bench = enabled()
+    bench.controller.use(replace(bsfm(), limits_n=(5.0, 40.0)), 2)
+    bench.force(10.0)
+    bench.run(1.5)
+    assert bench.last.state is State.HOLDING
+    assert abs(bench.plant.force_n - 10.0) < 1.0
+
+
 def test_chatter_of_the_setpoint_does_not_leave_the_band():
     bench = enabled()
     bench.force(20.0)
