@@ -1,0 +1,38 @@
+"""Files of an answer: all of them whole, or none, and never over what they were made from."""
+
+import errno
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import click
+
+
+def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """UsageError where two outputs, or an output and an input, are one file. FileNotFoundError where no directory is."""
+    taken = {path.resolve(): f"{path} is read" for path in inputs if path.exists()}
+    for target in targets:
+        if target.resolve() in taken:
+            raise click.UsageError(f"{target} would be overwritten: {taken[target.resolve()]}")
+        taken[target.resolve()] = f"{target} is written by another option"
+        if not target.parent.is_dir():
+            raise FileNotFoundError(errno.ENOENT, "no such directory", str(target.parent))
+
+
+def write_all(texts: Mapping[Path, str]) -> None:
+    """Each beside its name first; only when all are on the disk are they renamed. OSError, and no file has changed.
+
+    A device (/dev/null, a terminal) is written to in the end: nobody wants it replaced by a file.
+    """
+    devices = [path for path in texts if path.exists() and not path.is_file()]
+    beside = {path: path.with_name(f".{path.name}.{os.getpid()}") for path in texts if path not in devices}
+    try:
+        for path, fresh in beside.items():
+            fresh.write_text(texts[path], encoding="utf-8")
+        for path, fresh in beside.items():
+            fresh.replace(path)
+    finally:
+        for fresh in beside.values():
+            fresh.unlink(missing_ok=True)
+    for path in devices:
+        path.write_text(texts[path], encoding="utf-8")

@@ -1,0 +1,80 @@
+"""What is diagnosed: recordings by path or number, and the plant that they are compared with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import state_directory
+from gateway.diagnosis.measurement import Measurement
+from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
+from gateway.recording import Recording, find_recording, read_table
+from gateway.recording.mapping_file import column_mapping
+from gateway.recording.measurement import measurement_of
+from gateway.service.recorded_rig import plant_of, rig_of
+
+START_PLANT: Final = "paper-slide"
+_ANY_STATE: Final = "demo"  # whose state directory is meant where neither --state nor --rig says one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sources:
+    """paths: of the recordings, as found; rig: its name, empty for none; known_rig: where it is known here; notes: what was
+    decided."""
+
+    paths: tuple[Path, ...]
+    measurements: tuple[Measurement, ...]
+    plant: PlantProfile
+    rig: str
+    known_rig: Rig | None
+    notes: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The recordings in a few words."""
+        first, count = self.paths[0].name, len(self.paths)
+        return first if count == 1 else f"{first} and {count - 1} more"
+
+
+def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, state: Path | None) -> Sources:
+    """Everything that the diagnosis takes. RecordingError and CliError (65) for data, ProfileError for a rig."""
+    paths = tuple(_path(name, rig, state) for name in names)
+    known = load_rig(rig) if rig else None
+    mapping = column_mapping(columns)
+    recordings = [read_table(path, mapping) for path in paths]
+    measurements = tuple(measurement_of(recording) for recording in recordings)
+    rig_name, plant, notes = _of_rig(known) if known else _recorded(recordings)
+    here = known or rig_of(recordings[0])
+    return Sources(paths=paths, measurements=measurements, plant=plant, rig=rig_name, known_rig=here, notes=notes)
+
+
+def _path(name: str, rig: str | None, state: Path | None) -> Path:
+    path = Path(name)
+    if name.isdecimal() and not path.exists():
+        return find_recording(state_directory(state, rig or _ANY_STATE), int(name))
+    if not path.exists():
+        raise CliError(
+            f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA
+        )
+    return path
+
+
+def _of_rig(rig: Rig) -> tuple[str, PlantProfile, tuple[str, ...]]:
+    if rig.plant_profile:
+        return rig.name, rig.plant_profile, ()
+    plant = rig.stand_in or load_plant(START_PLANT)
+    return rig.name, plant, (f"rig {rig.name} names no plant: {plant.name} is the start",)
+
+
+def _recorded(recordings: Sequence[Recording]) -> tuple[str, PlantProfile, tuple[str, ...]]:
+    """The rig that the first recording carries or names, else the paper's."""
+    names = [str(recording.header.get("rig") or "") for recording in recordings]
+    notes = [f"the recordings are of several rigs: {', '.join(sorted(set(names)))}"] if len(set(names)) > 1 else []
+    plant = plant_of(recordings[0])
+    if plant is None:
+        plant = load_plant(START_PLANT)
+        missing = f"rig {names[0]} is not known here" if names[0] else "the recording names no rig"
+        notes.append(f"{missing}: the plant {START_PLANT} is the start; --rig names another")
+    return names[0], plant, tuple(notes)

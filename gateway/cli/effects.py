@@ -1,0 +1,79 @@
+"""`effects`: the catalogue of physical causes that `diagnose` knows."""
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gateway.cli.options import json_option
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from gateway.diagnosis import Effect
+
+FORMAT = 1
+
+
+@click.command()
+@json_option
+def command(*, as_json: bool) -> None:
+    """List the effects that diagnose can name.
+
+    For each: what it is, what it looks like, what a recording must contain to show it, its parameters, and the effects
+    that it is easily taken for.
+    """
+    from gateway.diagnosis import EFFECTS
+
+    if as_json:
+        document = {"format": FORMAT, "effects": [_facts(effect) for effect in EFFECTS]}
+        click.echo(json.dumps(document, indent=2, ensure_ascii=False))
+        return
+    from rich.console import Console
+
+    console = Console()
+    for family in dict.fromkeys(effect.family for effect in EFFECTS):
+        console.print(_table(family, [effect for effect in EFFECTS if effect.family == family]))
+        console.print()
+    console.print(
+        f"{len(EFFECTS)} effects; all are off in a plant that does not name them", style="dim", highlight=False
+    )
+
+
+def _facts(effect: "Effect") -> dict[str, Any]:
+    """The contract's fields; family and needs besides."""
+    return {
+        "name": effect.name,
+        "family": effect.family,
+        "what": effect.what,
+        "signature": effect.signature,
+        "excitation": effect.excitation,
+        "needs": list(effect.needs),
+        "parameters": [
+            {"name": parameter.name, "unit": parameter.unit, "section": parameter.section, "null": parameter.null}
+            for parameter in effect.parameters
+        ],
+        "group": list(effect.group),
+    }
+
+
+def _table(family: str, effects: "list[Effect]") -> "Table":
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim", title_justify="left")
+    table.add_column(family, no_wrap=True, min_width=23)
+    table.add_column("what it is")
+    for effect in effects:
+        parameters = ", ".join(f"{parameter.name} ({parameter.unit or '1'})" for parameter in effect.parameters)
+        needs = f"; needs the column {' and '.join(effect.needs)}" if effect.needs else ""
+        told = Text(effect.what)
+        for keyword, text in (
+            ("seen as", effect.signature),
+            ("record", effect.excitation + needs),
+            ("sized by", parameters),
+        ):
+            told.append(f"\n{keyword}: {text}", style="dim")
+        table.add_row(Text(effect.name, style="bold"), told)
+    return table

@@ -1,0 +1,251 @@
+"""What the charts of a diagnosis show, from the rows of a recording: envelopes, means over bins, directions, spectra.
+
+Nothing is thinned by leaving rows out: a million rows become the least and the greatest of each column of the picture, or
+the cells of the picture that hold a row. So a spike of one row is seen, and the files stay small.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.diagnosis.result import Trace
+
+RISING, FALLING = 1, -1
+_WALK_ROWS: Final = 20_000  # of the play operator, which is a loop in Python
+_PLAY_SHARE: Final = 0.01  # of the drive's range: smaller wobble is no change of direction
+_GAP_STEPS: Final = 3.0
+_WELCH_ROWS: Final = 2048
+_CONSTANT: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """Least and greatest value in each column of a picture; broken where nothing was measured: `pieces` of columns."""
+
+    x: Floats
+    low: Floats
+    high: Floats
+    pieces: tuple[slice, ...]
+
+
+def envelope(x: Floats, y: Floats, columns: int) -> Envelope:
+    """x rising, shape (rows,); y may hold NaN, which is left out."""
+    held = np.isfinite(x) & np.isfinite(y)
+    x, y = x[held], y[held]
+    if x.size <= columns:
+        return Envelope(x, y, y, _pieces(x, _usual_step(x) * _GAP_STEPS))
+    width = max((x[-1] - x[0]) / columns, 1e-300)
+    column = np.minimum(((x - x[0]) / width).astype(np.int64), columns - 1)
+    starts = np.flatnonzero(np.diff(column, prepend=-1))
+    middle = x[0] + (column[starts] + 0.5) * width
+    low, high = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
+    return Envelope(middle, low, high, _pieces(middle, max(_GAP_STEPS * _usual_step(x), 1.5 * width)))
+
+
+def _usual_step(x: Floats) -> float:
+    return float(np.median(np.diff(x))) if x.size > 1 else 1.0
+
+
+def _pieces(x: Floats, gap: float) -> tuple[slice, ...]:
+    ends = [0, *(np.flatnonzero(np.diff(x) > gap * (1.0 + 1e-9)) + 1).tolist(), x.size]
+    return tuple(slice(start, end) for start, end in pairwise(ends) if end > start)
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What one recording's judged rows leave: residuals are measured minus simulated. All arrays (judged rows,)."""
+
+    time_s: Floats
+    measured_n: Floats
+    before_n: Floats
+    after_n: Floats
+
+    @classmethod
+    def of(cls, trace: Trace) -> "Left":
+        measurement = trace.measurement
+        usable = measurement.usable
+        measured_n = measurement.force_n[usable]
+        return cls(
+            measurement.time_s[usable],
+            measured_n,
+            measured_n - trace.before_n[usable],
+            measured_n - trace.after_n[usable],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """The judged rows of all recordings on end: residuals (measured minus simulated) and what they may depend on."""
+
+    before_n: Floats
+    after_n: Floats
+    quantities: dict[str, Floats]
+    direction: Floats
+
+
+def joined(traces: Sequence[Trace]) -> Rows:
+    """quantities: the drive, the time and every covariate, by name; NaN where a recording does not have it."""
+    parts = [_quantities(trace.measurement) for trace in traces]
+    names = dict.fromkeys(name for part in parts for name in part)
+    usable = [trace.measurement.usable for trace in traces]
+
+    def column(name: str) -> Floats:
+        absent = [np.full(int(mask.sum()), np.nan) for mask in usable]
+        return np.concatenate(
+            [part[name][mask] if name in part else gap for part, mask, gap in zip(parts, usable, absent, strict=True)]
+        )
+
+    return Rows(
+        np.concatenate([Left.of(trace).before_n for trace in traces]),
+        np.concatenate([Left.of(trace).after_n for trace in traces]),
+        {name: column(name) for name in names},
+        np.concatenate([direction(trace.measurement)[trace.measurement.usable] for trace in traces]),
+    )
+
+
+def drive(measurement: Measurement) -> tuple[str, Floats]:
+    """The axis that a loop is drawn over: command, else pressure; time where there is neither."""
+    if measurement.command_v is not None:
+        return "command (V)", measurement.command_v
+    if measurement.pressure_pa is not None:
+        return "pressure (kPa)", measurement.pressure_pa / 1e3
+    return "time (s)", measurement.time_s
+
+
+def _quantities(measurement: Measurement) -> dict[str, Floats]:
+    label, values = drive(measurement)
+    found = {label: values}
+    if measurement.pressure_pa is not None and measurement.command_v is not None:
+        found["pressure (kPa)"] = measurement.pressure_pa / 1e3
+    if measurement.position_m is not None:
+        found["position_mm"] = measurement.position_m * 1e3
+    return found | dict(measurement.covariates)
+
+
+def direction(measurement: Measurement) -> Floats:
+    """+1 rising, -1 falling, 0 before the first move, shape (rows,): of the position where it was measured, else of the
+    drive. Play of a hundredth of the range keeps noise from being a reversal."""
+    values = measurement.position_m if measurement.position_m is not None else drive(measurement)[1]
+    if values.size == 0:
+        return values
+    every = -(-values.size // _WALK_ROWS)
+    walked = _walk(values[::every])
+    return np.repeat(walked, every)[: values.size]
+
+
+def _walk(values: Floats) -> Floats:
+    ways, way = np.zeros(values.size), 0.0
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        return ways
+    held, play = float(finite[0]), _PLAY_SHARE * float(np.ptp(finite))
+    for row, value in enumerate(values.tolist()):
+        if value > held + play:
+            held, way = value - play, float(RISING)
+        elif value < held - play:
+            held, way = value + play, float(FALLING)
+        ways[row] = way
+    return ways
+
+
+@dataclass(frozen=True, slots=True)
+class Binned:
+    """Means over equal bins of what they are drawn against."""
+
+    x: Floats
+    mean: Floats
+
+
+def binned(x: Floats, y: Floats, bins: int = 30, least: int = 5) -> Binned:
+    held = np.isfinite(x) & np.isfinite(y)
+    x, y = x[held], y[held]
+    if x.size == 0 or is_constant(x):
+        return Binned(np.zeros(0), np.zeros(0))
+    place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
+    count = np.bincount(place, minlength=bins)
+    full = count >= least
+    x_sum, y_sum = np.bincount(place, x, bins), np.bincount(place, y, bins)
+    return Binned(x_sum[full] / count[full], y_sum[full] / count[full])
+
+
+def is_constant(values: Floats) -> bool:
+    """No two different numbers in it, or none at all."""
+    finite = values[np.isfinite(values)]
+    return finite.size == 0 or float(np.ptp(finite)) <= _CONSTANT * max(1.0, float(np.abs(finite).max()))
+
+
+def dependence(x: Floats, y: Floats, bins: int = 20) -> float:
+    """Share of the variance of y that its mean over bins of x carries, 0..1."""
+    held = np.isfinite(x) & np.isfinite(y)
+    x, y = x[held], y[held]
+    if x.size < 2 * bins or is_constant(x) or is_constant(y):
+        return 0.0
+    place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
+    count = np.bincount(place, minlength=bins)
+    mean = np.bincount(place, y, bins) / np.maximum(count, 1)
+    between = float(np.sum(count * (mean - y.mean()) ** 2))
+    return between / (float(y.var()) * y.size)
+
+
+def occupied(
+    x: Floats, y: Floats, cells: tuple[int, int], limits: tuple[float, float, float, float]
+) -> NDArray[np.int64]:
+    """The cells (column, row) of a picture that hold at least one point, shape (n, 2). limits: x low, high, y low, high."""
+    x_low, x_high, y_low, y_high = limits
+    held = np.isfinite(x) & np.isfinite(y)
+    across = np.clip((x[held] - x_low) / (x_high - x_low) * cells[0], 0, cells[0] - 1).astype(np.int64)
+    up = np.clip((y[held] - y_low) / (y_high - y_low) * cells[1], 0, cells[1] - 1).astype(np.int64)
+    place = np.unique(across * cells[1] + up)
+    return np.stack([place // cells[1], place % cells[1]], axis=1)
+
+
+def spectrum(time_s: Floats, values: Floats, points: int = 140) -> tuple[Floats, Floats]:
+    """(frequency Hz, amplitude density N/sqrt(Hz)) by Welch's method over the stretches without gaps.
+
+    The greatest of each of `points` bands that are equally wide on a logarithmic axis: no line is lost. Empty where no
+    stretch is long enough. Rows are brought to equal steps by linear interpolation, which dampens the top of the band.
+    """
+    if time_s.size < 32:
+        return np.zeros(0), np.zeros(0)
+    step_s = _usual_step(time_s)
+    stretches = [
+        np.interp(np.arange(time_s[piece][0], time_s[piece][-1], step_s), time_s[piece], values[piece])
+        for piece in _pieces(time_s, _GAP_STEPS * step_s)
+    ]
+    longest = max(stretch.size for stretch in stretches)
+    rows = min(_WELCH_ROWS, 2 ** int(np.log2(max(longest / 4, 2))))
+    long_enough = [stretch for stretch in stretches if stretch.size >= rows]
+    if rows < 16:
+        return np.zeros(0), np.zeros(0)
+    found = [signal.welch(stretch, 1.0 / step_s, nperseg=rows, detrend="constant") for stretch in long_enough]
+    power = np.average([density for _, density in found], axis=0, weights=[stretch.size for stretch in long_enough])
+    return _banded(np.asarray(found[0][0])[1:], np.sqrt(power)[1:], points)
+
+
+def _banded(frequency_hz: Floats, density: Floats, points: int) -> tuple[Floats, Floats]:
+    edges = np.geomspace(frequency_hz[0], frequency_hz[-1] * (1.0 + 1e-9), points + 1)
+    band = np.searchsorted(edges, frequency_hz, side="right")
+    starts = np.flatnonzero(np.diff(band, prepend=-1))
+    peaks = np.maximum.reduceat(density, starts)
+    at = [int(start + np.argmax(density[start:end])) for start, end in zip(starts, [*starts[1:], None], strict=True)]
+    return frequency_hz[at], peaks
+
+
+def most_telling_window(left: Left, share: float = 0.08) -> tuple[float, float]:
+    """(start, end), s: the stretch in which the extended model gains most, or where the error is greatest."""
+    time_s, before_n, after_n = left.time_s, left.before_n, left.after_n
+    span_s = share * float(time_s[-1] - time_s[0])
+    gain = np.nan_to_num(before_n**2 - after_n**2)
+    if not np.any(gain > 0.0):
+        gain = np.nan_to_num(before_n**2)
+    total = np.concatenate([[0.0], np.cumsum(gain)])
+    starts = np.searchsorted(time_s, np.linspace(time_s[0], time_s[-1] - span_s, 200))
+    ends = np.searchsorted(time_s, time_s[starts] + span_s)
+    best = int(np.argmax(total[ends] - total[starts]))
+    return float(time_s[starts[best]]), float(time_s[starts[best]]) + span_s
