@@ -2,11 +2,14 @@
 
 import asyncio
 import gc
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
 
 def pytest_configure() -> None:

@@ -54,7 +54,7 @@ def _facts(rig: "Rig") -> dict[str, str]:
         "rig": f"{rig.name}: {rig.description}" + (" (simulated)" if rig.simulated else ""),
         "output": f"{rig.output.device.name}, {rig.output.baud} baud, {rig.output.port or 'simulated'}",
         "load_cell": f"{rig.load_cell.device.name}, {rig.load_cell.baud} baud, {rig.load_cell.port or 'simulated'}",
-        "calibration": f"{rig.calibration.name}, bsfm n={rig.calibration.order}",
+        "calibration": f"{rig.calibration.name}, {rig.calibration.kind}",
         "limits": f"0 .. {limits.force_max_n:g} N, {limits.voltage_min_v:g} .. {limits.voltage_max_v:g} V",
         "modbus tcp": f"{rig.network.bind}:{rig.network.port}",
         "fingerprint": rig.fingerprint[:16],

@@ -11,8 +11,9 @@ from gateway.cli.errors import CliError
 from gateway.cli.refused import explained
 from gateway.cli.upload_frames import Request, Upload
 from gateway.modbus.pdu import WRITE_REGISTER
-from gateway.registers.words import CommitStatus
+from gateway.registers.words import CommitStatus, UploadReason
 
+_OURS: Final = (UploadReason.STORAGE, UploadReason.DEFECT)
 _PATIENCE_S = 10.0  # a disk may be slow, a hung one is no disk
 _POLL_S: Final = 0.01
 _PLACES: Final = ("rising handle", "rising weight", "falling handle", "falling weight")
@@ -64,7 +65,7 @@ class Master(GatewayClient):
 
     def _failed(self, index: int, reason: int) -> CliError:
         unchanged = f"active set {self.calibration_id()} unchanged"
-        if not reason:
+        if reason in _OURS:
             return CliError(f"E431 the gateway could not store the set, its log says why; {unchanged}")
         name = self.register_map.find("failing_reason").values.get(reason, f"reason {reason}").replace("_", " ")
         return CliError(f"E401 {place(index)}: {name}; {unchanged}", exit_codes.DATA)

@@ -143,7 +143,9 @@ class RegisterBank:
             self._show_owner()
 
     def set_active_model(self, calibration: Calibration, slot: int = NO_SLOT) -> None:
-        """Show the coefficients in use in the active block, and their hash. slot: which recipe they are, if any."""
+        """Show the coefficients in use in the active block, and their hash, and hold to their force limits. slot: which
+        recipe they are, if any."""
+        self._commands.allow_force(calibration.force_limits_n, f"calibration {calibration.number}")
         self.staging.show_active(calibration, slot)
 
     def _noted(self, refusal: Refusal, peer: Peer) -> Refusal:

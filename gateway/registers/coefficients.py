@@ -42,18 +42,18 @@ class CoefficientSet:
 
     @classmethod
     def of_calibration(cls, calibration: Calibration) -> "CoefficientSet":
-        """The limits are the forces that both branches reach."""
-        rising, falling = calibration.rising_handles_n, calibration.falling_handles_n
+        """The limits are the calibration's own, else the forces that both branches reach."""
+        low_n, high_n = calibration.allowed_n
         return cls(
             order=calibration.order,
             x0_v=calibration.x0_v,
             x1_v=calibration.x1_v,
-            rising_handles_n=rising,
+            rising_handles_n=calibration.rising_handles_n,
             rising_weights=calibration.rising_weights,
-            falling_handles_n=falling,
+            falling_handles_n=calibration.falling_handles_n,
             falling_weights=calibration.falling_weights,
-            force_low_n=max(rising[0], falling[0]),
-            force_high_n=min(rising[-1], falling[-1]),
+            force_low_n=low_n,
+            force_high_n=high_n,
             blend_span_n=calibration.blend_span_n,
         )
 

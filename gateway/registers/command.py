@@ -58,4 +58,5 @@ class Status:
     calibration_phase: int = 0
     calibration_progress: float = 0.0
     calibration_stored: int = 0
+    residual_cause: int = 0  # ResidualCause
     enable_block: RefusalReason = RefusalReason.NONE

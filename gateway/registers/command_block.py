@@ -6,6 +6,7 @@ int16 face cannot show them. Each edge bit (reset, tare, take ownership) reads b
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import radians
 from struct import Struct
 from typing import Final
@@ -45,10 +46,8 @@ class CommandBlock:
         if tuple((r.name, r.address - block.first) for r in registers) != tuple((n, k) for k, n in enumerate(NAMES)):
             raise ValueError(f"map {register_map.name}: block command must hold {', '.join(NAMES)} in this order")
         self.values: Values = [0.0] * block.words
-        self.fields: tuple[CommandField | None, ...] = tuple(
-            command_field(registers[k], rules, register_map.name) if k < len(registers) else None
-            for k in range(block.words)
-        )
+        self._registers, self._map_name = registers, register_map.name
+        self.fields: tuple[CommandField | None, ...] = self._fields(rules)
         self._counts = [field.counts_per_unit if field else 1 for field in self.fields]
         self._image = image
         self._rules = rules
@@ -56,6 +55,21 @@ class CommandBlock:
         self._floats = [(b, b.repeats["command"]) for b in register_map.blocks if "command" in b.repeats]
         self._words, self._high_first = _WORD_STRUCTS[block.words], _FLOAT_STRUCTS[block.words]
         self._low_first = Struct(f"<{block.words}f")
+
+    def allow_force(self, limits_n: Sequence[float], source: str) -> None:
+        """From now on setpoints of 0 or limits_n (lowest, highest), whose they are is told by source; forces up to the smaller
+        of the rig's limit and theirs. Empty: the rig's alone."""
+        rules = self._rules
+        if limits_n:
+            high_n = max(0.0, min(limits_n[-1], rules.force_max_n))
+            low_n = min(max(0.0, limits_n[0]), high_n)
+            rules = replace(rules, setpoint_min_n=low_n, force_max_n=high_n, force_source=source)
+        self.fields = self._fields(rules)
+
+    def _fields(self, rules: BankRules) -> tuple[CommandField | None, ...]:
+        count, registers = len(self.values), self._registers
+        named = (command_field(register, rules, self._map_name) for register in registers)
+        return (*named, *(None,) * (count - len(registers)))
 
     def holds(self, block: Block, address: int) -> bool:
         """Whether this address is in a face of the command block, named or reserved."""

@@ -17,6 +17,7 @@ from gateway.registers.values import WordOrder, float32, pack_number, unpack_num
 from gateway.registers.words import RefusalReason
 
 SMALLEST_MEANT: Final = 1.0e-3
+FORCES: Final = ("force_setpoint", "precontact_force")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,7 @@ class CommandField:
         return self.float_low <= value <= self.float_high and abs(value) >= SMALLEST_MEANT
 
     def _out_of_range(self, value: float, address: int) -> Refusal:
-        allowed = allowed_range(self.low, self.high, self.unit)
+        allowed = ("0 and " if self.low > 0.0 else "") + allowed_range(self.low, self.high, self.unit)
         text = f"{self.name} = {self.shown(value)}, allowed {allowed} ({self.limit_source})"
         return Refusal(RefusalReason.OUT_OF_RANGE, address, text, value=value)
 
@@ -103,7 +104,7 @@ def command_field(register: Register, rules: BankRules, map_name: str) -> Comman
     source = f"map {map_name}"
     rig_low, rig_high = _rig_limits(register.name, rules) or (low, high)
     if rig_low > low or rig_high < high:
-        low, high, source = max(low, rig_low), min(high, rig_high), f"rig {rules.rig_name}"
+        low, high, source = max(low, rig_low), min(high, rig_high), _source(register.name, rules)
     if register.values:
         low, high = 0.0, 65535.0
     return CommandField(
@@ -122,7 +123,13 @@ def command_field(register: Register, rules: BankRules, map_name: str) -> Comman
     )
 
 
+def _source(name: str, rules: BankRules) -> str:
+    return rules.force_source if name in FORCES and rules.force_source else f"rig {rules.rig_name}"
+
+
 def _rig_limits(name: str, rules: BankRules) -> tuple[float, float] | None:
-    if name in ("force_setpoint", "precontact_force"):
+    if name in FORCES:
+        if name == FORCES[0] and rules.setpoint_min_n > 0.0:
+            return rules.setpoint_min_n, rules.force_max_n
         return 0.0, rules.force_max_n
     return (1000.0 * rules.voltage_min_v, 1000.0 * rules.voltage_max_v) if name == "voltage_setpoint" else None

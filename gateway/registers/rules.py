@@ -12,11 +12,15 @@ BASIC_BITS: Final = ControlBit.ENABLE | ControlBit.RESET_FAULT | ControlBit.TARE
 class BankRules:
     """force_max_n bounds force_setpoint and precontact_force; voltage_setpoint is 0 or within the voltage limits.
 
-    owner: the one host that may command, None for the first that does. cell_range_n bounds uploaded handles.
+    setpoint_min_n: smallest force_setpoint beside 0. force_source: who says these two, empty for the rig. owner: the one host
+    that may command, None for the first that does.
+    cell_range_n bounds uploaded handles.
     """
 
     rig_name: str
     force_max_n: float
+    setpoint_min_n: float = 0.0
+    force_source: str = ""
     voltage_min_v: float = 0.0
     voltage_max_v: float = 10.0
     cell_range_n: float = 100.0

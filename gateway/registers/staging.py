@@ -7,11 +7,12 @@ checks of every number and of the curves (gateway.bsfm.validate), then the force
 from collections.abc import Iterator
 from dataclasses import dataclass
 from struct import Struct
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.bsfm.curve import ORDER_MAX
 from gateway.bsfm.validate import CoefficientLimits, CoefficientReason, Coefficients, validate_coefficients
 from gateway.registers.coefficients import SET_BYTES, SET_WORDS, STRIDE, UNUSED_WORD, CoefficientSet, set_crc
+from gateway.registers.values import decimal
 from gateway.registers.words import UploadReason
 
 SLOTS: Final = 8
@@ -34,8 +35,17 @@ class StagedFault:
         return f"E401 {where}{self.reason.name.lower()}: {self.text}; active set {active} unchanged"
 
 
-def check_staged(words: bytes, limits: CoefficientLimits) -> tuple[Coefficients, int] | StagedFault:
-    """The coefficients and their target slot, or the first fault. words: order through target_slot (STAGED_BYTES).
+class Staged(NamedTuple):
+    """A set fit to be used. force_limits_n: of its own, as decimals, so that 25.3 N is 25.3 N and not the float32 just below
+    it; empty where they are the branches' reach, which needs no limit to act."""
+
+    coefficients: Coefficients
+    force_limits_n: tuple[float, ...]
+    slot: int
+
+
+def check_staged(words: bytes, limits: CoefficientLimits) -> Staged | StagedFault:
+    """The set and its target slot, or the first fault. words: order through target_slot (STAGED_BYTES).
 
     ValueError on another length: that is our own fault.
     """
@@ -47,7 +57,7 @@ def check_staged(words: bytes, limits: CoefficientLimits) -> tuple[Coefficients,
     used = _used(staged)
     for found in validate_coefficients(used, limits):
         return StagedFault(found.index, found.reason, found.text)
-    return _force_fault(staged) or (used, _TRAILER.unpack(words[SET_BYTES:])[2])
+    return _force_fault(staged) or Staged(used, _own_limits_n(staged), _TRAILER.unpack(words[SET_BYTES:])[2])
 
 
 def _frame_faults(words: bytes, staged: CoefficientSet) -> Iterator[StagedFault]:
@@ -77,9 +87,18 @@ def _used(staged: CoefficientSet) -> Coefficients:
 
 def _force_fault(staged: CoefficientSet) -> StagedFault | None:
     """Limits must lie within what both branches reach: their end handles, since the curves do increase."""
-    low = max(staged.rising_handles_n[0], staged.falling_handles_n[0])
-    high = min(staged.rising_handles_n[staged.order], staged.falling_handles_n[staged.order])
+    low, high = _reach_n(staged)
     if low <= staged.force_low_n < staged.force_high_n <= high:
         return None
     text = f"force limits {staged.force_low_n:g} .. {staged.force_high_n:g} N, the branches reach {low:g} .. {high:g} N"
     return StagedFault(_WHOLE, UploadReason.FORCE_LIMITS, text)
+
+
+def _reach_n(staged: CoefficientSet) -> tuple[float, float]:
+    low = max(staged.rising_handles_n[0], staged.falling_handles_n[0])
+    return low, min(staged.rising_handles_n[staged.order], staged.falling_handles_n[staged.order])
+
+
+def _own_limits_n(staged: CoefficientSet) -> tuple[float, ...]:
+    limits_n = staged.force_low_n, staged.force_high_n
+    return () if limits_n == _reach_n(staged) else (decimal(limits_n[0]), decimal(limits_n[1]))

@@ -47,6 +47,7 @@ _SOURCES: Final = {
     "calibration_phase": "calibration_phase",
     "calibration_progress": "calibration_progress",
     "calibration_stored": "calibration_stored",
+    "residual_cause": "residual_cause",
 }
 """Register -> field of Status."""
 

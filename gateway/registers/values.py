@@ -88,6 +88,11 @@ def float32(number: float) -> float:
         return inf if number > 0 else -inf
 
 
+def decimal(number: float) -> float:
+    """The shortest decimal that a float32 stands for: 25.3 for 25.299999237. Anything else comes back as it is."""
+    return next((short for digits in (6, 7, 8) if float32(short := float(f"{number:.{digits}g}")) == number), number)
+
+
 def carried_by_float32(number: float) -> float:
     """What a float register may show: NaN for anything not finite, clamped to what float32 carries."""
     return max(-LARGEST_FLOAT32, min(LARGEST_FLOAT32, number)) if isfinite(number) else nan

@@ -82,6 +82,7 @@ class WarningBit(IntFlag):
     NO_WATCHDOG = 1 << 5
     CLOCK_FALLBACK = 1 << 6
     MASTER_LOST = 1 << 7  # A310: the lease ran out, and the rig says hold or ramp
+    MODEL_DIFFERS = 1 << 8  # A345: the residual watch finds that the rig's plant no longer explains what is measured
 
 
 class RefusalReason(IntEnum):
@@ -123,6 +124,8 @@ class CalibrationPhase(IntEnum):
     STORED = 6  # calibration_stored is the number
     STOPPED = 7  # before its end: the data are kept
     REFUSED = 8  # the fit was refused: see the log
+    EXPERIMENT = 9  # an experiment of this machine: no calibration comes of it
+    RECORDED = 10  # the experiment is done and recorded
 
 
 class CommitAction(IntEnum):
@@ -145,10 +148,13 @@ class CommitStatus(IntEnum):
 
 
 class UploadReason(IntEnum):
-    """Why a staged set failed before its numbers were judged: failing_reason, beside gateway.bsfm.CoefficientReason (0..10)."""
+    """Why a commit failed where no coefficient is to blame: failing_reason, beside gateway.bsfm.CoefficientReason (0..10)."""
 
     LENGTH = 20
     CRC = 21
     UNUSED_NOT_ZERO = 22
     TARGET_SLOT = 23
     FORCE_LIMITS = 24
+    STORAGE = 25  # E431: the set is good, the disk took it not
+    NOT_STORED = 26  # E432, E433: what slot or rollback name is damaged, or is not there
+    DEFECT = 27  # A499: of ours

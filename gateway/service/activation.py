@@ -8,7 +8,7 @@ from hashlib import sha256
 
 from gateway.bsfm import Bsfm, Calibration, CoefficientLimits, Coefficients, validate_coefficients
 from gateway.registers.coefficients import CoefficientSet
-from gateway.registers.staging import StagedFault
+from gateway.registers.staging import Staged, StagedFault
 from gateway.service.calibration_store import UNKNOWN_N, CalibrationStore, StoreError
 from gateway.service.selection import Pointer
 
@@ -76,8 +76,9 @@ class Activation:
         return None
 
 
-def uploaded(coefficients: Coefficients, *, name: str, rig: str, date_utc: str, source: str) -> Calibration:
+def uploaded(staged: Staged, *, name: str, rig: str, date_utc: str, source: str) -> Calibration:
     """A checked set as a calibration. What it was fitted to is not known here: no residuals, and the hash is the set's."""
+    coefficients = staged.coefficients
     fresh = Calibration(
         number=0,
         name=name,
@@ -95,6 +96,7 @@ def uploaded(coefficients: Coefficients, *, name: str, rig: str, date_utc: str, 
         source=source,
         rig=rig,
         data_sha256="",
+        force_limits_n=staged.force_limits_n,
     )
     return replace(fresh, data_sha256=sha256(_words(fresh)).hexdigest())
 

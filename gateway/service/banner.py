@@ -40,7 +40,7 @@ def banner(ready: Ready) -> str:
     output, cell = rig.output, rig.load_cell
     elsewhere = "" if (host, port) == ("127.0.0.1", 5020) else f" --gateway {host}:{port}"
     lines = [
-        f"force-gateway {VERSION} · rig {rig.name} ({what}) · calibration {calibration.name}: bsfm n={calibration.order}",
+        f"force-gateway {VERSION} · rig {rig.name} ({what}) · calibration {calibration.name}: {calibration.kind}",
         f"  modbus tcp   {host}:{port}   units {units}      register table: force-gateway registers",
         f"  output       {ready.output_port:<16} {output.device.name} {output.baud}  {_said(ready.voltage_v, 'V', 3)}",
         f"  load cell    {ready.cell_port:<16} {cell.device.name} {cell.baud}  {_said(ready.force_n, 'N', 2)}",

@@ -13,6 +13,7 @@ from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.modbus import Peer
 from gateway.ports import PortError, SerialPort
 from gateway.profiles import CellLine, OutputLine, Rig
+from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.words import FaultCode, WarningBit
 from gateway.service import banner
@@ -29,6 +30,7 @@ from gateway.service.rig_calibrations import RigCalibrations
 from gateway.service.rules import bank_rules, server_settings
 from gateway.service.run_flag import RunFlag
 from gateway.service.tick import Tick
+from gateway.service.watch_desk import WatchDesk
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
 _STOP_BOUND_S = 4.5  # the guardian waits 5 s
@@ -61,6 +63,7 @@ class Cell:
         self._flag = RunFlag(state)
         self._closing = False
         self._spoke = asyncio.Event()
+        self.ring: SampleRing | None = None
         self.failed = asyncio.Event()
         asyncio.get_running_loop().set_exception_handler(self._on_defect)
         host = output_host(rig.output.device)
@@ -92,7 +95,11 @@ class Cell:
         )
         self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer.host}", f"{sentence}   ({peer})")
         self.controller = Controller(
-            rig.control, rig.calibration.model(), calibration_id=rig.calibration.number, unclean_restart=bool(cause)
+            rig.control,
+            rig.model_of(rig.calibration, rig.calibration.model()),
+            calibration_id=rig.calibration.number,
+            unclean_restart=bool(cause),
+            compensation=rig.compensation,
         )
         self.gateway = Gateway(
             self.bank,
@@ -103,6 +110,7 @@ class Cell:
             log=self._log,
         )
         self.gateway.recordings = self._recordings
+        self.gateway.ring = self.ring
         self._ladder = LadderKeeper(self.controller, rig, self._state, time.monotonic, self._log)
         self.gateway.ladder = self._ladder
         self.gateway.restart_cause = cause
@@ -112,8 +120,9 @@ class Cell:
             self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
         )
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
+        self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log)
         self._control_socket = ControlSocket(
-            self._state, self.bank, self._recordings, self.gateway.health, self._upload, self._ladder
+            self._state, self.bank, self._recordings, self.gateway.health, self._upload, self._ladder, self.watch_desk
         )
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: str) -> banner.Ready:
@@ -220,7 +229,7 @@ class Cell:
 
     def _on_calibration(self, taken: InUse) -> None:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
-        self.controller.use(taken.model, taken.calibration.number)
+        self.controller.use(self._rig.model_of(taken.calibration, taken.model), taken.calibration.number)
         self._recordings.calibration_number = taken.calibration.number
         self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
         self.gateway.refresh()

@@ -61,18 +61,33 @@ class Child:
             self.died = -1
 
 
-def _spawn(module: str, arguments: dict[str, Any], ours: socket.socket, theirs: socket.socket) -> Child:
-    """A session of its own: the terminal's Ctrl-C reaches the guardian alone."""
+def _spawn(module: str, arguments: dict[str, Any], *shared: int | None) -> Child:
+    """A session of its own: the terminal's Ctrl-C reaches the guardian alone. shared: descriptors that it inherits."""
+    ours, theirs = guardian_link.pair()
     command = [sys.executable, "-m", module, str(theirs.fileno()), json.dumps(arguments)]
-    process = subprocess.Popen(command, pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL, start_new_session=True)
-    theirs.close()
+    passed = (theirs.fileno(), *(descriptor for descriptor in shared if descriptor is not None))
+    with theirs:
+        process = subprocess.Popen(command, pass_fds=passed, stdin=subprocess.DEVNULL, start_new_session=True)
     return Child(process, ours, os.pidfd_open(process.pid))
 
 
 def spawn_control(arguments: dict[str, Any]) -> Child:
-    return _spawn("gateway.service.control_process", arguments, *guardian_link.pair())
+    return _spawn("gateway.service.control_process", arguments, arguments["ring"])
 
 
 def spawn_rig(rig: str, state: Path) -> Child:
     """The simulated rig outlives a kill of control, as a real rig does; it ends when its link does."""
-    return _spawn("gateway.service.simulated_rig", {"rig": rig, "state": str(state)}, *guardian_link.pair())
+    return _spawn("gateway.service.simulated_rig", {"rig": rig, "state": str(state)})
+
+
+def spawn_watch(arguments: dict[str, Any]) -> Child:
+    """The residual watch: what it finds it tells control, through the control socket."""
+    return _spawn("gateway.service.watch_process", arguments, arguments["ring"])
+
+
+def shared_memory() -> int | None:
+    """Memory without a name and without a disk, for the sample ring; None where the kernel has none to give."""
+    try:
+        return os.memfd_create("force-gateway-samples")
+    except (OSError, AttributeError):
+        return None

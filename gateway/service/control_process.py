@@ -17,11 +17,13 @@ from typing import Any
 
 from gateway.ports import PortError
 from gateway.profiles import ProfileError, Rig, load_rig
+from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.cell import Cell, StartError
 from gateway.service.event_log import EventLog
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.realtime import use_realtime
+from gateway.service.run_recording import COLUMNS
 
 EXIT_DEFECT, EXIT_CONFIGURATION = 1, 78
 
@@ -52,6 +54,23 @@ def load(options: dict[str, Any]) -> Rig:
     return rig.as_simulated() if options["simulate"] else rig
 
 
+def sample_ring(descriptor: int | None) -> SampleRing | None:
+    """The ring in the guardian's memory; None without one: nothing but the residual watch needs it."""
+    if descriptor is None:
+        return None
+    with contextlib.suppress(OSError):
+        return SampleRing(descriptor, COLUMNS)
+    return None
+
+
+def watch_wanted(rig: Rig, ring: SampleRing | None) -> dict[str, Any] | None:
+    """What the guardian tells the residual watch; None where there is none to start."""
+    if not rig.is_watched or ring is None:
+        return None
+    watch = rig.residual_watch
+    return {"simulated": rig.simulated, "window_s": watch.window_s, "every_s": watch.every_s}
+
+
 def _loop_factory() -> Any:
     """uvloop where it is installed (the `fast` extra), else the standard loop."""
     with contextlib.suppress(ImportError):
@@ -68,12 +87,18 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     if ports is None:
         return EXIT_CONFIGURATION
     cell = Cell(rig, ports, Path(options["state"]), guardian, log)
+    cell.ring = sample_ring(options["ring"])
     try:
         ready = await cell.start(options["bind"], record=options["record"], restarted=options["restarted"])
         ready = replace(ready, notes=ready.notes + notes)
         gc.collect()
         gc.freeze()
-        guardian.ready({"banner": banner.banner(ready), "info": banner.info(ready)}, rig.control.supervision.stall_s)
+        announcement = {
+            "banner": banner.banner(ready),
+            "info": banner.info(ready),
+            "watch": watch_wanted(rig, cell.ring),
+        }
+        guardian.ready(announcement, rig.control.supervision.stall_s)
         await _first_of(guardian.told_to_stop, cell.failed)
         if cell.failed.is_set():
             return EXIT_DEFECT

@@ -1,6 +1,7 @@
 """`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
 
-record on|off|status, calibration runs, the calibration in use and its change, last writers of each register, and faults
+record on|off|status, calibration runs, the calibration in use and its change, last writers of each register, what the
+residual watch has found (its process tells it here, others may read it), the loop's health, and faults
 of a simulated rig (passed on to the rig's own socket by the tools themselves). Mode 0600: whoever may write the state
 directory may ask.
 """
@@ -14,6 +15,7 @@ from gateway.service.ladder_keeper import LadderKeeper
 from gateway.service.publish import LoopHealth
 from gateway.service.recordings import Recordings
 from gateway.service.upload import Upload
+from gateway.service.watch_desk import WatchDesk
 
 
 class ControlSocket(JsonLineServer):
@@ -25,6 +27,7 @@ class ControlSocket(JsonLineServer):
         health: LoopHealth,
         upload: Upload,
         ladder: LadderKeeper,
+        watch: WatchDesk,
     ) -> None:
         handlers: dict[str, Handler] = {
             "record": self._record,
@@ -32,12 +35,14 @@ class ControlSocket(JsonLineServer):
             "calibrate": ladder.answer,
             "last-writer": self._last_writer,
             "health": self._health_figures,
+            "residual": watch.answer,
         }
         super().__init__(state / "control.sock", handlers)
         self._bank = bank
         self._recordings = recordings
         self._health = health
         self._upload = upload
+        self._watch = watch
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:
         is_on = request.get("on")
@@ -71,4 +76,5 @@ class ControlSocket(JsonLineServer):
             "loop_time_us": self._health.loop_time_s * 1e6,
             "late_p50_us": self._health.lateness_us(0.5),
             "late_p99_us": self._health.lateness_us(0.99),
+            "residual": self._watch.figures(),
         }

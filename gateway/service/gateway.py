@@ -14,13 +14,16 @@ from gateway.control import Controller
 from gateway.control.inputs import Line, Output
 from gateway.devices import CellHost
 from gateway.devices.messages import ForceSample
+from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command
+from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.words import FaultCode, WarningBit
 from gateway.service.ladder_keeper import LadderKeeper
 from gateway.service.output_exchange import OutputExchange
-from gateway.service.publish import LoopHealth, status_of
+from gateway.service.publish import Known, LoopHealth, status_of
 from gateway.service.recordings import Recordings
+from gateway.service.run_recording import row_of
 
 Log = Callable[[str, str], None]
 """log(cause, sentence): the cause groups lines for rate limits, the sentence is for people."""
@@ -44,6 +47,7 @@ class Gateway:
         self.output = output
         self.recordings: Recordings | None = None
         self.ladder: LadderKeeper | None = None
+        self.ring: SampleRing | None = None
         self.health = LoopHealth()
         self.decision: Output | None = None
         self.sample: ForceSample | None = None
@@ -54,6 +58,7 @@ class Gateway:
         self.owner_connected = True
         self.warnings = WarningBit(0)
         self.restart_cause = FaultCode.NONE
+        self.residual_cause = ResidualCause.NONE
         self._cell = cell
         self._clock = clock
         self._log = log
@@ -140,7 +145,8 @@ class Gateway:
             self.bank.release_owner()
         self.health.loop_time_s = self._clock() - now_s
         stored = self.ladder.stored if self.ladder else 0
-        status = status_of(decision, self.health, self.output.pressure_pa, self.controller.calibration_id, stored)
+        known = Known(self.controller.calibration_id, stored, self.residual_cause)
+        status = status_of(decision, self.health, self.output.pressure_pa, known)
         if decision.warnings & WarningBit.RESTARTED and not decision.fault:
             status = replace(status, fault_code=self.restart_cause)
         self.bank.publish(status)
@@ -152,3 +158,5 @@ class Gateway:
             self.recordings.append(self.sample, self.decision, self.output.pressure_pa)
         if self.ladder and self.sample and self.decision:
             self.ladder.append(self.sample, self.decision, self.output.pressure_pa)
+        if self.ring and self.sample and self.decision:
+            self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.pressure_pa))

@@ -20,8 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from gateway.service import link
-from gateway.service.children import Child, spawn_control, spawn_rig
+from gateway.service.children import Child, shared_memory, spawn_control, spawn_rig, spawn_watch
 from gateway.service.safe_line import SafeLine
+from gateway.service.watch_keeper import WatchKeeper
 
 _START_GRACE_S = 30.0  # imports on a slow machine; nothing but the safe voltage is written before READY
 _STOP_BOUND_S = 5.0
@@ -74,6 +75,8 @@ class Guardian:
     state: Path
     control: Child | None = None
     rig: Child | None = None
+    watch_keeper: WatchKeeper | None = None
+    ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
     line: SafeLine | None = None
     stall_s: float = 0.1
     bound: tuple[str, int] | None = None
@@ -90,6 +93,7 @@ class Guardian:
 
     def watch(self) -> int:
         wake = _signal_pipe()
+        self.ring = shared_memory()
         try:
             self._start_control(restarted="")
             while True:
@@ -103,6 +107,7 @@ class Guardian:
     def _step(self, wake: socket.socket) -> int | None:
         assert self.control
         sources: list[Any] = [self.control.died, wake, *([] if self.link_ended else [self.control.link])]
+        sources += self.watch_keeper.sources if self.watch_keeper else []
         readable, _, _ = select.select(sources, [], [], self._patience_s())
         if wake in readable:
             self._on_signal(wake.recv(64))
@@ -110,6 +115,8 @@ class Guardian:
             self._on_message()
         if self.control.died in readable:
             return self._on_death("died")
+        if self.watch_keeper:
+            self.watch_keeper.follow(readable, time.monotonic())
         return self._on_silence()
 
     def _patience_s(self) -> float:
@@ -117,6 +124,8 @@ class Guardian:
         deadlines = [self._beat_deadline_s()]
         if self.stop_deadline_s is not None:
             deadlines.append(self.stop_deadline_s)
+        if self.watch_keeper:
+            deadlines.append(self.watch_keeper.due_s)
         return max(0.0, min(deadlines) - now_s)
 
     def _beat_deadline_s(self) -> float:
@@ -171,12 +180,23 @@ class Guardian:
         self.stall_s = float(message.body["stall_s"])
         host, port = message.body["info"]["modbus"]
         self.bound = (host, port)  # a restart keeps the port that masters already know
+        self._provide_watch(message.body["watch"])
         pids = {"guardian": os.getpid(), "control": self.control.pid} | ({"rig": self.rig.pid} if self.rig else {})
+        pids |= {"watch": self.watch_keeper.pid} if self.watch_keeper and self.watch_keeper.pid else {}
         if self.options.json:
             print(json.dumps(message.body["info"] | {"pids": pids}), flush=True)
         elif not self.announced:
             print(message.body["banner"], flush=True)
         self.announced = True
+
+    def _provide_watch(self, wanted: dict[str, Any] | None) -> None:
+        """wanted: what the residual watch is told, None where the rig has none."""
+        if wanted is None or self.ring is None:
+            return
+        if self.watch_keeper is None:
+            arguments = wanted | {"rig": self.options.rig, "state": str(self.state), "ring": self.ring}
+            self.watch_keeper = WatchKeeper(lambda: spawn_watch(arguments))
+        self.watch_keeper.start(time.monotonic())
 
     def _on_silence(self) -> int | None:
         assert self.control
@@ -233,14 +253,17 @@ class Guardian:
                 "record": self.options.record,
                 "realtime": self.options.realtime,
                 "restarted": restarted,
+                "ring": self.ring,
             }
         )
 
     def _close(self) -> None:
-        for child in (self.control, self.rig):
+        for child in (self.control, self.rig, self.watch_keeper):
             if child:
                 child.end()
         self._drop_line()
+        if self.ring is not None:
+            os.close(self.ring)
 
     def _drop_line(self) -> None:
         if self.line:

@@ -1,4 +1,4 @@
-"""Keeps a calibration run of the controller: starts it for this machine, records it, and has it fitted when it is done.
+"""Keeps a calibration run or experiment: starts it for this machine, records it, and has a ladder fitted when it is done.
 
 The recording is one of its own, beside whatever else is recorded, with the plan in its header; it stays whatever becomes
 of the run. A run that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S:
@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.control import Controller
+from gateway.control.calibrating import AnyPlan, AnyRun
+from gateway.control.experiment_plan import ExperimentPlan
+from gateway.control.experiment_run import ExperimentRun
 from gateway.control.inputs import Output
-from gateway.control.ladder_run import LadderRun
-from gateway.control.ladder_stairs import RunPlan
 from gateway.devices.messages import ForceSample
 from gateway.profiles import Rig
+from gateway.profiles.plan_files import plain, plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase, RefusalReason, State
 from gateway.service.fit_child import FitChild, Result
@@ -61,18 +63,19 @@ class LadderKeeper:
             self._start(request["plan"], tuple(int(number) for number in request.get("continues", ())))
         return self.status()
 
-    def _tried(self, plan: RunPlan) -> Answer:
+    def _tried(self, plan: AnyPlan) -> Answer:
         """What a plan would do; ValueError where the rig does not allow it."""
-        run = LadderRun(plan, self._rig.control, self._controller.calibrating.model)
-        top_v = max(stair.voltage_v for stair in run.stairs)
-        top_n = self._controller.calibrating.model.force_n(top_v, 1.0)
+        run = self._calibrating.tried(plan)
+        top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)
+        top_n = self._calibrating.model.force_n(top_v, 1.0)
         return {
-            "stairs": len(run.stairs),
+            "stairs": 0 if isinstance(run, ExperimentRun) else len(run.stairs),
             "eta_s": run.eta_s,
             "v_max_v": top_v,
             "force_max_n": top_n,
             "simulated": self._rig.simulated,
             "rig": self._rig.name,
+            **_asks(plan),
         }
 
     def _start(self, fields: Any, continues: tuple[int, ...]) -> None:
@@ -94,16 +97,12 @@ class LadderKeeper:
     def status(self) -> Answer:
         calibrating, decision = self._calibrating, self._decision
         run = calibrating.run
-        stair = run.stairs[min(run.done, len(run.stairs) - 1)] if run else None
         return {
             "running": calibrating.running,
             "phase": calibrating.phase.name.lower(),
             "progress": calibrating.progress,
             "eta_s": round(calibrating.eta_s, 1),
-            "stair": run.done if run else 0,
-            "stairs": len(run.stairs) if run else 0,
-            "group": stair.group + 1 if stair else 0,
-            "groups": run.plan.groups if run else 0,
+            **_where(run),
             "noise_n": run.noise_n if run else None,
             "voltage_v": decision.voltage_v if decision else None,
             "force_n": decision.force_measured_n
@@ -154,7 +153,7 @@ class LadderKeeper:
             "calibration": self._controller.calibration_id,
             "simulated": rig.simulated,
             "seed": rig.seed,
-            "ladder": asdict(run.plan) | {"stairs": len(run.stairs)},
+            **_planned(run),
             "continues": list(self._continues),
         }
         try:
@@ -173,6 +172,8 @@ class LadderKeeper:
         if recorder.failure:
             self._ended = recorder.failure
             self._calibrating.phase = CalibrationPhase.STOPPED
+        elif self._calibrating.phase is CalibrationPhase.RECORDED:
+            self._log("calibration", f"info experiment recorded in {recorder.path}; force-gateway diagnose takes it")
         elif self._calibrating.phase is CalibrationPhase.FITTING:
             self._child = FitChild(recorder.path, self._rig.file, self._state, self._on_result)
 
@@ -193,23 +194,44 @@ _WORDS: Final = {
     RefusalReason.OUTPUT_FAULT: "the output device does not answer",
     RefusalReason.CELL_SILENT: "no fresh sample of the load cell",
 }
-_FIELDS: Final = {
-    "v_max_v": (float, int, type(None)),
-    "step_v": (float, int),
-    "groups": (int,),
-    "minor_points": (int,),
-    "first_group": (int,),
-    "tare": (bool,),
-}
 
 
-def _plan_of(fields: Any) -> RunPlan:
+def _asks(plan: AnyPlan) -> Answer:
+    """What a person should know and do before an experiment."""
+    if not isinstance(plan, ExperimentPlan):
+        return {"experiment": "", "check": True, "notes": [], "questions": []}
+    missing = [name for name in plan.columns if name not in COLUMNS]
+    told = f"this gateway does not record {' and '.join(missing)}: record it beside, and join the tables by time"
+    return {
+        "experiment": f"experiment {plan.name}, {len(plan.parts)} parts ({', '.join(part.name for part in plan.parts)})",
+        "check": plan.check,
+        "notes": [told] if missing else [],
+        "questions": [f"Ready to do this while it runs: {text}?" for text in plan.by_hand],
+    }
+
+
+def _where(run: AnyRun | None) -> Answer:
+    """How far a run is, in its own terms."""
+    told: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
+    if isinstance(run, ExperimentRun):
+        part = run.part
+        return told | {"part": part + 1, "parts": len(run.plan.parts), "part_name": run.plan.parts[part].name}
+    if run is None:
+        return told
+    stair = run.stairs[min(run.done, len(run.stairs) - 1)]
+    groups = run.plan.groups
+    return told | {"stair": run.done, "stairs": len(run.stairs), "group": stair.group + 1, "groups": groups}
+
+
+def _planned(run: AnyRun) -> Answer:
+    """For the recording's header: a ladder is what `fit` and --resume look for."""
+    if isinstance(run, ExperimentRun):
+        return {"experiment": plain(run.plan)}
+    return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs)}}
+
+
+def _plan_of(fields: Any) -> AnyPlan:
     """A plan from JSON; ValueError for a name or a type that it does not have."""
     if not isinstance(fields, dict):
         raise ValueError("plan: a JSON object is expected")
-    for name, value in fields.items():
-        if name not in _FIELDS:
-            raise ValueError(f"plan has no {name}; it has {', '.join(_FIELDS)}")
-        if not isinstance(value, _FIELDS[name]) or (isinstance(value, bool) and name != "tare"):
-            raise ValueError(f"plan: {name} = {value!r} is not {_FIELDS[name][0].__name__}")
-    return RunPlan(**fields)
+    return plan_of(fields)

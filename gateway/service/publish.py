@@ -31,9 +31,16 @@ class LoopHealth:
         return 0
 
 
-def status_of(
-    output: Output, health: LoopHealth, pressure_pa: float, calibration_id: int, calibration_stored: int = 0
-) -> Status:
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What the service knows beside the loop: calibrations by number, and the residual watch's cause."""
+
+    calibration_id: int
+    calibration_stored: int = 0
+    residual_cause: int = 0
+
+
+def status_of(output: Output, health: LoopHealth, pressure_pa: float, known: Known) -> Status:
     return Status(
         state=output.state,
         status_word=int(output.status),
@@ -51,12 +58,13 @@ def status_of(
         loop_time_s=health.loop_time_s,
         heartbeat_echo=output.heartbeat_echo,
         sequence_echo=output.sequence_echo,
-        calibration_id=calibration_id,
+        calibration_id=known.calibration_id,
         model_residual_n=output.model_residual_n,
         pressure_pa=pressure_pa,
         missed_ticks=health.missed_ticks,
         calibration_phase=output.calibration_phase,
         calibration_progress=output.calibration_progress,
-        calibration_stored=calibration_stored,
+        calibration_stored=known.calibration_stored,
+        residual_cause=known.residual_cause,
         enable_block=output.enable_block,
     )

@@ -27,6 +27,25 @@ COLUMNS = (
 _QUALITY_NUMBER = {Quality.OK: 0.0, Quality.UNSTABLE: 1.0, Quality.OVERLOAD: 2.0}
 
 
+def row_of(time_s: float, sample: ForceSample, decision: Output, pressure_pa: float) -> tuple[float, ...]:
+    """One row in the order of COLUMNS; time_s counts from wherever the taker's begins."""
+    return (
+        time_s,
+        decision.voltage_v,
+        decision.force_measured_n,
+        kilopascal_from_pascal(pressure_pa),
+        _QUALITY_NUMBER[sample.quality],
+        decision.force_requested_n,
+        decision.force_applied_n,
+        decision.feedforward_v,
+        decision.trim_v,
+        float(decision.state),
+        float(decision.fault),
+        float(decision.limited_by),
+        decision.model_residual_n,
+    )
+
+
 class RunRecording:
     """One open recording; time_s counts from its first row."""
 
@@ -43,20 +62,4 @@ class RunRecording:
         if self._start_s is None:
             self._start_s = sample.time_s
         self.rows += 1
-        self._recorder.append(
-            (
-                sample.time_s - self._start_s,
-                decision.voltage_v,
-                decision.force_measured_n,
-                kilopascal_from_pascal(pressure_pa),
-                _QUALITY_NUMBER[sample.quality],
-                decision.force_requested_n,
-                decision.force_applied_n,
-                decision.feedforward_v,
-                decision.trim_v,
-                float(decision.state),
-                float(decision.fault),
-                float(decision.limited_by),
-                decision.model_residual_n,
-            )
-        )
+        self._recorder.append(row_of(sample.time_s - self._start_s, sample, decision, pressure_pa))

@@ -2,7 +2,8 @@
 
 It is a child of the guardian in its own session, so it outlives a kill of control as a real rig does, and ends when the
 guardian does (its link closes). The wires take the time that their baud rates take. A socket in the state directory
-(`rig.sock`) takes faults for tests and demonstrations: no air, no contact, a cut wire, an inverted sign.
+(`rig.sock`) takes faults for tests and demonstrations: no air, no contact, a cut wire, an inverted sign, or a plant that
+is no longer the one in the rig's file.
 """
 
 import asyncio
@@ -29,9 +30,11 @@ from gateway.ports import PacedPty
 from gateway.profiles import Rig, load_rig
 from gateway.service.json_lines import JsonLineServer
 from gateway.service.tick import Tick
-from gateway.twin import Twin
+from gateway.twin import Plant, Twin
+from gateway.twin.plant import with_value
 
 _LONGEST_LEAP_S = 1.0  # a rig process that was stopped does not replay the hours it missed
+_SETTLED_S = 1.0  # until a changed plant has come to what is commanded
 
 
 class SimulatedRig:
@@ -51,6 +54,9 @@ class SimulatedRig:
         self._setting_v = 0.0
         self._now_s = now_s
         self._range_n = rig.plant.cell.range_n
+        self._plant = rig.plant
+        self._seed = rig.seed
+        self._twin_faults: dict[str, bool] = {}
 
     def advance(self, now_s: float) -> None:
         self.twin.advance(min(max(0.0, now_s - self._now_s), _LONGEST_LEAP_S))
@@ -85,24 +91,55 @@ class SimulatedRig:
                 return self._output.reply(self._output.refusal(request))
 
     def fault(self, request: dict[str, Any]) -> dict[str, Any]:
-        """{"do": "fault", "name": NAME, "on": bool}; ValueError on an unknown name."""
+        """{"do": "fault", "name": NAME, "on": bool}; NAME plant takes {"values": {"friction.coulomb_n": 2.5}} besides.
+
+        ValueError on an unknown name, or a value that no plant has.
+        """
         name, is_on = request.get("name"), bool(request.get("on", True))
         match name:
-            case "no-air":
-                self.twin.set_air(not is_on)
-            case "no-contact":
-                self.twin.set_contact(not is_on)
-            case "sign-inverted":
-                self.twin.set_sign(-1 if is_on else 1)
+            case "no-air" | "no-contact" | "sign-inverted":
+                self._twin_faults[name] = is_on
+                self._set_twin_faults()
             case "cell-cut":
                 self.is_cell_cut = is_on
             case "output-cut":
                 self.is_output_cut = is_on
+            case "plant":
+                self._change_plant(_changed(self._plant, request.get("values", {})) if is_on else self._plant)
             case _:
                 raise ValueError(
-                    f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, output-cut"
+                    f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, output-cut, plant"
                 )
         return {"fault": name, "on": is_on}
+
+    def _set_twin_faults(self) -> None:
+        self.twin.set_air(not self._twin_faults.get("no-air", False))
+        self.twin.set_contact(not self._twin_faults.get("no-contact", False))
+        self.twin.set_sign(-1 if self._twin_faults.get("sign-inverted", False) else 1)
+
+    def _change_plant(self, plant: Plant) -> None:
+        """Another machine in the place of this one, which has come to the standing command already."""
+        self._seed += 1
+        self.twin = Twin(plant, self._seed)
+        self._set_twin_faults()
+        self.twin.command(self._setting_v)
+        self.twin.advance(_SETTLED_S)
+
+
+def _changed(plant: Plant, values: Any) -> Plant:
+    """The plant with some numbers changed, by `section.field`; ValueError for what it does not have."""
+    if not isinstance(values, dict):
+        raise ValueError(f'values = {values}: {{"section.field": number}} is expected')
+    for path, value in values.items():
+        section, _, field = str(path).partition(".")
+        try:
+            known = getattr(getattr(plant, section), field)
+            plant = with_value(plant, section, field, float(value))
+        except (AttributeError, TypeError, ValueError):
+            raise ValueError(f"{path} = {value}: no number of a plant, such as friction.coulomb_n = 2.5") from None
+        if not isinstance(known, float):
+            raise ValueError(f"{path} is no number of a plant")
+    return plant
 
 
 async def serve(rig: Rig, link: socket.socket, state: Path) -> None:

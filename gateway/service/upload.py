@@ -7,9 +7,9 @@ swaps models without a bump. On any failure the active set stays, in the control
 slot or in use already keeps its number, so that a master which uploads its recipe for every part does not fill the disk.
 
 A commit fills its slot and is in use from then on. A dry run ends in `idle` when the set would be accepted. A failure
-that is no coefficient's fault (a full disk) has failing_index -1 and failing_reason 0; the log says E431. Force limits
-are checked against what the branches reach and not kept: the read-back shows the reach. What a tool of this machine asks
-for shows in the active block, not in commit_status, which is the masters'.
+that is no coefficient's fault (a full disk, a damaged slot) has failing_index -1 and a reason of its own. Force limits are
+kept with the set: while it is in use the smaller of its limit and the rig's holds. What a tool of this machine asks for
+shows in the active block, not in commit_status, which is the masters'.
 """
 
 import traceback
@@ -22,12 +22,12 @@ from gateway.registers.map import RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.staging import StagedFault, check_staged
 from gateway.registers.staging_block import StagingBlock
-from gateway.registers.words import CommitAction, CommitStatus, RefusalReason
+from gateway.registers.words import CommitAction, CommitStatus, RefusalReason, UploadReason
 from gateway.service.activation import Activation, InUse, NotFit, uploaded
 from gateway.service.apart import Apart, Done, Work
 from gateway.service.calibration_store import Standing, StoreError
 
-_NO_COEFFICIENT: Final = -1, 0
+_NO_COEFFICIENT: Final = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,9 +99,9 @@ class Upload:
         elif action is CommitAction.DRY_RUN:
             self._end(CommitStatus.IDLE, f"info {self._doing}: the set would be accepted")
         else:
-            coefficients, slot = found
+            slot = found.slot
             fresh = uploaded(
-                coefficients,
+                found,
                 name=f"slot-{slot}",
                 rig=self._rules.rig_name,
                 date_utc=self._rules.today(),
@@ -174,11 +174,12 @@ class Upload:
 
     def _fail(self, error: Exception) -> None:
         """NotFit and StoreError are answers; anything else is our defect, which must not stop the control."""
-        (index, reason), active = _NO_COEFFICIENT, self._calibration.number
+        index, reason, active = _NO_COEFFICIENT, int(UploadReason.DEFECT), self._calibration.number
         if isinstance(error, NotFit):
             index, reason, sentence = error.fault.index, int(error.fault.reason), error.fault.sentence(active)
         elif isinstance(error, StoreError):
             sentence = f"{error}; active set {active} unchanged"
+            reason = int(UploadReason.STORAGE if sentence.startswith("E431") else UploadReason.NOT_STORED)
         else:
             trace = "".join(traceback.format_exception(error))
             sentence = f"A499 a defect of ours, active set {active} unchanged:\n{trace}"
@@ -195,8 +196,8 @@ def _described(taken: InUse) -> str:
     """`calibration 17 (slot-3) in use, slot 3: bsfm n=2, 1.2 .. 65.1 N`."""
     calibration, slot = taken.calibration, taken.pointer.active.slot
     where = "" if slot is None else f", slot {slot}"
-    low_n, high_n = taken.model.force_range_n
+    low_n, high_n = calibration.allowed_n
     return (
         f"calibration {calibration.number} ({calibration.name}) in use{where}: "
-        f"bsfm n={calibration.order}, {low_n:.1f} .. {high_n:.1f} N"
+        f"{calibration.kind}, {low_n:.1f} .. {high_n:.1f} N"
     )

@@ -9,7 +9,7 @@ from gateway.registers.words import RefusalReason
 
 def test_reserved_words_inside_a_block_read_zero(bank):
     assert bank.read_registers(13, 3) == bytes(6)
-    assert bank.read_registers(129, 3) == bytes(6)
+    assert bank.read_registers(130, 2) == bytes(4)
 
 
 def test_proof_constants_read_as_documented(bank, register_map):

@@ -29,7 +29,7 @@ BAD_WORDS = [
     ((0, 0x10), 3, R.UNSUPPORTED_BIT, 0, 16.0, "W217 control_word bit 4 (valve_pull): rig demo has nothing behind it"),
     ((0, 0x8001), 3, R.UNSUPPORTED_BIT, 0, 0x8001, "W217 control_word bit 15: rig demo"),
     ((13, 1), 3, R.RESERVED, 13, 1.0, "W209 address 13 is reserved: 1 was written"),
-    ((129, 7), 3, R.RESERVED, 129, 7.0, "W209"),
+    ((130, 7), 3, R.RESERVED, 130, 7.0, "W209"),
     ((401, 7), 3, R.RESERVED, 401, 7.0, "W209"),
     ((226, 7), 3, R.RESERVED, 226, 7.0, "W209"),
     ((264, 7), 3, R.RESERVED, 264, 7.0, "W209"),
@@ -178,7 +178,7 @@ def test_the_echo_reads_back_as_written_in_either_order(bank, master):
 def test_the_rig_may_narrow_the_voltage_but_zero_stays(make_bank, master_of):
     bank = make_bank(voltage_min_v=0.5, voltage_max_v=8.0)
     master = master_of(bank, "10.0.0.1")
-    assert master.refusal(master.write, 5, 8001).sentence.endswith("allowed 500 .. 8000 mV (rig demo)")
+    assert master.refusal(master.write, 5, 8001).sentence.endswith("allowed 0 and 500 .. 8000 mV (rig demo)")
     assert master.refusal(master.write, 5, 499).reason is R.OUT_OF_RANGE
     master.write(5, 8000)
     master.write(5, 0)
@@ -203,7 +203,7 @@ def test_every_refusal_is_told_with_its_peer(bank, master):
 
 def test_reserved_words_accept_zero(bank, master):
     before = bank.command
-    for address in (129, 226, 227, 264, 401, 1650):
+    for address in (130, 226, 227, 264, 401, 1650):
         master.write(address, 0)
     master.write(13, 0, 0, 0)
     assert bank.command.force_setpoint_n == before.force_setpoint_n

@@ -9,6 +9,7 @@ from gateway.bsfm.validate import CoefficientReason
 from gateway.registers import MapError, RegisterMap, UnknownRegister
 from gateway.registers import words as w
 from gateway.registers.coefficients import SET_WORDS
+from gateway.registers.residual_cause import ResidualCause
 
 COMMAND = (
     "control_word force_setpoint force_ramp mode heartbeat voltage_setpoint tilt_angle precontact_force contact_ramp payload "
@@ -71,6 +72,7 @@ ENUMERATIONS = {
     "fault_code": w.FaultCode,
     "refusal_reason": w.RefusalReason,
     "calibration_phase": w.CalibrationPhase,
+    "residual_cause": ResidualCause,
     "commit": w.CommitAction,
     "commit_status": w.CommitStatus,
 }

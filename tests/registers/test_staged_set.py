@@ -39,9 +39,9 @@ def fault_of(words: bytes) -> StagedFault:
 
 
 def test_a_good_set_comes_out_with_its_slot():
-    coefficients, slot = check_staged(staged(), LIMITS)
+    coefficients, force_limits_n, slot = check_staged(staged(), LIMITS)
     assert isinstance(coefficients, Coefficients)
-    assert slot == 3
+    assert (force_limits_n, slot) == ((1.0, 59.0), 3)
     assert coefficients.rising_handles_n == GOOD.rising_handles_n
     assert coefficients.falling_weights == pytest.approx(GOOD.falling_weights)
 
@@ -57,7 +57,15 @@ def test_order_15_fits():
         rising_weights=(1.0,) * 16,
         falling_weights=(1.0,) * 16,
     )
-    assert check_staged(staged(full), LIMITS)[1] == 3
+    assert check_staged(staged(full), LIMITS).slot == 3
+
+
+@pytest.mark.parametrize(
+    ("low_n", "high_n", "own"), [(0.0, 60.0, ()), (0.0, 25.3, (0.0, 25.3)), (0.7, 60.0, (0.7, 60.0))]
+)
+def test_force_limits_of_its_own_come_out_as_the_decimals_that_were_meant(low_n, high_n, own):
+    found = check_staged(staged(replace(GOOD, force_low_n=low_n, force_high_n=high_n)), LIMITS)
+    assert found.force_limits_n == own
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """A staged set is in use, durable and read back as it was sent, or nothing has changed and the master reads why."""
 
+import struct
 from dataclasses import replace
 from itertools import count
 from random import Random
@@ -33,7 +34,7 @@ def test_a_committed_set_is_in_use_and_reads_back_as_sent(bench):
     assert bench.shown == [CommitStatus.WRITING], "committed is not said before the set is in use"
     assert taken.calibration.number == 2
     assert taken.model.voltage_v(26.0, 1.0)[0] == pytest.approx(4.0)
-    assert bench.log == [f"info upload by {PEER}: calibration 2 (slot-3) in use, slot 3: bsfm n=2, 0.0 .. 52.0 N"]
+    assert bench.log == [f"info upload by {PEER}: calibration 2 (slot-3) in use, slot 3: psfm n=2, 0.0 .. 52.0 N"]
 
 
 def test_what_an_upload_does_not_tell_is_not_made_up(bench):
@@ -133,7 +134,8 @@ def test_a_set_that_fails_a_check_changes_nothing_and_says_where_and_why(bench, 
 
 def test_every_reason_is_among_those_tried():
     tried = {reason for _, _, reason in CHECKS}
-    assert {*CoefficientReason, *UploadReason} - {CoefficientReason.NONE} == tried
+    not_of_a_set = {UploadReason.STORAGE, UploadReason.NOT_STORED, UploadReason.DEFECT}
+    assert {*CoefficientReason, *UploadReason} - {CoefficientReason.NONE} - not_of_a_set == tried
 
 
 def test_a_dry_run_checks_all_and_stores_nothing(bench):
@@ -197,7 +199,7 @@ def test_whatever_call_of_the_disk_fails_the_active_set_stays(bench, slot):
         if outcome == COMMITTED:
             assert bench.active_words != before
         else:
-            assert outcome == (FAILED, -1, 0)
+            assert outcome == (FAILED, -1, UploadReason.STORAGE)
             assert bench.log[-1].startswith("E431 calibration not stored: No space left on device")
             assert bench.log[-1].endswith(f"active set {number} unchanged")
             assert bench.active_words == before
@@ -209,11 +211,31 @@ def test_whatever_call_of_the_disk_fails_the_active_set_stays(bench, slot):
 
 def test_a_defect_of_ours_ends_the_commit_and_nothing_else(bench, monkeypatch):
     monkeypatch.setattr(bench.store, "add", lambda given: {}["missing"])
-    assert bench.upload_of(calibration(16)) == (FAILED, -1, 0)
+    assert bench.upload_of(calibration(16)) == (FAILED, -1, UploadReason.DEFECT)
     assert bench.log[-1].startswith("A499 a defect of ours, active set 1 unchanged:\n")
     assert "KeyError: 'missing'" in bench.log[-1]
     monkeypatch.undo()
     assert bench.upload_of(calibration(16)) == COMMITTED
+
+
+def test_force_limits_stay_with_their_set_and_the_smaller_of_them_and_the_rigs_holds(bench):
+    narrow = replace(calibration(16), force_limits_n=(2.5, 25.3))
+    assert bench.upload_of(narrow, 3) == COMMITTED
+    for given in (bench, bench.restarted()):
+        assert given.bank.read_registers(1634, 4) == struct.pack(">2f", 2.5, 25.3)
+        for word, force_n in ((2531, "25.31"), (249, "2.49")):
+            told = f"W204 force_setpoint = {force_n} N, allowed 0 and 2.5 .. 25.3 N (calibration 2)"
+            assert given.refused(1, word).sentence.startswith(told)
+        given.write(1, 2530)
+        given.write(1, 250)
+        given.write(1, 0)
+    assert bench.used[-1].model.limits_n == (2.5, 25.3)
+    assert bench.upload_of(narrow, 4) == COMMITTED
+    assert bench.store.slot(4) == 2, "the very same set"
+    assert bench.upload_of(calibration(16), 4) == COMMITTED
+    assert bench.store.slot(4) == 3, "without the limits it is another one"
+    bench.write(1, 6000)
+    assert bench.refused(1, 6001).sentence.startswith("W204 force_setpoint = 60.01 N, allowed 0 .. 60 N (rig demo)")
 
 
 def test_a_gateway_without_any_calibration_is_a_defect(bench):

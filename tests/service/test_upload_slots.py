@@ -2,7 +2,7 @@
 
 import pytest
 
-from gateway.registers.words import CommitStatus, RefusalReason
+from gateway.registers.words import CommitStatus, RefusalReason, UploadReason
 from tests.service.coefficients import calibration
 from tests.service.upload_bench import OWN, PEER
 
@@ -50,7 +50,7 @@ def test_a_slot_whose_file_is_damaged_fails_and_the_active_set_stays(filled):
     before = filled.active_words
     filled.write(1149, 1)
     filled.run()
-    assert filled.outcome == (CommitStatus.FAILED, -1, 0)
+    assert filled.outcome == (CommitStatus.FAILED, -1, UploadReason.NOT_STORED)
     assert filled.log[-1].startswith("E432 ") and filled.log[-1].endswith("active set 4 unchanged")
     assert filled.active_words == before
 

@@ -178,6 +178,14 @@ WARNINGS: Final = (
         "CLOCK_FALLBACK",
     ),
     Entry(
+        "A345",
+        "model differs from the measurements",
+        "Two windows in a row, the force was off the rig's plant by more than a quarter of the band; residual_cause says why.",
+        "As the name says: worn seals (coulomb-friction), another hose (transport-delay), a cell that warms up (linear-drift).",
+        "force-gateway record on, a minute of work, then force-gateway diagnose NUMBER: how sure, and by how much.",
+        "MODEL_DIFFERS",
+    ),
+    Entry(
         "A401",
         "control process restarted",
         "The control process died or stalled; the guardian wrote the safe voltage and started it again, in OFF.",
@@ -201,6 +209,13 @@ OTHERS: Final = (
         "A calibration run ended before its last stair; the output went to the safe voltage and the data are kept.",
         "Nobody followed the run any more (a closed terminal), or the recording could not be written.",
         "force-gateway calibrate --resume goes on with the groups that are missing; df -h shows a full disk.",
+    ),
+    Entry(
+        "A346",
+        "residual watch ended",
+        "The process that compares measurements with the rig's plant died; the fourth time it stays off. Control goes on.",
+        "The machine ran out of memory (the watch is the first to go), somebody ended it, or a defect of ours.",
+        "Look at the lines above it in the log; `residual_watch: {enabled: false}` in the rig file switches it off.",
     ),
     Entry(
         "A331",

@@ -12,7 +12,8 @@ from gateway.cli.codes import CATALOGUE, FAULT_CODES, WARNING_CODES
 from gateway.cli.monitoring.parts import big, chart, chart_top_n
 from gateway.cli.monitoring.table import View, register_table
 from gateway.cli.monitoring.track import Track, buckets
-from gateway.registers.words import FaultCode, State, StatusBit
+from gateway.cli.words_of_values import shown
+from gateway.registers.words import FaultCode, State, StatusBit, WarningBit
 
 _STATE_STYLE: Final = {
     State.OFF: "white on grey30",
@@ -106,19 +107,26 @@ def _alarms(track: Track) -> list[Text]:
     warnings = track.value("warning_word")
     if not isnan(warnings):
         codes += [(code, "black on yellow") for bit, code in WARNING_CODES.items() if int(warnings) & bit]
-    lines = [_alarm(code, style) for code, style in codes[:3]]
+    lines = [_alarm(code, style, _detail(code, track)) for code, style in codes[:3]]
     if len(codes) > 3:
         lines[-1] = Text(f" and {len(codes) - 2} more: see warning_word ", style="black on yellow")
     return lines
+
+
+def _detail(code: str, track: Track) -> str:
+    """What else the registers say of an alarm: the name that the residual watch has for its cause."""
+    if code != WARNING_CODES[WarningBit.MODEL_DIFFERS] or "residual_cause" not in track.readings:
+        return ""
+    return f": {shown(track.readings['residual_cause']).replace('_', '-')}"
 
 
 def _code_of_fault(number: int) -> str:
     return FAULT_CODES.get(FaultCode(number), "") if number in set(FaultCode) else ""
 
 
-def _alarm(code: str, style: str) -> Text:
+def _alarm(code: str, style: str, detail: str) -> Text:
     entry = CATALOGUE.get(code)
     text = Text(no_wrap=True, overflow="ellipsis")
     if entry is None:
         return text.append(" a fault that this version does not know ", style=style)
-    return text.append(f" {entry.code} {entry.title} ", style=style).append(f" {entry.do}")
+    return text.append(f" {entry.code} {entry.title}{detail} ", style=style).append(f" {entry.do}")

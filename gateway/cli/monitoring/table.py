@@ -25,6 +25,7 @@ _FIRST: Final = (
     "feedforward",
     "trim",
     "model_residual",
+    "residual_cause",
     "pressure",
     "sample_age",
     "owner_ip",

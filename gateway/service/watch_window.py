@@ -1,0 +1,116 @@
+"""What the residual watch looks at: the newest rows of the sample ring as a measurement, with a lead-in.
+
+The replay begins at rest without pressure; the machine does not, and its friction remembers. So rows before the window
+are replayed too and not judged. They begin where both agree: at the last 0 V, or else at the highest command of the lead,
+for whoever comes up to that from below, the replay from 0 as well, has all friction elements turned the same way (what is
+within the largest loop has no memory of what was before it). Ten seconds of any lead left 0.4 N of wrong friction.
+A gap (control was restarted) ends what can be replayed; rows in and shortly after a fault are no witness of the plant.
+
+The pressure is left out: an output device measures it for its display, late and seldom, which is no second channel.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.measurement import Flags, Floats, Measurement
+from gateway.recording import Recording, RecordingError
+from gateway.recording.measurement import measurement_of
+
+LEAD_S: Final = 12.0
+"""How far before the window a replay may begin; the search takes its blocks from all rows, so that more costs certainty."""
+_SETTLED_S: Final = 1.0  # from the first row of a replay until it may be judged
+_GAP_S: Final = 0.5
+_AFTER_FAULT_S: Final = 2.0
+_ALMOST: Final = 0.9  # of the window must be there, and usable
+_OFF_V: Final = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A measurement whose lead-in is not usable. end_s: time of its newest row, by the machine's monotonic clock;
+    excitation_v: standard deviation of the command in the window; moves: how often the command turned."""
+
+    measurement: Measurement
+    end_s: float
+    excitation_v: float
+    moves: int
+
+
+def window_of(data: bytes, columns: tuple[str, ...], window_s: float) -> Window | str:
+    """The window that ends with the newest row; a sentence where there is nothing to judge."""
+    table = np.frombuffer(data, dtype="<f8").reshape(-1, len(columns))
+    rows = {name: table[:, index] for index, name in enumerate(columns)}
+    rows = _unbroken(rows)
+    time_s = rows["time_s"]
+    if time_s.size < 2 or time_s[-1] - time_s[0] < window_s * _ALMOST + _SETTLED_S:
+        return "the run is younger than the window"
+    first = _first(rows["command_v"], time_s, window_s)
+    rows = {name: values[first:].copy() for name, values in rows.items()}
+    window = rows["time_s"] >= max(time_s[-1] - window_s, rows["time_s"][0] + _SETTLED_S)
+    judged = window & ~_faulty(rows)
+    if judged.sum() < _ALMOST * window.sum():
+        return "a fault stood"
+    command_v = rows["command_v"][judged]
+    if not np.any(command_v > _OFF_V):
+        return "nothing was commanded"
+    measurement = _measurement(rows, judged)
+    return (
+        measurement if isinstance(measurement, str) else Window(measurement, float(time_s[-1]), *_excitation(command_v))
+    )
+
+
+def _measurement(rows: dict[str, Floats], judged: Flags) -> Measurement | str:
+    """As a recording of the run would be read, judged where it may be."""
+    time_s = rows["time_s"]
+    marked = rows | {
+        "time_s": time_s - time_s[0],
+        "pressure_kpa": np.full(time_s.size, np.nan),
+        "force_n": np.where(judged, rows["force_n"], np.nan),
+    }
+    try:
+        found = measurement_of(Recording(Path("window"), {}, marked, time_s.size, False))
+    except RecordingError as error:
+        return str(error)
+    return replace(found, force_n=np.where(found.usable, found.force_n, 0.0))
+
+
+def _unbroken(rows: dict[str, Floats]) -> dict[str, Floats]:
+    """What follows the last gap, or the last time that runs backwards."""
+    steps_s = np.diff(rows["time_s"])
+    breaks = np.flatnonzero((steps_s > _GAP_S) | (steps_s < 0.0))
+    first = int(breaks[-1]) + 1 if breaks.size else 0
+    return {name: values[first:] for name, values in rows.items()}
+
+
+def _first(command_v: Floats, time_s: Floats, window_s: float) -> int:
+    """The row where the replay begins."""
+    begin_s = time_s[-1] - window_s
+    stop = max(1, int(np.searchsorted(time_s, begin_s - _SETTLED_S)))
+    start = int(np.searchsorted(time_s, begin_s - LEAD_S))
+    held = max(1, int(np.searchsorted(time_s, time_s[0] + _SETTLED_S)))
+    resting = np.flatnonzero(_held(command_v[start:stop] <= _OFF_V, held) >= held)  # a dip of the command is no rest
+    if resting.size:
+        return start + held - 1 + int(resting[-1])
+    return start + int(np.argmax(_held(command_v[start : stop + held], held)[: stop - start]))
+
+
+def _held(values: Floats | Flags, rows: int) -> Floats:
+    """Sums over so many rows, from each row on."""
+    return np.convolve(values, np.ones(rows), mode="valid") if values.size >= rows else np.zeros(1)
+
+
+def _faulty(rows: dict[str, Floats]) -> Flags:
+    """Rows with a latched fault, and those shortly after."""
+    faulty = rows["fault_code"] != 0.0
+    time_s = rows["time_s"]
+    last_s = np.maximum.accumulate(np.where(faulty, time_s, -np.inf))
+    return np.asarray(time_s - last_s < _AFTER_FAULT_S)
+
+
+def _excitation(command_v: Floats) -> tuple[float, int]:
+    moved = np.sign(np.diff(command_v))
+    moved = moved[moved != 0.0]
+    return float(np.std(command_v)), int(np.count_nonzero(np.diff(moved)))
