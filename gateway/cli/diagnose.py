@@ -4,6 +4,7 @@ Everything is read, computed and put into words before the first file is written
 """
 
 import json
+import os
 import time
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -66,6 +67,7 @@ def command(**options: Any) -> None:
     RECORDING is a number of `recordings list`, a .fgr file, CSV or Parquet with time_s, force_n and command_v or
     pressure_kpa. Several are explained by one model.
     """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
     from gateway.cli.diagnosing.outputs import check_targets, write_all
     from gateway.cli.diagnosing.sources import read_sources
 
@@ -111,7 +113,13 @@ def _diagnosed(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis,
 
     from gateway.diagnosis import Options, diagnose
 
-    asked = Options(without=options["without"], noise_floor_n=options["noise_floor_n"], clock=time.perf_counter)
+    asked = Options(
+        without=options["without"],
+        noise_floor_n=options["noise_floor_n"],
+        late_s=sources.late_s,
+        quantum_n=sources.quantum_n,
+        clock=time.perf_counter,
+    )
     began_s = time.perf_counter()
     with Console(stderr=True).status("diagnosing"):
         diagnosis = diagnose(sources.measurements, sources.plant.plant, asked)

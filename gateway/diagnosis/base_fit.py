@@ -12,14 +12,16 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.bench import Bench
+from gateway.diagnosis.catalogue import EFFECTS
 from gateway.diagnosis.catalogue_cylinder import AREA, COULOMB
 from gateway.diagnosis.catalogue_regulator import LAG
+from gateway.diagnosis.catalogue_sensing import CLOCK_OFFSET
 from gateway.diagnosis.effect import Parameter
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.point import Point
 from gateway.diagnosis.refine import Fitted, Problem, refine
-from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator
+from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
 DEFAULT_PLANT: Final = Plant(
     regulator=Regulator(lag_s=0.072),
@@ -32,12 +34,23 @@ _LAGS_S: Final = (0.005, 0.02, 0.05, 0.1, 0.2)
 _COULOMBS_N: Final = (0.0, 0.3, 1.0, 2.5, 6.0)
 
 
-def base_parameters(bench: Bench, hidden: frozenset[str]) -> tuple[Parameter, ...]:
-    """What is refitted: `hidden` are names of effects that are switched off."""
+def bare(plant: Plant) -> Plant:
+    """The plant's dimensions and base parameters, every effect at its null value: what is known of a foreign machine."""
+    kept = {AREA.path, LAG.path, COULOMB.path}
+    for effect in EFFECTS:
+        for parameter in effect.parameters:
+            if not parameter.shape and parameter.path not in kept:
+                plant = with_value(plant, parameter.section, parameter.name, float(parameter.null))
+    return with_value(with_value(plant, "contact", "mass_kg", 0.0), "contact", "pad_damping_n_s_per_m", 0.0)
+
+
+def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -> tuple[Parameter, ...]:
+    """What is refitted. hidden: names of effects that are switched off; late_s: how late readings may come, see Options."""
     commanded = any(each.command_v is not None for each in bench.measurements)
     found = [AREA]
     found += [LAG] if commanded else []
     found += [COULOMB] if "coulomb-friction" not in hidden else []
+    found += [replace(CLOCK_OFFSET, low=0.0, high=late_s)] if late_s > 0.0 else []
     return tuple(found)
 
 

@@ -49,7 +49,7 @@ class Bench:
         self.force_rows = np.concatenate(
             [np.full(segment.rows.stop - segment.rows.start, segment.is_force) for segment in self.segments]
         )
-        self.block_of_row = np.concatenate([_blocks(segment) for segment in self.segments])
+        self.block_of_row = np.concatenate([_blocks(segment, self.usable) for segment in self.segments])
         self._taken_out: list[Floats] = []
         self._nuisance = _nuisance(self, self._taken_out)
 
@@ -208,9 +208,11 @@ def _segments(measurements: Sequence[Measurement]) -> list[Segment]:
     return segments
 
 
-def _blocks(segment: Segment) -> NDArray[np.int64]:
-    rows = segment.rows.stop - segment.rows.start
-    return np.asarray(segment.recording * BLOCKS + (np.arange(rows) * BLOCKS) // rows)
+def _blocks(segment: Segment, usable: Flags) -> NDArray[np.int64]:
+    """Block of each row: blocks of one recording hold equally many rows that count."""
+    counted = np.cumsum(usable[segment.rows])
+    share = np.maximum(counted - 1, 0) * BLOCKS // max(int(counted[-1]), 1)
+    return np.asarray(segment.recording * BLOCKS + share)
 
 
 def _nuisance(bench: Bench, taken_out: Sequence[Floats]) -> Floats:

@@ -60,6 +60,7 @@ CYLINDER: Final = (
         signature="rounded corners of the loop at each reversal",
         excitation="many reversals, small ones too",
         experiment="a ladder with minor loops: reversals of 0.1, 0.3 and 1 V around three levels",
+        least=1.0e-5,
         forms=(Form(parameters=(PRESLIDING,), probes=fixed((3.0e-5,), (1.0e-4,), (4.0e-4,))),),
         group=_ONE_SPEED,
     ),
@@ -86,7 +87,7 @@ CYLINDER: Final = (
         experiment="reversals of 0.1 and 1 V around three levels",
         forms=(Form(parameters=(ASYMMETRY,), probes=fixed((0.2,)), proportional=True),),
         group=("coulomb-friction", "viscous-friction"),
-        rarity=4.0,
+        rarity=10.0,
     ),
     Effect(
         name="dwell-stiction",

@@ -28,11 +28,15 @@ from gateway.twin.replay_drive import Motion
 class Options:
     """without: an effect of the base model to switch off, to see it found again. noise_floor_n: known floor, N.
 
+    late_s: readings may come up to so much late without being a finding (the wires of a gateway's own recording).
+    quantum_n: step of the readings that is known and no finding either.
     clock: seconds from anywhere, for the account of where the time went; None: no account.
     """
 
     without: str | None = None
     noise_floor_n: float | None = None
+    late_s: float = 0.0
+    quantum_n: float = 0.0
     clock: Callable[[], float] | None = None
 
 
@@ -48,17 +52,22 @@ def diagnose(
     options = options or Options()
     hidden = frozenset({options.without} if options.without else ())
     account = _Account(options.clock)
-    start = _prepared(plant or DEFAULT_PLANT, hidden)
-    bench, base, whiten = _based(measurements, start, hidden)
+    given = plant or DEFAULT_PLANT
+    bench, base, whiten = _based(measurements, _prepared(given, hidden), hidden, options.late_s)
     account("base fit")
-    bench, base, found_direct = _direct(bench, base, whiten, start)
+    bench, base, found_direct = _direct(bench, base, whiten, max(options.quantum_n, given.cell.quantum_n))
     effects = _competitors(base.free, hidden)
     found = search(bench, base, effects, whiten, account)
     left = screen(bench, found.fitted, found.whiten, [each.leftover for each in found.nameless])
     account("screen")
     result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
     account("judgement")
-    return replace(result, spent_s=account.spent_s)
+    return replace(
+        result,
+        base=_with_readings_of(given, result.base),
+        plant=_with_readings_of(given, result.plant),
+        spent_s=account.spent_s,
+    )
 
 
 class _Account:
@@ -77,8 +86,8 @@ class _Account:
 
 
 def _prepared(plant: Plant, hidden: frozenset[str]) -> Plant:
-    """The plant without noise, and without the effects that are to be found again."""
-    plant = with_value(plant, "cell", "noise_n", 0.0)
+    """The plant without noise and rounding, and without the effects that are to be found again."""
+    plant = with_value(with_value(plant, "cell", "noise_n", 0.0), "cell", "quantum_n", 0.0)
     for name in hidden:
         for parameter in BY_NAME[name].parameters:
             if not parameter.shape:
@@ -86,7 +95,15 @@ def _prepared(plant: Plant, hidden: frozenset[str]) -> Plant:
     return plant
 
 
-def _based(measurements: Sequence[Measurement], start: Plant, hidden: frozenset[str]) -> tuple[Bench, Fitted, Whitener]:
+def _with_readings_of(given: Plant, plant: Plant) -> Plant:
+    """The plant with the noise and the rounding that were known before, unless a coarser rounding was found."""
+    quantum_n = max(given.cell.quantum_n, plant.cell.quantum_n)
+    return with_value(with_value(plant, "cell", "noise_n", given.cell.noise_n), "cell", "quantum_n", quantum_n)
+
+
+def _based(
+    measurements: Sequence[Measurement], start: Plant, hidden: frozenset[str], late_s: float
+) -> tuple[Bench, Fitted, Whitener]:
     """The bench and base model that fit best, over the ways in which motion may be known."""
     measured = any(each.position_m is not None for each in measurements)
     motions: tuple[Motion, ...] = ("inferred", "measured", "measured-reversed") if measured else ("inferred",)
@@ -94,18 +111,20 @@ def _based(measurements: Sequence[Measurement], start: Plant, hidden: frozenset[
     for motion in motions:
         bench = Bench(measurements, motion)
         whiten = white(bench, bench.measured_n)
-        free = base_parameters(bench, hidden - {"coulomb-friction"})  # friction tells which way is which
+        free = base_parameters(bench, hidden - {"coulomb-friction"}, late_s)  # friction tells which way is which
         tries.append((fit_base(bench, start, free, whiten), motion, bench, whiten))
     fitted, motion, bench, whiten = min(tries, key=lambda each: each[0].chi2)
-    free = base_parameters(bench, hidden)
+    free = base_parameters(bench, hidden, late_s)
     if free != fitted.free:
         fitted = fit_base(bench, start, free, whiten)
     return bench, fitted, whiten
 
 
-def _direct(bench: Bench, base: Fitted, whiten: Whitener, start: Plant) -> tuple[Bench, Fitted, tuple[Direct, ...]]:
+def _direct(
+    bench: Bench, base: Fitted, whiten: Whitener, known_quantum_n: float
+) -> tuple[Bench, Fitted, tuple[Direct, ...]]:
     """What the readings tell by themselves; rows that are no witness are left out and the base is fitted again."""
-    lattice = coarse(bench, base.residual_n, start.cell.quantum_n)
+    lattice = coarse(bench, base.residual_n, known_quantum_n)
     found = [lattice] if lattice else []
     quantum_n = lattice.values[0][1] if lattice else 0.0
     for direct in (spikes(bench, base.residual_n, quantum_n), None if lattice else repeats(bench, base.residual_n)):

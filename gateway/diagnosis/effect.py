@@ -82,6 +82,7 @@ class Effect:
     forms: tuple[Form, ...]
     group: tuple[str, ...] = ()
     rarity: float = 0.0  # chi-square by which it must beat a commoner cause that explains as much
+    least: float = 0.0  # of the first parameter, below which it is part of every machine
     direct: bool = False  # told by the readings themselves, not by what the model leaves
     marks: tuple[Parameter, ...] = field(default=())  # parameters that only the direct way sets
 

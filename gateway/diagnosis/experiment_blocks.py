@@ -17,19 +17,19 @@ def _part(name: str, why: str, moves: Iterator[Move] | Sequence[Move]) -> Part:
 
 
 def _step(level: float, hold_s: float) -> Move:
-    return Move(do=Do.STEP, to_share=level, hold_s=hold_s)
+    return Move(do=Do.STEP, to_share=round(level, 4), hold_s=hold_s)
 
 
 def _ramp(level: float, over_s: float, hold_s: float = 0.5) -> Move:
-    return Move(do=Do.RAMP, to_share=level, over_s=over_s, hold_s=hold_s)
+    return Move(do=Do.RAMP, to_share=round(level, 4), over_s=over_s, hold_s=hold_s)
 
 
 def _ladder(level: float, stairs: int, hold_s: float) -> Move:
-    return Move(do=Do.LADDER, to_share=level, stairs=stairs, hold_s=hold_s)
+    return Move(do=Do.LADDER, to_share=round(level, 4), stairs=stairs, hold_s=hold_s)
 
 
 def _swing(size: float, times: int, over_s: float | None, hold_s: float | None = None) -> Move:
-    return Move(do=Do.REVERSALS, size_share=size, times=times, over_s=over_s, hold_s=hold_s)
+    return Move(do=Do.REVERSALS, size_share=size, times=times, over_s=over_s and round(over_s, 3), hold_s=hold_s)
 
 
 def _dwells() -> Iterator[Move]:
@@ -46,10 +46,9 @@ def _reversals(sizes: Sequence[float], over_s: float, times: int = 2) -> Iterato
 
 
 def _steps() -> Iterator[Move]:
+    yield _step(0.45, 1.2)
     for size in (0.06, 0.12, 0.25, 0.5):
-        for _ in range(2):
-            yield _step(0.45 + size / 2.0, 1.2)
-            yield _step(0.45 - size / 2.0, 1.2)
+        yield _swing(size, 2, None, 1.2)
 
 
 def _ramps() -> Iterator[Move]:

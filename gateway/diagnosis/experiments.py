@@ -197,25 +197,27 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {experiment.name: experiment for exp
 """By name of the effect, in the catalogue's order."""
 
 
-def plan_for(names: Iterable[str], *, longest_s: float = inf, title: str = "") -> Plan:
+def plan_for(names: Iterable[str], *, besides: Iterable[str] = (), longest_s: float = inf) -> Plan:
     """One plan that shows each of these effects, or tells them apart: blocks that several need once, shortest first.
 
-    Where some need a person meanwhile and others do not, those that do are left out; so is what would pass longest_s,
-    except that one experiment is always in it. KeyError for a name that the catalogue does not have, ValueError for none.
+    Where some need a person meanwhile and others do not, those that do are left out. Those of `besides` are taken as far as
+    longest_s goes, those of `names` whatever the time.
+    KeyError for a name that the catalogue does not have, ValueError for none.
     """
-    asked = [EXPERIMENTS[name] for name in dict.fromkeys(names)]
+    first = tuple(dict.fromkeys(names))
+    asked = [EXPERIMENTS[name] for name in dict.fromkeys((*first, *besides))]
     if not asked:
         raise ValueError("a plan needs at least one effect")
     together = [each for each in asked if not each.meanwhile] or [
         each for each in asked if each.meanwhile == asked[0].meanwhile
     ]
     left_out = [(each.name, f"needs a run of its own: {each.meanwhile}") for each in asked if each not in together]
-    chosen, parts = _fitting(together, longest_s)
+    chosen, parts = _fitting(together, first, longest_s)
     left_out += [
         (each.name, f"would take {_extra_s(each, parts):.0f} s more") for each in together if each not in chosen
     ]
     return Plan(
-        experiment=_merged(chosen, parts, title),
+        experiment=_merged(chosen, parts),
         left_out=tuple(left_out),
         apart=tuple(dict.fromkeys(each.apart for each in chosen if each.apart)),
     )
@@ -233,8 +235,7 @@ def plan_next(diagnosis: Diagnosis, *, longest_s: float = USUAL_LONGEST_S) -> Pl
     names = [*groups, *alone] or unseen
     if not names:
         return None
-    least_s = plan_for(groups).total_s if groups else 0.0
-    plan = plan_for(names, longest_s=max(longest_s, least_s))
+    plan = plan_for(groups or (alone or unseen)[:1], besides=names, longest_s=longest_s)
     left = [(name, _help(EXPERIMENTS[name])) for name in unseen if name not in names]
     return Plan(experiment=plan.experiment, left_out=(*plan.left_out, *left), apart=plan.apart)
 
@@ -245,11 +246,13 @@ def _help(experiment: Experiment) -> str:
     return "; ".join([*said, *(text for text in (experiment.meanwhile, experiment.apart) if text)])
 
 
-def _fitting(experiments: Sequence[Experiment], longest_s: float) -> tuple[list[Experiment], list[Part]]:
-    """Greedily what adds least; of equals the first one asked for."""
-    chosen: list[Experiment] = []
-    parts: list[Part] = []
-    rest = list(experiments)
+def _fitting(
+    experiments: Sequence[Experiment], must: Sequence[str], longest_s: float
+) -> tuple[list[Experiment], list[Part]]:
+    """What must be, then greedily what adds least; of equals the first one asked for."""
+    chosen = [each for each in experiments if each.name in must]
+    parts = list(dict.fromkeys(part for each in chosen for part in each.parts))
+    rest = [each for each in experiments if each not in chosen]
     while rest:
         best = min(rest, key=lambda each: _extra_s(each, parts))
         if chosen and _extra_s(best, parts) + sum(part.duration_s for part in parts) > longest_s:
@@ -264,11 +267,11 @@ def _extra_s(experiment: Experiment, parts: Sequence[Part]) -> float:
     return sum(part.duration_s for part in experiment.parts if part not in parts)
 
 
-def _merged(experiments: Sequence[Experiment], parts: Sequence[Part], title: str) -> ExperimentPlan:
+def _merged(experiments: Sequence[Experiment], parts: Sequence[Part]) -> ExperimentPlan:
     names = tuple(each.name for each in experiments)
     return ExperimentPlan(
-        name=title or (f"{names[0]} and {len(names) - 1} more" if len(names) > 2 else " and ".join(names)),
-        description="; ".join(f"{each.name}: {each.why}" for each in experiments[:1]) if len(names) == 1 else "",
+        name=f"{names[0]} and {len(names) - 1} more" if len(names) > 2 else " and ".join(names),
+        description=experiments[0].why if len(names) == 1 else "",
         shows=names,
         columns=tuple(dict.fromkeys(column for each in experiments for column in each.columns)),
         by_hand=tuple(dict.fromkeys(each.meanwhile for each in experiments if each.meanwhile)),

@@ -5,12 +5,15 @@ a fit needs of it; leaving b out is a subtraction, a bootstrap is a weighted sum
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.refine import Fitted, Whiten
+
+_RIDGE: Final = 0.01  # of a parameter's whole weight: a block that holds all of it says nothing about itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +101,7 @@ def held_out(bench: Bench, fitted: Fitted, whiten: Whiten) -> HeldOut:
     blocks = int(bench.block_of_row.max()) + 1
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
     columns = columns / scale[:, None]
-    gram, slope = columns @ columns.T + 1.0e-9 * np.eye(columns.shape[0]), columns @ residual
+    gram, slope = columns @ columns.T + _RIDGE * np.eye(columns.shape[0]), columns @ residual
     errors, counts, steps = np.zeros(blocks), np.zeros(blocks), np.zeros((blocks, columns.shape[0]))
     for block in range(blocks):
         rows = bench.block_of_row == block

@@ -1,7 +1,7 @@
 """The search: add the winner of a contest while it pays, then let every accepted effect compete for its place again.
 
 Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
-not see whose 95 % interval is positive; at least 2 % of the held-out squared error; and, for every effect after the
+not see, in nearly all ways to resample them; at least 2 % of the held-out squared error; and, for every effect after the
 first, a few percent of what the others explain: no form is exact, and what a cause's wrong form leaves must not be
 named. A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
 """
@@ -29,6 +29,7 @@ MOST_EFFECTS: Final = 5
 _DISCREPANT: Final = 3.0  # chi-square per row of the winner
 _CLEARLY: Final = 1.05  # a nameless dependence must explain this much more than the best effect ...
 _MARGIN: Final = 10.0  # ... and this much more in chi-square
+_DOUBT: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
 _SEED: Final = 21
 _LEAST_GAIN: Final = 0.02  # of the held-out squared error
 _LEAST_BESIDE: Final = 0.04  # of the chi-square that the effects before it explain
@@ -123,6 +124,7 @@ def _acceptable(bench: Bench, fitted: Fitted, base: Fitted, contest: Contest, wh
         explained = max(base.chi2 - fitted.chi2, 0.0)
         if (
             significant(each, contest.starts)
+            and abs(each.fitted.point.value(each.form.parameters[0])) >= each.effect.least
             and each.gain > _LEAST_BESIDE * explained
             and _worth(bench, fitted, each.fitted, whiten)
         ):
@@ -136,7 +138,7 @@ def _worth(bench: Bench, before: Fitted, after: Fitted, whiten: Whitener) -> boo
     error_after = held_out(bench, after, whiten).errors
     saved = error_before - error_after
     weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
-    low = float(np.quantile(weights @ saved, 0.025))
+    low = float(np.quantile(weights @ saved, _DOUBT))
     return low > 0.0 and float(np.sum(saved)) > _LEAST_GAIN * float(np.sum(error_before))
 
 

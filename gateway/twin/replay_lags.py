@@ -4,8 +4,13 @@ While a target u holds for a time h, two lags make of their states p1 and p2
     p1' = u + e1 (p1 - u),  p2' = u + e2 (p2 - u) + K (p1 - u),  K = t1 (e1 - e2) / (t1 - t2),  e = exp(-h / t),
 so the states when each command arrives are a linear recursion with coefficients of its own in every row (`scanned`), and
 a pressure at any time is one more such piece of what was held last. A delay only shifts this time. A lag that differs
-with the direction, and the slew limit behind the lags, are stepped through from command to command instead.
+with the direction, and the slew limit behind the lags, are stepped through from command to command instead. Between
+evenly spaced rows all of it, the piece at the end and the delay as well, is one linear filter (`evenly`), three times as fast.
 """
+
+import math
+from collections.abc import Iterable
+from itertools import repeat
 
 import numpy as np
 
@@ -19,11 +24,38 @@ def lags(regulator: Regulator) -> bool:
     return regulator.lag_s > 0.0 or regulator.second_lag_s > 0.0 or regulator.slew_pa_per_s < UNLIMITED
 
 
+def is_linear(regulator: Regulator) -> bool:
+    """Are there lags, and neither another one for rising nor a slew limit?"""
+    slews = regulator.slew_pa_per_s < UNLIMITED
+    return lags(regulator) and not slews and regulator.fill_slowdown == 0.0
+
+
+def evenly(regulator: Regulator, target_pa: Floats, step_s: float) -> Floats:
+    """The pressure at rows that lie evenly, (rows,), of a linear regulator; target_pa: one more, from before the first.
+
+    The taps come from what one target for one step leaves in the row where it is seen first and in the two after that.
+    """
+    from scipy.signal import lfilter
+
+    whole = math.floor(regulator.delay_s / step_s)
+    kept_1, kept_2, across = coupling(regulator.lag_s, regulator.second_lag_s, step_s)
+    _, part_2, part = coupling(regulator.lag_s, regulator.second_lag_s, (whole + 1) * step_s - regulator.delay_s)
+    first, second = 1.0 - kept_1, 1.0 - kept_2 - across
+    left = [1.0 - part_2 - part, part * first + part_2 * second]
+    left.append(part * kept_1 * first + part_2 * (kept_2 * second + across * first))
+    back = (1.0, -(kept_1 + kept_2), kept_1 * kept_2)
+    ahead = [sum(left[tap - i] * back[i] for i in range(tap + 1)) for tap in range(3)]
+    start, late = target_pa[0], min(whole, target_pa.size - 1)
+    found = np.full(target_pa.size - 1, start)
+    found[late:] += lfilter(ahead, back, target_pa[: target_pa.size - 1 - late] - start)
+    return found
+
+
 def scanned(kept: Real, gained: Floats, start: float) -> Floats:
     """x[0] = start, x[k + 1] = kept[k] x[k] + gained[k]; kept: a float, or one for each step.
 
-    BLAS solves it as a triangular band, faster than lfilter, which takes no coefficients that change. Imported here:
-    the twin's real-time part knows no scipy.
+    BLAS solves it as a triangular band; lfilter takes no coefficients that change. Imported here, as above: the twin's
+    real-time part knows no scipy.
     """
     from scipy.linalg.blas import dtbsv
 
@@ -103,7 +135,7 @@ def _filled(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[Float
     ways = []
     for lag_s in (_filling_s(regulator), regulator.lag_s):
         shares = coupling(lag_s, regulator.second_lag_s, held_s)
-        ways.append(zip(*(np.broadcast_to(share, steps).tolist() for share in shares), strict=True))
+        ways.append(zip(*(_each(share, steps) for share in shares), strict=True))
     first = second = float(target_pa[0])
     firsts, seconds = [first], [second]
     for target, filling, emptying in zip(target_pa[:-1].tolist(), *ways, strict=True):
@@ -118,9 +150,14 @@ def _filled(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[Float
 def _slewed(pressure_pa: Floats, most_pa: Real) -> Floats:
     """What a slew limit of `most_pa` per step lets through."""
     pressure = float(pressure_pa[0])
-    found, most = [pressure], np.broadcast_to(most_pa, pressure_pa.size - 1)
-    for asked, most_pa in zip(pressure_pa[1:].tolist(), most.tolist(), strict=True):
+    found = [pressure]
+    for asked, most in zip(pressure_pa[1:].tolist(), _each(most_pa, pressure_pa.size - 1), strict=True):
         travel = asked - pressure
-        pressure += most_pa if travel > most_pa else -most_pa if travel < -most_pa else travel
+        pressure += most if travel > most else -most if travel < -most else travel
         found.append(pressure)
     return np.array(found)
+
+
+def _each(values: Real, steps: int) -> Iterable[float]:
+    """What is one for all steps, or one for each, as floats for each."""
+    return values.tolist() if np.ndim(values) else repeat(float(values), steps)

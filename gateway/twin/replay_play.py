@@ -6,6 +6,7 @@ met, bounds the force; with a gap, what lies beyond the pad counts as a negative
 nothing that the drive could rest on.
 """
 
+from itertools import repeat
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -70,14 +71,14 @@ def _bounded(low: Floats, high: Floats, back_n: float, most_n: float) -> tuple[F
 def _single(low: Floats, high: Floats, start_n: float, share: Real) -> Floats:
     """One lane in floats."""
     force = min(max(start_n, float(low[0])), float(high[0]))
-    found, edges = [force], zip(low[1:].tolist(), high[1:].tolist(), strict=True)
+    found, least_n, most_n = [force], low[1:].tolist(), high[1:].tolist()
     if _is_whole(share):
-        for least, most in edges:
+        for least, most in zip(least_n, most_n, strict=True):
             force = least if force < least else most if force > most else force
             found.append(force)
     else:
-        shares = np.broadcast_to(share, low.size - 1).tolist()
-        for (least, most), goes in zip(edges, shares, strict=True):
+        shares = repeat(share, low.size - 1) if type(share) is float else share.tolist()
+        for least, most, goes in zip(least_n, most_n, shares, strict=True):
             force += goes * ((least if force < least else most if force > most else force) - force)
             found.append(force)
     return np.array(found)

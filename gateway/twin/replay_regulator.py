@@ -17,7 +17,7 @@ from gateway.twin.regulator import target_pa
 from gateway.twin.replay_cache import Cache
 from gateway.twin.replay_drive import Drive, Floats
 from gateway.twin.replay_grid import Grid, alike
-from gateway.twin.replay_lags import at_commands, lags, later
+from gateway.twin.replay_lags import at_commands, evenly, is_linear, lags, later
 from gateway.twin.sections import UNLIMITED, Regulator
 from gateway.twin.terms import switched_on
 from gateway.twin.terms_regulator import drooped, hunted, leaked
@@ -62,7 +62,7 @@ class Pressures:
 
     def _followed(self, regulator: Regulator) -> Floats:
         """What lags and delay make of the target, then ceiling, leak and hunting."""
-        pressure = self._lagged(regulator) if lags(regulator) else self._averaged(regulator)
+        pressure = self._delayed(regulator)
         if regulator.ceiling_pa < UNLIMITED:
             pressure = np.minimum(pressure, regulator.ceiling_pa)
         if regulator.leak_flow_pa != 0.0:
@@ -70,6 +70,14 @@ class Pressures:
         if regulator.hunting_pa != 0.0:
             pressure = hunted(regulator, pressure, self._grid.time_s)
         return pressure
+
+    def _delayed(self, regulator: Regulator) -> Floats:
+        """What lags and delay make of the target."""
+        if not lags(regulator):
+            return self._averaged(regulator)
+        if self._grid.is_rows and type(self._held_s) is float and is_linear(regulator):
+            return evenly(regulator, self._target(regulator), self._held_s)
+        return self._lagged(regulator)
 
     def _lagged(self, regulator: Regulator) -> Floats:
         """The last target that is seen at each point, and how far the pressure has come towards it."""

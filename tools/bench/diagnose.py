@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Where the time of one diagnosis goes: `tools/bench/diagnose.py [RECORDING]`; without one, a hidden delay is generated.
 
-The recording without an argument is 60 s at 200 Hz, made by the twin with paper-slide's numbers, a delay that the model does not
+The recording without an argument is 60 s at 200 Hz, made by the twin with a delay that the model does not
 have and 0.1 N of noise. Prints seconds per stage, the whole, and the largest memory.
 """
 
@@ -57,7 +57,9 @@ def main() -> None:
         print(f"{stage:24s} {spent_s:6.2f} s")
     print(f"{'whole':24s} {time.perf_counter() - began:6.2f} s")
     print(f"largest memory           {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:6.0f} MB")
-    print(f"verdict {found.verdict}: " + (", ".join(f"{c.name} {c.confidence:.2f}" for c in found.causes) or "no cause"))
+    print(
+        f"verdict {found.verdict}: " + (", ".join(f"{c.name} {c.confidence:.2f}" for c in found.causes) or "no cause")
+    )
 
 
 if __name__ == "__main__":

@@ -3,9 +3,10 @@
     .venv/bin/python tools/bench/replay.py
 
 The recording: a rich minute at 200 Hz (a command that steps, ramps and swings), 12000 rows. Lanes differ in the fields that
-are named; "jitter": the same recording with rows 1.5 ms too early or late. A new recording each time, so that nothing is known from before; then "again", with one new plant among known
-ones, which is what a search asks for mostly. Behind it: steps of 5 V, lags of 30 to 120 ms, several delays; the largest
-difference at a row from a replay in steps of 0.05 ms, with rigid friction, with presliding, and with the plant's drag besides.
+are named; "jitter": the same recording with rows up to 1.5 ms too early or late. A new recording each time, so that nothing
+is known from before; then "again", with one new plant among known ones, which is what a search asks for mostly. At last the
+largest difference at a row from a replay in steps of 0.05 ms, over steps of 5 V, a single lag of 30 to 120 ms and several
+delays: with rigid friction, with presliding, and with drag besides.
 """
 
 import time
@@ -37,8 +38,9 @@ def rich_drive(jitter_s: float = 0.0) -> Drive:
 
 def wandered(time_s: Floats, jitter_s: float) -> Floats:
     """Rows too early or too late by up to this much."""
-    found = time_s + np.random.default_rng(2).uniform(-jitter_s, jitter_s, time_s.size)
-    return found - found[0]
+    found: Floats = time_s + np.random.default_rng(2).uniform(-jitter_s, jitter_s, time_s.size)
+    found -= found[0]
+    return found
 
 
 def stepping_drive(jitter_s: float) -> Drive:
@@ -115,6 +117,7 @@ def twin_us_per_step(plant: Plant) -> float:
 
 def print_accuracy(base: Plant) -> None:
     print(f"\n{'N from fine steps, rows:':28}{'even':>9}{'jitter':>9}")
+    base = with_value(base, "regulator", "second_lag_s", 0.0)
     still = with_value(base, "friction", "viscous_n_s_per_m", 0.0)
     for name, plant in (("rigid friction", rigid(base)), ("presliding", still), ("presliding, drag", base)):
         found = [worst_n(plant, stepping_drive(jitter_s)) for jitter_s in (0.0, JITTER_S)]

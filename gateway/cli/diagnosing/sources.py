@@ -1,20 +1,24 @@
 """What is diagnosed: recordings by path or number, and the plant that they are compared with."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.options import state_directory
+from gateway.devices import cell_host
+from gateway.diagnosis.base_fit import bare
 from gateway.diagnosis.measurement import Measurement
 from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.mapping_file import column_mapping
 from gateway.recording.measurement import measurement_of
-from gateway.service.recorded_rig import plant_of, rig_of
+from gateway.service.recorded_rig import plant_of, rig_of, rig_texts
+from gateway.twin.plant import values
 
+_WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
 START_PLANT: Final = "paper-slide"
 _ANY_STATE: Final = "demo"  # whose state directory is meant where neither --state nor --rig says one
 
@@ -22,7 +26,7 @@ _ANY_STATE: Final = "demo"  # whose state directory is meant where neither --sta
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
     """paths: of the recordings, as found; rig: its name, empty for none; known_rig: where it is known here; notes: what was
-    decided."""
+    decided; late_s: how late the wires may have made the readings; quantum_n: their known step."""
 
     paths: tuple[Path, ...]
     measurements: tuple[Measurement, ...]
@@ -30,6 +34,8 @@ class Sources:
     rig: str
     known_rig: Rig | None
     notes: tuple[str, ...]
+    late_s: float = 0.0
+    quantum_n: float = 0.0
 
     @property
     def name(self) -> str:
@@ -44,10 +50,30 @@ def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, 
     known = load_rig(rig) if rig else None
     mapping = column_mapping(columns)
     recordings = [read_table(path, mapping) for path in paths]
-    measurements = tuple(measurement_of(recording) for recording in recordings)
+    measurements = tuple(
+        _without_polled_pressure(measurement_of(each)) if _of_gateway(each) else measurement_of(each)
+        for each in recordings
+    )
     rig_name, plant, notes = _of_rig(known) if known else _recorded(recordings)
     here = known or rig_of(recordings[0])
-    return Sources(paths=paths, measurements=measurements, plant=plant, rig=rig_name, known_rig=here, notes=notes)
+    return Sources(
+        paths=paths,
+        measurements=measurements,
+        plant=plant,
+        rig=rig_name,
+        known_rig=here,
+        notes=notes,
+        late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
+        quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
+    )
+
+
+def _quantum_n(rig: Rig | None) -> float:
+    """One count of the rig's amplifier, N; 0 where it is not known."""
+    if rig is None:
+        return 0.0
+    line = rig.load_cell
+    return cell_host(line.device, line.sign, line.unit).resolution_n
 
 
 def _path(name: str, rig: str | None, state: Path | None) -> Path:
@@ -74,7 +100,25 @@ def _recorded(recordings: Sequence[Recording]) -> tuple[str, PlantProfile, tuple
     notes = [f"the recordings are of several rigs: {', '.join(sorted(set(names)))}"] if len(set(names)) > 1 else []
     plant = plant_of(recordings[0])
     if plant is None:
-        plant = load_plant(START_PLANT)
+        plant = _foreign(load_plant(START_PLANT))
         missing = f"rig {names[0]} is not known here" if names[0] else "the recording names no rig"
-        notes.append(f"{missing}: the plant {START_PLANT} is the start; --rig names another")
+        notes.append(f"{missing}: the plant {START_PLANT} without its effects is the start; --rig names another")
     return names[0], plant, tuple(notes)
+
+
+def _foreign(profile: PlantProfile) -> PlantProfile:
+    """The start for a machine that nobody described: nobody said that it has this one's delay or seals."""
+    plant = bare(profile.plant)
+    now = {f"{section}.{name}": value for section, name, value in values(plant)}
+    origins = {path: origin for path, origin in profile.origins.items() if origin.value == now[path]}
+    return replace(profile, plant=plant, origins=origins)
+
+
+def _of_gateway(recording: Recording) -> bool:
+    """Is it one of the gateway's own?"""
+    return bool(rig_texts(recording))
+
+
+def _without_polled_pressure(measurement: Measurement) -> Measurement:
+    """The gateway polls the regulator's pressure a few times a second and holds it: it is no witness of transients."""
+    return replace(measurement, pressure_pa=None) if measurement.command_v is not None else measurement

@@ -53,7 +53,7 @@ def told(
 def _line(keyword: str, text: str, style: str = "") -> RenderableType:
     grid = Table.grid(padding=(0, 2))
     grid.add_column(min_width=8, no_wrap=True, style="dim")
-    grid.add_column()
+    grid.add_column(overflow="fold")  # a path that is cut cannot be copied
     grid.add_row(keyword, Text(text, style=style))
     return grid
 
