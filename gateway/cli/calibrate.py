@@ -1,4 +1,7 @@
-"""`calibrate`: the guided ladder on the gateway that runs, from the questions to the number of a new calibration."""
+"""`calibrate`: the guided ladder on the gateway that runs, from the questions to the number of a new calibration.
+
+With an experiment as its plan (`diagnose --plan` writes them) it records what the plan puts out, and stores nothing.
+"""
 
 import json
 from pathlib import Path
@@ -15,6 +18,7 @@ _QUESTIONS: Final = (
     "Are hands and people away, and does nothing else command this tool?",
     "Is the air on, with supply enough for {top:g} V?",
 )
+_GO_ON: Final = "; force-gateway calibrate --resume goes on"
 
 
 @click.command()
@@ -26,7 +30,12 @@ _QUESTIONS: Final = (
 )
 @click.option("--quick", is_flag=True, help="1 V stairs, 2 groups, short reversal part: under a minute.")
 @click.option("--tare", is_flag=True, help="Take the force at rest as zero first (only with the tool unloaded).")
-@click.option("--plan", "plan_file", type=click.Path(path_type=Path, exists=True, dir_okay=False), help="Plan as YAML.")
+@click.option(
+    "--plan",
+    "plan_file",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="Plan as YAML: a ladder's, or an experiment of diagnose --plan.",
+)
 @click.option("--resume", is_flag=True, help="Go on with the groups that the last stopped run did not climb.")
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.option(
@@ -37,23 +46,26 @@ _QUESTIONS: Final = (
 def command(
     *, state: Path | None, rig: str, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **wanted: Any
 ) -> None:
-    """Measure a ladder and make a numbered calibration of it.
+    """Measure a ladder and make a numbered calibration of it, or run and record an experiment (--plan).
 
     Runs on the gateway of this machine. Ctrl-C goes to 0 V and keeps the data. Nothing is activated: that is
     `calibration use N`.
     """
     from gateway.cli.calibrating.follow import follow
+    from gateway.cli.calibrating.plans import is_experiment
     from gateway.cli.calibrating.sources import LocalRun, RemoteRun
 
+    resumes = True
     if gateway:
         if any(wanted.values()):
             raise click.UsageError("by Modbus (--gateway) the gateway runs its own plan: leave the plan's options out")
         run: LocalRun | RemoteRun = RemoteRun(gateway)
     else:
         directory = state_directory(state, rig)
-        run = LocalRun(directory, *_plan(directory, wanted))
+        fields, earlier = _plan(directory, wanted)
+        run, resumes = LocalRun(directory, fields, earlier), not is_experiment(fields)
     _ask(run.preview(), yes)
-    _tell(follow(run), as_json)
+    _tell(follow(run), as_json, resumes=resumes)
 
 
 def _plan(directory: Path, wanted: dict[str, Any]) -> tuple[dict[str, Any], list[int]]:
@@ -69,21 +81,22 @@ def _plan(directory: Path, wanted: dict[str, Any]) -> tuple[dict[str, Any], list
     if wanted["quick"]:
         fields |= {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
     if wanted["plan_file"]:
-        fields |= _from_file(wanted["plan_file"])
+        fields |= _from_file(wanted["plan_file"], wanted)
     names = ("groups", "step_v", "v_max_v", "minor_points")
     fields |= {name: wanted[name] for name in names if wanted[name] is not None}
     return fields | ({"tare": True} if wanted["tare"] else {}), earlier
 
 
-def _from_file(path: Path) -> dict[str, Any]:
-    import yaml
+def _from_file(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
+    """The plan's fields; UsageError where options of a ladder stand beside an experiment."""
+    from gateway.cli.calibrating.plans import fields_of, is_experiment
 
-    try:
-        fields = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise CliError(f"{path}: {error}", exit_codes.CONFIGURATION) from None
-    if not isinstance(fields, dict):
-        raise CliError(f"{path}: a plan has lines such as `groups: 5`", exit_codes.CONFIGURATION)
+    fields = fields_of(path)
+    options = ("groups", "step_v", "v_max_v", "minor_points", "quick", "resume")
+    if is_experiment(fields) and any(wanted[name] for name in options):
+        raise click.UsageError(
+            f"{path} is an experiment: --groups, --step, --v-max, --minor, --quick, --resume are a ladder's"
+        )
     return fields
 
 
@@ -92,11 +105,13 @@ def _ask(preview: dict[str, Any], yes: bool) -> None:
     if preview:
         top = f"{preview['v_max_v']:.1f} V (about {preview['force_max_n']:.0f} N)"
         where = ", on a simulated rig" if preview["simulated"] else ""
-        stairs = f"{preview['rig']}: {preview['stairs']} stairs up to {top}"
-        click.echo(f"{stairs}, about {_minutes(preview['eta_s'])}{where}", err=True)
+        what = preview["experiment"] or f"{preview['stairs']} stairs"
+        click.echo(f"{preview['rig']}: {what} up to {top}, about {_minutes(preview['eta_s'])}{where}", err=True)
+        for note in preview["notes"]:
+            click.echo(f"  {note}", err=True)
     if yes:
         return
-    for question in _QUESTIONS:
+    for question in (*(_QUESTIONS if preview.get("check", True) else _QUESTIONS[:2]), *preview.get("questions", ())):
         words = question.format(force=preview.get("force_max_n", 60.0), top=preview.get("v_max_v", 8.0))
         if not click.confirm(words, err=True):
             raise CliError("not begun: nothing has moved")
@@ -106,7 +121,7 @@ def _minutes(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.1f} min"
 
 
-def _tell(end: dict[str, Any], as_json: bool) -> None:
+def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
     """The table and the number, or why there is none."""
     from gateway.cli.fit import show
 
@@ -119,13 +134,13 @@ def _tell(end: dict[str, Any], as_json: bool) -> None:
         click.echo(
             f"calibration {end['stored']} is stored, not active; force-gateway calibration use {end['stored']} there"
         )
-    if end["phase"] == "stored":
+    elif end["phase"] == "recorded":
+        path = Path(end["recording"])
+        number = f"{int(path.stem)}" if path.stem.isdecimal() else str(path)
+        click.echo(f"recorded in {path}; force-gateway diagnose {number} takes it")
+    if end["phase"] in ("stored", "recorded"):
         return
-    kept = (
-        f"\nthe data are kept in {end['recording']}; force-gateway calibrate --resume goes on"
-        if end.get("recording")
-        else ""
-    )
+    kept = f"\nthe data are kept in {end['recording']}{_GO_ON if resumes else ''}" if end.get("recording") else ""
     if end["phase"] == "refused":
         raise CliError(str(end.get("sentence") or "the fit was refused: see the gateway's log"), exit_codes.DATA)
     raise CliError(f"{str(end.get('sentence') or 'calibration stopped').removeprefix('info ')}{kept}")

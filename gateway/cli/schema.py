@@ -4,7 +4,7 @@ import json
 
 import click
 
-KINDS = ("rig", "device", "plant", "calibration", "registers")
+KINDS = ("rig", "device", "plant", "calibration", "registers", "plan")
 
 
 @click.command()

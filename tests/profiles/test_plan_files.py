@@ -65,7 +65,10 @@ def test_a_ladder_says_no_more_than_its_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "faults"),
     [
-        ("groups: five\nstep: 0.1\n", [":1:9 groups: \"five\" is not a whole number", ":2:1 step: is not a known key; did you mean step_v"]),
+        (
+            "groups: five\nstep: 0.1\n",
+            [":1:9 groups: \"five\" is not a whole number", ":2:1 step: is not a known key; did you mean step_v"],
+        ),
         ("name: x\n", [":1:1 parts: is missing"]),
         ("name: x\nparts: []\n", [":2:8 parts: is empty"]),
         (
@@ -73,7 +76,7 @@ def test_a_ladder_says_no_more_than_its_file(tmp_path: Path) -> None:
             [":5:14 parts[0].moves[0].do: stepp is not one of step, dwell", ":6:30 parts[0].moves[1].to_share: 1.5 is above 1"],
         ),
         (
-            "name: x\nparts:\n  - name: a\n    moves:\n      - {do: step, hold_s: 1}\n      - {do: dwell, hold_s: 1, times: 3}\n",
+            "name: x\nparts:\n  - name: a\n    moves:\n      - {do: step, hold_s: 1}\n      - {do: dwell, hold_s: 1, times: 3}",
             [":5:9 parts[0].moves[0]: a step needs to_share", ":6:39 parts[0].moves[1].times: means nothing in a dwell"],
         ),
         ("name: x\nname: y\nparts: []\n", [":2:1 name: the key stands twice"]),

@@ -25,6 +25,8 @@ _NAMES: Final = {
     "stored": "stored",
     "refused": "fit refused",
     "stopped": "stopped",
+    "experiment": "experiment",
+    "recorded": "recorded",
 }
 
 

@@ -16,7 +16,7 @@ from gateway.cli.refused import explained
 from gateway.profiles import load_register_map
 from gateway.registers.words import CalibrationPhase, ControlBit
 
-ENDED: Final = ("stored", "refused", "stopped")
+ENDED: Final = ("stored", "refused", "stopped", "recorded")
 _WORDS: Final = ("calibration_phase", "calibration_progress", "calibration_stored", "force_measured", "output_voltage")
 
 
@@ -33,7 +33,7 @@ class Look:
 
 
 class LocalRun:
-    """plan: fields of RunPlan; earlier: recordings that it goes on from."""
+    """plan: fields of RunPlan or ExperimentPlan; earlier: recordings that it goes on from."""
 
     def __init__(self, state: Path, plan: dict[str, Any], earlier: list[int]) -> None:
         self._state = state
@@ -50,13 +50,14 @@ class LocalRun:
     def look(self) -> Look:
         self._last = last = ask(self._state, {"do": "calibrate"})
         group = f" {last['group']} of {last['groups']}" if last["phase"] == "ladder" else ""
+        part = f": {last['part_name']} ({last['part']} of {last['parts']})" if last["phase"] == "experiment" else ""
         return Look(
             last["phase"],
             last["progress"],
             last["eta_s"],
             nan if last["force_n"] is None else last["force_n"],
             nan if last["voltage_v"] is None else last["voltage_v"],
-            group,
+            group or part,
         )
 
     def stop(self) -> None:
