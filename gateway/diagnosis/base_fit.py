@@ -41,7 +41,9 @@ def bare(plant: Plant) -> Plant:
         for parameter in effect.parameters:
             if not parameter.shape and parameter.path not in kept:
                 plant = with_value(plant, parameter.section, parameter.name, float(parameter.null))
-    return with_value(with_value(plant, "contact", "mass_kg", 0.0), "contact", "pad_damping_n_s_per_m", 0.0)
+    for section, name in (("contact", "mass_kg"), ("contact", "pad_damping_n_s_per_m"), ("cell", "filter_s")):
+        plant = with_value(plant, section, name, 0.0)  # a filter that is not there looks like crosstalk
+    return plant
 
 
 def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -> tuple[Parameter, ...]:

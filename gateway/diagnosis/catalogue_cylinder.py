@@ -50,6 +50,7 @@ CYLINDER: Final = (
         signature="the loop widens with speed; on a stiff workpiece it looks like a lag",
         excitation="motions at several speeds",
         experiment="strokes at three speeds with position_mm recorded",
+        least=25.0,
         forms=(Form(parameters=(VISCOUS,), probes=fixed((50.0,), (500.0,))),),
         group=tuple(dict.fromkeys((*SLOW_LAGS, *_ONE_SPEED))),
     ),

@@ -14,6 +14,7 @@ from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.refine import Fitted
 
 _SMALLEST_STEP_V: Final = 0.02
+_LARGEST_SPAN_V: Final = 20.0  # millivolts taken for volts would ask for a million steps
 _USUAL_STEPS_V: Final = (10.0 / 1023.0, 10.0 / 511.0, 10.0 / 255.0, 5.0 / 1023.0, 5.0 / 255.0)
 _MAINS_HZ: Final = 0.15  # how far the mains stray
 _FINER: Final = 0.012  # about a step that was found
@@ -96,6 +97,7 @@ def _likeness(bench: Bench, steps_v: Floats, lag_s: float, residual: Floats, whi
 
 def _tried_steps_v(span_v: float) -> Floats:
     steps, step = [], _SMALLEST_STEP_V
+    span_v = min(span_v, _LARGEST_SPAN_V)
     while step < min(0.5 * span_v, 1.0):
         steps.append(step)
         step *= 1.0 + min(0.5 * step / max(span_v, step), 0.05)

@@ -113,6 +113,8 @@ def _wandering(part: Floats) -> float:
     for block in np.array_split(part, BLOCKS):
         power = np.abs(np.fft.rfft(block * np.hanning(block.size))) ** 2
         total += float(power.sum())
+        if power.size < 7:
+            continue
         best = int(np.argmax(power[3:-3])) + 3
         around = np.r_[power[max(best - _AROUND, 1) : best - 2], power[best + 3 : best + _AROUND]]
         if around.size and power[best] > _STANDS_OUT * float(around.mean()):

@@ -38,19 +38,15 @@ class Slides:
     def of(self, plants: Sequence[Plant], pressures: Sequence[Floats], which: NDArray[np.intp]) -> list[Floats]:
         """One force per plant; equal ones are the same array."""
         keys = [self._key(plant) for plant in plants]
+        known = {key: found for key in keys if (found := self._forces.get(key)) is not None}
         missing: dict[Hashable, Load] = {}
         for key, plant, place in zip(keys, plants, which, strict=True):
-            if key not in missing and self._forces.get(key) is None:
+            if key not in known and key not in missing:
                 missing[key] = loaded(plant, pressures[place], self._grid.moment)
         fresh = dict(zip(missing, self._computed(list(missing.values())), strict=True))
-        for key, force in fresh.items():
+        for key, force in fresh.items():  # a long recording's series push each other out, and those known before
             self._forces.put(key, force)
-        return [fresh[key] if key in fresh else self._known(key) for key in keys]
-
-    def _known(self, key: Hashable) -> Floats:
-        found = self._forces.get(key)
-        assert found is not None
-        return found
+        return [fresh[key] if key in fresh else known[key] for key in keys]
 
     def _key(self, plant: Plant) -> Hashable:
         contact = plant.contact
