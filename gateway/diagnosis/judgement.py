@@ -115,8 +115,7 @@ def _without(accepted: Accepted, found: Found) -> Fitted:
 def _verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
     if not causes:
         return Verdict.UNKNOWN if left or unexplained else Verdict.NOTHING_FOUND
-    alone = all(len(cause.group) == 1 for cause in causes)
-    return Verdict.CONFIRMED if reached and not left and alone else Verdict.PARTIAL
+    return Verdict.CONFIRMED if reached and not left else Verdict.PARTIAL
 
 
 def _replicates(bench: Bench) -> float | None:

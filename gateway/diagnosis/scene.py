@@ -14,6 +14,7 @@ from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.refine import Fitted
 
 _SMALLEST_STEP_V: Final = 0.02
+_AT_ONCE: Final = 64  # steps
 _LARGEST_SPAN_V: Final = 20.0  # millivolts taken for volts would ask for a million steps
 _USUAL_STEPS_V: Final = (10.0 / 1023.0, 10.0 / 511.0, 10.0 / 255.0, 5.0 / 1023.0, 5.0 / 255.0)
 _MAINS_HZ: Final = 0.15  # how far the mains stray
@@ -86,6 +87,9 @@ def _command_steps_v(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[fl
 
 def _likeness(bench: Bench, steps_v: Floats, lag_s: float, residual: Floats, whiten: Whitener) -> Floats:
     """Chi-square that the saw tooth of each step explains of the whitened residual."""
+    if steps_v.size > _AT_ONCE:  # all at once would be gigabytes of a long recording
+        parts = np.array_split(steps_v, -(-steps_v.size // _AT_ONCE))
+        return np.concatenate([_likeness(bench, part, lag_s, residual, whiten) for part in parts])
     vectors = np.zeros((steps_v.size, bench.rows))
     for segment in bench.segments:
         command_v = bench.measurements[segment.recording].command_v

@@ -98,6 +98,8 @@ def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
         if segment.is_force:
             part = white[segment.rows]
             levels = np.array([np.mean(block**2) for block in np.array_split(part, BLOCKS)])
+            if not levels.any():
+                continue
             usual = float(np.median(levels))
             apart = np.sum((levels / levels.mean() - 1.0) ** 2) * part.size / BLOCKS / 2.0
             if chi2_law.sf(apart, BLOCKS - 1) < _LEVEL:

@@ -33,7 +33,7 @@ _DOUBT: Final = 0.15  # of resampled blocks may see no gain: an effect may show 
 _OVERWHELMING: Final = 80.0
 _SEED: Final = 21
 _LEAST_GAIN: Final = 0.02  # of the held-out squared error
-_LEAST_BESIDE: Final = 0.04  # of the chi-square that the effects before it explain
+_LEAST_BESIDE: Final = 0.08  # of the chi-square that the effects before it explain
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,25 +125,26 @@ def _acceptable(bench: Bench, fitted: Fitted, base: Fitted, contest: Contest, wh
     explained = max(base.chi2 - fitted.chi2, 0.0)
     if winner is None or not significant(winner, contest.starts) or winner.gain <= _LEAST_BESIDE * explained:
         return None
-    return winner if _worth(bench, fitted, winner, whiten) else None
+    return winner if _worth(bench, fitted, winner, whiten, explained) else None
 
 
 def _noticeable(finalist: Finalist) -> bool:
     return abs(finalist.fitted.point.value(finalist.form.parameters[0])) >= finalist.effect.least
 
 
-def _worth(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener) -> bool:
+def _worth(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, explained: float) -> bool:
     """Does it save enough of the held-out squared error, in nearly all ways to resample the blocks?
 
     An effect that shows in one block only (a slide that rests once, a force that is negative once) cannot be resampled;
-    an overwhelming chi-square stands for it.
+    an overwhelming chi-square stands for it, also beside what the effects before it have `explained`.
     """
     error_before = held_out(bench, before, whiten).errors
     saved = error_before - held_out(bench, winner.fitted, whiten).errors
     if float(np.sum(saved)) <= _LEAST_GAIN * float(np.sum(error_before)):
         return False
     weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
-    return winner.gain > _OVERWHELMING or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
+    overwhelming = winner.gain > max(_OVERWHELMING, 0.5 * explained)
+    return overwhelming or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
 
 
 def _exchanged(
