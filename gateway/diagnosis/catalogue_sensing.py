@@ -119,6 +119,7 @@ SENSING: Final = (
         excitation="steps or ramps of the command",
         experiment="steps of the command with pressure_kpa recorded by the clock of the force",
         least=7.0e-4,
+        rarity=3.0,
         forms=(Form(parameters=(CLOCK_OFFSET,), probes=fixed((0.003,), (0.03,), (-0.02,))),),
         group=SLOW_LAGS,
     ),

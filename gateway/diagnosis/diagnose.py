@@ -13,6 +13,7 @@ from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
 from gateway.diagnosis.direct import Direct, coarse, repeats, spikes
 from gateway.diagnosis.effect import Effect, Parameter
+from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
 from gateway.diagnosis.judgement import judged
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import Whitener, white
@@ -50,6 +51,7 @@ def diagnose(
     if not measurements:
         raise ValueError("a diagnosis needs at least one recording")
     options = options or Options()
+    measurements = [excerpt(each, max(MOST_ROWS // len(measurements), 1)) for each in measurements]
     hidden = frozenset({options.without} if options.without else ())
     account = _Account(options.clock)
     given = plant or DEFAULT_PLANT

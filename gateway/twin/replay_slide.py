@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.twin.friction import DRY
 from gateway.twin.plant import Plant
 from gateway.twin.replay_cache import Cache
 from gateway.twin.replay_drive import Drive, Floats
@@ -22,6 +23,7 @@ from gateway.twin.replay_load import Load, loaded
 from gateway.twin.replay_measured import Motions
 from gateway.twin.replay_play import played
 from gateway.twin.replay_stepped import stepped
+from gateway.twin.terms import switched_on
 
 Way: TypeAlias = Callable[[list[Load], Grid], list[Floats]]
 
@@ -57,11 +59,12 @@ class Slides:
         if self._motions is not None:
             return [self._motions.force_n(load) for load in loads]
         found: dict[int, Floats] = {}
-        ways = {id(load): self._way(load) for load in loads}
-        for way in (played, elastic, stepped):
-            batch = [load for load in loads if ways[id(load)] == way]
-            if batch:
-                found |= zip(map(id, batch), way(batch, self._grid), strict=True)
+        batches: dict[tuple[Way, tuple[bool, ...]], list[Load]] = {}
+        for load in loads:
+            way = self._way(load)
+            batches.setdefault((way, _memories(load) if way is stepped else ()), []).append(load)
+        for (way, _), batch in batches.items():
+            found |= zip(map(id, batch), way(batch, self._grid), strict=True)
         return [found[id(load)] for load in loads]
 
     @staticmethod
@@ -71,3 +74,10 @@ class Slides:
             return played
         ordinary = friction.stribeck_n == 0.0 and friction.dwell_stiction_n == 0.0
         return elastic if ordinary and load.stays_on_the_pad else stepped
+
+
+def _memories(load: Load) -> tuple[bool, ...]:
+    """What a slide remembers: lanes that step together, and any part of them, must have as many elements."""
+    friction = load.plant.friction
+    aging = (friction.presliding_m, friction.dwell_stiction_n, friction.asymmetry_n)
+    return (switched_on(friction, DRY), *(value != 0.0 for value in aging))
