@@ -202,7 +202,7 @@ CONTACT: Final = (
             Form(parameters=(LOST,), probes=fixed((0.5,), (2.0,))),
             Form(parameters=(BACKLASH,), probes=fixed((0.2,), (0.6,))),
         ),
-        group=("regulator-hysteresis", "coulomb-friction", "sign-loss"),
+        group=("regulator-hysteresis", "coulomb-friction", "sign-loss", "asymmetric-friction"),
         rarity=4.0,
     ),
 )

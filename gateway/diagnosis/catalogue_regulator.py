@@ -8,7 +8,6 @@ DELAY: Final = Parameter("regulator", "delay_s", "s", 0.0, 0.0, 1.0, 0.001)
 LAG: Final = Parameter("regulator", "lag_s", "s", 0.0, 0.0, 2.0, 0.002)
 SECOND_LAG: Final = Parameter("regulator", "second_lag_s", "s", 0.0, 0.0, 2.0, 0.002)
 DEAD_BAND: Final = Parameter("regulator", "dead_band_pa", "Pa", 0.0, 0.0, 2.0e5, 100.0)
-STOP_SHORT: Final = Parameter("regulator", "stop_short_pa", "Pa", 0.0, 0.0, 2.0e5, 100.0)
 HYSTERESIS: Final = Parameter("regulator", "hysteresis_pa", "Pa", 0.0, 0.0, 2.0e5, 200.0)
 COMMAND_STEP: Final = Parameter("regulator", "command_step_v", "V", 0.0, 0.0, 2.0, 0.0001)
 BOW: Final = Parameter("regulator", "command_bow", "1", 0.0, -0.25, 0.25, 0.002)
@@ -52,7 +51,7 @@ def _steps(scene: Scene) -> tuple[Start, ...]:
 
 
 def _dead_band(scene: Scene) -> tuple[Start, ...]:
-    return ((1.0e3,), (3.0e3,), (8.0e3,), (2.0e4,))
+    return tuple((band_pa,) for band_pa in scene.dead_bands_pa)
 
 
 def _hunting(scene: Scene) -> tuple[Start, ...]:
@@ -89,7 +88,7 @@ REGULATOR: Final = (
         signature="the force stands still while the command creeps, then jumps",
         excitation="steps of the command smaller than the dead band, up and down",
         experiment="a staircase of 0.01 V steps up and down around three levels",
-        forms=(Form(parameters=(DEAD_BAND,), probes=_dead_band),),
+        forms=(Form(parameters=(DEAD_BAND,), probes=_dead_band, exact=True),),
         group=("regulator-hysteresis", "command-quantisation"),
     ),
     Effect(

@@ -24,7 +24,7 @@ _RESAMPLES: Final = 500
 _SHARE: Final = 0.95  # a name that wins this often stands alone
 _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
 _ALIKE: Final = 0.75  # share of the gain that a relative must explain to stay in the group
-_WAVES: Final = 4
+_WAVES: Final = 6
 _SEED: Final = 20
 
 

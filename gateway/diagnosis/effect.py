@@ -49,6 +49,7 @@ class Scene:
     mains_hz: tuple[float, ...] = ()  # 50 and 60 Hz, as far off as the remainder shows
     pitches_mm: tuple[float, ...] = ()  # strongest periods of the remainder along the position
     command_steps_v: tuple[float, ...] = ()  # steps of the command whose saw tooth the remainder shows most
+    dead_bands_pa: tuple[float, ...] = ()  # dead bands of the target that the remainder shows most
     columns: frozenset[str] = frozenset()
 
 

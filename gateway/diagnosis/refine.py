@@ -94,7 +94,8 @@ def linearised(bench: Bench, problems: Sequence[Problem], whiten: Whiten) -> lis
 def _secant(point: Point, parameter: Parameter) -> tuple[Point, float]:
     """A neighbour in one parameter, and how far it is."""
     value = point.value(parameter)
-    step = max(parameter.step, 0.02 * abs(value)) if abs(value) < 1.0e11 else parameter.step
+    own = parameter.shape or abs(value) >= 1.0e11  # 2 % of a frequency or a pitch is many turns over a minute
+    step = parameter.step if own else max(parameter.step, 0.02 * abs(value))
     moved = point.moved(parameter, value + step if value + step <= parameter.high else value - step)
     return moved, moved.value(parameter) - value
 

@@ -1,24 +1,18 @@
 """What the starts of a search need to know of a recording: its levels, and where its remainder oscillates."""
 
-import math
 from typing import Final
 
 import numpy as np
 
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.catalogue_cylinder import AREA, COULOMB
-from gateway.diagnosis.catalogue_regulator import LAG
+from gateway.diagnosis.command_search import likely_dead_bands_pa, likely_steps_v
 from gateway.diagnosis.effect import Scene
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.refine import Fitted
 
-_SMALLEST_STEP_V: Final = 0.02
-_AT_ONCE: Final = 64  # steps
-_LARGEST_SPAN_V: Final = 20.0  # millivolts taken for volts would ask for a million steps
-_USUAL_STEPS_V: Final = (10.0 / 1023.0, 10.0 / 511.0, 10.0 / 255.0, 5.0 / 1023.0, 5.0 / 255.0)
 _MAINS_HZ: Final = 0.15  # how far the mains stray
-_FINER: Final = 0.012  # about a step that was found
 _PEAKS: Final = 3
 _PITCH_BINS: Final = 4096
 
@@ -42,7 +36,8 @@ def scene_of(bench: Bench, fitted: Fitted, whiten: Whitener) -> Scene:
         lines_hz=lines_hz(bench, white),
         mains_hz=_mains_hz(bench, white),
         pitches_mm=_pitches_mm(white, positions) if positions is not None else (),
-        command_steps_v=_command_steps_v(bench, fitted, whiten),
+        command_steps_v=likely_steps_v(bench, fitted, whiten),
+        dead_bands_pa=likely_dead_bands_pa(bench, fitted, whiten),
         columns=bench.columns(),
     )
 
@@ -67,54 +62,6 @@ def _mains_hz(bench: Bench, white: Floats) -> tuple[float, ...]:
         index = np.minimum(np.round(folded * size).astype(int), power.size - 1)
         found.append(float(tried_hz[int(np.argmax(power[index]))]))
     return tuple(found)
-
-
-def _command_steps_v(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[float, ...]:
-    """Steps of the command whose saw tooth is most like the residual, the best first.
-
-    A saw tooth of n teeth is met only by a step within 1/(2n) of the true one, so the steps are tried that densely, with
-    the gain and lag of the base model and no friction.
-    """
-    commanded = [each for each in bench.measurements if each.command_v is not None and np.ptp(each.command_v) > 0.0]
-    if not commanded:
-        return ()
-    lag_s, residual = fitted.point.value(LAG), whiten(fitted.residual_n)
-    steps_v = _tried_steps_v(max(float(np.ptp(each.command_v)) for each in commanded if each.command_v is not None))
-    best = steps_v[np.argsort(-_likeness(bench, steps_v, lag_s, residual, whiten))[:_PEAKS]]
-    finer = [step_v * np.linspace(1.0 - _FINER, 1.0 + _FINER, 41) for step_v in best]
-    return tuple(float(near[int(np.argmax(_likeness(bench, near, lag_s, residual, whiten)))]) for near in finer)
-
-
-def _likeness(bench: Bench, steps_v: Floats, lag_s: float, residual: Floats, whiten: Whitener) -> Floats:
-    """Chi-square that the saw tooth of each step explains of the whitened residual."""
-    if steps_v.size > _AT_ONCE:  # all at once would be gigabytes of a long recording
-        parts = np.array_split(steps_v, -(-steps_v.size // _AT_ONCE))
-        return np.concatenate([_likeness(bench, part, lag_s, residual, whiten) for part in parts])
-    vectors = np.zeros((steps_v.size, bench.rows))
-    for segment in bench.segments:
-        command_v = bench.measurements[segment.recording].command_v
-        if segment.is_force and command_v is not None:
-            vectors[:, segment.rows] = _teeth(command_v, steps_v, lag_s, _row_s(bench))
-    vectors = whiten(bench.reduced(vectors))
-    return np.asarray(np.maximum(vectors @ residual, 0.0) ** 2 / np.maximum(np.sum(vectors**2, axis=1), 1.0e-300))
-
-
-def _tried_steps_v(span_v: float) -> Floats:
-    steps, step = [], _SMALLEST_STEP_V
-    span_v = min(span_v, _LARGEST_SPAN_V)
-    while step < min(0.5 * span_v, 1.0):
-        steps.append(step)
-        step *= 1.0 + min(0.5 * step / max(span_v, step), 0.05)
-    return np.array([*steps, *_USUAL_STEPS_V])
-
-
-def _teeth(command_v: Floats, steps_v: Floats, lag_s: float, row_s: float) -> Floats:
-    """What rounding to each step changes behind the lag, (steps, rows); a row sees the command of the row before."""
-    from scipy.signal import lfilter
-
-    rounded = np.round(command_v / steps_v[:, None]) * steps_v[:, None] - command_v
-    share = 1.0 - math.exp(-row_s / max(lag_s, 1.0e-6))
-    return np.asarray(lfilter([0.0, share], [1.0, share - 1.0], rounded, axis=1))
 
 
 def _pitches_mm(white: Floats, positions_mm: Floats) -> tuple[float, ...]:

@@ -7,6 +7,7 @@ run of a prototype); the simulated force is. What has no shape at all is asked o
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,7 @@ from gateway.diagnosis.result import Leftover
 
 _LEVEL: Final = 1.0e-3  # of a false answer over all questions
 _LEAST_SHARE: Final = 0.01  # of the whitened squared residual
+_AT_ONCE: Final = 60  # questions
 _MOST: Final = 6
 _AROUND: Final = 14  # lines to either side that a wandering line stands out of
 _STANDS_OUT: Final = 16.0  # times their mean
@@ -46,32 +48,39 @@ def best_answer(
     """The most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
     white = whiten(fitted.residual_n)
     known = {(each.depends_on, each.shape) for each in given}
-    asked = [
+    asked = (
         each
         for each in questions(bench, fitted.residual_n, white)
         if (each.outside or not outside) and (each.depends_on, each.shape) not in known
-    ]
+    )
     return _best(bench, fitted, whiten, asked)
 
 
-def _best(bench: Bench, fitted: Fitted, whiten: Whitener, asked: Sequence[Question]) -> Answer | None:
+def _best(bench: Bench, fitted: Fitted, whiten: Whitener, asked: Iterator[Question]) -> Answer | None:
+    """Some at a time: a thousand columns would be gigabytes at once."""
+    model, white = whiten(fitted.jacobian), whiten(fitted.residual_n)
+    total = max(float(white @ white), 1.0)
+    tried, best = 0, None
+    while some := list(islice(asked, _AT_ONCE)):
+        tried += sum(each.among for each in some)
+        columns = whiten(bench.reduced(np.vstack([each.columns for each in some])))
+        found = [each for each in _answers(Normal(model, columns, white), some, total) if each.share >= _LEAST_SHARE]
+        best = min([*found, *([best] if best else [])], key=lambda each: each.log_chance, default=None)
+    return best if best and best.log_chance < np.log(_LEVEL / tried) else None
+
+
+def _answers(normal: Normal, asked: Sequence[Question], total: float) -> Iterator[Answer]:
+    """Each question's gain beside the model; `normal` holds the columns of all of them in order."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
-    white = whiten(fitted.residual_n)
-    total = max(float(white @ white), 1.0)
-    columns = whiten(bench.reduced(np.vstack([each.columns for each in asked])))
-    normal = Normal(whiten(fitted.jacobian), columns, white)
-    tried = sum(each.among for each in asked)
-    answers, at = [], 0
+    at = 0
     for question in asked:
         indices = list(range(at, at + question.columns.shape[0]))
         at += len(indices)
         usable = [k for k in indices if normal.power[k] > 1.0e-6 * max(normal.raw_power[k], 1.0e-300)]
         gain = normal.add(usable).gain if usable else 0.0
         chance = float(chi2_law.logsf(gain, len(indices))) + float(np.log(question.among))
-        answers.append(Answer(question, gain, gain / total, chance))
-    telling = [each for each in answers if each.log_chance < np.log(_LEVEL / tried) and each.share >= _LEAST_SHARE]
-    return min(telling, key=lambda each: each.log_chance, default=None)
+        yield Answer(question, gain, gain / total, chance)
 
 
 def screen(bench: Bench, fitted: Fitted, whiten: Whitener, given: Sequence[Leftover]) -> tuple[Leftover, ...]:

@@ -1,0 +1,155 @@
+"""The catalogue is a contract: 43 names, each with parameters that the plant has, and null means off."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from gateway.diagnosis import BY_NAME, EFFECTS, Effect, Parameter, effect_named
+from gateway.twin.plant import Plant, values
+from tests.diagnosis.hidden import BY_NAME as EXAMPLES
+from tests.diagnosis.machine import LOGGED, MACHINE, command_v, plant, readings_n, times_s
+
+NAMES = """
+transport-delay extra-lag dead-band regulator-hysteresis command-quantisation command-nonlinearity supply-saturation
+supply-droop leak regulator-hunting slew-limit
+coulomb-friction stribeck-friction viscous-friction presliding load-dependent-friction asymmetric-friction dwell-stiction
+creep contact-nonlinearity end-stop side-load tilt-gravity feed-drag spindle-vibration pad-wear position-dependence
+position-ripple backlash
+thermal-zero-drift thermal-span-drift warm-up linear-drift sensor-quadratic sensor-cubic mains-hum clock-offset clock-skew
+repeated-samples outliers sensor-quantisation valve-crosstalk sign-loss
+""".split()
+FAMILIES = {"regulator": 11, "cylinder": 7, "contact and tool": 11, "sensing and logging": 14}
+GROUPS_OF_THE_PAGE = (
+    ("regulator-hysteresis", "coulomb-friction"),
+    ("transport-delay", "clock-offset", "extra-lag", "viscous-friction"),
+    ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift"),
+    ("sensor-quadratic", "sensor-cubic", "supply-saturation", "contact-nonlinearity"),
+    ("coulomb-friction", "viscous-friction", "presliding"),
+)
+WORDS = ("family", "what", "signature", "excitation", "experiment")
+UNITS = {
+    "_pa": "Pa", "_s": "s", "_v": "V", "_hz": "Hz", "_rad": "rad", "_deg": "deg", "_m": "m", "_m2": "m2", "_n": "N",
+    "_mm": "mm", "_per_s": "1/s", "_per_m": "1/m", "_per_k": "1/K", "_per_n": "1/N", "_n_per_n": "N/N", "_n_per_k": "N/K",
+    "_per_n2": "1/N2", "_m_per_s": "m/s", "_pa_per_s": "Pa/s", "_n_per_s": "N/s", "_n_s_per_m": "N s/m", "_per_pa": "1/Pa",
+    "_pa_per_pa": "Pa/Pa", "_n_per_mm": "N/mm", "_n_per_mm2": "N/mm2", "_n_s_per_mm": "N s/mm", "_n_per_m": "N/m",
+    "_n_per_krpm2": "N/krpm2", "_n_per_v": "N/V",
+}  # fmt: skip
+
+
+def parameters() -> Iterator[tuple[Effect, Parameter]]:
+    for effect in EFFECTS:
+        for parameter in effect.parameters:
+            yield effect, parameter
+
+
+def test_the_names_are_those_of_the_page() -> None:
+    assert sorted(effect.name for effect in EFFECTS) == sorted(NAMES)
+    assert len(EFFECTS) == 43
+    assert [BY_NAME[name].name for name in NAMES] == NAMES
+
+
+def test_families_have_the_size_of_the_page() -> None:
+    counts = {name: sum(effect.family == name for effect in EFFECTS) for name in FAMILIES}
+    assert counts == FAMILIES
+
+
+def test_a_name_that_is_not_there_is_a_key_error() -> None:
+    with pytest.raises(KeyError):
+        effect_named("gremlins")
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_every_effect_has_its_words(word: str) -> None:
+    for effect in EFFECTS:
+        text = getattr(effect, word)
+        assert text.strip() == text and len(text) >= (3 if word in ("what", "excitation") else 8), (effect.name, word)
+        assert not text.endswith(".") and "\n" not in text, (effect.name, word)
+
+
+def test_no_two_effects_are_described_alike() -> None:
+    assert len({effect.what for effect in EFFECTS}) == len(EFFECTS)
+    assert len({effect.signature for effect in EFFECTS}) == len(EFFECTS)
+
+
+def test_groups_name_other_effects() -> None:
+    for effect in EFFECTS:
+        assert set(effect.group) <= set(NAMES), effect.name
+        assert len(set(effect.group)) == len(effect.group), effect.name
+
+
+@pytest.mark.parametrize("group", GROUPS_OF_THE_PAGE, ids=lambda group: group[0])
+def test_the_page_s_groups_are_known_both_ways(group: tuple[str, ...]) -> None:
+    for name in group:
+        assert set(group) - {name} <= set(BY_NAME[name].group), name
+
+
+def test_every_effect_has_a_parameter_and_a_way_to_be_told() -> None:
+    for effect in EFFECTS:
+        assert effect.parameters, effect.name
+        assert effect.direct == (not effect.forms) == bool(effect.marks), effect.name
+        assert not all(parameter.shape for parameter in effect.parameters), effect.name
+
+
+def test_every_parameter_is_a_field_of_the_plant_with_that_null() -> None:
+    """A shape has no effect of its own: its null is where a plant begins."""
+    nulls = {f"{section}.{name}": value for section, name, value in values(Plant())}
+    for effect, parameter in parameters():
+        assert parameter.path in nulls, (effect.name, parameter.path)
+        assert parameter.null == nulls[parameter.path], (effect.name, parameter.path)
+
+
+def test_every_parameter_says_its_unit_as_its_name_does() -> None:
+    for effect, parameter in parameters():
+        ends = [end for end in UNITS if parameter.name.endswith(end)]
+        expected = UNITS[max(ends, key=len)] if ends and parameter.name != "command_s" else "1"  # an S, no second
+        assert parameter.unit == expected, (effect.name, parameter.path)
+
+
+def test_bounds_hold_the_null_and_a_step_moves_within_them() -> None:
+    for effect, parameter in parameters():
+        assert parameter.low <= parameter.null <= parameter.high, (effect.name, parameter.path)
+        assert 0.0 < parameter.step < parameter.high - parameter.low, (effect.name, parameter.path)
+
+
+def test_needs_are_columns_that_a_recording_may_have() -> None:
+    for effect in EFFECTS:
+        for form in effect.forms:
+            assert set(form.needs) <= {*LOGGED, "command_v", "pressure_kpa"}, effect.name
+
+
+def test_the_examples_are_of_all_effects_and_use_their_parameters() -> None:
+    assert sorted(EXAMPLES) == sorted(NAMES)
+    for name, example in EXAMPLES.items():
+        own = {parameter.path for parameter in BY_NAME[name].parameters}
+        assert set(example.changes) <= own, name
+        assert set(example.expected) <= {path.split(".")[1] for path in own}, name
+
+
+TIME_S = times_s(15.0, 100.0)
+COLUMNS = {name: make(TIME_S) for name, make in LOGGED.items()}
+VOLTS = command_v(TIME_S)
+
+
+def test_off_equals_absent() -> None:
+    """All sizes at null, whatever the shapes: bit by bit the readings of a machine that has none of it."""
+    absent = readings_n(MACHINE, TIME_S, VOLTS, {})
+    for effect in EFFECTS:
+        taken = {"friction.coulomb_n"} if effect.name == "coulomb-friction" else set()
+        off = {
+            each.path: each.low + 0.3 * (min(each.high, 10.0) - each.low) if each.shape else each.null
+            for each in effect.parameters
+            if each.path not in taken
+        }
+        found = readings_n(plant(off), TIME_S, VOLTS, COLUMNS)
+        np.testing.assert_array_equal(found, absent, err_msg=effect.name)
+
+
+def test_on_is_seen() -> None:
+    """Each example changes the readings; the three that only chance makes are in the readings themselves."""
+    for name, example in EXAMPLES.items():
+        if not BY_NAME[name].direct:
+            around = plant(example.around)
+            before = readings_n(around, TIME_S, VOLTS, COLUMNS)
+            after = readings_n(plant(example.changes, around), TIME_S, VOLTS, COLUMNS)
+            assert float(np.sqrt(np.mean((after - before) ** 2))) > 0.02, name

@@ -1,0 +1,89 @@
+"""Each effect of the catalogue, strong and excited, is named with its size; without it the same recording shows nothing.
+
+The twin makes these recordings: the least that a search must do. The push gate asks eight effects of different families and
+two recordings without any; --long asks all 43, with and without.
+"""
+
+import pytest
+
+from gateway.diagnosis import Diagnosis, Options, Verdict, diagnose
+from gateway.diagnosis.result import Cause
+from tests.diagnosis.hidden import BY_NAME, EXAMPLES, Hidden
+from tests.diagnosis.machine import NOISE_N
+
+GATE = (
+    "transport-delay",
+    "command-quantisation",
+    "presliding",
+    "load-dependent-friction",
+    "tilt-gravity",
+    "creep",
+    "thermal-span-drift",
+    "outliers",
+)
+GATE_WITHOUT = ("supply-saturation", "side-load")
+ALL = [each.name for each in EXAMPLES]
+
+
+def diagnosed(example: Hidden, *, hidden: bool) -> Diagnosis:
+    return diagnose([example.recording(hidden=hidden)], None, Options(without=example.without))
+
+
+def cause_of(found: Diagnosis, name: str) -> Cause:
+    """The cause that is it, or whose group holds it."""
+    causes = [cause for cause in found.causes if name in (cause.name, *cause.group)]
+    assert causes, f"{name} is not among {[(cause.name, cause.group) for cause in found.causes]}, {found.leftover}"
+    return causes[0]
+
+
+def check_sizes(example: Hidden, cause: Cause) -> None:
+    """Only where the name is right do its parameters mean the same."""
+    for name, value in example.expected.items():
+        estimate = cause.parameters[name]
+        assert 1.0 / example.factor < estimate.value / value < example.factor, (example.name, name, estimate)
+        assert estimate.ci95[0] <= estimate.value <= estimate.ci95[1]
+
+
+def check_found(name: str) -> None:
+    example = BY_NAME[name]
+    found = diagnosed(example, hidden=True)
+    cause = cause_of(found, name)
+    assert found.verdict not in (Verdict.NOTHING_FOUND, Verdict.UNKNOWN)
+    assert cause.name in cause.group
+    assert 0.0 <= cause.confidence <= 1.0
+    if cause.name == name:
+        check_sizes(example, cause)
+    if example.changes:
+        assert found.baseline.rms_n > 1.5 * NOISE_N
+        assert found.extended.held_out_rms_n < 0.75 * found.baseline.rms_n
+        assert cause.gain.ci95[0] > 0.0
+
+
+def check_nothing(name: str) -> None:
+    found = diagnosed(BY_NAME[name], hidden=False)
+    assert found.causes == ()
+    assert found.verdict == Verdict.NOTHING_FOUND, found.leftover
+    assert found.baseline.rms_n == pytest.approx(NOISE_N, rel=0.05)
+    assert found.baseline.noise_floor_n == pytest.approx(NOISE_N, rel=0.05)
+
+
+@pytest.mark.parametrize("name", GATE)
+def test_an_effect_is_named_with_its_size(name: str) -> None:
+    check_found(name)
+
+
+@pytest.mark.parametrize("name", GATE_WITHOUT)
+def test_without_the_effect_nothing_is_found(name: str) -> None:
+    check_nothing(name)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name in ALL if name not in GATE])
+def test_every_other_effect_is_named_with_its_size(name: str) -> None:
+    check_found(name)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name in ALL if name not in GATE_WITHOUT])
+def test_without_any_other_effect_nothing_is_found(name: str) -> None:
+    check_nothing(name)
