@@ -8,6 +8,7 @@ import os
 import time
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,6 +25,14 @@ if TYPE_CHECKING:
 _STDOUT: Final = Path("-")
 _FAILS: Final = {"partial": ("partial", "unknown"), "unknown": ("unknown",)}
 _OUTPUT: Final = click.Path(path_type=Path, dir_okay=False)
+
+
+class _Finite(click.FloatRange):
+    """NaN is in every range for click, and infinite is no noise."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = float(super().convert(value, param, ctx))
+        return number if isfinite(number) else self.fail(f"{value} is no finite number.", param, ctx)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +54,7 @@ class Answer:
 @click.option("--without", metavar="EFFECT", help="Switch one effect of the base model off, to see it found again.")
 @click.option(
     "--noise-floor-n",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=_Finite(min=0.0, min_open=True),
     metavar="X",
     help="RMS noise of the readings, N, if known.",
 )

@@ -41,7 +41,7 @@ def command(*, as_json: bool) -> None:
 
 
 def _facts(effect: "Effect") -> dict[str, Any]:
-    """The contract's fields; family and needs besides."""
+    """The contract's fields; family and needs besides. A group holds the own name, as in the JSON of a diagnosis."""
     return {
         "name": effect.name,
         "family": effect.family,
@@ -53,7 +53,7 @@ def _facts(effect: "Effect") -> dict[str, Any]:
             {"name": parameter.name, "unit": parameter.unit, "section": parameter.section, "null": parameter.null}
             for parameter in effect.parameters
         ],
-        "group": list(effect.group),
+        "group": [effect.name, *(name for name in effect.group if name != effect.name)],
     }
 
 

@@ -55,14 +55,15 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
 
 
 def _simulated(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Floats, list[str]]":
-    """Readings, N. Where the position was measured nobody says which way is out: the way that fits better is taken."""
+    """Readings, N. Where a position was measured nobody says which way is out, or whether it is that of the slide at all
+    and not of the tool along the workpiece: as in a diagnosis, the way that fits best is taken."""
     import numpy as np
 
-    from gateway.diagnosis.bench import drive_of
+    from gateway.diagnosis.bench import MOTIONS, drive_of
     from gateway.twin.replay import Replay
     from gateway.twin.replay_drive import Motion
 
-    ways: tuple[Motion, ...] = ("inferred",) if measurement.position_m is None else ("measured", "measured-reversed")
+    ways: tuple[Motion, ...] = ("inferred",) if measurement.position_m is None else MOTIONS
     answers = [Replay(drive_of(measurement, way)).run([profile.plant]).reading_n[0] for way in ways]
     errors = [float(np.mean((measurement.force_n - answer)[measurement.usable] ** 2)) for answer in answers]
     best = int(np.argmin(errors))

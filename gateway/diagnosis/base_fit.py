@@ -21,7 +21,7 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.point import Point
 from gateway.diagnosis.refine import Fitted, Problem, refine
-from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
+from gateway.twin.plant import UNLIMITED, Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
 DEFAULT_PLANT: Final = Plant(
     regulator=Regulator(lag_s=0.072),
@@ -43,7 +43,7 @@ def bare(plant: Plant) -> Plant:
                 plant = with_value(plant, parameter.section, parameter.name, float(parameter.null))
     for section, name in (("contact", "mass_kg"), ("contact", "pad_damping_n_s_per_m"), ("cell", "filter_s")):
         plant = with_value(plant, section, name, 0.0)  # a filter that is not there looks like crosstalk
-    return plant
+    return with_value(plant, "cell", "range_n", UNLIMITED)  # nobody said which cell it is
 
 
 def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -> tuple[Parameter, ...]:

@@ -19,6 +19,7 @@ from gateway.twin.replay import Drive, Replay
 from gateway.twin.replay_drive import Motion
 from gateway.twin.surroundings import Surroundings
 
+MOTIONS: Final[tuple[Motion, ...]] = ("inferred", "measured", "measured-reversed")  # how the slide's may be known
 BLOCKS: Final = 20  # per recording, for held-out errors and resampling
 SETTLING_S: Final = 1.0  # of a recording's start are not judged, unless it begins at rest:
 REST_S: Final = 0.2  # command and force stand still for so long

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
-from gateway.diagnosis.bench import Bench
+from gateway.diagnosis.bench import MOTIONS, Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
 from gateway.diagnosis.direct import Direct, coarse, repeats, spikes
 from gateway.diagnosis.effect import Effect, Parameter
@@ -22,7 +22,6 @@ from gateway.diagnosis.result import Diagnosis
 from gateway.diagnosis.screen import screen
 from gateway.diagnosis.search import search
 from gateway.twin.plant import Plant, with_value
-from gateway.twin.replay_drive import Motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +107,7 @@ def _based(
 ) -> tuple[Bench, Fitted, Whitener]:
     """The bench and base model that fit best, over the ways in which motion may be known."""
     measured = any(each.position_m is not None for each in measurements)
-    motions: tuple[Motion, ...] = ("inferred", "measured", "measured-reversed") if measured else ("inferred",)
+    motions = MOTIONS if measured else MOTIONS[:1]
     tries = []
     for motion in motions:
         bench = Bench(measurements, motion)

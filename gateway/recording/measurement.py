@@ -24,6 +24,8 @@ SHORTEST_S: Final = 1.0
 _DRIVES: Final = ("command_v", "pressure_kpa")
 _NEEDED: Final = f"at least {FEWEST_ROWS} usable rows over {SHORTEST_S:g} s are needed, 60 s at 200 Hz are good"
 _HIGHEST_COMMAND_V: Final = 50.0
+_LARGEST: Final = 1.0e60  # beyond, squares and products of columns overflow: what a logger writes for "no value"
+_TURNED: Final = -0.8  # correlation of force and command at which the sign is asked for
 _PASCAL: Final = linear_conversion("pressure", "kpa", "pa")[0]
 _METRE: Final = linear_conversion("length", "mm", "m")[0]
 
@@ -32,8 +34,8 @@ def measurement_of(recording: Recording) -> Measurement:
     """The checked measurement. RecordingError in the user's words, with row and column where there is one."""
     _check_columns(recording)
     axis = time_axis(recording)
-    columns = {name: values[axis.kept] for name, values in recording.columns.items()}
-    notes = [*recording.notes, *axis.notes]
+    columns, told = _measured({name: values[axis.kept] for name, values in recording.columns.items()})
+    notes = [*recording.notes, *axis.notes, *told]
     usable, told = _usable(columns, axis)
     notes += told
     drive, driven, told = _drive(columns, axis.time_s)
@@ -43,6 +45,7 @@ def measurement_of(recording: Recording) -> Measurement:
     repeated, told = repeated_readings(columns["force_n"])
     position_m, said = _position_m(columns, axis.time_s)
     others, heard = covariates(columns, axis.time_s, columns["force_n"])
+    heard += _suspicious(columns["force_n"][usable], {name: values[usable] for name, values in drive.items()})
     return Measurement(
         name=recording.path.name,
         time_s=axis.time_s,
@@ -86,6 +89,30 @@ def _meant(recording: Recording, missing: list[str]) -> str:
             if found and quantity and found[0] == quantity[0] and name.lower() == f"{stem}_{found[1]}":
                 near.append(f"{target}={name}:{found[1]}")
     return f" Meant is probably --columns {','.join(near)}." if near else ""
+
+
+def _measured(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
+    """The columns with NaN where a number is none of a measurement, and a sentence for each such column."""
+    notes = []
+    for name, values in columns.items():
+        absurd = np.isfinite(values) & (np.abs(values) > _LARGEST)
+        if absurd.any():
+            columns = columns | {name: np.where(absurd, np.nan, values)}
+            notes.append(f"{int(absurd.sum())} values of {name} are beyond {_LARGEST:.0e}: taken as missing")
+    return columns, notes
+
+
+def _suspicious(force_n: Floats, drive: Mapping[str, Floats]) -> list[str]:
+    """What an intact machine would not show. Told only: each has an honest reason as well."""
+    if is_constant(force_n):
+        return [f"force_n is {force_n[0]:.5g} in every row: an unplugged or frozen cell? Nothing can be seen in it"]
+    command_v = drive.get("command_v")
+    if command_v is None or is_constant(command_v):
+        return []
+    alike = float(np.corrcoef(force_n, command_v)[0, 1])
+    if alike > _TURNED:
+        return []
+    return [f"force_n falls as command_v rises (correlation {alike:.2f}): the cell's sign turned, or the wrong column?"]
 
 
 def _usable(columns: Mapping[str, Floats], axis: TimeAxis) -> tuple[Flags, list[str]]:

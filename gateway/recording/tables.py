@@ -17,6 +17,8 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
     lenient: rows and cells of a CSV that cannot be read are told in `notes` and left out; else they are a
     RecordingError that names row and column. OSError as usual.
     """
+    if path.is_dir():
+        raise RecordingError(f"{path} is a directory: name the recording in it")
     with path.open("rb") as stream:
         start = stream.read(len(MAGIC))
     if start == MAGIC or (path.suffix == ".fgr" and start):

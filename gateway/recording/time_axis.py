@@ -23,6 +23,8 @@ GAP_S: Final = 0.05
 SETTLING_S: Final = 0.5
 """How long after a gap the force still depends on what happened in it (slowest regulator lag of the catalogue, thrice)."""
 _COARSE_S: Final = 1.0
+TOO_COARSE_S: Final = 2.0
+"""From here on every response that the catalogue knows is over between two rows; times in ms look like this."""
 _SAME_S: Final = 1.0e-9  # what adding and scaling leaves of two equal stamps
 
 
@@ -59,6 +61,7 @@ def time_axis(recording: Recording) -> TimeAxis:
         )
     kept = rows[last_of_stamp]
     time_s = stamps[kept] - stamps[kept[0]] if kept.size else stamps[kept]
+    _refuse_coarse(recording, time_s)
     after_gap, told = _after_gaps(time_s)
     return TimeAxis(kept, time_s, after_gap, (*notes, *told))
 
@@ -71,6 +74,15 @@ def _unknown(recording: Recording, known: Flags) -> list[str]:
     if unknown > LARGEST_UNKNOWN_SHARE * known.size:
         raise RecordingError(f"{place}, column time_s: no number; so in {unknown} of {known.size} rows: not a time")
     return [f"{unknown} rows without a time (the first: {place}) are left out"]
+
+
+def _refuse_coarse(recording: Recording, time_s: Floats) -> None:
+    median_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
+    if median_s >= TOO_COARSE_S:
+        raise RecordingError(
+            f"{recording.path}, column time_s: one row every {median_s:.3g} s, and a force follows its command within one: "
+            "nothing can be judged between such rows. Are the times in ms? then --columns time_s=...:ms"
+        )
 
 
 def _after_gaps(time_s: Floats) -> tuple[Flags, list[str]]:

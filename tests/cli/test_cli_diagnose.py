@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -151,7 +152,9 @@ def test_a_recording_of_the_gateway_brings_its_own_plant(tmp_path: Path, call: C
 
 def test_a_table_without_a_rig_says_which_plant_is_the_start(tmp_path: Path, call: Call, engine: Engine) -> None:
     answer = call("diagnose", str(table(tmp_path / "a.csv", facts="")))
-    assert "the recording names no rig: the plant paper-slide is the start" in " ".join(answer.stdout.split())
+    assert "the recording names no rig: the plant paper-slide without its effects is the start" in " ".join(
+        answer.stdout.split()
+    )
 
 
 @pytest.mark.parametrize(
@@ -176,6 +179,12 @@ def test_bad_input_is_said_with_its_place_and_nothing_is_written(
 def test_a_recording_that_is_not_there_is_bad_input(tmp_path: Path, call: Call) -> None:
     assert call("diagnose", str(tmp_path / "none.csv")).exit_code == 65
     assert call("diagnose", "7", "--state", str(tmp_path)).exit_code == 65
+
+
+@pytest.mark.parametrize("floor", ["nan", "inf", "0", "-1", "x"])
+def test_a_noise_floor_is_a_positive_number(tmp_path: Path, call: Call, engine: Engine, floor: str) -> None:
+    answer = call("diagnose", str(table(tmp_path / "a.csv")), "--noise-floor-n", floor)
+    assert answer.exit_code == 2 and "--noise-floor-n" in answer.output
 
 
 def test_an_unknown_effect_is_answered_with_its_neighbours(tmp_path: Path, call: Call, engine: Engine) -> None:
@@ -241,7 +250,7 @@ def test_the_closed_loop_is_measured_only_when_asked_and_told_everywhere(
     document = json.loads((tmp_path / "out.json").read_text())["closed_loop"]
     assert (document["before_rms_n"], document["after_rms_n"]) == (1.2, 0.3)
     assert "RMS 1.20 -> 0.30 N" in " ".join(answer.stdout.split())
-    assert "RMS 1.20 -> 0.30 N" in report.read_text(encoding="utf-8")
+    assert "RMS 1.20 -> 0.30 N" in unescape(report.read_text(encoding="utf-8"))
 
 
 def test_a_loop_that_could_not_be_closed_says_why(

@@ -92,6 +92,7 @@ def test_effects_as_json_has_the_contract_s_fields_for_every_effect(call: Call) 
         assert {"name", "what", "signature", "excitation", "parameters", "group"} <= set(effect)
         assert all({"name", "unit", "null"} <= set(parameter) for parameter in effect["parameters"])
         assert effect["parameters"] and effect["what"] and effect["signature"] and effect["excitation"]
+        assert effect["group"][0] == effect["name"] and len(set(effect["group"])) == len(effect["group"])
 
 
 def test_each_parameter_of_an_effect_has_a_name_of_its_own_and_stands_in_a_plant(call: Call) -> None:

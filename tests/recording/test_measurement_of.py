@@ -76,6 +76,7 @@ def test_units_are_si() -> None:
         ({"time_s": TIME_S * 0.1}, "1000 usable rows in 0.4995 s"),
         (spoiled("command_v", slice(None)), "0 usable rows"),
         ({"time_s": np.zeros(N)}, "1 usable rows in 0 s"),
+        ({"time_s": TIME_S * 1e3}, "one row every 5 s"),
     ],
 )
 def test_what_only_the_user_can_know_is_refused(changed: dict[str, Any], words: str) -> None:
@@ -94,6 +95,28 @@ def test_a_constant_force_is_a_measurement() -> None:
     found = measured(force_n=np.full(N, 3.0), command_v=np.full(N, 2.0))
     assert found.usable.all()
     assert not found.repeated.any()
+
+
+def test_a_constant_force_is_said_to_be_one() -> None:
+    assert noted(measured(force_n=np.full(N, 5.0)), "force_n is 5 in every row")
+    assert not noted(measured(), "in every row")
+
+
+def test_a_force_against_its_command_asks_for_the_sign() -> None:
+    assert noted(measured(force_n=-columns()["force_n"]), "force_n falls as command_v rises (correlation -")
+    assert not noted(measured(), "falls as")
+    assert not noted(measured(force_n=-columns()["force_n"], command_v=np.full(N, 2.0)), "falls as")
+
+
+@pytest.mark.parametrize("name", ["force_n", "command_v", "temperature_c"])
+def test_what_overflows_in_a_square_is_a_missing_value(name: str) -> None:
+    table = columns(temperature_c=20.0 + TIME_S**2)
+    table[name][500] = 1.0e300
+    found = measured(**table)
+    assert noted(found, f"1 values of {name} are beyond 1e+60: taken as missing")
+    assert bool(found.usable[500]) == (name != "force_n")
+    assert found.command_v is not None and float(found.command_v.max()) < 4.0
+    assert float(found.covariates["temperature_c"].max()) < 100.0
 
 
 def test_of_rows_with_one_time_the_last_stays() -> None:

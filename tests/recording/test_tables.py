@@ -149,6 +149,11 @@ def test_other_files_are_told_for_what_they_are(content: bytes, words: str, tmp_
     assert words in str(caught.value)
 
 
+def test_a_directory_is_told_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="is a directory: name the recording in it"):
+        read_table(tmp_path)
+
+
 def test_a_torn_last_line_is_left_out_and_told(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("time_s,force_n\n0,1\n1,2\n2")
