@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from gateway.profiles import PlantProfile
 
 FORMAT = 1
+_WAYS = {
+    "inferred": "position_mm is not taken for the motion of the slide: inferred motion fits better",
+    "measured": "position_mm is taken for the motion of the slide",
+    "measured-reversed": "position_mm is taken for the motion of the slide, and counts down when the tool moves out",
+}
 
 
 @click.command()
@@ -67,8 +72,7 @@ def _simulated(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Fl
     answers = [Replay(drive_of(measurement, way)).run([profile.plant]).reading_n[0] for way in ways]
     errors = [float(np.mean((measurement.force_n - answer)[measurement.usable] ** 2)) for answer in answers]
     best = int(np.argmin(errors))
-    notes = ["the measured position counts down when the tool moves out"] if ways[best] == "measured-reversed" else []
-    return np.asarray(answers[best]), notes
+    return np.asarray(answers[best]), [_WAYS[ways[best]]] if measurement.position_m is not None else []
 
 
 def _facts(measurement: "Measurement", simulated_n: "Floats") -> dict[str, Any]:

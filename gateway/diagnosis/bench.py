@@ -50,6 +50,7 @@ class Bench:
         self.force_rows = np.concatenate(
             [np.full(segment.rows.stop - segment.rows.start, segment.is_force) for segment in self.segments]
         )
+        self.weights: Floats = np.ones(self.measured_n.size)  # of the rows, for who whitens
         self.block_of_row = np.concatenate([_blocks(segment, self.usable) for segment in self.segments])
         self._taken_out: list[Floats] = []
         self._nuisance = _nuisance(self, self._taken_out)
@@ -92,6 +93,19 @@ class Bench:
         self.usable = self.usable & ~rows
         self.measured_n = np.where(self.usable, self.measured_n, 0.0)
         self._nuisance = _nuisance(self, self._taken_out)
+
+    def doubt_times(self, simulated_n: Floats, late_s: float, noise_n: float) -> None:
+        """Readings may be early or late by chance, by `late_s` (standard deviation): while the force moves they say less."""
+        slope = self.slope_n_per_s(simulated_n)
+        self.weights = 1.0 / np.sqrt(1.0 + (slope * late_s / noise_n) ** 2)
+
+    def slope_n_per_s(self, simulated_n: Floats) -> Floats:
+        """Rate of the simulated force, per channel."""
+        slope = np.zeros(self.rows)
+        seconds = self.time_s()
+        for segment in self.segments:
+            slope[segment.rows] = np.gradient(simulated_n[segment.rows], seconds[segment.rows])
+        return slope
 
     def take_out(self, columns: Floats) -> None:
         """From now on nothing that these columns (k, rows) explain counts: a dependence that no effect has a name for."""

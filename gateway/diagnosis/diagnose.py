@@ -7,6 +7,7 @@ noise floor which is known, from replicate cycles or from the user.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
 from gateway.diagnosis.bench import MOTIONS, Bench
@@ -16,12 +17,14 @@ from gateway.diagnosis.effect import Effect, Parameter
 from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
 from gateway.diagnosis.judgement import judged
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.noise import Whitener, fast_noise_n, white
 from gateway.diagnosis.refine import Fitted
 from gateway.diagnosis.result import Diagnosis
 from gateway.diagnosis.screen import screen
 from gateway.diagnosis.search import search
 from gateway.twin.plant import Plant, with_value
+
+_CHANCE_SHARE: Final = 0.25  # of the time that readings may be late is chance: a process that was not woken at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +60,10 @@ def diagnose(
     bench, base, whiten = _based(measurements, _prepared(given, hidden), hidden, options.late_s)
     account("base fit")
     bench, base, found_direct = _direct(bench, base, whiten, max(options.quantum_n, given.cell.quantum_n))
+    if options.late_s > 0.0:
+        simulated_n = bench.simulate([base.point])[0]
+        bench.doubt_times(simulated_n, _CHANCE_SHARE * options.late_s, fast_noise_n(base.residual_n[bench.judged]))
+        base = refit(bench, base, whiten)
     effects = _competitors(base.free, hidden)
     found = search(bench, base, effects, whiten, account)
     left = screen(bench, found.fitted, found.whiten, [each.leftover for each in found.nameless])

@@ -43,7 +43,7 @@ class Whitener:
         """Whitened vectors (..., rows)."""
         white = np.empty_like(vectors)
         for segment, noise in zip(self.bench.segments, self.noises, strict=True):
-            part = vectors[..., segment.rows]
+            part = vectors[..., segment.rows] * self.bench.weights[segment.rows]
             white[..., segment.rows] = np.fft.irfft(np.fft.rfft(part) * noise.weights, part.shape[-1])
         return white
 
@@ -84,7 +84,7 @@ def coloured(bench: Bench, remainder_n: Floats, basis: Floats) -> Whitener:
     """
     noises = []
     for segment in bench.segments:
-        part, usable = remainder_n[segment.rows], bench.usable[segment.rows]
+        part, usable = remainder_n[segment.rows] * bench.weights[segment.rows], bench.usable[segment.rows]
         taken = np.sum(np.abs(np.fft.rfft(basis[:, segment.rows])) ** 2, axis=0) / part.size
         noises.append(_fit(part, np.clip(1.0 - taken, _LEAST_LEFT, 1.0) * max(float(np.mean(usable)), 0.05)))
     return Whitener(bench, tuple(noises))

@@ -124,7 +124,7 @@ def _of_lines(bench: Bench, white: Floats) -> Iterator[Question]:
 
 
 def _of_motion(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Question]:
-    slope = _slope(bench, simulated_n)
+    slope = bench.slope_n_per_s(simulated_n)
     moving = np.sign(slope) * bench.force_rows
     time = standard(bench.time_s(), bench)
     command = standard(bench.command(), bench)
@@ -135,12 +135,3 @@ def _of_motion(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Que
     yield Question("direction", "the difference between rising and falling changes in time", drifting, True)
     yield Question("speed", "in proportion to the rate of the force", standard(slope, bench)[None], False)
     yield Question("command", "curved", np.vstack([command, command**2, command**3]), False)
-
-
-def _slope(bench: Bench, simulated_n: Floats) -> Floats:
-    """Rate of the simulated force, N/s, per channel."""
-    slope = np.zeros(bench.rows)
-    seconds = bench.time_s()
-    for segment in bench.segments:
-        slope[segment.rows] = np.gradient(simulated_n[segment.rows], seconds[segment.rows])
-    return slope

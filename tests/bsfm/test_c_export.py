@@ -152,7 +152,7 @@ def test_the_header_says_where_it_comes_from_and_what_it_is_not():
     sources = c_source(CASES["demo"])
     assert sorted(sources) == ["bsfm_demo.c", "bsfm_demo.h"]
     header = sources["bsfm_demo.h"].split("*/")[0]
-    told = ('1 "demo" of 2026-11-21', "twin of plant paper-slide", "RMS 0.131 N", "0 .. 8 V", "blend span 13 N")
+    told = ('1 "demo" of 2026-11-21', "twin of plant paper-slide", "RMS 0.131 N", "0 .. 8 V", "blend span 14 N")
     told = (*told, "slip stops, where the calibration has them, are not exported")
     for words in (*told, "force-gateway 0.1.0", "sha256 9698ef5c", "not a safety device", "bsfm_demo_command(&state,"):
         assert words in header

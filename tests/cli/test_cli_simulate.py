@@ -45,6 +45,18 @@ def test_a_plant_that_made_the_recording_leaves_nothing(tmp_path: Path, call: Ca
     assert document["residual_n"]["all"]["max_n"] < 1e-4
 
 
+def test_a_position_of_something_else_does_not_move_the_slide(tmp_path: Path, call: Call, recording: Path) -> None:
+    series, elsewhere = tmp_path / "series.csv", tmp_path / "c.csv"
+    assert call("simulate", str(recording), "--csv", str(series)).exit_code == 0
+    columns = read_table(series).columns
+    along_mm = 300.0 + 200.0 * np.sin(0.7 * columns["time_s"])
+    table = np.stack([columns["time_s"], columns["command_v"], columns["simulated_n"], along_mm], axis=1)
+    np.savetxt(elsewhere, table, "%.9g", ",", header="time_s,command_v,force_n,position_mm", comments="")
+    document = json.loads(call("simulate", str(elsewhere), "--json").stdout)
+    assert document["residual_n"]["all"]["max_n"] < 1e-4
+    assert any("position_mm is not taken for the motion" in note for note in document["notes"])
+
+
 def test_the_series_and_the_figures_are_one_story(tmp_path: Path, call: Call, recording: Path) -> None:
     series = tmp_path / "series.csv"
     answer = call("simulate", str(recording), "--rig", "demo", "--csv", str(series), "--json")

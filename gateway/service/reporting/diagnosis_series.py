@@ -19,6 +19,7 @@ from gateway.diagnosis.result import Trace
 RISING, FALLING = 1, -1
 _WALK_ROWS: Final = 20_000  # of the play operator, which is a loop in Python
 _PLAY_SHARE: Final = 0.01  # of the drive's range: smaller wobble is no change of direction
+_LEAST_ALIKE: Final = 0.5  # of the mean product of two directions: 1 for the same, 0 for unrelated ones
 _GAP_STEPS: Final = 3.0
 _WELCH_ROWS: Final = 2048
 _CONSTANT: Final = 1e-9
@@ -129,14 +130,21 @@ def _quantities(measurement: Measurement) -> dict[str, Floats]:
 
 
 def direction(measurement: Measurement) -> Floats:
-    """+1 rising, -1 falling, 0 before the first move, shape (rows,): of the position where it was measured, else of the
-    drive. Play of a hundredth of the range keeps noise from being a reversal."""
-    values = measurement.position_m if measurement.position_m is not None else drive(measurement)[1]
-    if values.size == 0:
-        return values
-    every = -(-values.size // _WALK_ROWS)
-    walked = _walk(values[::every])
-    return np.repeat(walked, every)[: values.size]
+    """+1 rising, -1 falling, 0 before the first move, shape (rows,): of the slide's position where that was measured, else
+    of the drive. Play of a hundredth of the range keeps noise from being a reversal."""
+    driven = _ways(drive(measurement)[1])
+    if measurement.position_m is None or not driven.size:
+        return driven
+    moved = _ways(measurement.position_m)
+    if measurement.command_v is None:
+        return moved
+    alike = float(np.mean(driven * moved))  # a position that ignores the command is the tool's, along the workpiece
+    return driven if abs(alike) < _LEAST_ALIKE else moved
+
+
+def _ways(values: Floats) -> Floats:
+    every = max(-(-values.size // _WALK_ROWS), 1)
+    return np.repeat(_walk(values[::every]), every)[: values.size]
 
 
 def _walk(values: Floats) -> Floats:

@@ -78,6 +78,13 @@ def test_a_measured_position_tells_the_direction_better_than_the_command() -> No
     assert set(direction(measurement)[20:]) == {-1.0}
 
 
+def test_the_way_of_the_tool_along_the_workpiece_is_no_direction_of_the_slide() -> None:
+    volts = 3.0 + np.sin(np.linspace(0.0, 12.0 * np.pi, 1200))
+    plain = replace(trace(rows=1200).measurement, command_v=volts, position_m=None)
+    along_m = np.sin(np.linspace(0.0, 7.0 * np.pi, 1200) + 0.4)
+    assert np.array_equal(direction(replace(plain, position_m=along_m)), direction(plain))
+
+
 def test_mains_hum_stands_at_its_frequency_though_rows_are_uneven_and_missing() -> None:
     rng = np.random.default_rng(4)
     time_s = np.cumsum(rng.uniform(0.0045, 0.0055, 12_000))
