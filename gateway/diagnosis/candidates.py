@@ -101,7 +101,11 @@ def _bounded(candidate: Candidate, normal: Normal, point: Point, size: float) ->
     limit = candidate.form.exact or candidate.form.parameters[0].null >= ANY  # a fall from UNLIMITED has one size
     kept = min(max(size, 0.0 if _at_low(candidate, point) else -1.0), 1.0 if limit else _LARGEST_STRETCH)
     gain = float(2.0 * kept * normal.slope[column] - kept**2 * normal.power[column])
-    begin = started(point, candidate.form, candidate.start) if limit else _sized(candidate, point, max(kept, 0.2))
+    begin = (
+        started(point, candidate.form, candidate.start)
+        if limit
+        else _sized(candidate, point, kept if kept < 0.0 else max(kept, 0.2))
+    )
     return Score(candidate, max(gain, 0.0) if kept != 0.0 else 0.0, begin)
 
 

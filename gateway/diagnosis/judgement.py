@@ -7,7 +7,7 @@ jackknife's over blocks, which believes in no noise model.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -34,7 +34,7 @@ from gateway.diagnosis.result import (
     Trace,
     Verdict,
 )
-from gateway.diagnosis.search import Accepted, Found
+from gateway.diagnosis.search import Accepted, Found, without
 from gateway.twin.plant import Plant, with_value
 
 _REACHED: Final = 1.05  # residual over floor that counts as reached
@@ -65,7 +65,7 @@ def judged(
     given_floor_n: float | None,
 ) -> Diagnosis:
     """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
-    reported = _reported(bench, found)
+    found, reported = _worthy(bench, found)
     known_n = given_floor_n if given_floor_n is not None else _replicates(bench)
     rms_n = bench.rms_n(reported.base.residual_n)
     floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n)
@@ -74,14 +74,15 @@ def judged(
     causes.sort(key=lambda cause: -cause.gain.share_of_excess)
     names = frozenset(cause.name for cause in causes)
     fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in effects}
+    unseen = invisible(bench, effects, found.first.wave, found.first.normal, names | fixed)
     unexplained = known_n is not None and rms_n > _ABOVE * known_n
     return Diagnosis(
         verdict=_verdict(causes, left, reached=known_n is not None and reaches, unexplained=unexplained),
         baseline=Baseline(rms_n, floor_n, int(bench.judged.sum()), sum(each.duration_s for each in bench.measurements)),
         causes=tuple(causes),
         leftover=tuple(left),
-        not_identifiable=invisible(bench, effects, found.first.wave, found.first.normal, names | fixed),
-        rejected=_rejected(bench, found, names),
+        not_identifiable=unseen,
+        rejected=_rejected(bench, found, names | {each.name for each in unseen}),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant(reported.base),
         plant=_extended(reported, causes),
@@ -90,6 +91,20 @@ def judged(
         experiments=_experiments(causes),
         notes=tuple(note for each in bench.measurements for note in each.notes),
     )
+
+
+def _worthy(bench: Bench, found: Found) -> tuple[Found, Reported]:
+    """What is reported, without effects that make the unseen blocks worse once everything counts again."""
+    reported = _reported(bench, found)
+    gains = [
+        held_out(bench, without_it, reported.whiten).rms_n - reported.held_out.rms_n for without_it in reported.without
+    ]
+    if not gains or min(gains) > 0.0:
+        return found, reported
+    worst = int(np.argmin(gains))
+    kept = found.accepted[:worst] + found.accepted[worst + 1 :]
+    fitted = without(bench, found.fitted, found.base, found.accepted[worst], kept, found.whiten) if kept else found.base
+    return _worthy(bench, replace(found, fitted=fitted, accepted=kept))
 
 
 def _reported(bench: Bench, found: Found) -> Reported:

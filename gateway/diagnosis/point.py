@@ -33,11 +33,8 @@ def started(point: Point, form: Form, start: Start) -> Point:
     return point
 
 
-def without(point: Point, parameters: Sequence[Parameter]) -> Point:
-    """The same point with the sizes among these parameters at their null values."""
+def back_at(point: Point, before: Point, parameters: Sequence[Parameter]) -> Point:
+    """The same point with these parameters where they were before."""
     for parameter in parameters:
-        if not parameter.shape:
-            point = replace(
-                point, plant=with_value(point.plant, parameter.section, parameter.name, float(parameter.null))
-            )
+        point = point.moved(parameter, before.value(parameter))
     return point

@@ -14,7 +14,7 @@ import numpy as np
 
 from gateway.diagnosis.bench import BLOCKS, Bench
 from gateway.diagnosis.gram import Normal
-from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.questions import Question, questions
 from gateway.diagnosis.refine import Fitted
@@ -103,7 +103,7 @@ def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
     """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
-    times_are_sure = bool(np.all(bench.weights == 1.0))  # late readings come in bursts
+    times_are_sure = bool(np.all(bench.weights == 1.0)) and all(map(_evenly_sampled, bench.measurements))
     for segment in bench.segments:
         if segment.is_force:
             part = white[segment.rows]
@@ -117,6 +117,12 @@ def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
                 yield Leftover("time", "louder at some times than at others", share)
             if (share := _wandering(part)) > _LEAST_SHARE:
                 yield Leftover("time", "a line that wanders, or comes and goes", share)
+
+
+def _evenly_sampled(measurement: Measurement) -> bool:
+    """Are rows hardly missing? Whitening takes rows for evenly spaced; where they are not, noise seems to come and go."""
+    rows_s = np.diff(measurement.time_s)
+    return float(np.mean(rows_s > 1.5 * np.median(rows_s))) < 0.02
 
 
 def _wandering(part: Floats) -> float:

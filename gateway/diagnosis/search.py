@@ -20,8 +20,8 @@ from gateway.diagnosis.contest import Contest, Finalist, finalist, hold, signifi
 from gateway.diagnosis.effect import Effect, Form, Parameter
 from gateway.diagnosis.gram import held_out, orthonormal
 from gateway.diagnosis.noise import Whitener, coloured
-from gateway.diagnosis.point import without
-from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.point import back_at
+from gateway.diagnosis.refine import Fitted, Problem, Whiten, refine
 from gateway.diagnosis.scene import scene_of
 from gateway.diagnosis.screen import Answer, best_answer
 
@@ -83,7 +83,7 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
         base = _revalued(bench, base, whiten)
         clock(f"contest {len(accepted) + len(nameless) + 1}")
     if len(accepted) > 1:
-        fitted, accepted = _exchanged(bench, fitted, accepted, effects, whiten)
+        fitted, accepted = _exchanged(bench, fitted, base, accepted, effects, whiten)
         clock("exchange")
     return Found(base, fitted, tuple(accepted), tuple(nameless), whiten, first, contest)
 
@@ -121,15 +121,17 @@ def _others(effects: Sequence[Effect], accepted: Sequence[Accepted]) -> list[Eff
 
 def _acceptable(bench: Bench, fitted: Fitted, base: Fitted, contest: Contest, whiten: Whitener) -> Finalist | None:
     """The winner, if it keeps every rule; None otherwise. Sizes that every machine has do not take part."""
-    winner = next((each for each in contest.finalists if _noticeable(each)), None)
+    winner = next((each for each in contest.finalists if _noticeable(each, fitted)), None)
     explained = max(base.chi2 - fitted.chi2, 0.0)
     if winner is None or not significant(winner, contest.starts) or winner.gain <= _LEAST_BESIDE * explained:
         return None
     return winner if _worth(bench, fitted, winner, whiten, explained) else None
 
 
-def _noticeable(finalist: Finalist) -> bool:
-    return abs(finalist.fitted.point.value(finalist.form.parameters[0])) >= finalist.effect.least
+def _noticeable(finalist: Finalist, before: Fitted) -> bool:
+    """Is its size, or the change of a size that the plant had already, more than every machine has?"""
+    size = finalist.form.parameters[0]
+    return abs(finalist.fitted.point.value(size) - before.point.value(size)) >= finalist.effect.least
 
 
 def _worth(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, explained: float) -> bool:
@@ -148,7 +150,12 @@ def _worth(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, exp
 
 
 def _exchanged(
-    bench: Bench, fitted: Fitted, accepted: list[Accepted], effects: Sequence[Effect], whiten: Whitener
+    bench: Bench,
+    fitted: Fitted,
+    base: Fitted,
+    accepted: list[Accepted],
+    effects: Sequence[Effect],
+    whiten: Whitener,
 ) -> tuple[Fitted, list[Accepted]]:
     """Take each accepted effect out and let all that are not in the model compete for its place.
 
@@ -158,7 +165,7 @@ def _exchanged(
         if len(accepted) < 2:
             break
         holder, beside = accepted[index], accepted[:index] + accepted[index + 1 :]
-        lone = _reduced(bench, fitted, holder, beside, whiten)
+        lone = without(bench, fitted, base, holder, beside, whiten)
         scene = scene_of(bench, lone, whiten)
         held = finalist(bench, holder.effect, holder.form, fitted, lone, whiten)
         contest = hold(bench, lone, _others(effects, beside), scene, whiten, holder=held)
@@ -171,10 +178,12 @@ def _exchanged(
     return fitted, accepted
 
 
-def _reduced(bench: Bench, fitted: Fitted, taken: Accepted, beside: Sequence[Accepted], whiten: Whitener) -> Fitted:
-    """The model without one effect, refitted."""
+def without(
+    bench: Bench, fitted: Fitted, base: Fitted, taken: Accepted, beside: Sequence[Accepted], whiten: Whiten
+) -> Fitted:
+    """The model without one effect, its parameters back where the base model has them, refitted."""
     kept = {parameter.path for each in beside for parameter in each.form.parameters}
     gone: tuple[Parameter, ...] = tuple(each for each in taken.form.parameters if each.path not in kept)
     paths = {each.path for each in gone}
     free = tuple(each for each in fitted.free if each.path not in paths)
-    return refine(bench, [Problem(without(fitted.point, gone), free)], whiten, waves=4)[0]
+    return refine(bench, [Problem(back_at(fitted.point, base.point, gone), free)], whiten, waves=4)[0]

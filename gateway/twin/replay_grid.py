@@ -18,7 +18,7 @@ from gateway.twin.replay_drive import Drive, Floats
 from gateway.twin.surroundings import COLUMNS, Moment
 
 COARSEST_S: Final = 5.0e-3
-MOST_STEPS: Final = 200_000
+MOST_STEPS: Final = 80_000
 _ALIKE: Final = 1.0e-6  # of a step
 
 
