@@ -45,7 +45,7 @@ def wave(bench: Bench, fitted: Fitted, effects: Iterable[Effect], scene: Scene) 
     for effect in effects:
         for form in effect.forms:
             if set(form.needs) <= scene.columns:
-                for start in form.probes(scene):
+                for start in _starts(form, fitted.point, scene):
                     starts = [start, _quarter_turn(form, start)] if form.quadrature else [start]
                     indices = tuple(range(len(points), len(points) + len(starts)))
                     points += [started(fitted.point, form, each) for each in starts]
@@ -54,6 +54,15 @@ def wave(bench: Bench, fitted: Fitted, effects: Iterable[Effect], scene: Scene) 
         return Wave((), np.empty((0, bench.rows)))
     centre = bench.measured_n - fitted.residual_n
     return Wave(tuple(candidates), bench.reduced(bench.simulate(points) - centre * bench.usable))
+
+
+def _starts(form: Form, point: Point, scene: Scene) -> tuple[Start, ...]:
+    """The form's own, and the way back to nothing where the plant already has the effect."""
+    starts, size = form.probes(scene), form.parameters[0]
+    there = point.value(size) - size.null
+    if not starts or there == 0.0 or size.null >= ANY or form.quadrature:
+        return starts
+    return (*starts, (-there, *starts[0][1:]))
 
 
 def _quarter_turn(form: Form, start: Start) -> Start:
