@@ -105,8 +105,8 @@ def test_the_grid_is_as_fine_as_the_rows_and_at_most_5_ms() -> None:
     assert Replay(Drive(time_s=time_s, command_v=command_at(time_s))).grid.step_s == pytest.approx(0.005)
     time_s = np.arange(300_000) * 1.0e-3
     replay = Replay(Drive(time_s=time_s, command_v=command_at(time_s)))
-    assert replay.grid.step_s == pytest.approx(1.5e-3, rel=1.0e-3)
-    assert replay.notes == ("simulated in steps of 1.5 ms, coarser than the rows",)
+    assert replay.grid.step_s == pytest.approx(3.75e-3, rel=1.0e-3)
+    assert replay.notes == ("simulated in steps of 3.75 ms, coarser than the rows",)
 
 
 def test_before_the_first_row_the_command_was_nothing_or_what_is_said() -> None:
