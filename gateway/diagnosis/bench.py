@@ -23,6 +23,7 @@ MOTIONS: Final[tuple[Motion, ...]] = ("inferred", "measured", "measured-reversed
 BLOCKS: Final = 20  # per recording, for held-out errors and resampling
 SETTLING_S: Final = 1.0  # of a recording's start are not judged, unless it begins at rest:
 REST_S: Final = 0.2  # command and force stand still for so long
+_SLACK: Final = 5.0e-3  # of the forces' range that a force at rest may wander
 NOMINAL_AREA_M2: Final = 1.0e-4  # turns a measured pressure into newtons
 
 
@@ -177,7 +178,8 @@ def _begins_at_rest(measurement: Measurement) -> bool:
     if min(first.size, second.size) < 4:
         return False
     error_n = float(np.sqrt(np.var(first) / first.size + np.var(second) / second.size))
-    return abs(float(np.mean(first) - np.mean(second))) < 4.0 * error_n + 1.0e-9
+    slack_n = _SLACK * float(np.ptp(measurement.force_n[measurement.usable]))  # slow noise wanders, too
+    return abs(float(np.mean(first) - np.mean(second))) < max(4.0 * error_n, slack_n) + 1.0e-9
 
 
 def drive_of(measurement: Measurement, motion: Motion) -> Drive:

@@ -61,7 +61,7 @@ CYLINDER: Final = (
         signature="rounded corners of the loop at each reversal",
         excitation="many reversals, small ones too",
         experiment="a ladder with minor loops: reversals of 0.1, 0.3 and 1 V around three levels",
-        least=1.0e-5,
+        least=3.0e-6,
         forms=(Form(parameters=(PRESLIDING,), probes=fixed((3.0e-5,), (1.0e-4,), (4.0e-4,))),),
         group=_ONE_SPEED,
     ),

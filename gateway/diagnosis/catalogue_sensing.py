@@ -20,7 +20,7 @@ HUM_PHASE: Final = Parameter("cell", "hum_phase_rad", "rad", 0.0, -10.0, 10.0, 0
 CLOCK_OFFSET: Final = Parameter("cell", "clock_offset_s", "s", 0.0, -1.0, 1.0, 0.001)
 CLOCK_SKEW: Final = Parameter("cell", "clock_skew", "1", 0.0, -0.05, 0.05, 2.0e-5)
 CROSSTALK: Final = Parameter("cell", "crosstalk_n_per_v", "N/V", 0.0, -20.0, 20.0, 0.01)
-SIGN_LOST: Final = Parameter("cell", "sign_lost", "1", 0.0, 0.0, 1.0, 0.05)
+SIGN_LOST: Final = Parameter("cell", "sign_lost", "1", 0.0, 0.0, 1.0, 0.05, settled=True)
 REPEATED: Final = Parameter("cell", "repeated_share", "1", 0.0, 0.0, 1.0, 0.01)
 OUTLIER_SHARE: Final = Parameter("cell", "outlier_share", "1", 0.0, 0.0, 0.5, 0.001)
 OUTLIER: Final = Parameter("cell", "outlier_n", "N", 0.0, 0.0, 1.0e4, 0.1)
@@ -181,8 +181,7 @@ SENSING: Final = (
         signature="readings that should be negative are mirrored",
         excitation="forces below zero",
         experiment="pull at the load cell by hand",
-        forms=(Form(parameters=(SIGN_LOST,), probes=fixed((1.0,))),),
+        forms=(Form(parameters=(SIGN_LOST,), probes=fixed((1.0,)), exact=True),),
         group=("backlash",),
-        rarity=2.0,
     ),
 )

@@ -89,7 +89,7 @@ def significant(finalist: Finalist, starts: int) -> bool:
     """Chi-square at 1 % over the number of starts."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
-    return bool(chi2_law.sf(finalist.gain, finalist.dof) < 0.01 / max(starts, 1))
+    return bool(chi2_law.sf(finalist.gain, max(finalist.dof, 1)) < 0.01 / max(starts, 1))
 
 
 def hold(
@@ -120,7 +120,7 @@ def hold(
 
 
 def _joined(fitted: Fitted, form: Form) -> tuple[Parameter, ...]:
-    return (*fitted.free, *(each for each in form.parameters if each not in fitted.free))
+    return (*fitted.free, *(each for each in form.parameters if each not in fitted.free and not each.settled))
 
 
 def finalist(bench: Bench, effect: Effect, form: Form, refined: Fitted, beside: Fitted, whiten: Whiten) -> Finalist:

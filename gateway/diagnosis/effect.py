@@ -18,7 +18,10 @@ ANY: Final = 1.0e12
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of the plant. low, high: what a fit may try; step: secant, absolute; shape: no effect of its own."""
+    """One number of the plant. low, high: what a fit may try; step: secant, absolute; shape: no effect of its own.
+
+    settled: it is there as a start has it or not at all, nothing between: not fitted.
+    """
 
     section: str
     name: str
@@ -28,6 +31,7 @@ class Parameter:
     high: float
     step: float
     shape: bool = False
+    settled: bool = False
 
     @property
     def path(self) -> str:

@@ -196,8 +196,9 @@ def _interval(value: float, error: float) -> tuple[float, float]:
 def _estimates(bench: Bench, fitted: Fitted, parameters: Sequence[Parameter], whiten: Whitener) -> dict[str, Estimate]:
     own = np.sqrt(np.maximum(np.diag(covariance(fitted, whiten)), 0.0))
     errors = np.maximum(own, held_out(bench, fitted, whiten).jackknife)[len(fitted.point.offsets_n) :]
+    settled = [(each, 0.0) for each in parameters if each.settled]
     estimates = {}
-    for parameter, error in zip(fitted.free, errors, strict=True):
+    for parameter, error in (*zip(fitted.free, errors, strict=True), *settled):
         if parameter in parameters:
             value = fitted.point.value(parameter)
             estimates[parameter.name] = Estimate(
