@@ -109,6 +109,7 @@ def _bounded(candidate: Candidate, normal: Normal, point: Point, size: float) ->
     column = candidate.columns[0]
     limit = candidate.form.exact or candidate.form.parameters[0].null >= ANY  # a fall from UNLIMITED has one size
     kept = min(max(size, 0.0 if _at_low(candidate, point) else -1.0), 1.0 if limit else _LARGEST_STRETCH)
+    kept = 1.0 if candidate.form.exact else kept
     gain = float(2.0 * kept * normal.slope[column] - kept**2 * normal.power[column])
     begin = (
         started(point, candidate.form, candidate.start)
