@@ -13,9 +13,11 @@ VISCOUS: Final = Parameter("friction", "viscous_n_s_per_m", "N s/m", 0.0, 0.0, 1
 PRESLIDING: Final = Parameter("friction", "presliding_m", "m", 0.0, 0.0, 5.0e-3, 5.0e-6)
 LOAD: Final = Parameter("friction", "load_dependent_n_per_n", "N/N", 0.0, 0.0, 0.9, 0.003)
 ASYMMETRY: Final = Parameter("friction", "asymmetry_n", "N", 0.0, -50.0, 50.0, 0.05)
+DRAG_ASYMMETRY: Final = Parameter("friction", "asymmetry_n_s_per_m", "N s/m", 0.0, -1.0e5, 1.0e5, 20.0)
 STICTION: Final = Parameter("friction", "dwell_stiction_n", "N", 0.0, 0.0, 50.0, 0.1)
 STICTION_TIME: Final = Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.1, 100.0, 0.2, shape=True)
 SIDE_FEED: Final = Parameter("friction", "side_load_n_s_per_mm", "N s/mm", 0.0, 0.0, 20.0, 0.005)
+SIDE_GRIP: Final = Parameter("friction", "side_load_n_per_n", "N/N", 0.0, 0.0, 0.9, 0.003)
 SIDE_TILT: Final = Parameter("friction", "side_load_tilt_n", "N", 0.0, 0.0, 100.0, 0.1)
 SIDE_POSITION: Final = Parameter("friction", "side_load_n_per_mm", "N/mm", 0.0, 0.0, 20.0, 0.002)
 
@@ -86,7 +88,10 @@ CYLINDER: Final = (
         signature="rising and falling branch are not the same distance from the middle",
         excitation="full reversals and partial ones that end inside the loop",
         experiment="reversals of 0.1 and 1 V around three levels",
-        forms=(Form(parameters=(ASYMMETRY,), probes=fixed((0.2,)), proportional=True),),
+        forms=(
+            Form(parameters=(ASYMMETRY,), probes=fixed((0.2,)), proportional=True),
+            Form(parameters=(DRAG_ASYMMETRY,), probes=fixed((200.0,), (-200.0,))),
+        ),
         group=("coulomb-friction", "viscous-friction"),
         rarity=10.0,
     ),
@@ -110,6 +115,7 @@ SIDE_LOAD: Final = Effect(
     experiment="reversals of 1 V at rest and at two feeds, with feed_mm_s recorded",
     forms=(
         Form(parameters=(SIDE_FEED,), probes=fixed((0.02,)), needs=("feed_mm_s",)),
+        Form(parameters=(SIDE_GRIP,), probes=fixed((0.02,)), needs=("feed_mm_s",)),
         Form(parameters=(SIDE_TILT,), probes=fixed((0.3,)), needs=("tilt_deg",)),
         Form(parameters=(SIDE_POSITION,), probes=fixed((0.02,)), needs=("position_mm",)),
     ),

@@ -26,6 +26,7 @@ REASONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "slew-limit": (("regulator.slew_pa_per_s",), "the regulator cannot be faster than it is"),
     "stribeck-friction": (("friction.stribeck_n", "friction.stribeck_speed_m_per_s"), _SPEED),
     "viscous-friction": (("friction.viscous_n_s_per_m",), _SPEED),
+    "asymmetric-friction": (("friction.asymmetry_n_s_per_m",), _SPEED),
     "dwell-stiction": (
         ("friction.dwell_stiction_n", "friction.dwell_stiction_s"),
         "the model has no memory of how long the slide has rested",
@@ -36,7 +37,12 @@ REASONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
         "beyond it the slide carries no more force: mount the tool nearer",
     ),
     "side-load": (
-        ("friction.side_load_n_s_per_mm", "friction.side_load_tilt_n", "friction.side_load_n_per_mm"),
+        (
+            "friction.side_load_n_s_per_mm",
+            "friction.side_load_n_per_n",
+            "friction.side_load_tilt_n",
+            "friction.side_load_n_per_mm",
+        ),
         "the model's loop has one width, whatever presses from the side",
     ),
     "spindle-vibration": (

@@ -42,7 +42,14 @@ REGULATOR: Final = (
     "supply_pa",
     "ceiling_pa",
 )
-FRICTION: Final = ("coulomb_n", "load_dependent_n_per_n", "asymmetry_n", "presliding_m", "viscous_n_s_per_m")
+FRICTION: Final = (
+    "coulomb_n",
+    "load_dependent_n_per_n",
+    "asymmetry_n",
+    "presliding_m",
+    "viscous_n_s_per_m",
+    "asymmetry_n_s_per_m",
+)
 CONTACT: Final = (
     "pad_stiffness_n_per_m",
     "pad_damping_n_s_per_m",

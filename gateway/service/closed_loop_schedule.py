@@ -107,6 +107,7 @@ def columns_of(base: Plant, extended: Plant) -> frozenset[str]:
     friction, before = extended.friction, base.friction
     for field, column in (
         ("side_load_n_s_per_mm", "feed_mm_s"),
+        ("side_load_n_per_n", "feed_mm_s"),
         ("side_load_tilt_n", "tilt_deg"),
         ("side_load_n_per_mm", "position_mm"),
     ):

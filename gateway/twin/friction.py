@@ -25,8 +25,10 @@ from gateway.twin.surroundings import Moment
 from gateway.twin.terms import switched_on
 
 _RADIAN_PER_DEGREE: Final = math.pi / 180.0
+_DRAGGED_MM_PER_S: Final = 1.0
 ELEMENTS: Final = 3
 RIGID_M: Final = 1.0e-9
+FREE_N_PER_M: Final = 1.0e-3  # stands for no stiffness at all, where a slide without mass and drag moves freely
 BREAKAWAY_M: Final = 2.0e-5  # motion after which a rest is forgotten, where presliding is shorter
 DRY: Final = (
     "coulomb_n",
@@ -35,6 +37,7 @@ DRY: Final = (
     "stribeck_n",
     "dwell_stiction_n",
     "side_load_n_s_per_mm",
+    "side_load_n_per_n",
     "side_load_tilt_n",
     "side_load_n_per_mm",
 )
@@ -53,6 +56,13 @@ def side_load_n(friction: Friction, moment: Moment) -> Real:
     return load
 
 
+def side_share(friction: Friction, moment: Moment) -> Real:
+    """side-load: the surface's grip grows with the thrust as soon as the tool is dragged, N/N."""
+    if moment.feed_mm_s is None:
+        return 0.0
+    return friction.side_load_n_per_n * (1.0 - exponential(-abs(moment.feed_mm_s) / _DRAGGED_MM_PER_S))
+
+
 def two_sided(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
     """asymmetric-friction: (limit, centre) of a friction that is larger moving out than moving in, neither below 0.
 
@@ -60,6 +70,12 @@ def two_sided(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
     """
     out, back = larger(limit + asymmetry_n, 0.0), larger(limit - asymmetry_n, 0.0)
     return 0.5 * (out + back), 0.5 * (out - back)
+
+
+def drags(friction: Friction) -> tuple[Real, Real]:
+    """asymmetric-friction by speed: viscous drag (moving out, moving in), N s/m, neither below 0."""
+    viscous, more_out = friction.viscous_n_s_per_m, friction.asymmetry_n_s_per_m
+    return larger(viscous + more_out, 0.0), larger(viscous - more_out, 0.0)
 
 
 def rested(stiction_n: Real, full_n: Real, share: Real) -> Real:
@@ -80,7 +96,7 @@ class Elements:
         self._stribeck_travel_m = friction.stribeck_speed_m_per_s * step_s
         self._stribeck = bool(np.any(friction.stribeck_n))
         dry = switched_on(friction, DRY)
-        self._coulomb_n = friction.coulomb_n
+        self._coulomb_n, self._per_n = friction.coulomb_n, friction.load_dependent_n_per_n
         self.asymmetric, self.ages = bool(np.any(friction.asymmetry_n)), bool(np.any(friction.dwell_stiction_n))
         self._rest_share = 1.0 - exponential(-step_s / friction.dwell_stiction_s)
         self._breakaway_m = larger(friction.presliding_m, BREAKAWAY_M)
@@ -88,6 +104,8 @@ class Elements:
         count = (ELEMENTS if np.any(friction.presliding_m) else 1) if dry else 0
         yields_m = [larger(friction.presliding_m * ((j + 1) / count), RIGID_M) for j in range(count)]
         self._inverse_per_m = [1.0 / yield_m for yield_m in yields_m]
+        self._lopsided = bool(np.any(friction.asymmetry_n_s_per_m))
+        self.set_drag(step_s)
         tails = [sum(self._inverse_per_m[j:], start=zero) for j in range(count + 1)]
         self._stuck_slope_per_m, self._slopes_per_m = tails[0], tails[1:]
         self._part = 1.0 / count if count else 0.0
@@ -96,18 +114,18 @@ class Elements:
 
     def limit_n(self, thrust_n: Real, last_travel_m: Real) -> Real:
         """Largest friction at this thrust (never negative), N; the speed that shapes it is the last step's."""
-        friction = self._friction
-        limit = self._coulomb_n + friction.load_dependent_n_per_n * thrust_n
+        limit = self._coulomb_n + self._per_n * thrust_n
         if self._stribeck:
             ratio = last_travel_m / self._stribeck_travel_m
-            limit = limit + friction.stribeck_n / (1.0 + ratio * ratio)
+            limit = limit + self._friction.stribeck_n / (1.0 + ratio * ratio)
         if self.ages:
             limit = limit + self._stiction_n
         return limit
 
-    def load_sideways(self, load_n: Real) -> None:
-        """Raise the limit by a side load, until the next one."""
+    def load_sideways(self, load_n: Real, share: Real) -> None:
+        """Raise the limit by a side load and by a share of the thrust, until the next one."""
         self._coulomb_n = self._friction.coulomb_n + load_n
+        self._per_n = self._friction.load_dependent_n_per_n + share
 
     def age(self, travel_m: Real, limit: Real) -> None:
         """Rest raises the limit, motion lowers it again. What a rising limit holds it does not push: the strains give."""
@@ -118,13 +136,20 @@ class Elements:
         self.strains = [strain * ratio for strain in self.strains]
         self._total = self._total * ratio
 
+    def set_drag(self, step_s: Real) -> None:
+        """Mean of the drags in both directions, and half of what they differ, as stiffness of a step, N/m."""
+        out, back = drags(self._friction)
+        self.drag_n_per_m, self._more_out_n_per_m = 0.5 * (out + back) / step_s, 0.5 * (out - back) / step_s
+
     def travel_m(self, drive_n: Real, stiffness_n_per_m: Real, limit: Real) -> Real:
-        """How far `drive_n` moves the slide against a spring and this friction."""
-        if not self.strains:
-            return drive_n / stiffness_n_per_m
+        """How far `drive_n` moves the slide against a spring, the mean drag and this friction."""
         share = limit * self._part
         held = drive_n - share * self._total
         direction = sign(held)
+        if self._lopsided:
+            stiffness_n_per_m = larger(stiffness_n_per_m + direction * self._more_out_n_per_m, FREE_N_PER_M)
+        if not self.strains:
+            return drive_n / stiffness_n_per_m
         left, along = direction * held, direction * share
         furthest = left / (stiffness_n_per_m + share * self._stuck_slope_per_m)
         for strain, slope in zip(self.strains, self._slopes_per_m, strict=True):
@@ -157,7 +182,7 @@ class Elements:
 
     def bear(self, other: "Elements") -> None:
         """Take over the side load of another slide."""
-        self._coulomb_n = other._coulomb_n
+        self._coulomb_n, self._per_n = other._coulomb_n, other._per_n
 
     @property
     def mean(self) -> Real:

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.twin.friction import side_load_n, two_sided
+from gateway.twin.elementwise import Real
+from gateway.twin.friction import side_load_n, side_share, two_sided
 from gateway.twin.plant import Plant
 from gateway.twin.replay_drive import Floats
+from gateway.twin.sections import Friction
 from gateway.twin.slide import weight_n
 from gateway.twin.surroundings import Moment
 
@@ -39,11 +41,17 @@ class Load:
         return contact.gap_m == 0.0 and bounded and float(self.drive_n.min()) >= 0.0
 
 
+def sideways_n(friction: Friction, thrust_n: Floats, moment: Moment) -> Real:
+    """The side load on the grid, N; a float where there is none."""
+    side: Real = side_load_n(friction, moment)
+    return side + side_share(friction, moment) * thrust_n if friction.side_load_n_per_n else side
+
+
 def loaded(plant: Plant, pressure_pa: Floats, moment: Moment) -> Load:
     """Thrust and friction limit of a plant under a pressure."""
     friction, contact = plant.friction, plant.contact
     thrust = plant.cylinder.area_m2 * pressure_pa
-    limit = friction.coulomb_n + side_load_n(friction, moment) + friction.load_dependent_n_per_n * thrust
+    limit = friction.coulomb_n + sideways_n(friction, thrust, moment) + friction.load_dependent_n_per_n * thrust
     drive = thrust + weight_n(contact.mass_kg, contact.tilt_deg) if contact.mass_kg else thrust
     if friction.asymmetry_n != 0.0:
         limit, centre = two_sided(limit, friction.asymmetry_n)

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.twin.friction import BREAKAWAY_M, ELEMENTS, RIGID_M, moved, rested
+from gateway.twin.friction import BREAKAWAY_M, ELEMENTS, RIGID_M, drags, moved, rested
 from gateway.twin.replay_cache import Cache
 from gateway.twin.replay_drive import Drive, Floats
 from gateway.twin.replay_grid import Grid
@@ -40,8 +40,9 @@ class Motions:
         """Force of one load on the grid, N: thrust - friction outward, seen from the position's own direction."""
         friction = load.plant.friction
         limit, strain = self._limit_n(friction, load.limit_n), self._mean_strain(friction.presliding_m)
-        held = limit * strain + friction.viscous_n_s_per_m * self._speed_m_per_s
-        return load.drive_n - held
+        out, back = drags(friction)
+        speed = self._speed_m_per_s
+        return load.drive_n - limit * strain - np.where(speed > 0.0, out, back) * speed
 
     def _limit_n(self, friction: Friction, limit: Floats) -> Floats:
         """The limit with what the motion makes of it: Stribeck's curve and stiction after a rest."""

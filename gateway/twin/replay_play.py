@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.twin.elementwise import Real
+from gateway.twin.friction import drags
 from gateway.twin.replay_drive import Floats
 from gateway.twin.replay_grid import Grid
 from gateway.twin.replay_load import Load
 from gateway.twin.replay_parts import apart, in_parts, together
 
-Band: TypeAlias = tuple[Floats, Floats, float, Real]
-"""Lower edge, upper edge, force at the back stop (negative beyond a gap), N; share of the way that a step goes: one for
-all steps, or one for each."""
+Band: TypeAlias = tuple[Floats, Floats, float, Real, Real]
+"""Lower edge, upper edge, force at the back stop (negative beyond a gap), N; share of the way out that a step goes, and of
+the way in: one for all steps, or one for each."""
 
 _SINGLY: Final = 12  # lanes that are faster one by one in floats than together in numpy
 
@@ -28,7 +29,9 @@ _SINGLY: Final = 12  # lanes that are faster one by one in floats than together 
 def played(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
     bands = [_band(load, grid.steps_s) for load in loads]
-    found = {lane: low for lane, (low, high, _, share) in enumerate(bands) if low is high and _is_whole(share)}
+    found = {
+        lane: low for lane, (low, high, _, *shares) in enumerate(bands) if low is high and all(map(_is_whole, shares))
+    }
     dragged = [lane for lane in range(len(loads)) if lane not in found]
     if len(dragged) <= _SINGLY:
         found |= {lane: _single(*bands[lane]) for lane in dragged}
@@ -52,10 +55,13 @@ def _band(load: Load, steps_s: Real) -> Band:
         low, high = load.drive_n - load.limit_n, load.drive_n + load.limit_n
     if back_n < 0.0:
         low, high = np.where(low > 0.0, low, back_n), np.where(high >= 0.0, high, back_n)
-    drag_n_s_per_m, share = load.plant.friction.viscous_n_s_per_m, 1.0
-    if drag_n_s_per_m > 0.0:
-        share = contact.pad_stiffness_n_per_m / (contact.pad_stiffness_n_per_m + drag_n_s_per_m / steps_s)
-    return (*_bounded(low, high, back_n, most_n), back_n, share)
+    out, back = (_share(drag, contact.pad_stiffness_n_per_m, steps_s) for drag in drags(load.plant.friction))
+    return (*_bounded(low, high, back_n, most_n), back_n, out, back)
+
+
+def _share(drag_n_s_per_m: Real, stiffness_n_per_m: float, steps_s: Real) -> Real:
+    """How much of its way a slide goes in a step."""
+    return stiffness_n_per_m / (stiffness_n_per_m + drag_n_s_per_m / steps_s) if drag_n_s_per_m > 0.0 else 1.0
 
 
 def _bounded(low: Floats, high: Floats, back_n: float, most_n: float) -> tuple[Floats, Floats]:
@@ -68,19 +74,22 @@ def _bounded(low: Floats, high: Floats, back_n: float, most_n: float) -> tuple[F
     return (high, high) if same else (low, high)
 
 
-def _single(low: Floats, high: Floats, start_n: float, share: Real) -> Floats:
+def _single(low: Floats, high: Floats, start_n: float, out: Real, back: Real) -> Floats:
     """One lane in floats."""
     force = min(max(start_n, float(low[0])), float(high[0]))
     found, least_n, most_n = [force], low[1:].tolist(), high[1:].tolist()
-    if _is_whole(share):
+    if _is_whole(out) and _is_whole(back):
         for least, most in zip(least_n, most_n, strict=True):
             force = least if force < least else most if force > most else force
             found.append(force)
-    else:
-        shares = repeat(share, low.size - 1) if type(share) is float else share.tolist()
-        for least, most, goes in zip(least_n, most_n, shares, strict=True):
-            force += goes * ((least if force < least else most if force > most else force) - force)
-            found.append(force)
+        return np.array(found)
+    outs, backs = (repeat(share, low.size - 1) if type(share) is float else share.tolist() for share in (out, back))
+    for least, most, goes_out, goes_back in zip(least_n, most_n, outs, backs, strict=True):
+        if force < least:
+            force += goes_out * (least - force)
+        elif force > most:
+            force += goes_back * (most - force)
+        found.append(force)
     return np.array(found)
 
 
@@ -89,34 +98,32 @@ def _together(bands: list[Band]) -> list[Floats]:
     low, high = together([band[0] for band in bands]), together([band[1] for band in bands])
     start = np.clip(np.array([band[2] for band in bands]), low[0], high[0])
     guess = np.where(low[1:] >= low[:-1], low[:-1], high[:-1])
-    shares = [band[3] for band in bands]
-    uneven = any(type(share) is not float for share in shares)
-    own = [together([np.broadcast_to(share, low.shape[0] - 1) for share in shares])] if uneven else []
-    common = None if uneven or all(map(_is_whole, shares)) else np.array(shares)
+    ways = [[band[way] for band in bands] for way in (3, 4)]
+    dragged = not all(_is_whole(share) for shares in ways for share in shares)
+    own = [together([np.broadcast_to(share, low.shape[0] - 1) for share in shares]) for shares in ways if dragged]
 
     def march(which: NDArray[np.intp], series: list[Floats], state: Floats, forces: Floats) -> None:
-        low, high, *own = series
-        share = own[0] if own else common if common is None else np.broadcast_to(common[which], low.shape)
-        _march(share, low, high, state, forces)
+        low, high, *shares = series
+        _march(shares, low, high, state, forces)
 
     force = in_parts(march, [low[1:], high[1:], *own], start[None], guess[None])
     return apart(np.concatenate([start[None], force]))
 
 
-def _march(shares: Floats | None, low: Floats, high: Floats, state: Floats, forces: Floats) -> None:
-    """Step through (steps, lanes) of the band and of the share; advances the state (1, lanes) and fills the forces."""
+def _march(shares: list[Floats], low: Floats, high: Floats, state: Floats, forces: Floats) -> None:
+    """Step through (steps, lanes) of the band and of the shares; advances the state (1, lanes) and fills the forces."""
     force = state[0]
-    if shares is None:
+    if not shares:
         for least, most, out in zip(low, high, forces, strict=True):
             np.maximum(force, least, out=out)
             np.minimum(out, most, out=out)
             force = out
     else:
-        for least, most, share, out in zip(low, high, shares, forces, strict=True):
+        for least, most, goes_out, goes_back, out in zip(low, high, *shares, forces, strict=True):
             np.maximum(force, least, out=out)
             np.minimum(out, most, out=out)
-            np.subtract(out, force, out)
-            np.multiply(out, share, out)
-            np.add(out, force, out)
+            way = out - force
+            np.multiply(way, np.where(way > 0.0, goes_out, goes_back), out=way)
+            np.add(force, way, out=out)
             force = out
     state[0] = force

@@ -70,14 +70,15 @@ class Slides:
     @staticmethod
     def _way(load: Load) -> Way:
         contact, friction = load.plant.contact, load.plant.friction
-        if load.is_rigid and (contact.gap_m == 0.0 or friction.viscous_n_s_per_m == 0.0):
+        drags = friction.viscous_n_s_per_m != 0.0 or friction.asymmetry_n_s_per_m != 0.0
+        if load.is_rigid and (contact.gap_m == 0.0 or not drags):
             return played
-        ordinary = friction.stribeck_n == 0.0 and friction.dwell_stiction_n == 0.0
+        ordinary = not (friction.stribeck_n or friction.dwell_stiction_n or friction.asymmetry_n_s_per_m)
         return elastic if ordinary and load.stays_on_the_pad else stepped
 
 
 def _memories(load: Load) -> tuple[bool, ...]:
     """What a slide remembers: lanes that step together, and any part of them, must have as many elements."""
     friction = load.plant.friction
-    aging = (friction.presliding_m, friction.dwell_stiction_n, friction.asymmetry_n)
-    return (switched_on(friction, DRY), *(value != 0.0 for value in aging))
+    others = (friction.presliding_m, friction.dwell_stiction_n, friction.asymmetry_n, friction.asymmetry_n_s_per_m)
+    return (switched_on(friction, DRY), *(value != 0.0 for value in others))

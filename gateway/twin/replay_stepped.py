@@ -12,17 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.twin.elementwise import Real, exponential, larger
-from gateway.twin.friction import Elements, side_load_n
+from gateway.twin.friction import FREE_N_PER_M, Elements
 from gateway.twin.plant import Plant, stack
 from gateway.twin.replay_drive import Floats
 from gateway.twin.replay_grid import Grid
-from gateway.twin.replay_load import Load
+from gateway.twin.replay_load import Load, sideways_n
 from gateway.twin.replay_parts import apart, in_parts, together
 from gateway.twin.slide import SlideState, weight_n
 
 _SINGLY: Final = 4  # lanes that are faster one by one in floats
 _LENGTH_M: Final = 1.0e-4  # unit of positions and travels where states are compared
-_FREE_N_PER_M: Final = 1.0e-3  # as in slide.py
 
 
 class _Elements(Elements):
@@ -30,6 +29,7 @@ class _Elements(Elements):
 
     def set_step(self, step_s: Real, last_s: Real) -> None:
         """The length of the coming step, and of the one in which the slide made its last travel, s."""
+        self.set_drag(step_s)
         self._stribeck_travel_m = self._friction.stribeck_speed_m_per_s * last_s
         if self.ages:
             self._rest_share = 1.0 - exponential(-step_s / self._friction.dwell_stiction_s)
@@ -44,10 +44,10 @@ class _Slide(SlideState):
 
     def set_step(self, step_s: Real, last_s: Real) -> None:
         """As for the elements; not needed where all steps are as long as the first."""
-        drag_n_per_m = self._plant.friction.viscous_n_s_per_m / step_s
-        self._free_n_per_m = larger(drag_n_per_m, _FREE_N_PER_M)
-        self._pressed_n_per_m = drag_n_per_m + self._pad_n_per_m
         self._elements.set_step(step_s, last_s)
+        drag_n_per_m = self._elements.drag_n_per_m
+        self._free_n_per_m = larger(drag_n_per_m, FREE_N_PER_M)
+        self._pressed_n_per_m = drag_n_per_m + self._pad_n_per_m
 
 
 def stepped(loads: list[Load], grid: Grid) -> list[Floats]:
@@ -56,7 +56,7 @@ def stepped(loads: list[Load], grid: Grid) -> list[Floats]:
         return [_single(load, grid) for load in loads]
     plants = [load.plant for load in loads]
     pressure = together([load.pressure_pa for load in loads])
-    side = together([np.broadcast_to(_side_n(load, grid), grid.points) for load in loads])
+    side = together([np.broadcast_to(_sideways_n(load, grid), grid.points) for load in loads])
     steps = [np.repeat(lengths[:, None], len(loads), axis=1) for lengths in _lengths(grid)]
     slide = _slide(plants, grid.step_s)
     slide.set_side_load(side[0])
@@ -71,15 +71,14 @@ def stepped(loads: list[Load], grid: Grid) -> list[Floats]:
     return apart(np.concatenate([first[None], force]))
 
 
+def _sideways_n(load: Load, grid: Grid) -> Real:
+    return sideways_n(load.plant.friction, load.thrust_n, grid.moment)
+
+
 def _lengths(grid: Grid) -> list[Floats]:
     """Of each step and of the one before it, s; none where they are alike."""
     steps_s = grid.steps_s
     return [] if type(steps_s) is float else [steps_s, np.concatenate([steps_s[:1], steps_s[:-1]])]
-
-
-def _side_n(load: Load, grid: Grid) -> Real:
-    """The side load on the grid, N; a float where there is none."""
-    return side_load_n(load.plant.friction, grid.moment)
 
 
 def _slide(plants: list[Plant], step_s: float) -> _Slide:
@@ -94,7 +93,7 @@ def _slide(plants: list[Plant], step_s: float) -> _Slide:
 
 def _single(load: Load, grid: Grid) -> Floats:
     """One lane, in floats."""
-    slide, side_n = _slide([load.plant], grid.step_s), _side_n(load, grid)
+    slide, side_n = _slide([load.plant], grid.step_s), _sideways_n(load, grid)
     sides = None if isinstance(side_n, float) else side_n.tolist()
     lengths = list(zip(*(column.tolist() for column in _lengths(grid)), strict=True))
     first, *pressures = load.pressure_pa.tolist()

@@ -67,10 +67,12 @@ class Friction:
     stribeck_n: NotNegative = 0.0  # what standing adds to sliding
     stribeck_speed_m_per_s: Positive = 0.01  # scale of the above, no effect of its own
     viscous_n_s_per_m: NotNegative = 0.0  # per speed
+    asymmetry_n_s_per_m: float = 0.0  # more of it moving out, less moving in
     presliding_m: NotNegative = 0.0  # travel until the last Maxwell-slip element slides; 0: rigid Coulomb
     dwell_stiction_n: NotNegative = 0.0  # what a long rest adds until the slide has moved again
     dwell_stiction_s: Positive = 5.0  # time constant of the rest, no effect of its own
     side_load_n_s_per_mm: NotNegative = 0.0  # more friction per feed speed (needs the feed)
+    side_load_n_per_n: NotNegative = 0.0  # more friction per newton of thrust while the feed moves (needs the feed)
     side_load_tilt_n: NotNegative = 0.0  # more friction by the sine of the tilt (needs the tilt)
     side_load_n_per_mm: NotNegative = 0.0  # more friction per distance from the middle (needs the position)
 

@@ -12,7 +12,7 @@ from numpy.random import default_rng
 
 from gateway.twin.contact import ContactState
 from gateway.twin.elementwise import Real
-from gateway.twin.friction import side_load_n
+from gateway.twin.friction import side_load_n, side_share
 from gateway.twin.load_cell import LoadCellState
 from gateway.twin.plant import Plant, lane_count, plain
 from gateway.twin.regulator import RegulatorState
@@ -137,7 +137,8 @@ class Twin:
         """
         self._moment.look(around)
         self._regulator.supply_kpa = self._moment.supply_kpa
-        self._slide.set_side_load(side_load_n(self.plant.friction, self._moment))
+        friction = self.plant.friction
+        self._slide.set_side_load(side_load_n(friction, self._moment), side_share(friction, self._moment))
         self._contact.look(self._slide.force_n)
         self._cell.look(self._moment)
 

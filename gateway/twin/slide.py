@@ -14,11 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.twin.elementwise import Real, any_below, clip, larger, smaller
-from gateway.twin.friction import Elements, two_sided
+from gateway.twin.friction import FREE_N_PER_M, Elements, two_sided
 from gateway.twin.plant import Plant
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
-_FREE_N_PER_M = 1.0e-3  # stands for no stiffness at all, where a slide without mass and drag moves freely
+MOVING = ("viscous_n_s_per_m", "asymmetry_n_s_per_m", "stribeck_n", "dwell_stiction_n")
+"""Friction that is nothing at rest."""
 
 
 def weight_n(mass_kg: Real, tilt_deg: Real) -> Real:
@@ -53,13 +54,13 @@ class SlideState:
         self._gap_m = contact.gap_m
         self._weight_n = self._steady_n = weight_n(contact.mass_kg, contact.tilt_deg)
         self._inertia_n_per_m = contact.mass_kg / step_s**2
-        drag_n_per_m = self._inertia_n_per_m + plant.friction.viscous_n_s_per_m / step_s
-        self._free_n_per_m = larger(drag_n_per_m, _FREE_N_PER_M)
+        self._elements = Elements(plant.friction, step_s, zero)
+        drag_n_per_m = self._inertia_n_per_m + self._elements.drag_n_per_m
+        self._free_n_per_m = larger(drag_n_per_m, FREE_N_PER_M)
         self._pad_n_per_m = contact.pad_stiffness_n_per_m
         self._pad_step_n_per_m = contact.pad_stiffness_n_per_m + contact.pad_damping_n_s_per_m / step_s
         self._pressed_n_per_m = drag_n_per_m + self._pad_step_n_per_m
         self._stop_in_reach = stop_in_reach(plant, contact.gap_m)
-        self._elements = Elements(plant.friction, step_s, zero)
         self._limit_n = self._centre_n = zero
         self._travel_m: Real = zero
         self.position_m: Real = zero
@@ -86,13 +87,13 @@ class SlideState:
         self._gap_m = self._plant.contact.gap_m - height_m
         self._stop_in_reach = stop_in_reach(self._plant, self._gap_m)
 
-    def set_side_load(self, load_n: Real) -> None:
-        """What presses the slide sideways raises its friction by this much, N; 0 is null."""
-        self._elements.load_sideways(load_n)
+    def set_side_load(self, load_n: Real, share: Real = 0.0) -> None:
+        """What presses the slide sideways raises its friction by this much, N, and this share of the thrust; 0 is null."""
+        self._elements.load_sideways(load_n, share)
 
     def settle(self, pressure_pa: Real) -> None:
         """Come to rest under this pressure at once: one step without inertia and drag, which are nothing at rest."""
-        friction = replace(self._plant.friction, viscous_n_s_per_m=0.0, stribeck_n=0.0, dwell_stiction_n=0.0)
+        friction = replace(self._plant.friction, **dict.fromkeys(MOVING, 0.0))
         contact = replace(self._plant.contact, mass_kg=0.0, pad_damping_n_s_per_m=0.0)
         still = SlideState(replace(self._plant, friction=friction, contact=contact), self._step_s, self._zero)
         still._steady_n, still._gap_m, still._touching = self._steady_n, self._gap_m, self._touching

@@ -32,7 +32,7 @@ def rig_with(folder: Path, line: str, **numbers: float) -> Path:
 
 
 def test_every_effect_of_the_catalogue_has_a_treatment_or_a_reason():
-    assert sorted(treatment.name for treatment in TREATMENTS) == sorted(effect.name for effect in EFFECTS)
+    assert {treatment.name for treatment in TREATMENTS} == {effect.name for effect in EFFECTS}
     assert all(why and why[0].islower() and not why.endswith(".") for _, why in REASONS.values())
     assert {treatment.name for treatment in TREATMENTS if treatment.by is By.NOTHING} == set(REASONS)
 

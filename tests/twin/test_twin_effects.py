@@ -39,6 +39,7 @@ STATIC: list[tuple[Any, float]] = [
     (Friction(coulomb_n=1.0, asymmetry_n=0.4), -1.4),
     (Friction(coulomb_n=1.0, asymmetry_n=-3.0), 0.0),  # never below 0
     (Friction(side_load_n_s_per_mm=0.05), -1.0),
+    (Friction(side_load_n_per_n=0.05), -0.05 * THRUST_N),
     (Friction(side_load_tilt_n=2.0), -2.0 * math.sin(math.radians(60.0))),
     (Friction(side_load_n_per_mm=0.1), -1.2),
     (Contact(backlash_n=1.0), -0.5),

@@ -61,8 +61,10 @@ ON = {
     ("regulator", "fill_slowdown"): 0.5,
     ("regulator", "hunting_pa"): 5.0e3,
     ("friction", "asymmetry_n"): 0.5,
+    ("friction", "asymmetry_n_s_per_m"): 300.0,
     ("friction", "dwell_stiction_n"): 5.0,
     ("friction", "side_load_n_s_per_mm"): 0.02,
+    ("friction", "side_load_n_per_n"): 0.05,
     ("friction", "side_load_tilt_n"): 1.0,
     ("friction", "side_load_n_per_mm"): 0.05,
     ("contact", "backlash_n"): 0.5,
@@ -178,6 +180,7 @@ def test_an_effect_whose_column_nobody_knows_is_off() -> None:
     needy = [
         ("regulator", "droop_pa_per_pa"),
         ("friction", "side_load_n_s_per_mm"),
+        ("friction", "side_load_n_per_n"),
         ("contact", "tilt_n"),
         ("contact", "spindle_n"),
         ("cell", "zero_n_per_k"),
