@@ -42,9 +42,10 @@ def wave(bench: Bench, fitted: Fitted, effects: Iterable[Effect], scene: Scene) 
     """Every start of these effects that the recording's columns allow."""
     points: list[Point] = []
     candidates: list[Candidate] = []
+    taken = {parameter.path for parameter in fitted.free}
     for effect in effects:
         for form in effect.forms:
-            if set(form.needs) <= scene.columns:
+            if set(form.needs) <= scene.columns and not taken & {parameter.path for parameter in form.parameters}:
                 for start in _starts(form, fitted.point, scene):
                     starts = [start, _quarter_turn(form, start)] if form.quadrature else [start]
                     indices = tuple(range(len(points), len(points) + len(starts)))

@@ -15,7 +15,8 @@ LOAD: Final = Parameter("friction", "load_dependent_n_per_n", "N/N", 0.0, 0.0, 0
 ASYMMETRY: Final = Parameter("friction", "asymmetry_n", "N", 0.0, -50.0, 50.0, 0.05)
 DRAG_ASYMMETRY: Final = Parameter("friction", "asymmetry_n_s_per_m", "N s/m", 0.0, -1.0e5, 1.0e5, 20.0)
 STICTION: Final = Parameter("friction", "dwell_stiction_n", "N", 0.0, 0.0, 50.0, 0.1)
-STICTION_TIME: Final = Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.1, 100.0, 0.2, shape=True)
+STICTION_TIME: Final = Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.8, 100.0, 0.2, shape=True)
+AT_ONCE: Final = Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.02, 0.8, 0.01, shape=True)
 SIDE_FEED: Final = Parameter("friction", "side_load_n_s_per_mm", "N s/mm", 0.0, 0.0, 20.0, 0.005)
 SIDE_GRIP: Final = Parameter("friction", "side_load_n_per_n", "N/N", 0.0, 0.0, 0.9, 0.003)
 SIDE_TILT: Final = Parameter("friction", "side_load_tilt_n", "N", 0.0, 0.0, 100.0, 0.1)
@@ -42,7 +43,10 @@ CYLINDER: Final = (
         signature="a jump after each rest, larger at slow ramps",
         excitation="motions at slow and fast speed, and reversals",
         experiment="ramps of 0.05, 0.5 and 5 V/s up and down",
-        forms=(Form(parameters=(STRIBECK, STRIBECK_SPEED), probes=fixed((0.3, 1.0e-4), (0.3, 1.0e-3), (0.3, 6.0e-3))),),
+        forms=(
+            Form(parameters=(STRIBECK, STRIBECK_SPEED), probes=fixed((0.3, 1.0e-4), (0.3, 1.0e-3), (0.3, 6.0e-3))),
+            Form(parameters=(STICTION, AT_ONCE), probes=fixed((0.15, 0.1), (0.15, 0.3))),  # of a slide that sticks and slips
+        ),
         group=("coulomb-friction", "dwell-stiction"),
     ),
     Effect(
