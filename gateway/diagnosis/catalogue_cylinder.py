@@ -45,7 +45,9 @@ CYLINDER: Final = (
         experiment="ramps of 0.05, 0.5 and 5 V/s up and down",
         forms=(
             Form(parameters=(STRIBECK, STRIBECK_SPEED), probes=fixed((0.3, 1.0e-4), (0.3, 1.0e-3), (0.3, 6.0e-3))),
-            Form(parameters=(STICTION, AT_ONCE), probes=fixed((0.15, 0.1), (0.15, 0.3))),  # of a slide that sticks and slips
+            Form(
+                parameters=(STICTION, AT_ONCE), probes=fixed((0.15, 0.1), (0.15, 0.3))
+            ),  # of a slide that sticks and slips
         ),
         group=("coulomb-friction", "dwell-stiction"),
     ),

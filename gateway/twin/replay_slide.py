@@ -1,9 +1,10 @@
 """Replay, stage 2: the slide's force on the grid for each different combination of pressure, cylinder, friction and pad.
 
-Three ways to the same closed form of friction.py, the cheapest that a plant allows:
+Four ways to the same closed form of friction.py, the cheapest that a plant allows:
     - rigid friction (no presliding) is a play of the force between thrust - limit and thrust + limit (replay_play.py);
     - presliding where the pad is never left and no stop is met: all lanes at once (replay_elastic.py);
-    - anything else (Stribeck, dwell stiction, a gap, a stop): the twin's own slide, step by step (replay_stepped.py).
+    - rigid friction with Stribeck's curve or stiction, on the pad: a play of varying width (replay_sticking.py);
+    - anything else (a gap, a stop, presliding with these): the twin's own slide, step by step (replay_stepped.py).
 Measured motion leaves the pad out (replay_measured.py).
 """
 
@@ -23,6 +24,7 @@ from gateway.twin.replay_load import Load, loaded
 from gateway.twin.replay_measured import Motions
 from gateway.twin.replay_play import played
 from gateway.twin.replay_stepped import stepped
+from gateway.twin.replay_sticking import sticking
 from gateway.twin.terms import switched_on
 
 Way: TypeAlias = Callable[[list[Load], Grid], list[Floats]]
@@ -73,8 +75,12 @@ class Slides:
         drags = friction.viscous_n_s_per_m != 0.0 or friction.asymmetry_n_s_per_m != 0.0
         if load.is_rigid and (contact.gap_m == 0.0 or not drags):
             return played
-        ordinary = not (friction.stribeck_n or friction.dwell_stiction_n or friction.asymmetry_n_s_per_m)
-        return elastic if ordinary and load.stays_on_the_pad else stepped
+        if not load.stays_on_the_pad:
+            return stepped
+        if friction.presliding_m == 0.0:
+            return sticking
+        moved = friction.stribeck_n or friction.dwell_stiction_n or friction.asymmetry_n_s_per_m
+        return stepped if moved else elastic
 
 
 def _memories(load: Load) -> tuple[bool, ...]:
