@@ -20,7 +20,7 @@ from gateway.twin.replay_load import Load, sideways_n
 from gateway.twin.replay_parts import apart, in_parts, together
 from gateway.twin.slide import SlideState, weight_n
 
-_SINGLY: Final = 4  # lanes that are faster one by one in floats
+_SINGLY: Final = 1  # lanes that are faster one by one in floats
 _LENGTH_M: Final = 1.0e-4  # unit of positions and travels where states are compared
 
 
