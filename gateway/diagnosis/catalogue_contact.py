@@ -28,8 +28,6 @@ CURVE: Final = Parameter("contact", "position_n_per_mm2", "N/mm2", 0.0, -100.0, 
 RIPPLE: Final = Parameter("contact", "ripple_n", "N", 0.0, 0.0, 50.0, 0.05)
 RIPPLE_PITCH: Final = Parameter("contact", "ripple_pitch_mm", "mm", 5.0, 0.05, 1.0e4, 0.002, shape=True)
 RIPPLE_PHASE: Final = Parameter("contact", "ripple_phase_rad", "rad", 0.0, -10.0, 10.0, 0.02, shape=True)
-BACKLASH: Final = Parameter("contact", "backlash_n", "N", 0.0, 0.0, 100.0, 0.05)
-
 LOST: Final = Parameter("contact", "lost_n", "N", 0.0, 0.0, 100.0, 0.05)
 
 MONOTONE: Final = ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift")
@@ -194,15 +192,14 @@ CONTACT: Final = (
     Effect(
         name="backlash",
         family="contact and tool",
-        what="play in mount or guide: it must close before force passes, or is lost at each reversal",
-        signature="no force until the thrust has closed the gap, or a pause after each reversal",
-        excitation="reversals of different size",
+        what="play in mount or guide that must close before force passes (lost at each reversal, it widens the loop)",
+        signature="no force until the thrust has closed the gap",
+        excitation="returns to no force, from different sizes",
         experiment="reversals of 0.05 to 1 V around three levels with position_mm recorded",
         forms=(
             Form(parameters=(LOST,), probes=fixed((0.5,), (2.0,))),
-            Form(parameters=(BACKLASH,), probes=fixed((0.2,), (0.6,))),
-        ),
-        group=("regulator-hysteresis", "coulomb-friction", "sign-loss", "asymmetric-friction"),
+        ),  # the other play is friction's: one cannot tell
+        group=("sign-loss", "asymmetric-friction"),
         rarity=4.0,
     ),
 )
