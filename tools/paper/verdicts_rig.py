@@ -1,5 +1,7 @@
 """Figs. 7 and 8: validation and steps."""
 
+from typing import Final
+
 import numpy as np
 
 from gateway.twin.experiment import Floats
@@ -9,6 +11,8 @@ from paper.rigs import paper_plant
 from paper.study import Study
 from paper.trials import Trial, largest_n, settled_s
 from paper.verdict import ERROR_TOLERANCE, TIME_TOLERANCE_S, Verdict, near, word
+
+CUBIC: Final = "a cubic per direction fits the twin's loop down to the noise, so both laws give the same volts"
 
 
 def signs(trial: Trial, name: str) -> tuple[float, float]:
@@ -24,52 +28,56 @@ def largest(trial: Trial, name: str) -> float:
 
 
 def validation(study: Study) -> list[Verdict]:
-    trial, paper = study.validation, paper_values.VALIDATION_MAX_N
-    worst = {name: largest(trial, name) for name in trial.laws}
-    share = {name: signs(trial, name) for name in trial.laws}
-    mostly = {
-        name: f"{rise:.0%} of the rise negative, {fall:.0%} of the fall positive"
-        for name, (rise, fall) in share.items()
-    }
+    """How large the errors are, and on which side."""
+    return [*largest_errors(study.validation), *sides(study.validation)]
+
+
+def largest_errors(trial: Trial) -> list[Verdict]:
+    bsfm_n, psfm_n = largest(trial, "bsfm"), largest(trial, "psfm")
     pace = (
         f"the paper gives no pace; {lag_s():.3f} s of delay and lags cost {PACE_N_PER_S * lag_s():.2f} N at this one. "
         "The loop itself is the ladder's and adds little"
     )
-    cubic = "a cubic per direction fits the twin's loop down to the noise, so both laws give the same volts"
+    at_pace = f"{bsfm_n:.2f} N (order 2, at an assumed {PACE_N_PER_S:g} N/s)"
+    both_orders = f"{psfm_n:.2f} N (order 3), {largest(trial, 'psfm 2'):.2f} N (order 2)"
     return [
-        Verdict(
-            "Fig. 7(b)",
-            "Largest validation error of BSFM",
-            f"{paper['bsfm']:.2f} N",
-            f"{worst['bsfm']:.2f} N (order 2, at an assumed {PACE_N_PER_S:g} N/s)",
-            word(near(worst["bsfm"], paper["bsfm"], ERROR_TOLERANCE)),
-            pace,
-        ),
-        Verdict(
-            "Fig. 7(b)",
-            "Largest validation error of PSFM, twice BSFM's",
-            f"{paper['psfm']:.2f} N",
-            f"{worst['psfm']:.2f} N (order 3), {worst['psfm 2']:.2f} N (order 2)",
-            word(near(worst["psfm"], paper["psfm"], ERROR_TOLERANCE)),
-            cubic,
-        ),
+        largest_error("Largest validation error of BSFM", "bsfm", bsfm_n, at_pace, pace),
+        largest_error("Largest validation error of PSFM, twice BSFM's", "psfm", psfm_n, both_orders, CUBIC),
+    ]
+
+
+def largest_error(statement: str, law: str, ours_n: float, ours: str, why: str) -> Verdict:
+    paper_n = paper_values.VALIDATION_MAX_N[law]
+    holds = word(near(ours_n, paper_n, ERROR_TOLERANCE))
+    return Verdict("Fig. 7(b)", statement, f"{paper_n:.2f} N", ours, holds, why)
+
+
+def sides(trial: Trial) -> list[Verdict]:
+    """Which sign the error has in each direction."""
+    bsfm, psfm = signs(trial, "bsfm"), signs(trial, "psfm")
+    return [
         Verdict(
             "Fig. 7(b)",
             "BSFM: error mostly negative rising, positive falling",
             "shown",
-            mostly["bsfm"],
-            word(min(share["bsfm"]) > 0.5),
+            mostly(bsfm),
+            word(min(bsfm) > 0.5),
             "the force comes late: too low on the way up, too high on the way down",
         ),
         Verdict(
             "Fig. 7(b)",
             "PSFM: error mostly negative in both directions",
             "shown",
-            mostly["psfm"],
-            word(share["psfm"][0] > 0.5 and share["psfm"][1] < 0.5),
-            f"{cubic}, and the same signs",
+            mostly(psfm),
+            word(psfm[0] > 0.5 and psfm[1] < 0.5),
+            f"{CUBIC}, and the same signs",
         ),
     ]
+
+
+def mostly(share: tuple[float, float]) -> str:
+    rise, fall = share
+    return f"{rise:.0%} of the rise negative, {fall:.0%} of the fall positive"
 
 
 def lag_s() -> float:
