@@ -10,16 +10,15 @@ cleared, so that the registers do not show an enable that is not there.
 from math import inf
 
 from gateway.bsfm import Bsfm
-from gateway.control.calibrating import RAMPING_DOWN, AnyPlan, Calibrating
+from gateway.control.calibrating import AnyPlan, Calibrating
 from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.contact import ContactSense
 from gateway.control.decision import Outcome, Standing, output_of, safe_output, warning_bits
 from gateway.control.demand import Demand, ramped_down
 from gateway.control.follower import CommandFollower
-from gateway.control.force_law import ModelError
 from gateway.control.inputs import Line, Output
 from gateway.control.ladder_stairs import RunPlan
-from gateway.control.limits import NotFiniteError
+from gateway.control.motion import Motion, Moved
 from gateway.control.pursuit import Moment, Pursuit
 from gateway.control.reading import NO_READING, Reader
 from gateway.control.reasons import enable_refused, fault_sentence
@@ -56,12 +55,13 @@ class Controller:
         self._settings = settings
         self._follower = CommandFollower(settings)
         self._follower.use(model)
+        self.calibrating = Calibrating(settings, model)
         self._pursuit = Pursuit(settings, model, compensation.timing)
+        response = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
+        self._motion = Motion(self._pursuit, response, self.calibrating)
         self._supervisor = Supervisor(settings)
         self._reader = Reader(settings.supervision, compensation.cell)
         self._contact = ContactSense(settings.defaults.contact_threshold_n)
-        self._response = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
-        self.calibrating = Calibrating(settings, model)
         self._reading = NO_READING
         self._last_s: float | None = None
         self._fault, self._faulted_s = FaultCode.NONE, -inf
@@ -84,10 +84,8 @@ class Controller:
     def use(self, model: Bsfm, calibration_id: int) -> None:
         """Swap the calibration; while enabled the voltage difference fades instead of jumping, and a force above the new
         set's limits is left by the ramp."""
-        self._pursuit.law.use(model, self._given_n)
+        self._motion.use(model, self._given_n)
         self._follower.use(model)
-        self._response.use(model)
-        self.calibrating.use(model)
         self.calibration_id = calibration_id
 
     def safe_output(self, fault: FaultCode) -> Output:
@@ -100,8 +98,7 @@ class Controller:
         try:
             return self._step(now_s, command, sample, line)
         except Exception:
-            self._pursuit.rest()
-            self.calibrating.end()
+            self._motion.rest()
             if self.state is not State.FAULT:
                 self.state, self._fault, self._faulted_s = State.FAULT, FaultCode.INTERNAL, now_s
             raise
@@ -112,8 +109,7 @@ class Controller:
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
         self._last_s = now_s
         self._outcome = Outcome()
-        self._pursuit.elapse(dt_s)
-        self._response.advance(self._pursuit.stage.voltage_v, dt_s)
+        self._motion.elapse(dt_s)
         rises, falls = self._follower.take(now_s, command)
         self._outside_n = self._compensation.outside_n(command.tilt_angle_rad, line.feed_mm_s)
         self._sense(now_s, sample, line)
@@ -121,7 +117,7 @@ class Controller:
         if self.state in ENABLED_STATES:
             self._supervise(now_s, line)
         if self.state in ENABLED_STATES:
-            self._pursue(now_s, dt_s)
+            self._move(now_s, dt_s)
         return output_of(command, self._standing(now_s, line), self._pursuit, self._reading, self._outcome)
 
     @property
@@ -135,7 +131,7 @@ class Controller:
         if not reading.is_new:
             return
         touching = self._contact.update(reading)
-        self._supervisor.observe(reading, self._response, self._pursuit.law.blend, touching)
+        self._supervisor.observe(reading, self._motion.response, self._pursuit.law.blend, touching)
         if self.state not in ENABLED_STATES:
             self._supervisor.observe_rest(reading)
             self._telling.stuck(self._supervisor.is_stuck, reading, self._outcome.events)
@@ -163,8 +159,7 @@ class Controller:
 
     def _let_go(self, sentence: str) -> None:
         """The output goes to the safe voltage, the command and its owner with it."""
-        self._pursuit.rest()
-        self.calibrating.end()
+        self._motion.rest()
         self._ramping_down = self._master_lost = self._telling.said_unreachable = False
         self._outcome.release_owner = True
         self._refuse(sentence)
@@ -175,29 +170,22 @@ class Controller:
         self._follower.expect_clearing()
 
     def _reset(self, now_s: float) -> None:
-        command = self._follower.command
-        if command.control_word & ControlBit.ENABLE or command.force_setpoint_n != 0.0:
-            self._refuse("W302 reset refused: write setpoint 0 and enable 0 with the reset bit")
-        elif not self._follower.lease.is_fresh_since(self._faulted_s, now_s):
-            self._refuse("W302 reset refused: the heartbeat has not changed since the fault")
-        else:
-            self._outcome.events.append(f"info fault {self._fault.name} reset by {self._follower.who}")
-            self.state, self._fault = next_state(self.state, Event.RESET), FaultCode.NONE
-            self._restarted = False
+        refused = self._follower.reset_refused(now_s, self._faulted_s)
+        if refused:
+            self._refuse(refused)
+            return
+        self._outcome.events.append(f"info fault {self._fault.name} reset by {self._follower.who}")
+        self.state, self._fault = next_state(self.state, Event.RESET), FaultCode.NONE
+        self._restarted = False
 
     def _tare(self) -> None:
-        gravity_n = self._follower.demand.gravity_n
-        before_n = self._reader.zero.zero_n
         pressing = self.state in ENABLED_STATES and self._pursuit.stage.voltage_v > 0.0
+        refused = "" if self._reading.is_fresh else "no fresh load-cell sample"
         if self.state is State.FAULT or pressing:
-            reason = "disable the output or set the force to 0 first"
-        elif not self._reading.is_fresh:
-            reason = "no fresh load-cell sample"
-        else:
-            reason = self._reader.zero.tare(gravity_n)
-        zero_n = self._reader.zero.zero_n
-        self._supervisor.rise.shift(zero_n - before_n)
-        self._outcome.events.append(f"W303 tare refused: {reason}" if reason else f"info tare: zero at {zero_n:.2f} N")
+            refused = "disable the output or set the force to 0 first"
+        moved_n, sentence = self._reader.zero.tare(self._follower.demand.gravity_n, refused)
+        self._supervisor.rise.shift(moved_n)
+        self._outcome.events.append(sentence)
 
     def _enable(self, now_s: float, line: Line) -> None:
         block = self._block(now_s, line)
@@ -237,8 +225,7 @@ class Controller:
     def _supervise(self, now_s: float, line: Line) -> None:
         name = self._follower.not_finite
         found = finding(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
-        expected_n = self._response.rise_n(self._pursuit.law.blend)
-        found = found or self._supervisor.first_cause(now_s, self._reading, line, expected_n)
+        found = found or self._supervisor.first_cause(now_s, self._reading, line, self._motion.expected_rise_n)
         if found:
             self._fail(now_s, found)
         elif self.calibrating.is_local or not self._follower.lease.is_lost(now_s, line.owner_connected):
@@ -263,54 +250,38 @@ class Controller:
         words = "ramping to 0 N" if self._ramping_down else "holding the last setpoint"
         self._outcome.events.append(fault_sentence(FaultCode.MASTER_LOST, f"{seen}, {words}"))
 
-    # -- pursuit
+    # -- motion
 
     def _target(self) -> Demand:
         """What to pursue now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
         demand = self._follower.demand
-        if not self._ramping_down:
-            return demand
-        return ramped_down(demand, self._settings)
+        return ramped_down(demand, self._settings) if self._ramping_down else demand
 
-    def _climb(self, now_s: float) -> None:
-        """One step of the calibration run, in place of the force law."""
-        if self._ramping_down or self._master_lost:
-            ended: Finding | None = RAMPING_DOWN
-        else:
-            ended = self.calibrating.climb(now_s, self._reading, self._pursuit, self._response)
-        if ended is None:
-            self.state = next_state(self.state, Event.MOVE)
-        elif ended.fault:
-            self._fail(now_s, ended)
-        else:
-            self._disable(ended.sentence)
-
-    def _pursue(self, now_s: float, dt_s: float) -> None:
+    def _move(self, now_s: float, dt_s: float) -> None:
         if self.calibrating.running:
-            self._climb(now_s)
+            must_end = self._ramping_down or self._master_lost
+            self._follow(now_s, self._motion.climb(now_s, self._reading, must_end=must_end))
             return
-        expected_n = self._response.force_n(self._pursuit.law.blend) + self._given_n
-        held_back = self._supervisor.rise.is_too_high
-        moment = Moment(
-            now_s, dt_s, self._reading, self._contact.touching, expected_n, held_back, outside_n=self._outside_n
-        )
-        try:
-            event = self._pursuit.step(self._target(), moment)
-        except ModelError as error:
-            self._fail(now_s, finding(FaultCode.MODEL_INVALID, str(error)))
-            return
-        except NotFiniteError as error:
-            self._fail(now_s, finding(FaultCode.NOT_FINITE, str(error)))
-            return
-        self.state = next_state(self.state, event)
-        if self._ramping_down and self._pursuit.law.applied_n <= 0.0:
-            self._disable("info force ramped to 0, output disabled")
-        self._telling.unreachable(self._pursuit, self._measured_n(), expected_n, self._outcome.events)
+        moment = self._moment(now_s, dt_s)
+        self._follow(now_s, self._motion.pursue(self._target(), moment, ramps_down=self._ramping_down))
+        measured_n = self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
+        self._telling.unreachable(self._pursuit, measured_n, moment.expected_n, self._outcome.events)
+
+    def _moment(self, now_s: float, dt_s: float) -> Moment:
+        expected_n = self._motion.expected_n + self._given_n
+        held_back, touching = self._supervisor.rise.is_too_high, self._contact.touching
+        return Moment(now_s, dt_s, self._reading, touching, expected_n, held_back, self._outside_n)
+
+    def _follow(self, now_s: float, moved: Moved) -> None:
+        """The state goes along with what has moved, or could not."""
+        if isinstance(moved, Event):
+            self.state = next_state(self.state, moved)
+        elif moved.fault:
+            self._fail(now_s, moved)
+        else:
+            self._disable(moved.sentence)
 
     # -- what people see
-
-    def _measured_n(self) -> float:
-        return self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
 
     def _standing(self, now_s: float, line: Line) -> Standing:
         enabled = self.state in ENABLED_STATES
@@ -321,7 +292,7 @@ class Controller:
             warnings=warning_bits(int(line.warnings), self._pursuit, self._restarted, self._master_lost),
             touching=self._contact.touching,
             accepted_n=self._target().force_n if enabled else 0.0,
-            expected_cell_n=self._response.force_n(self._pursuit.law.blend) + self._outside_n,
+            expected_cell_n=self._motion.expected_n + self._outside_n,
             calibration_phase=self.calibrating.phase,
             calibration_progress=self.calibrating.progress,
         )

@@ -8,6 +8,7 @@ from gateway.control.lease import Lease
 from gateway.control.limits import NotFiniteError, narrowed
 from gateway.control.settings import ControlSettings
 from gateway.registers.command import Command
+from gateway.registers.words import ControlBit
 
 
 class CommandFollower:
@@ -43,6 +44,14 @@ class CommandFollower:
         self.lease.observe(now_s, command.heartbeat)
         self._demand()
         return after & ~before, before & ~after
+
+    def reset_refused(self, now_s: float, faulted_s: float) -> str:
+        """Why a reset of a fault of faulted_s is refused now; empty where it is not."""
+        if self.command.control_word & ControlBit.ENABLE or self.command.force_setpoint_n != 0.0:
+            return "W302 reset refused: write setpoint 0 and enable 0 with the reset bit"
+        if not self.lease.is_fresh_since(faulted_s, now_s):
+            return "W302 reset refused: the heartbeat has not changed since the fault"
+        return ""
 
     def _demand(self) -> None:
         try:

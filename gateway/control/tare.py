@@ -33,15 +33,26 @@ class Zero:
         """The stream was interrupted: what came before does not describe now."""
         self._recent_n.clear()
 
-    def tare(self, gravity_n: float) -> str:
-        """Take the zero. Returns "" or the reason of the refusal, in numbers; gravity_n as in `demand`."""
+    def tare(self, gravity_n: float, refused: str = "") -> tuple[float, str]:
+        """Take the zero, unless refused: by how much it moved, N, and the sentence for the log; gravity_n as in `demand`."""
+        before_n = self.zero_n
+        reason = refused or self._unsteady(gravity_n)
+        if reason:
+            return 0.0, f"W303 tare refused: {reason}"
+        self.zero_n = self._mean_n() + gravity_n
+        return self.zero_n - before_n, f"info tare: zero at {self.zero_n:.2f} N"
+
+    def _unsteady(self, gravity_n: float) -> str:
+        """Why the recent samples are no zero, in numbers; empty where they are one."""
         recent = self._recent_n
         if len(recent) < _FEWEST:
             return f"{len(recent)} usable samples, at least {_FEWEST} are needed"
-        spread_n, mean_n = max(recent) - min(recent), sum(recent) / len(recent)
+        spread_n, mean_n = max(recent) - min(recent), self._mean_n()
         if spread_n > self._largest_spread_n:
             return f"force not steady: {spread_n:.2f} N between samples, allowed {self._largest_spread_n:.2f} N"
         if abs(mean_n + gravity_n) > self._largest_n:
             return f"{mean_n:.1f} N at rest, allowed {self._largest_n:.0f} N: stuck in contact or wrong cell"
-        self.zero_n = mean_n + gravity_n
         return ""
+
+    def _mean_n(self) -> float:
+        return sum(self._recent_n) / len(self._recent_n)

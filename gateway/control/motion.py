@@ -1,0 +1,74 @@
+"""What moves the output while it is enabled: force law or direct voltage, or a calibration run in their place.
+
+One step answers with an event of the state table, or with a Finding: of a fault, or with FaultCode.NONE of an end that
+disables the output with a sentence. What the model expects is kept beside it, as both and the supervision compare with it.
+"""
+
+from typing import Final, TypeAlias
+
+from gateway.bsfm import Bsfm
+from gateway.control.calibrating import RAMPING_DOWN, Calibrating
+from gateway.control.demand import Demand
+from gateway.control.force_law import ModelError
+from gateway.control.limits import NotFiniteError
+from gateway.control.pursuit import Moment, Pursuit
+from gateway.control.reading import Reading
+from gateway.control.response import ModelResponse
+from gateway.control.state_table import Event
+from gateway.control.supervision import Finding, finding
+from gateway.registers.words import FaultCode
+
+Moved: TypeAlias = Event | Finding
+
+_RAMPED_DOWN: Final = Finding(FaultCode.NONE, "info force ramped to 0, output disabled")
+
+
+class Motion:
+    """Pursuit, run and response of one rig, with one calibration for all of them."""
+
+    def __init__(self, pursuit: Pursuit, response: ModelResponse, calibrating: Calibrating) -> None:
+        self.pursuit = pursuit
+        self.response = response
+        self._calibrating = calibrating
+
+    def use(self, model: Bsfm, given_n: float) -> None:
+        """Swap the calibration. given_n: contact force that the slide need not give."""
+        self.pursuit.law.use(model, given_n)
+        self.response.use(model)
+        self._calibrating.use(model)
+
+    def elapse(self, dt_s: float) -> None:
+        """dt_s has passed with the present voltage on the output, whoever drives it."""
+        self.pursuit.elapse(dt_s)
+        self.response.advance(self.pursuit.stage.voltage_v, dt_s)
+
+    def rest(self) -> None:
+        """The safe voltage at once; a run ends with it."""
+        self.pursuit.rest()
+        self._calibrating.end()
+
+    @property
+    def expected_n(self) -> float:
+        """Cell force that the model expects now."""
+        return self.response.force_n(self.pursuit.law.blend)
+
+    @property
+    def expected_rise_n(self) -> float:
+        """The same above the force at rest."""
+        return self.response.rise_n(self.pursuit.law.blend)
+
+    def climb(self, now_s: float, reading: Reading, *, must_end: bool) -> Moved:
+        """One step of the run. must_end: the output ramps down, or the master is lost."""
+        if must_end:
+            return RAMPING_DOWN
+        return self._calibrating.climb(now_s, reading, self.pursuit, self.response) or Event.MOVE
+
+    def pursue(self, demand: Demand, moment: Moment, *, ramps_down: bool) -> Moved:
+        """One step towards the demand. ramps_down: there is nothing left to do once the force is 0."""
+        try:
+            event = self.pursuit.step(demand, moment)
+        except ModelError as error:
+            return finding(FaultCode.MODEL_INVALID, str(error))
+        except NotFiniteError as error:
+            return finding(FaultCode.NOT_FINITE, str(error))
+        return _RAMPED_DOWN if ramps_down and self.pursuit.law.applied_n <= 0.0 else event
