@@ -18,7 +18,7 @@ from gateway.registers import RegisterBank
 from gateway.registers.words import FaultCode, WarningBit
 from gateway.service import banner
 from gateway.service.activation import InUse
-from gateway.service.control_socket import ControlSocket
+from gateway.service.control_socket import Asked, ControlSocket
 from gateway.service.event_log import EventLog
 from gateway.service.gateway import Gateway
 from gateway.service.guardian_line import GuardianLine
@@ -122,7 +122,15 @@ class Cell:
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
         self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log)
         self._control_socket = ControlSocket(
-            self._state, self.bank, self._recordings, self.gateway.health, self._upload, self._ladder, self.watch_desk
+            self._state,
+            Asked(
+                bank=self.bank,
+                recordings=self._recordings,
+                health=self.gateway.health,
+                upload=self._upload,
+                ladder=self._ladder,
+                watch=self.watch_desk,
+            ),
         )
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: str) -> banner.Ready:

@@ -6,6 +6,7 @@ of a simulated rig (passed on to the rig's own socket by the tools themselves). 
 directory may ask.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,63 +19,60 @@ from gateway.service.upload import Upload
 from gateway.service.watch_desk import WatchDesk
 
 
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Who answers: the parts of a running gateway that its tools may ask."""
+
+    bank: RegisterBank
+    recordings: Recordings
+    health: LoopHealth
+    upload: Upload
+    ladder: LadderKeeper
+    watch: WatchDesk
+
+
 class ControlSocket(JsonLineServer):
-    def __init__(
-        self,
-        state: Path,
-        bank: RegisterBank,
-        recordings: Recordings,
-        health: LoopHealth,
-        upload: Upload,
-        ladder: LadderKeeper,
-        watch: WatchDesk,
-    ) -> None:
+    def __init__(self, state: Path, asked: Asked) -> None:
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,
-            "calibrate": ladder.answer,
+            "calibrate": asked.ladder.answer,
             "last-writer": self._last_writer,
             "health": self._health_figures,
-            "residual": watch.answer,
+            "residual": asked.watch.answer,
         }
         super().__init__(state / "control.sock", handlers)
-        self._bank = bank
-        self._recordings = recordings
-        self._health = health
-        self._upload = upload
-        self._watch = watch
+        self._asked = asked
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:
         is_on = request.get("on")
         if is_on is None:
-            return self._recordings.status()
-        return self._recordings.start() if is_on else self._recordings.stop()
+            return self._asked.recordings.status()
+        return self._asked.recordings.start() if is_on else self._asked.recordings.stop()
 
     def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
         """{"use": number} or {"rollback": true} begin a change; neither tells what is in use and how the last one went."""
         if request.get("rollback"):
-            return self._upload.rollback()
+            return self._asked.upload.rollback()
         number = request.get("use")
         if number is None:
-            return self._upload.status()
+            return self._asked.upload.status()
         if type(number) is not int:
             raise ValueError(f"use = {number}: the number of a calibration is expected")
-        return self._upload.use(number)
+        return self._asked.upload.use(number)
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
-        return {
-            "owner": self._bank.owner,
-            "writers": {
-                name: {"peer": str(peer), "time_s": at_s} for name, (peer, at_s) in self._bank.last_writer.items()
-            },
-        }
+        bank = self._asked.bank
+        writers = {name: {"peer": str(peer), "time_s": at_s} for name, (peer, at_s) in bank.last_writer.items()}
+        return {"owner": bank.owner, "writers": writers}
 
     def _health_figures(self, request: dict[str, Any]) -> dict[str, Any]:
+        health = self._asked.health
         return {
-            "ticks": self._health.ticks,
-            "missed_ticks": self._health.missed_ticks,
-            "loop_time_us": self._health.loop_time_s * 1e6,
-            "late_p50_us": self._health.lateness_us(0.5),
-            "late_p99_us": self._health.lateness_us(0.99),
-            "residual": self._watch.figures(),
+            "ticks": health.ticks,
+            "missed_ticks": health.missed_ticks,
+            "loop_time_us": health.loop_time_s * 1e6,
+            "late_p50_us": health.lateness_us(0.5),
+            "late_p99_us": health.lateness_us(0.99),
+            "residual": self._asked.watch.figures(),
         }
