@@ -1,5 +1,6 @@
 """The text of the generated C: what it needs, where it says it comes from, what it refuses, and its own self-test."""
 
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -50,6 +51,12 @@ def written(directory: Path, *calibrations: Calibration) -> list[str]:
             (directory / name).write_text(text, encoding="ascii")
         prefixes.append(name.removesuffix(".c"))
     return prefixes
+
+
+def code_only(directory: Path, prefix: str) -> str:
+    """What a compiler sees of both files: no comments, and the same names whatever the calibration is called."""
+    text = "".join((directory / f"{prefix}{end}").read_text(encoding="ascii") for end in (".h", ".c"))
+    return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).replace(prefix, "one").replace(prefix.upper(), "ONE")
 
 
 def compiled(directory: Path, compiler: str, *arguments: str) -> None:
@@ -145,7 +152,9 @@ HOSTILE = (
 def test_no_text_of_a_calibration_can_leave_its_comment(tmp_path, text):
     one = replace(CASES["demo"], name=text[:40], rig=text, source=text, date_utc=text, data_sha256=text)
     (prefix,) = written(tmp_path, one)
+    (harmless,) = written(tmp_path, CASES["demo"])
     compiled(tmp_path, "gcc", *STRICT, "-Wcomment", "-Wtrigraphs", "-c", f"{prefix}.c")
+    assert code_only(tmp_path, prefix) == code_only(tmp_path, harmless)
 
 
 def test_the_header_says_where_it_comes_from_and_what_it_is_not():

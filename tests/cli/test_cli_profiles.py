@@ -72,7 +72,9 @@ def test_a_rig_that_is_not_there_is_a_configuration_error(call) -> None:
 
 @pytest.mark.parametrize("kind", ["rig", "device", "plant", "calibration", "registers"])
 def test_schemas_are_schemas(kind: str, call) -> None:
-    jsonschema.Draft202012Validator.check_schema(json.loads(call("schema", kind).output))
+    schema = json.loads(call("schema", kind).output)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert not jsonschema.Draft202012Validator(schema).is_valid([]), "a schema that takes anything checks nothing"
 
 
 def test_the_register_table_has_three_forms(call, register_map: RegisterMap) -> None:

@@ -262,7 +262,7 @@ def test_a_quick_run_is_shorter_than_a_minute() -> None:
 
 def test_control_still_imports_no_numpy() -> None:
     code = "import sys, gateway.control; assert 'numpy' not in sys.modules"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_beyond_the_calibrations_own_range_the_force_is_expected_to_go_on_rising() -> None:

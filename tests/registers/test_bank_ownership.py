@@ -110,9 +110,11 @@ def test_the_lease_end_releases(bank, master, other):
     assert bank.owner == "10.0.0.2"
 
 
-def test_the_byte_order_proof_needs_no_ownership(master, other):
+def test_the_byte_order_proof_needs_no_ownership(bank, master, other):
     master.write(0, 1, 1200)
     other.write_float(416, 1234.5)
+    assert other.float(416) == 1234.5
+    assert bank.owner == "10.0.0.1"
 
 
 @pytest.mark.parametrize(

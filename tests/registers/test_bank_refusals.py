@@ -182,15 +182,20 @@ def test_the_rig_may_narrow_the_voltage_but_zero_stays(make_bank, master_of):
     assert master.refusal(master.write, 5, 499).reason is R.OUT_OF_RANGE
     master.write(5, 8000)
     master.write(5, 0)
+    assert bank.command.voltage_setpoint_v == 0.0
 
 
 def test_a_limit_that_float32_rounds_away_is_still_reached(make_bank, master_of):
     bank = make_bank(force_max_n=60.1)  # float32(60.1) is 60.0999985, float32(0.1) would be above
     master = master_of(bank, "10.0.0.1")
     master.write(1, 6010)
+    assert bank.command.force_setpoint_n == pytest.approx(60.1)
+    master.write(1, 0)
     master.write_float(202, 60.1)
-    high = master_of(make_bank(force_max_n=40.2), "10.0.0.1")  # float32(40.2) is above 40.2
-    high.write_float(202, 40.2)
+    assert bank.command.force_setpoint_n == pytest.approx(60.1)
+    narrow = make_bank(force_max_n=40.2)  # float32(40.2) is above 40.2
+    master_of(narrow, "10.0.0.1").write_float(202, 40.2)
+    assert narrow.command.force_setpoint_n == pytest.approx(40.2)
 
 
 def test_every_refusal_is_told_with_its_peer(bank, master):

@@ -102,9 +102,14 @@ def test_a_terminal_that_takes_nothing_holds_up_neither_the_caller_nor_the_end()
 
 @pytest.mark.parametrize("error", [BrokenPipeError(), ValueError("I/O operation on closed file")])
 def test_a_terminal_that_went_away_stops_nothing(error: Exception) -> None:
+    tried: list[str] = []
+
     def gone(line: str) -> None:
+        tried.append(line)
         raise error
 
     with EventLog(gone) as log:
         for index in range(3000):
             log(f"cause {index}", "sentence")
+    assert len(tried) > 1, "the writer ended with the first error"
+    assert not log._thread.is_alive()

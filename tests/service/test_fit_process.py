@@ -67,4 +67,4 @@ def test_a_recording_that_is_none_is_told_on_one_line(tmp_path: Path) -> None:
 
 def test_the_control_process_imports_no_scipy_with_all_of_this() -> None:
     code = "import sys, gateway.service.control_process as c; assert not {'scipy', 'rich', 'jinja2'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -135,11 +135,15 @@ def test_control_asks_for_the_simulated_ports_and_gets_them_or_the_reason(ends: 
 
 
 def test_a_guardian_that_does_not_read_does_not_stop_the_loop(ends: Pair) -> None:
-    async def scene() -> None:
+    async def scene() -> bool:
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1])
         for _ in range(10_000):
             guardian.heartbeat()
         guardian.close()
+        return guardian.is_gone
 
-    asyncio.run(scene())
+    assert not asyncio.run(scene()), "a full line is not the end of it"
+    received = list(iter(lambda: link.receive(ends[0]), None))
+    assert all(message == link.Message(link.HEARTBEAT) for message in received), "what arrives is whole"
+    assert 0 < len(received) < 10_000, "the line was never full: this test shows nothing"

@@ -1,6 +1,7 @@
 """The loop's clock tick: on the kernel's timer, counting what was missed, telling how late it comes."""
 
 import asyncio
+import os
 import time
 
 import pytest
@@ -64,15 +65,28 @@ def test_lateness_is_the_age_of_the_newest_expiration() -> None:
     assert 0.0 <= late_s <= PERIOD_S + 0.02
 
 
-def test_closing_twice_or_before_the_start_is_no_trouble() -> None:
-    async def scene() -> None:
-        tick = Tick(PERIOD_S, lambda expirations, late_s: None)
+@pytest.mark.parametrize("fallback", [False, True])
+def test_closing_twice_or_before_the_start_is_no_trouble(fallback: bool) -> None:
+    """The second close must not close what has the descriptor's number by then."""
+    seen: list[int] = []
+
+    async def scene() -> bytes:
+        tick = Tick(PERIOD_S, lambda expirations, late_s: seen.append(expirations))
+        tick.is_fallback = fallback
         tick.close()
         tick.start()
         tick.close()
+        reader, writer = os.pipe()
         tick.close()
+        await asyncio.sleep(3 * PERIOD_S)
+        os.write(writer, b"open")
+        heard = os.read(reader, 8)
+        os.close(reader)
+        os.close(writer)
+        return heard
 
-    asyncio.run(scene())
+    assert asyncio.run(scene()) == b"open"
+    assert seen == [], "closed is closed"
 
 
 def test_missed_ticks_and_lateness_are_counted() -> None:

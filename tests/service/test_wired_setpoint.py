@@ -59,6 +59,7 @@ def test_twelve_newton_within_a_second(seed: int) -> None:
     took_s = wired.until(lambda: abs(wired.force_n - 12.0) <= BAND_N, 1.0)
     print(f"seed {seed}: within 1 N of 12 N after {took_s:.3f} s of virtual time")
     wired.observer.check(wired.rig)
+    assert took_s <= 1.0
 
 
 def errors_n(wired: Wired, setpoints_n: tuple[float, ...]) -> list[float]:
