@@ -17,13 +17,14 @@ from gateway.diagnosis.point import Point
 from gateway.twin.plant import with_value
 from gateway.twin.replay import Drive, Replay
 from gateway.twin.replay_drive import Motion
-from gateway.twin.surroundings import Surroundings
+from gateway.twin.surroundings import COLUMNS, Surroundings
 
 MOTIONS: Final[tuple[Motion, ...]] = ("inferred", "measured", "measured-reversed")  # how the slide's may be known
 BLOCKS: Final = 20  # per recording, for held-out errors and resampling
 SETTLING_S: Final = 1.0  # of a recording's start are not judged, unless it begins at rest:
 REST_S: Final = 0.2  # command and force stand still for so long
 _SLACK: Final = 5.0e-3  # of the forces' range that a force at rest may wander
+SURROUNDINGS: Final = COLUMNS  # what a drive takes of a recording's covariates, and of its position
 NOMINAL_AREA_M2: Final = 1.0e-4  # turns a measured pressure into newtons
 
 
@@ -201,17 +202,6 @@ def drive_of(measurement: Measurement, motion: Motion) -> Drive:
         repeated=measurement.repeated,
         before_v=None,
     )
-
-
-SURROUNDINGS: Final = (
-    "temperature_c",
-    "supply_kpa",
-    "spindle_rpm",
-    "feed_mm_s",
-    "tilt_deg",
-    "position_mm",
-    "distance_m",
-)
 
 
 def _segments(measurements: Sequence[Measurement]) -> list[Segment]:

@@ -10,23 +10,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.recording.mapping import CONTRACT, listed
+from gateway.recording.columns import CONTRACT, DERIVED
+from gateway.recording.mapping import listed
 
 Floats = NDArray[np.float64]
 
 JUDGED: Final = ("time_s", "force_n", "command_v", "pressure_kpa", "position_mm", "quality")
 """Columns that a measurement has fields for."""
-DERIVED: Final = (
-    "setpoint_n",
-    "applied_n",
-    "feedforward_v",
-    "trim_v",
-    "state",
-    "fault_code",
-    "limited_by",
-    "model_residual_n",
-)
-"""What our recorder writes beside the contract. The trim and the residual hold the measured force."""
 MANY: Final = 200
 _TURNS_WHILE_CONSTANT: Final = "spindle_rpm"
 _COPY: Final = 1.0 - 5.0e-4

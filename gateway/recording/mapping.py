@@ -10,24 +10,9 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Final
 
+from gateway.recording.columns import CONTRACT
 from gateway.recording.errors import RecordingError
 from gateway.units import LINEAR, linear_conversion
-
-CONTRACT: Final = (
-    "time_s",
-    "force_n",
-    "command_v",
-    "pressure_kpa",
-    "temperature_c",
-    "supply_kpa",
-    "spindle_rpm",
-    "feed_mm_s",
-    "tilt_deg",
-    "position_mm",
-    "distance_m",
-    "quality",
-)
-"""Columns with a meaning of their own; a number that cannot be read there is a fault, not a missing value."""
 
 EXAMPLE: Final = "--columns time_s=1:ms,command_v=2:mv,force_n=3:n"
 

@@ -6,23 +6,10 @@
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import Recorder
+from gateway.recording.columns import DERIVED
 from gateway.units import kilopascal_from_pascal
 
-COLUMNS = (
-    "time_s",
-    "command_v",
-    "force_n",
-    "pressure_kpa",
-    "quality",
-    "setpoint_n",
-    "applied_n",
-    "feedforward_v",
-    "trim_v",
-    "state",
-    "fault_code",
-    "limited_by",
-    "model_residual_n",
-)
+COLUMNS = ("time_s", "command_v", "force_n", "pressure_kpa", "quality", *DERIVED)
 
 _QUALITY_NUMBER = {Quality.OK: 0.0, Quality.UNSTABLE: 1.0, Quality.OVERLOAD: 2.0}
 

@@ -5,8 +5,10 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import ColumnMapping, ColumnSource, RecordingError
+from gateway.recording.columns import CONTRACT, DERIVED
 from gateway.recording.mapping import picked, quantity_of
 from gateway.recording.mapping_file import column_mapping, read_mapping
+from gateway.twin.surroundings import COLUMNS
 from gateway.units import LINEAR, linear_conversion
 
 
@@ -126,3 +128,8 @@ def test_the_longest_ending_is_the_unit() -> None:
     assert quantity_of("time_s") == ("time", "s")
     assert quantity_of("oil_temperature_c") == ("temperature", "c")
     assert quantity_of("quality") is None
+
+
+def test_what_the_twin_knows_of_its_surroundings_stands_in_the_contract_under_the_same_names() -> None:
+    assert set(COLUMNS) <= set(CONTRACT)
+    assert not set(DERIVED) & set(CONTRACT)
