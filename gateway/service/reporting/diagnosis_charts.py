@@ -16,7 +16,7 @@ from gateway.service.reporting.diagnosis_series import FALLING, RISING, Left, Ro
 from gateway.service.reporting.diagnosis_svg import SeriesChart, limits
 from gateway.service.reporting.svg import Axis
 
-_WIDE, _WIDE_HIGH, _HIGH = 1140, 250, 300
+_WIDE, _NARROW, _WIDE_HIGH, _HIGH = 1140, 560, 250, 300
 _COLUMNS: Final = 260  # of a full-width picture: bands of 4 pixels
 _UNITS: Final = {
     "temperature_c": "temperature (°C)",
@@ -52,7 +52,12 @@ def axis_name(quantity: str) -> str:
     return _UNITS.get(quantity, quantity)
 
 
-def followed(trace: Trace, after: bool, window: tuple[float, float] | None = None) -> Drawing:
+def _width(wide: bool) -> int:
+    """Across both columns of the page, or one."""
+    return _WIDE if wide else _NARROW
+
+
+def followed(trace: Trace, after: bool, window: tuple[float, float] | None = None, *, wide: bool = True) -> Drawing:
     """Measured and simulated force over time; window: (start, end), s, of a closer look."""
     left = Left.of(trace)
     start, end = window or (float(left.time_s[0]), float(left.time_s[-1]))
@@ -63,10 +68,10 @@ def followed(trace: Trace, after: bool, window: tuple[float, float] | None = Non
         Axis(start, max(end, start + 1e-9), "time (s)"),
         Axis(*limits(measured_n, *both), "force (N)"),
         f"Measured and simulated force over time, {'after' if after else 'before'}",
-        width=_WIDE // 2 if window else _WIDE,
+        width=_WIDE if wide else _WIDE // 2,
         height=_WIDE_HIGH,
     )
-    columns = _COLUMNS // 2 if window else _COLUMNS
+    columns = _COLUMNS if wide else _COLUMNS // 2
     name = "after" if after else "before"
     chart.envelope(series.envelope(time_s, measured_n, columns), "measured", "measured")
     chart.envelope(series.envelope(time_s, both[int(after)], columns), name, f"simulated, {name}")
@@ -88,11 +93,11 @@ def residual_over_time(trace: Trace) -> Drawing:
     return _drawing(chart)
 
 
-def residual_against(rows: Rows, quantity: str) -> Drawing:
+def residual_against(rows: Rows, quantity: str, *, wide: bool = False) -> Drawing:
     """Clouds before and after, with the means over bins."""
     x = rows.quantities[quantity]
     held = np.isfinite(x)
-    chart = _residual_chart(x[held], rows, quantity)
+    chart = _residual_chart(x[held], rows, quantity, wide)
     for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
         chart.cloud(x[held], left_n[held], name)
     for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
@@ -103,11 +108,11 @@ def residual_against(rows: Rows, quantity: str) -> Drawing:
     return _drawing(chart)
 
 
-def residual_by_direction(rows: Rows, quantity: str, after: bool) -> Drawing:
+def residual_by_direction(rows: Rows, quantity: str, after: bool, *, wide: bool = False) -> Drawing:
     """Against the drive, rows of rising and of falling motion apart."""
     x, left_n = rows.quantities[quantity], rows.after_n if after else rows.before_n
     ways = ((RISING, "rising"), (FALLING, "falling"))
-    chart = _residual_chart(x, rows, quantity)
+    chart = _residual_chart(x, rows, quantity, wide)
     for way, name in ways:
         mask = rows.direction == way
         chart.cloud(x[mask], left_n[mask], name)
@@ -119,17 +124,18 @@ def residual_by_direction(rows: Rows, quantity: str, after: bool) -> Drawing:
     return _drawing(chart)
 
 
-def _residual_chart(x: Floats, rows: Rows, quantity: str) -> SeriesChart:
+def _residual_chart(x: Floats, rows: Rows, quantity: str, wide: bool) -> SeriesChart:
     """Before and after on one scale, so that they can be compared."""
     return SeriesChart(
         Axis(*limits(x, margin=0.02), axis_name(quantity)),
         Axis(*limits(rows.before_n, rows.after_n, around=0.0), "measured − simulated (N)"),
         f"Residual against {axis_name(quantity)}",
+        width=_width(wide),
         height=_HIGH,
     )
 
 
-def loop(traces: Sequence[Trace], after: bool) -> Drawing:
+def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing:
     """Force against the drive, measured and simulated."""
     label = series.drive(traces[0].measurement)[0]
     alike = [trace for trace in traces if series.drive(trace.measurement)[0] == label]
@@ -142,6 +148,7 @@ def loop(traces: Sequence[Trace], after: bool) -> Drawing:
         Axis(*limits(x, margin=0.02), label),
         Axis(*limits(measured_n, measured_n - left[0], measured_n - left[1]), "force (N)"),
         f"Force against {label}, {name}",
+        width=_width(wide),
         height=_HIGH,
         cell_px=2.0,
     )
@@ -150,7 +157,7 @@ def loop(traces: Sequence[Trace], after: bool) -> Drawing:
     return _drawing(chart)
 
 
-def spectra(trace: Trace) -> Drawing:
+def spectra(trace: Trace, *, wide: bool = False) -> Drawing:
     """Amplitude density of the residual, before and after; NOTHING for a recording that is too short."""
     left = Left.of(trace)
     both = [series.spectrum(left.time_s, left_n) for left_n in (left.before_n, left.after_n)]
@@ -164,6 +171,7 @@ def spectra(trace: Trace) -> Drawing:
         Axis(float(frequency_hz[0]), float(frequency_hz[-1]), "frequency (Hz)", logarithmic=True),
         Axis(max(float(densities.min()) / 1.5, top * 1e-5), top, "residual (N/√Hz)", logarithmic=True),
         "Spectrum of the residual, before and after",
+        width=_width(wide),
         height=_HIGH,
     )
     for (hertz, density), name in zip(both, ("before", "after"), strict=True):

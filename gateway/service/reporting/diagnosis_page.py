@@ -1,7 +1,8 @@
 """The report of a diagnosis: one HTML file, no scripts, nothing loaded; light and dark, and fit for paper."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from html import escape
 from typing import Final
 
@@ -11,6 +12,7 @@ from gateway.service.reporting import diagnosis_charts as charts
 from gateway.service.reporting import diagnosis_tables as tables
 from gateway.service.reporting import diagnosis_words as words
 from gateway.service.reporting.diagnosis_charts import Drawing
+from gateway.service.reporting.diagnosis_grid import Panel, figure, grid
 from gateway.service.reporting.diagnosis_series import (
     Left,
     Rows,
@@ -118,17 +120,6 @@ def _section(title: str, content: str) -> str:
     return f"<h2>{title}</h2>{content}" if content else ""
 
 
-def _figure(title: str, drawing: Drawing, caption: str = "", style: str = "") -> str:
-    if not drawing:
-        return ""
-    told = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
-    return f"<figure class='{style}'><h3>{escape(title)}</h3>{drawing.key}{drawing.svg}{told}</figure>"
-
-
-def _pair(*blocks: str) -> str:
-    return f"<div class='pair'>{''.join(blocks)}</div>" if any(blocks) else ""
-
-
 def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
     traces = [trace for trace in diagnosis.traces if trace.measurement.usable.any()]
     if not traces:
@@ -145,37 +136,36 @@ def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
     yield "<h2>Spectrum and loop</h2>"
     longest = max(traces, key=lambda trace: trace.measurement.rows)
     caption = "Greatest density in each band; a flat line is white noise, a peak is an oscillation."
-    yield _pair(
-        _figure("Loop, before", charts.loop(traces, after=False), "Base model, refitted."),
-        _figure("Loop, after", charts.loop(traces, after=True), "Extended model.") if changed else "",
-        _figure("Spectrum of the residual", charts.spectra(longest), caption),
-    )
+    loops = [Panel("Loop, before", partial(charts.loop, traces, after=False), "Base model, refitted.")]
+    if changed:
+        loops.append(Panel("Loop, after", partial(charts.loop, traces, after=True), "Extended model."))
+    yield grid(*loops, Panel("Spectrum of the residual", partial(charts.spectra, longest), caption))
 
 
 def _over_time(trace: Trace, suffix: str, changed: bool) -> Iterator[str]:
     window = most_telling_window(Left.of(trace))
     yield f"<h2>Measured and simulated{escape(suffix)}</h2>"
-    yield _figure("Before: the base model, refitted", charts.followed(trace, after=False), style="full")
+    yield figure("Before: the base model, refitted", charts.followed(trace, after=False), style="full")
     if changed:
-        yield _figure("After: with the causes", charts.followed(trace, after=True), style="full")
+        yield figure("After: with the causes", charts.followed(trace, after=True), style="full")
     close = f"Closer, {words.number(window[0])} to {words.number(window[1])} s"
-    yield _pair(
-        _figure(f"{close}, before", charts.followed(trace, after=False, window=window)),
-        _figure(f"{close}, after", charts.followed(trace, after=True, window=window)) if changed else "",
-    )
+    yield grid(*_before_and_after(close, partial(charts.followed, trace, window=window), changed))
     caption = "Bands reach from the least to the greatest reading of each column of pixels."
-    yield _figure("What is left over time", charts.residual_over_time(trace), caption, "full")
+    yield figure("What is left over time", charts.residual_over_time(trace), caption, "full")
+
+
+def _before_and_after(title: str, draw: Callable[..., Drawing], changed: bool) -> list[Panel]:
+    """The same of both models; of the base model alone where nothing was added to it."""
+    panels = [Panel(f"{title}, before", partial(draw, after=False))]
+    return [*panels, Panel(f"{title}, after", partial(draw, after=True))] if changed else panels
 
 
 def _dependences(rows: Rows, axis: str, diagnosis: Diagnosis) -> Iterator[str]:
     yield "<h2>What the residual depends on</h2>"
     if not is_constant(rows.quantities[axis]):
-        yield _pair(
-            _figure("By direction, before", charts.residual_by_direction(rows, axis, after=False)),
-            _figure("By direction, after", charts.residual_by_direction(rows, axis, after=True))
-            if diagnosis.causes
-            else "",
-        )
+        draw = partial(charts.residual_by_direction, rows, axis)
+        yield grid(*_before_and_after("By direction", draw, bool(diagnosis.causes)))
+    yield f"<h3>By direction, in figures</h3>{tables.directions(rows)}"
     moving = [name for name, values in rows.quantities.items() if not is_constant(values)]
     named = {rest.depends_on for rest in diagnosis.leftover}
     strength = {
@@ -186,12 +176,15 @@ def _dependences(rows: Rows, axis: str, diagnosis: Diagnosis) -> Iterator[str]:
         (name for name in moving if name != axis), key=lambda name: (name not in named, -max(strength[name]))
     )
     shown = ([axis] if axis in moving else []) + covariates[:_MOST_COVARIATES]
-    yield _pair(
-        f"<div><h3>By direction, in figures</h3>{tables.directions(rows)}</div>",
+    yield grid(
         *(
-            _figure(f"Against {charts.axis_name(name)}", charts.residual_against(rows, name), _carries(*strength[name]))
+            Panel(
+                f"Against {charts.axis_name(name)}",
+                partial(charts.residual_against, rows, name),
+                _carries(*strength[name]),
+            )
             for name in shown
-        ),
+        )
     )
     yield _left_out(rows, covariates)
 

@@ -24,18 +24,19 @@ DIAGNOSIS_STYLE: Final = (
 .key i[class*=measured]{background:var(--measured)}
 .key i[class*=rising]{background:var(--rising)}.key i[class*=falling]{background:var(--falling)}
 .verdict{font-size:1.05rem;color:var(--ink)}
-figure.full{margin:1rem 0;overflow-x:auto}figure.full svg{min-width:720px}
+figure.full{margin:1rem 0}figure.across{grid-column:1/-1;min-width:0}
+figure.full,figure.across{overflow-x:auto}figure.full svg,figure.across svg{min-width:720px}
 .causes{width:100%}.causes td{white-space:nowrap}.causes tbody th{color:var(--ink);max-width:26rem;font-weight:400}
 small{color:var(--dim);font-size:.82rem}
 small.alike{color:var(--ink)}
 .unseen tbody th{white-space:nowrap}
-.numbers td,.numbers th+th{text-align:right}
+.numbers{width:100%}.numbers td,.numbers th+th{text-align:right}
 .meter{display:inline-block;width:5rem;height:.6rem;border-radius:3px;background:var(--grid);vertical-align:baseline}
 .meter i{display:block;height:100%;border-radius:3px;background:var(--after)}
 ol.next{padding-left:1.3rem}ol.next li{margin:.3rem 0}
 details summary{cursor:pointer;color:var(--dim)}
 @media print{details::details-content{content-visibility:visible;block-size:auto}
-figure.full{overflow:visible}figure.full svg{min-width:0}h2{break-after:avoid}
+figure.full,figure.across{overflow:visible}figure.full svg,figure.across svg{min-width:0}h2{break-after:avoid}
 .meter,.meter i,.band,.key i{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 """
 )

@@ -70,6 +70,21 @@ def test_it_shows_all_that_the_contract_asks_for() -> None:
         assert text in html
 
 
+@pytest.mark.parametrize("changed", [True, False])
+@pytest.mark.parametrize("columns", range(4))
+def test_no_place_of_a_grid_is_empty(columns: int, changed: bool) -> None:
+    """Two figures to a row; where one is left it reaches across, as wide as it is drawn."""
+    one = trace(rows=3000, **{f"column_{k}": np.linspace(0.0, 1.0, 3000) ** (k + 2) for k in range(columns)})
+    html = page(diagnosis(traces=(one,), **({} if changed else {"causes": ()})))
+    grids = re.findall(r"<div class='pair'>(.*?)</div>", html, re.DOTALL)
+    assert len(grids) == 4
+    for grid in grids:
+        styles = re.findall(r"<figure class='(.*?)'>", grid)
+        assert styles == [""] * (len(styles) // 2 * 2) + ["across"] * (len(styles) % 2)
+        widths = re.findall(r'viewBox="0 0 (\d+) ', grid)
+        assert [int(width) > 1000 for width in widths] == [style == "across" for style in styles]
+
+
 def test_a_group_is_named_as_a_group() -> None:
     html = page(diagnosis(causes=(FRICTION, WARMTH)))
     assert "or warm-up, or linear-drift: not told apart here" in html
