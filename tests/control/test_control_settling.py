@@ -219,7 +219,7 @@ def test_a_calibration_is_swapped_without_a_bump():
     bench = enabled()
     bench.force(20.0)
     bench.run(1.0)
-    before_v = bench.last.voltage_v
+    before_v, fed_v = bench.last.voltage_v, bench.last.feedforward_v
     bench.controller.use(bsfm(scale=1.1), 2)
     assert bench.step().voltage_v == pytest.approx(before_v, abs=0.02)
     first = len(bench.history)
@@ -227,6 +227,21 @@ def test_a_calibration_is_swapped_without_a_bump():
     forces = [record.force_n for record in bench.history[first:]]
     assert max(abs(force_n - 20.0) for force_n in forces) < 1.5
     assert bench.controller.calibration_id == 2
+    less_v = bsfm().voltage_v(20.0, 1.0)[0] - bsfm(scale=1.1).voltage_v(20.0, 1.0)[0]
+    assert fed_v - bench.last.feedforward_v == pytest.approx(less_v, abs=0.05), "the new set is what feeds forward"
+
+
+def test_the_residual_is_that_of_the_set_in_use():
+    """Also where nothing moves any more: the model's expectation changes with the set and not with the next voltage."""
+    bench = enabled()
+    bench.voltage(3.0)
+    bench.run(2.0)
+    before_n = bench.last.model_residual_n
+    bench.controller.use(bsfm(scale=1.2), 2)
+    after_n = bench.step().model_residual_n
+    changed_n = bsfm().force_n(3.0, 1.0) - bsfm(scale=1.2).force_n(3.0, 1.0)
+    assert after_n - before_n == pytest.approx(changed_n, abs=0.3)
+    assert bench.controller.calibrating.model == bsfm(scale=1.2), "the check of the next ladder compares with this one"
 
 
 def test_a_set_with_a_lower_force_limit_is_swapped_in_by_the_ramp_and_out_again():

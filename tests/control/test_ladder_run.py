@@ -201,6 +201,16 @@ def test_a_stop_of_the_service_ends_it() -> None:
     assert bench.last.voltage_v == 0.0
 
 
+@pytest.mark.parametrize("tare", [True, False])
+def test_a_tare_is_taken_before_the_ladder_where_it_is_asked_for(tare: bool) -> None:
+    bench = Bench(seed=3)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.7)
+    begun(bench, replace(SHORT, tare=tare))
+    assert (bench.last.calibration_phase, bench.last.voltage_v) == (CalibrationPhase.ZERO, 0.0)
+    assert bench.controller.calibrating.cell_n == pytest.approx(0.0 if tare else 1.7, abs=0.2)
+    assert any(event.startswith("info tare") for event in bench.events) == tare
+
+
 def test_an_asked_stop_keeps_what_was_learned_and_says_so() -> None:
     bench = begun(Bench(seed=17))
     bench.run(3.0)
