@@ -83,7 +83,7 @@ CYLINDER: Final = (
         forms=(
             Form(
                 parameters=(LOAD,),
-                probes=fixed((0.02,)),
+                probes=fixed((0.003,), (0.02,)),
             ),
         ),
     ),
@@ -96,7 +96,7 @@ CYLINDER: Final = (
         experiment="reversals of 0.1 and 1 V around three levels",
         forms=(
             Form(parameters=(ASYMMETRY,), probes=fixed((0.2,)), proportional=True),
-            Form(parameters=(DRAG_ASYMMETRY,), probes=fixed((200.0,), (-200.0,))),
+            Form(parameters=(DRAG_ASYMMETRY,), probes=fixed((40.0,), (-40.0,), (300.0,), (-300.0,))),
         ),
         group=("coulomb-friction", "viscous-friction"),
         rarity=10.0,
@@ -120,10 +120,10 @@ SIDE_LOAD: Final = Effect(
     excitation="reversals of the force at different feed, tilt or position, with that column recorded",
     experiment="reversals of 1 V at rest and at two feeds, with feed_mm_s recorded",
     forms=(
-        Form(parameters=(SIDE_FEED,), probes=fixed((0.02,)), needs=("feed_mm_s",)),
-        Form(parameters=(SIDE_GRIP,), probes=fixed((0.02,)), needs=("feed_mm_s",)),
-        Form(parameters=(SIDE_TILT,), probes=fixed((0.3,)), needs=("tilt_deg",)),
-        Form(parameters=(SIDE_POSITION,), probes=fixed((0.02,)), needs=("position_mm",)),
+        Form(parameters=(SIDE_FEED,), probes=fixed((0.003,), (0.02,)), needs=("feed_mm_s",)),
+        Form(parameters=(SIDE_GRIP,), probes=fixed((0.003,), (0.02,)), needs=("feed_mm_s",)),
+        Form(parameters=(SIDE_TILT,), probes=fixed((0.05,), (0.4,)), needs=("tilt_deg",)),
+        Form(parameters=(SIDE_POSITION,), probes=fixed((0.002,), (0.02,)), needs=("position_mm",)),
     ),
     group=("load-dependent-friction",),
 )

@@ -98,7 +98,7 @@ REGULATOR: Final = (
         signature="a loop of constant width between command and pressure",
         excitation=_SLOW_STEPS,
         experiment="a staircase up and down with the pressure recorded: the loop stands between command and pressure",
-        forms=(Form(parameters=(HYSTERESIS,), probes=fixed((3.0e3,), (1.0e4,), (3.0e4,))),),
+        forms=(Form(parameters=(HYSTERESIS,), probes=fixed((600.0,), (3.0e3,), (1.0e4,), (3.0e4,))),),
         group=("coulomb-friction",),
     ),
     Effect(

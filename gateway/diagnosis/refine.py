@@ -83,7 +83,8 @@ def linearised(bench: Bench, problems: Sequence[Problem], whiten: Whiten) -> lis
         centre = simulated[at]
         rows = [_offset_column(bench, recording) for recording in range(len(problem.point.offsets_n))]
         for k, parameter in enumerate(problem.free):
-            rows.append((simulated[at + 1 + k] - centre) / _secant(problem.point, parameter)[1])
+            step = _secant(problem.point, parameter)[1]
+            rows.append((simulated[at + 1 + k] - centre) / step if step else np.zeros_like(centre))
         at += 1 + len(problem.free)
         residual = bench.residuals(centre)
         jacobian = bench.reduced(np.array(rows)) if rows else np.empty((0, bench.rows))
@@ -92,7 +93,7 @@ def linearised(bench: Bench, problems: Sequence[Problem], whiten: Whiten) -> lis
 
 
 def _secant(point: Point, parameter: Parameter) -> tuple[Point, float]:
-    """A neighbour in one parameter, and how far it is."""
+    """A neighbour in one parameter, and how far it is: 0 where the limit is so far that no step changes it."""
     value = point.value(parameter)
     own = parameter.shape or abs(value) >= 1.0e11  # 2 % of a frequency or a pitch is many turns over a minute
     step = parameter.step if own else max(parameter.step, 0.02 * abs(value))
