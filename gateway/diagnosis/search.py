@@ -68,7 +68,7 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
     first, fitted, accepted = contest, base, list[Accepted]()
     nameless: list[Answer] = []
     while len(accepted) + len(nameless) < MOST_EFFECTS:
-        winner = _acceptable(bench, fitted, base, contest, whiten)
+        winner = _acceptable(bench, fitted, contest, whiten, _explained(base, fitted, accepted))
         answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
         if answer is not None and (winner is None or answer.gain > _CLEARLY * winner.gain + _MARGIN):
             nameless.append(answer)
@@ -119,10 +119,20 @@ def _others(effects: Sequence[Effect], accepted: Sequence[Accepted]) -> list[Eff
     return [effect for effect in effects if effect.name not in taken]
 
 
-def _acceptable(bench: Bench, fitted: Fitted, base: Fitted, contest: Contest, whiten: Whitener) -> Finalist | None:
-    """The winner, if it keeps every rule; None otherwise. Sizes that every machine has do not take part."""
+def _explained(base: Fitted, fitted: Fitted, accepted: Sequence[Accepted]) -> float:
+    """Chi-square that the model explains by causes whose wrong form could look like another one: not by oscillations."""
+    gains = [(each.contest.winner.gain, each.form.quadrature) for each in accepted]
+    total = sum(gain for gain, _oscillates in gains)
+    shapes = sum(gain for gain, oscillates in gains if not oscillates)
+    return max(base.chi2 - fitted.chi2, 0.0) * (shapes / total if total > 0.0 else 1.0)
+
+
+def _acceptable(bench: Bench, fitted: Fitted, contest: Contest, whiten: Whitener, explained: float) -> Finalist | None:
+    """The winner, if it keeps every rule; None otherwise. Sizes that every machine has do not take part.
+
+    explained: what the effects before it have explained.
+    """
     winner = next((each for each in contest.finalists if _noticeable(each, fitted)), None)
-    explained = max(base.chi2 - fitted.chi2, 0.0)
     if winner is None or not significant(winner, contest.starts) or winner.gain <= _LEAST_BESIDE * explained:
         return None
     return winner if _worth(bench, fitted, winner, whiten, explained) else None

@@ -3,10 +3,11 @@
 import math
 from typing import Final
 
-from gateway.twin.elementwise import Real, chosen, larger, root, sine
+from gateway.twin.elementwise import Real, exponential, larger, root, sine
 from gateway.twin.sections import Regulator
 
 ATMOSPHERE_PA: Final = 1.0e5
+CLOSING_PA: Final = 2.0e4
 CHOKED_RATIO: Final = 0.528  # of the pressures at a hole, below which the flow is that of sound
 
 
@@ -20,10 +21,15 @@ def bent_command(regulator: Regulator, voltage_v: Real) -> Real:
 
 
 def drooped(regulator: Regulator, pressure_pa: Real, supply_kpa: Real) -> Real:
-    """supply-droop: what a stronger air line adds, where the regulator gives pressure at all; never below 0."""
+    """supply-droop: what a stronger air line adds, as far as the regulator is open; never below 0."""
     excess_pa = supply_kpa * 1.0e3 - regulator.droop_reference_pa
-    gained = pressure_pa * (1.0 + regulator.droop_share_per_pa * excess_pa) + regulator.droop_pa_per_pa * excess_pa
-    return chosen(pressure_pa > 0.0, larger(gained, 0.0), pressure_pa)
+    added = regulator.droop_pa_per_pa * open_share(pressure_pa)
+    return larger(pressure_pa + (pressure_pa * regulator.droop_share_per_pa + added) * excess_pa, 0.0)
+
+
+def open_share(pressure_pa: Real) -> Real:
+    """How far the regulator works at all: it closes over the last few 10 kPa above none."""
+    return 1.0 - exponential(-larger(pressure_pa, 0.0) / CLOSING_PA)
 
 
 def leaked(regulator: Regulator, pressure_pa: Real) -> Real:
@@ -39,7 +45,6 @@ def leaked(regulator: Regulator, pressure_pa: Real) -> Real:
 
 
 def hunted(regulator: Regulator, pressure_pa: Real, time_s: Real) -> Real:
-    """regulator-hunting: a limit cycle on the pressure while there is pressure; never below 0."""
+    """regulator-hunting: a limit cycle on the pressure, as far as the regulator is open; never below 0."""
     angle_rad = (2.0 * math.pi) * regulator.hunting_hz * time_s + regulator.hunting_phase_rad
-    hunting = larger(pressure_pa + regulator.hunting_pa * sine(angle_rad), 0.0)
-    return chosen(pressure_pa > 0.0, hunting, pressure_pa)
+    return larger(pressure_pa + regulator.hunting_pa * open_share(pressure_pa) * sine(angle_rad), 0.0)
