@@ -28,6 +28,7 @@ from gateway.diagnosis.screen import Answer, best_answer
 MOST_EFFECTS: Final = 5
 _DISCREPANT: Final = 3.0  # chi-square per row of the winner
 _CLEARLY: Final = 1.05  # a nameless dependence must explain this much more than the best effect ...
+_CLEARLY_ALIKE: Final = 1.3  # ... or this much more, where both look at one column ...
 _MARGIN: Final = 10.0  # ... and this much more in chi-square
 _DOUBT: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
 _OVERWHELMING: Final = 80.0
@@ -70,7 +71,7 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
     while len(accepted) + len(nameless) < MOST_EFFECTS:
         winner = _acceptable(bench, fitted, contest, whiten, _explained(base, fitted, accepted))
         answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
-        if answer is not None and (winner is None or answer.gain > _CLEARLY * winner.gain + _MARGIN):
+        if answer is not None and (winner is None or _explains_clearly_more(answer, winner)):
             nameless.append(answer)
             bench.take_out(answer.question.columns)
             fitted = refit(bench, fitted, whiten)
@@ -117,6 +118,12 @@ def _revalued(bench: Bench, fitted: Fitted, whiten: Whitener) -> Fitted:
 def _others(effects: Sequence[Effect], accepted: Sequence[Accepted]) -> list[Effect]:
     taken = {each.effect.name for each in accepted}
     return [effect for effect in effects if effect.name not in taken]
+
+
+def _explains_clearly_more(answer: Answer, winner: Finalist) -> bool:
+    """A nameless dependence on the winner's own column may be no more than the winner's form, which is never exact."""
+    times = _CLEARLY_ALIKE if answer.question.depends_on in winner.form.needs else _CLEARLY
+    return answer.gain > times * winner.gain + _MARGIN
 
 
 def _explained(base: Fitted, fitted: Fitted, accepted: Sequence[Accepted]) -> float:
