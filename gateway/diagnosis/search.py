@@ -66,20 +66,24 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
     """All effects that the recording shows, one after the other. `base` is the refitted base model."""
     base, whiten, contest = _opened(bench, base, effects, whiten)
     clock("first contest")
-    first, fitted, accepted = contest, base, list[Accepted]()
+    first, fitted, accepted, usual = contest, base, list[Accepted](), list[Effect]()
     nameless: list[Answer] = []
-    while len(accepted) + len(nameless) < MOST_EFFECTS:
+    while len(accepted) + len(usual) + len(nameless) < MOST_EFFECTS:
         winner = _acceptable(bench, fitted, contest, whiten, _explained(base, fitted, accepted))
         answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
         if answer is not None and (winner is None or _explains_clearly_more(answer, winner)):
             nameless.append(answer)
             bench.take_out(answer.question.columns)
             fitted = refit(bench, fitted, whiten)
-        elif winner is not None:
+        elif winner is None:
+            break
+        elif _noticeable(winner, fitted):
             accepted.append(Accepted(winner.effect, winner.form, contest))
             fitted = winner.fitted
         else:
-            break
+            usual.append(winner.effect)
+            base, fitted = _widened(bench, base, winner, whiten), winner.fitted
+        effects = [effect for effect in effects if effect not in usual]
         fitted, whiten, contest = _opened(bench, fitted, _others(effects, accepted), whiten)
         base = _revalued(bench, base, whiten)
         clock(f"contest {len(accepted) + len(nameless) + 1}")
@@ -135,11 +139,8 @@ def _explained(base: Fitted, fitted: Fitted, accepted: Sequence[Accepted]) -> fl
 
 
 def _acceptable(bench: Bench, fitted: Fitted, contest: Contest, whiten: Whitener, explained: float) -> Finalist | None:
-    """The winner, if it keeps every rule; None otherwise. Sizes that every machine has do not take part.
-
-    explained: what the effects before it have explained.
-    """
-    winner = next((each for each in contest.finalists if _noticeable(each, fitted)), None)
+    """The winner, if it keeps every rule; None otherwise. explained: what the effects before it have explained."""
+    winner = contest.winner if contest.finalists else None
     if winner is None or not significant(winner, contest.starts) or winner.gain <= _LEAST_BESIDE * explained:
         return None
     return winner if _worth(bench, fitted, winner, whiten, explained) else None
@@ -149,6 +150,14 @@ def _noticeable(finalist: Finalist, before: Fitted) -> bool:
     """Is its size, or the change of a size that the plant had already, more than every machine has?"""
     size = finalist.form.parameters[0]
     return abs(finalist.fitted.point.value(size) - before.point.value(size)) >= finalist.effect.least
+
+
+def _widened(bench: Bench, base: Fitted, usual: Finalist, whiten: Whiten) -> Fitted:
+    """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
+    point, new = base.point, tuple(each for each in usual.form.parameters if each not in base.free)
+    for parameter in new:
+        point = point.moved(parameter, usual.fitted.point.value(parameter))
+    return refine(bench, [Problem(point, (*base.free, *new))], whiten, waves=3)[0]
 
 
 def _worth(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, explained: float) -> bool:
