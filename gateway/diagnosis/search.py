@@ -27,14 +27,14 @@ from gateway.diagnosis.screen import Answer, best_answer
 
 MOST_EFFECTS: Final = 5
 _DISCREPANT: Final = 3.0  # chi-square per row of the winner
-_CLEARLY: Final = 1.05  # a nameless dependence must explain this much more than the best effect ...
+_CLEARLY: Final = 1.15  # a nameless dependence must explain this much more than the best effect ...
 _CLEARLY_ALIKE: Final = 1.3  # ... or this much more, where both look at one column ...
 _MARGIN: Final = 10.0  # ... and this much more in chi-square
 _DOUBT: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
 _OVERWHELMING: Final = 80.0
 _SEED: Final = 21
 _LEAST_GAIN: Final = 0.02  # of the held-out squared error
-_LEAST_BESIDE: Final = 0.08  # of the chi-square that the effects before it explain
+_LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain
 
 
 @dataclass(frozen=True, slots=True)
