@@ -28,6 +28,7 @@ VERBS: Final = (
     "upload",
     "record",
     "recordings",
+    "metrics",
     "diagnose",
     "simulate",
     "effects",

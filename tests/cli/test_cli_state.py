@@ -255,6 +255,28 @@ def test_record_asks_the_running_gateway(
     assert sentence in result.output
 
 
+def test_metrics_are_figures_with_a_name_a_kind_and_base_units(call, control_socket, tmp_path: Path) -> None:
+    residual = {"cause": 1, "name": "transport-delay", "warnings": 2, "age_s": None, "rms_n": 0.31}
+    health = {"ticks": 500, "missed_ticks": 3, "loop_time_us": 250.0, "late_p50_us": 64, "late_p99_us": 1024}
+    asked = control_socket({"ok": True, **health, "residual": residual})
+    result = call("metrics", "--state", tmp_path)
+    assert (result.exit_code, asked) == (0, [{"do": "health"}])
+    lines = result.output.splitlines()
+    values = [line for line in lines if not line.startswith("#")]
+    assert values == [
+        "force_gateway_loop_ticks_total 500",
+        "force_gateway_loop_missed_ticks_total 3",
+        "force_gateway_loop_step_seconds 0.00025",
+        "force_gateway_loop_late_p50_seconds 6.4e-05",
+        "force_gateway_loop_late_p99_seconds 0.001024",
+        'force_gateway_residual_cause{name="transport-delay"} 1',
+        "force_gateway_residual_warnings_total 2",
+        "force_gateway_residual_rms_newtons 0.31",
+    ]
+    assert "# TYPE force_gateway_loop_ticks_total counter" in lines
+    assert len(lines) == 3 * len(values)
+
+
 def test_what_the_gateway_refuses_is_told(call, control_socket, tmp_path: Path) -> None:
     control_socket({"ok": False, "error": "already recording to 0001.fgr"})
     answer = call("record", "on", "--state", tmp_path)
