@@ -3,7 +3,7 @@
 from typing import Final
 
 from gateway.diagnosis.catalogue_cylinder import SIDE_LOAD
-from gateway.diagnosis.catalogue_regulator import LIMITS
+from gateway.diagnosis.catalogue_regulator import LIMITS, limits
 from gateway.diagnosis.effect import Effect, Form, Parameter, Scene, Start, fixed
 
 CREEP: Final = Parameter("contact", "creep_share", "1", 0.0, -1.0, 1.0, 0.002)
@@ -35,7 +35,7 @@ MONOTONE: Final = ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero
 
 def _stroke(scene: Scene) -> tuple[Start, ...]:
     """Travel at which the pad carries a force that was nearly reached; the pad's stiffness is the default plant's."""
-    return tuple((0.97 * force_n / 4.1e4 - STROKE.null,) for force_n in scene.forces_n[1:] if force_n > 1.0)
+    return tuple((force_n / 4.1e4 - STROKE.null,) for force_n in limits(scene.forces_n) if force_n > 1.0)
 
 
 def _stop(scene: Scene) -> tuple[Start, ...]:

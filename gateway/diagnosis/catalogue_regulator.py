@@ -23,6 +23,7 @@ HUNTING_HZ: Final = Parameter("regulator", "hunting_hz", "Hz", 5.0, 0.1, 40.0, 0
 HUNTING_PHASE: Final = Parameter("regulator", "hunting_phase_rad", "rad", 0.0, -10.0, 10.0, 0.02, shape=True)
 SLEW: Final = Parameter("regulator", "slew_pa_per_s", "Pa/s", 1.0e12, 1.0e4, 1.0e12, 1.0e4)
 
+NEAR: Final = (0.93, 0.96, 0.985)
 SLOW_LAGS: Final = ("transport-delay", "clock-offset", "extra-lag", "viscous-friction")
 LIMITS: Final = (
     "sensor-quadratic",
@@ -38,12 +39,17 @@ _SLOW_STEPS: Final = "a slow staircase up and down over the whole range with sma
 
 def _supply(scene: Scene) -> tuple[Start, ...]:
     """A fall from UNLIMITED to just below the pressures that were reached."""
-    return tuple((quantile * 0.97 - SUPPLY.null,) for quantile in scene.pressures_pa[1:] if quantile > 2.0e4)
+    return tuple((limit_pa - SUPPLY.null,) for limit_pa in limits(scene.pressures_pa) if limit_pa > 2.0e4)
+
+
+def limits(reached: tuple[float, ...]) -> tuple[float, ...]:
+    """Where what was reached may have met a limit: below each quantile, and closely below the largest."""
+    return tuple(0.97 * quantile for quantile in reached[1:-1]) + tuple(share * reached[-1] for share in NEAR)
 
 
 def _slew(scene: Scene) -> tuple[Start, ...]:
     fastest = max(scene.pressure_rate_pa_per_s, 1.0e4)
-    return tuple((share * fastest - SLEW.null,) for share in (0.15, 0.3, 0.5, 0.8))
+    return tuple((share * fastest - SLEW.null,) for share in (0.15, 0.3, 0.5, 0.7, 0.85, 1.0, 1.2))
 
 
 def _steps(scene: Scene) -> tuple[Start, ...]:

@@ -32,6 +32,8 @@ _CLEARLY_ALIKE: Final = 1.3  # ... or this much more, where both look at one col
 _MARGIN: Final = 10.0  # ... and this much more in chi-square
 _DOUBT: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
 _OVERWHELMING: Final = 80.0
+_RIVALS: Final = 2
+_WINS: Final = 0.05  # share from which a rival is looked at
 _SEED: Final = 21
 _LEAST_GAIN: Final = 0.02  # of the held-out squared error
 _LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain
@@ -69,9 +71,14 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
     first, fitted, accepted, usual = contest, base, list[Accepted](), list[Effect]()
     nameless: list[Answer] = []
     while len(accepted) + len(usual) + len(nameless) < MOST_EFFECTS:
-        winner = _acceptable(bench, fitted, contest, whiten, _explained(base, fitted, accepted))
+        explained = _explained(base, fitted, accepted)
+        winner = None
+        if _promising(contest, explained):
+            rival = _foreseen(bench, contest, _others(effects, accepted), whiten)
+            winner = rival if _worth(bench, fitted, rival, whiten, explained) else None
         answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
-        if answer is not None and (winner is None or _explains_clearly_more(answer, winner)):
+        strongest = contest.winner if winner else None
+        if answer is not None and _stands_beside(answer, strongest, explained):
             nameless.append(answer)
             bench.take_out(answer.question.columns)
             fitted = refit(bench, fitted, whiten)
@@ -124,10 +131,15 @@ def _others(effects: Sequence[Effect], accepted: Sequence[Accepted]) -> list[Eff
     return [effect for effect in effects if effect.name not in taken]
 
 
-def _explains_clearly_more(answer: Answer, winner: Finalist) -> bool:
-    """A nameless dependence on the winner's own column may be no more than the winner's form, which is never exact."""
-    times = _CLEARLY_ALIKE if answer.question.depends_on in winner.form.needs else _CLEARLY
-    return answer.gain > times * winner.gain + _MARGIN
+def _stands_beside(answer: Answer, strongest: Finalist | None, explained: float) -> bool:
+    """Is a nameless dependence more than what the effects before it have left, and clearly more than the strongest effect?
+
+    One on the effect's own column may be no more than the effect's form, which is never exact.
+    """
+    if strongest is None:
+        return answer.gain > _LEAST_BESIDE * explained
+    times = _CLEARLY_ALIKE if answer.question.depends_on in strongest.form.needs else _CLEARLY
+    return answer.gain > times * strongest.gain + _MARGIN
 
 
 def _explained(base: Fitted, fitted: Fitted, accepted: Sequence[Accepted]) -> float:
@@ -138,12 +150,41 @@ def _explained(base: Fitted, fitted: Fitted, accepted: Sequence[Accepted]) -> fl
     return max(base.chi2 - fitted.chi2, 0.0) * (shapes / total if total > 0.0 else 1.0)
 
 
-def _acceptable(bench: Bench, fitted: Fitted, contest: Contest, whiten: Whitener, explained: float) -> Finalist | None:
-    """The winner, if it keeps every rule; None otherwise. explained: what the effects before it have explained."""
-    winner = contest.winner if contest.finalists else None
-    if winner is None or not significant(winner, contest.starts) or winner.gain <= _LEAST_BESIDE * explained:
-        return None
-    return winner if _worth(bench, fitted, winner, whiten, explained) else None
+def _foreseen(bench: Bench, contest: Contest, effects: Sequence[Effect], whiten: Whitener) -> Finalist:
+    """The winner; or a rival of another kind that, together with its best companion, explains clearly more.
+
+    Two causes together may look like a third one. Looked at only where resampling does not decide.
+    """
+    winner = contest.winner
+    rivals = [each for each in contest.finalists[1:] if _rivals(each, winner, contest)][:_RIVALS]
+    if not rivals:
+        return winner
+    costs = [_with_companion(bench, each, effects, whiten) for each in (winner, *rivals)]
+    best = int(np.argmin(costs))
+    return (winner, *rivals)[best] if costs[best] < costs[0] - _MARGIN else winner
+
+
+def _rivals(other: Finalist, winner: Finalist, contest: Contest) -> bool:
+    """Does resampling let this one win now and then, and is it neither the same effect nor a relative?"""
+    name = other.effect.name
+    is_other = name != winner.effect.name and name not in winner.effect.group
+    return is_other and contest.shares.get(name, 0.0) >= _WINS and significant(other, contest.starts)
+
+
+def _with_companion(bench: Bench, first: Finalist, effects: Sequence[Effect], whiten: Whitener) -> float:
+    """Chi-square and price of an effect and of the best one beside it."""
+    others = [effect for effect in effects if effect.name != first.effect.name]
+    contest = hold(bench, first.fitted, others, scene_of(bench, first.fitted, whiten), whiten)
+    found = [each.fitted.chi2 + each.price for each in contest.finalists if significant(each, contest.starts)]
+    return first.price + min([first.fitted.chi2, *found])
+
+
+def _promising(contest: Contest, explained: float) -> bool:
+    """Is the winner more than chance, and more than what a wrong form of the `explained` effects may leave?"""
+    if not contest.finalists:
+        return False
+    winner = contest.winner
+    return significant(winner, contest.starts) and winner.gain > _LEAST_BESIDE * explained
 
 
 def _noticeable(finalist: Finalist, before: Fitted) -> bool:
