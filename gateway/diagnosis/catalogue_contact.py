@@ -20,7 +20,6 @@ FEED_DRAG_ABS: Final = Parameter("contact", "feed_drag_abs_n_s_per_mm", "N s/mm"
 SPINDLE: Final = Parameter("contact", "spindle_n", "N", 0.0, 0.0, 100.0, 0.05)
 SPINDLE_PHASE: Final = Parameter("contact", "spindle_phase_rad", "rad", 0.0, -10.0, 10.0, 0.02, shape=True)
 SPINDLE_SQUARE: Final = Parameter("contact", "spindle_n_per_krpm2", "N/krpm2", 0.0, 0.0, 100.0, 0.005)
-SPINDLE_ORDER: Final = Parameter("contact", "spindle_order", "1", 1.0, 1.0, 4.0, 1.0, shape=True)
 WEAR: Final = Parameter("contact", "wear_per_m", "1/m", 0.0, -1.0, 1.0, 1.0e-4)
 WEAR_N: Final = Parameter("contact", "wear_n_per_m", "N/m", 0.0, -100.0, 100.0, 1.0e-3)
 SLOPE: Final = Parameter("contact", "position_n_per_mm", "N/mm", 0.0, -100.0, 100.0, 0.005)

@@ -88,6 +88,29 @@ class Cell:
         self._recordings = Recordings(state / "recordings", rig, log)
 
     def _wire(self, cause: FaultCode) -> None:
+        """Bank and controller, the gateway between them, and who serves both."""
+        self._wire_gateway(cause)
+        rig = self._rig
+        self._ladder = LadderKeeper(self.controller, rig, self._state, time.monotonic, self._log)
+        self.gateway.ladder = self._ladder
+        self._server = ModbusTcpServer(
+            self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
+        )
+        self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
+        self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log)
+        self._control_socket = ControlSocket(
+            self._state,
+            Asked(
+                bank=self.bank,
+                recordings=self._recordings,
+                health=self.gateway.health,
+                upload=self._upload,
+                ladder=self._ladder,
+                watch=self.watch_desk,
+            ),
+        )
+
+    def _wire_gateway(self, cause: FaultCode) -> None:
         rig = self._rig
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
         self.bank.on_refusal = lambda refusal, peer: self._log(
@@ -111,27 +134,9 @@ class Cell:
         )
         self.gateway.recordings = self._recordings
         self.gateway.ring = self.ring
-        self._ladder = LadderKeeper(self.controller, rig, self._state, time.monotonic, self._log)
-        self.gateway.ladder = self._ladder
         self.gateway.restart_cause = cause
         if self._tick.is_fallback:
             self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
-        self._server = ModbusTcpServer(
-            self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
-        )
-        self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
-        self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log)
-        self._control_socket = ControlSocket(
-            self._state,
-            Asked(
-                bank=self.bank,
-                recordings=self._recordings,
-                health=self.gateway.health,
-                upload=self._upload,
-                ladder=self._ladder,
-                watch=self.watch_desk,
-            ),
-        )
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: str) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""

@@ -8,36 +8,9 @@ from typing import Any
 import pytest
 
 from gateway.fieldbus import BindError, ModbusTcpServer, ServerSettings
-from gateway.modbus import Adu, pdu
-from gateway.modbus.mbap import encode
+from gateway.modbus import pdu
 from gateway.modbus.memory import MemoryBank
-
-READ = pdu.read_request(3, 0, 2)
-READ_ANSWER = bytes.fromhex("0304") + bytes(4)
-
-
-def framed(request: bytes, transaction: int = 1) -> bytes:
-    return encode(Adu(transaction, 1, request))
-
-
-async def end_of(reader: asyncio.StreamReader) -> bytes:
-    """Everything up to the end of the connection, however it ends."""
-    found = b""
-    try:
-        while chunk := await reader.read(65536):
-            found += chunk
-    except ConnectionError:
-        pass
-    return found
-
-
-async def exchange(port: int, data: bytes, size: int) -> bytes:
-    reader, writer = await asyncio.open_connection("127.0.0.1", port)
-    writer.write(data)
-    found = await reader.readexactly(size)
-    writer.close()
-    await writer.wait_closed()
-    return found
+from tests.fieldbus.by_hand import READ, READ_ANSWER, end_of, exchange, framed
 
 
 def test_closing_leaves_nothing_behind_and_frees_the_port(run: Any, serve: Any) -> None:

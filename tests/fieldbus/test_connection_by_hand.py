@@ -10,13 +10,9 @@ from gateway.fieldbus.connection import BUFFER_BYTES
 from gateway.modbus import Adu, answer, pdu
 from gateway.modbus.mbap import encode
 from gateway.modbus.memory import MemoryBank
+from tests.fieldbus.by_hand import READ, framed
 
-READ = pdu.read_request(3, 0, 2)
 FAR = "192.0.2.7"
-
-
-def framed(request: bytes, transaction: int = 1, unit: int = 1) -> bytes:
-    return encode(Adu(transaction, unit, request))
 
 
 def reads(count: int) -> bytes:

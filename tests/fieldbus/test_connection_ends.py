@@ -2,15 +2,9 @@
 
 from typing import Any
 
-from gateway.modbus import Adu, pdu
-from gateway.modbus.mbap import encode
+from tests.fieldbus.by_hand import READ, framed
 
-READ = pdu.read_request(3, 0, 2)
 FAR = "192.0.2.7"
-
-
-def framed(request: bytes, transaction: int = 1) -> bytes:
-    return encode(Adu(transaction, 1, request))
 
 
 def test_half_a_request_is_waited_for_no_longer_than_partial_s(stand: Any, deliver: Any) -> None:
