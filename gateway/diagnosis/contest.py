@@ -5,7 +5,7 @@ winner's name stands only if it wins nearly always; otherwise the group of those
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -25,12 +25,16 @@ _SHARE: Final = 0.95  # a name that wins this often stands alone
 _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
 _ALIKE: Final = 0.75  # share of the gain that a relative must explain to stay in the group
 _WAVES: Final = 6
+_DEFENDED: Final = 0.04
 _SEED: Final = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Finalist:
-    """An effect refined jointly with the model. dof: parameters that it added; trials: starts that it chose among."""
+    """An effect refined jointly with the model. dof: parameters that it added.
+
+    defence: chi-square by which a rival must beat it, because it stood in the model before.
+    """
 
     effect: Effect
     form: Form
@@ -38,6 +42,7 @@ class Finalist:
     gain: float  # in chi-square
     dof: int
     block_chi2: Floats
+    defence: float = 0.0
 
     @property
     def penalised(self) -> float:
@@ -45,8 +50,8 @@ class Finalist:
 
     @property
     def price(self) -> float:
-        """What its parameters and its rarity cost, in chi-square."""
-        return 2.0 * self.dof + self.effect.rarity
+        """What its parameters and its rarity cost, less its defence, in chi-square."""
+        return 2.0 * self.dof + self.effect.rarity - self.defence
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +119,15 @@ def hold(
         finalist(bench, score.candidate.effect, score.candidate.form, each, fitted, whiten)
         for score, each in zip(best, refined, strict=True)
     ]
-    finalists += [holder] if holder else []
+    finalists += [replace(holder, defence=_defence(bench, holder))] if holder else []
     finalists.sort(key=lambda each: -each.penalised)
     return Contest(fitted, tuple(finalists), _shares(finalists), _starts(found, scene), tuple(promised), found, normal)
+
+
+def _defence(bench: Bench, holder: Finalist) -> float:
+    """Where the whole model is still far from the noise, a few percent of gain are no reason to change a cause."""
+    per_row = holder.fitted.chi2 / max(int(bench.usable.sum()), 1)
+    return _DEFENDED * holder.gain * min(max((per_row - 1.1) / 0.4, 0.0), 1.0)
 
 
 def _joined(fitted: Fitted, form: Form) -> tuple[Parameter, ...]:

@@ -3,7 +3,12 @@
 Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
 not see, in nearly all ways to resample them; at least 2 % of the held-out squared error; and, for every effect after the
 first, a few percent of what the others explain: no form is exact, and what a cause's wrong form leaves must not be
-named. A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
+named. What oscillates does not count there: the rest of a sine is no bent line.
+    - Two causes together may look like a third one: where resampling does not decide, the winner's rivals are judged
+      with the best companion that each finds.
+    - A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
+    - An effect of a size that every machine has goes into the base model: it is no finding, and without it its work
+      would be done, and its name taken, by another one.
 """
 
 from collections.abc import Callable, Sequence
