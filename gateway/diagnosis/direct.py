@@ -17,7 +17,8 @@ from gateway.diagnosis.noise import fast_noise_n
 
 _SPIKE: Final = 7.5  # robust standard deviations: one chance in 10^13 rows
 _FEWEST_SPIKES: Final = 3
-_LEAST_REPEATED: Final = 0.005  # share of rows
+_LEAST_REPEATED: Final = 0.001  # share of rows ...
+_MORE_THAN_CHANCE: Final = 3.0  # ... and times what counts as coarse as these repeat by chance
 _LEAST_COARSE: Final = 0.05  # share of the noise's power that rounding to the lattice makes
 
 
@@ -70,12 +71,18 @@ def repeats(bench: Bench, residual_n: Floats) -> Direct | None:
         if segment.is_force:
             flagged[segment.rows] = bench.measurements[segment.recording].repeated & bench.usable[segment.rows]
     share = float(flagged.sum()) / max(int(bench.judged.sum()), 1)
-    if share < _LEAST_REPEATED:
+    if share < max(_LEAST_REPEATED, _MORE_THAN_CHANCE * _chance_of_a_repeat(bench, residual_n)):
         return None
     values = ((REPEATED, share, float(np.sqrt(share / bench.judged.sum()))),)
     return Direct(
         "repeated-samples", values, flagged, bench.rms_n(residual_n), _rms(residual_n[bench.judged & ~flagged])
     )
+
+
+def _chance_of_a_repeat(bench: Bench, residual_n: Floats) -> float:
+    """That two readings of Gaussian noise fall on the same count."""
+    quantum_n = max(_lattice_n(each.force_n[each.usable]) for each in bench.measurements)
+    return quantum_n / (2.0 * float(np.sqrt(np.pi)) * max(fast_noise_n(residual_n[bench.judged]), 1.0e-9))
 
 
 def coarse(bench: Bench, residual_n: Floats, known_n: float) -> Direct | None:

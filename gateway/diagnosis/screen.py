@@ -122,7 +122,7 @@ def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
 def _evenly_sampled(measurement: Measurement) -> bool:
     """Are rows hardly missing? Whitening takes rows for evenly spaced; where they are not, noise seems to come and go."""
     rows_s = np.diff(measurement.time_s)
-    return float(np.mean(rows_s > 1.5 * np.median(rows_s))) < 0.02
+    return float(np.mean(rows_s > 1.9 * np.median(rows_s))) < 0.02
 
 
 def _wandering(part: Floats) -> float:
