@@ -126,4 +126,11 @@ EXAMPLES: Final = (
     Hidden(name="valve-crosstalk", changes={"cell.crosstalk_n_per_v": 2.0}),
     Hidden(name="sign-loss", changes={"cell.sign_lost": 1.0}, around={"cell.zero_n": -1.1}),
 )  # fmt: skip
+OTHER_FORMS: Final = (
+    Hidden(name="asymmetric-friction", changes={"friction.asymmetry_n_s_per_m": 500.0}),
+    Hidden(name="side-load", changes={"friction.side_load_n_per_n": 0.06}, columns=_FEED),
+    Hidden(name="stribeck-friction", changes={"friction.dwell_stiction_n": 1.0, "friction.dwell_stiction_s": 0.15},
+           factor=2.0),
+)  # fmt: skip
+"""Effects that show in more than one way, in another one than above."""
 BY_NAME: Final = {each.name: each for each in EXAMPLES}

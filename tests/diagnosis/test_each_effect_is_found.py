@@ -8,7 +8,7 @@ import pytest
 
 from gateway.diagnosis import Diagnosis, Options, Verdict, diagnose
 from gateway.diagnosis.result import Cause
-from tests.diagnosis.hidden import BY_NAME, EXAMPLES, Hidden
+from tests.diagnosis.hidden import BY_NAME, EXAMPLES, OTHER_FORMS, Hidden
 from tests.diagnosis.machine import NOISE_N
 
 GATE = (
@@ -44,8 +44,8 @@ def check_sizes(example: Hidden, cause: Cause) -> None:
         assert estimate.ci95[0] <= estimate.value <= estimate.ci95[1]
 
 
-def check_found(name: str) -> None:
-    example = BY_NAME[name]
+def check_found(example: Hidden) -> None:
+    name = example.name
     found = diagnosed(example, hidden=True)
     cause = cause_of(found, name)
     assert found.verdict not in (Verdict.NOTHING_FOUND, Verdict.UNKNOWN)
@@ -69,7 +69,7 @@ def check_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", GATE)
 def test_an_effect_is_named_with_its_size(name: str) -> None:
-    check_found(name)
+    check_found(BY_NAME[name])
 
 
 @pytest.mark.parametrize("name", GATE_WITHOUT)
@@ -80,10 +80,21 @@ def test_without_the_effect_nothing_is_found(name: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in ALL if name not in GATE])
 def test_every_other_effect_is_named_with_its_size(name: str) -> None:
-    check_found(name)
+    check_found(BY_NAME[name])
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in ALL if name not in GATE_WITHOUT])
 def test_without_any_other_effect_nothing_is_found(name: str) -> None:
     check_nothing(name)
+
+
+@pytest.mark.parametrize("example", OTHER_FORMS[:1], ids=lambda each: each.name)
+def test_an_effect_is_named_in_another_form(example: Hidden) -> None:
+    check_found(example)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("example", OTHER_FORMS[1:], ids=lambda each: each.name)
+def test_every_other_form_is_named(example: Hidden) -> None:
+    check_found(example)

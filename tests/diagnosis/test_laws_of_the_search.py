@@ -168,6 +168,16 @@ def test_the_plain_one_is_right(plain: Diagnosis) -> None:
     assert plain.causes[0].name == "load-dependent-friction"
 
 
+def test_what_every_machine_has_is_no_finding_and_no_noise() -> None:
+    """Half a millisecond of delay under a hundredth of the usual noise: in the base model, and no work for other names."""
+    volts, noise_n = command_v(SHORT_S), np.random.default_rng(11).normal(0.0, 0.01, SHORT_S.size)
+    late_n = readings_n(plant({"regulator.delay_s": 5.0e-4}), SHORT_S, volts, {})
+    found = diagnose([measurement(SHORT_S, volts, late_n + noise_n, {})])
+    assert found.causes == ()
+    assert found.baseline.rms_n == pytest.approx(0.01, rel=0.1)
+    assert found.extended.held_out_rms_n == pytest.approx(0.01, rel=0.1)
+
+
 @pytest.mark.parametrize("constant_n", [-30.0, 500.0])
 def test_a_constant_added_to_the_force_changes_nothing(plain: Diagnosis, constant_n: float) -> None:
     check_same(plain, diagnose([short(constant_n)]))
