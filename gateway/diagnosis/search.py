@@ -77,19 +77,19 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
     nameless: list[Answer] = []
     while len(accepted) + len(usual) + len(nameless) < MOST_EFFECTS:
         explained = _explained(base, fitted, accepted)
-        winner = None
+        winner, saved = None, 0.0
         if _promising(contest, explained):
-            rival = _foreseen(bench, contest, _others(effects, accepted), whiten)
-            winner = rival if _worth(bench, fitted, rival, whiten, explained) else None
+            winner = _foreseen(bench, contest, _others(effects, accepted), whiten)
+            saved = _saved(bench, fitted, winner, whiten, explained)
         answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
-        strongest = contest.winner if winner else None
+        strongest = contest.winner if saved > 0.0 else None
         if answer is not None and _stands_beside(answer, strongest, explained):
             nameless.append(answer)
             bench.take_out(answer.question.columns)
             fitted = refit(bench, fitted, whiten)
-        elif winner is None:
+        elif winner is None or saved == 0.0:
             break
-        elif _noticeable(winner, fitted):
+        elif saved > _LEAST_GAIN and _noticeable(winner, fitted):
             accepted.append(Accepted(winner.effect, winner.form, contest))
             fitted = winner.fitted
         else:
@@ -206,19 +206,18 @@ def _widened(bench: Bench, base: Fitted, usual: Finalist, whiten: Whiten) -> Fit
     return refine(bench, [Problem(point, (*base.free, *new))], whiten, waves=3)[0]
 
 
-def _worth(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, explained: float) -> bool:
-    """Does it save enough of the held-out squared error, in nearly all ways to resample the blocks?
+def _saved(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, explained: float) -> float:
+    """Share of the held-out squared error that it saves; 0 unless it saves in nearly all ways to resample the blocks.
 
     An effect that shows in one block only (a slide that rests once, a force that is negative once) cannot be resampled;
     an overwhelming chi-square stands for it, also beside what the effects before it have `explained`.
     """
     error_before = held_out(bench, before, whiten).errors
     saved = error_before - held_out(bench, winner.fitted, whiten).errors
-    if float(np.sum(saved)) <= _LEAST_GAIN * float(np.sum(error_before)):
-        return False
     weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
     overwhelming = winner.gain > max(_OVERWHELMING, 0.5 * explained)
-    return overwhelming or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
+    sure = overwhelming or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
+    return max(float(np.sum(saved)), 0.0) / float(np.sum(error_before)) if sure else 0.0
 
 
 def _exchanged(
