@@ -96,7 +96,7 @@ CYLINDER: Final = (
         experiment="reversals of 0.1 and 1 V around three levels",
         forms=(
             Form(parameters=(ASYMMETRY,), probes=fixed((0.2,)), proportional=True),
-            Form(parameters=(DRAG_ASYMMETRY,), probes=fixed((40.0,), (-40.0,), (300.0,), (-300.0,))),
+            Form(parameters=(DRAG_ASYMMETRY,), probes=fixed((40.0,), (-40.0,), (300.0,), (-300.0,)), least=25.0),
         ),
         group=("coulomb-friction", "viscous-friction"),
         rarity=10.0,

@@ -12,6 +12,7 @@ from typing import Final
 from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
 from gateway.diagnosis.bench import MOTIONS, Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
+from gateway.diagnosis.catalogue_cylinder import DRAG_ASYMMETRY
 from gateway.diagnosis.direct import Direct, coarse, repeats, spikes
 from gateway.diagnosis.effect import Effect, Parameter
 from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
@@ -64,7 +65,7 @@ def diagnose(
         simulated_n = bench.simulate([base.point])[0]
         bench.doubt_times(simulated_n, _CHANCE_SHARE * options.late_s, fast_noise_n(base.residual_n[bench.judged]))
         base = refit(bench, base, whiten)
-    effects = _competitors(base.free, hidden)
+    effects = _competitors(base.free, hidden, options.late_s)
     found = search(bench, base, effects, whiten, account)
     left = screen(bench, found.fitted, found.whiten, [each.leftover for each in found.nameless])
     account("screen")
@@ -143,11 +144,17 @@ def _direct(
     return bench, base, tuple(found)
 
 
-def _competitors(free: Sequence[Parameter], hidden: frozenset[str]) -> tuple[Effect, ...]:
-    """Effects that may be found: all that the base model does not fit anyway."""
+def _competitors(free: Sequence[Parameter], hidden: frozenset[str], late_s: float) -> tuple[Effect, ...]:
+    """Effects that may be found: all that the base model does not fit anyway.
+
+    Where wires may be late by themselves, a drag that differs by direction is not looked for: on the pad it comes late
+    like a wire, only by milliseconds more in one direction than in the other.
+    """
     taken = {parameter.path for parameter in free}
     return tuple(
-        effect
+        replace(
+            effect, forms=tuple(form for form in effect.forms if late_s == 0.0 or DRAG_ASYMMETRY not in form.parameters)
+        )
         for effect in EFFECTS
         if not effect.direct and (effect.name in hidden or not taken & {p.path for p in effect.parameters})
     )

@@ -23,6 +23,7 @@ from gateway.diagnosis.gram import HeldOut, covariance, held_out
 from gateway.diagnosis.identifiability import invisible
 from gateway.diagnosis.noise import Whitener, white
 from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.remarks import remarks, too_high_a_floor
 from gateway.diagnosis.result import (
     Baseline,
     Cause,
@@ -44,6 +45,7 @@ _BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain 
 _LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
 _DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
 _SAME_AREA: Final = 0.2
+_LEAST_REJECTED: Final = 1.0e-3  # of the RMS
 _SEED: Final = 43
 
 
@@ -68,8 +70,9 @@ def judged(
 ) -> Diagnosis:
     """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
     found, reported = _worthy(bench, found)
-    known_n = given_floor_n if given_floor_n is not None else _replicates(bench)
     rms_n = bench.rms_n(reported.base.residual_n)
+    too_high = given_floor_n is not None and given_floor_n > rms_n
+    known_n = _replicates(bench) if given_floor_n is None or too_high else given_floor_n
     floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n)
     reaches = reported.held_out.rms_n <= _REACHED * floor_n
     causes = _causes(bench, found, reported, floor_n) + _direct_causes(bench, reported, direct, floor_n)
@@ -84,14 +87,17 @@ def judged(
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
-        rejected=_rejected(bench, found, names | {each.name for each in unseen}),
+        rejected=_rejected(bench, found, rms_n, {*names, *_grouped(causes), *(each.name for each in unseen)}),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant(reported.base),
         plant=_extended(reported, causes),
         base_parameters=_estimates(bench, reported.base, reported.base.free, reported.whiten),
         traces=_traces(bench, reported),
         experiments=_experiments(causes),
-        notes=tuple(note for each in bench.measurements for note in each.notes),
+        notes=(
+            *remarks(bench.measurements, reported.fitted.point.offsets_n, floor_n),
+            *((too_high_a_floor(given_floor_n, rms_n),) if too_high and given_floor_n is not None else ()),
+        ),
     )
 
 
@@ -215,9 +221,9 @@ def _estimates(bench: Bench, fitted: Fitted, parameters: Sequence[Parameter], wh
     for parameter, error in (*zip(fitted.free, errors, strict=True), *settled):
         if parameter in parameters:
             value = fitted.point.value(parameter)
-            estimates[parameter.name] = Estimate(
-                parameter.section, value, parameter.unit, _interval(value, float(error))
-            )
+            low, high = _interval(value, float(error))
+            within = (max(low, parameter.low), min(high, parameter.high))
+            estimates[parameter.name] = Estimate(parameter.section, value, parameter.unit, within)
     return estimates
 
 
@@ -235,16 +241,21 @@ def _extended(reported: Reported, causes: Sequence[Cause]) -> Plant:
     return plant
 
 
-def _rejected(bench: Bench, found: Found, accepted: frozenset[str]) -> tuple[Rejected, ...]:
-    """Losers of the first contest and of the last, by what they would save of the held-out RMS."""
+def _grouped(causes: Sequence[Cause]) -> set[str]:
+    return {name for cause in causes for name in cause.group}
+
+
+def _rejected(bench: Bench, found: Found, rms_n: float, told: set[str]) -> tuple[Rejected, ...]:
+    """Losers of the first contest and of the last, by the part of the RMS that they would save of unseen blocks, N."""
     gains: dict[str, float] = {}
     for contest in (found.first, found.last):
         before_n = held_out(bench, contest.beside, found.whiten).rms_n
         for finalist in contest.finalists:
-            name = finalist.effect.name
-            if name not in accepted:
-                gains[name] = before_n - held_out(bench, finalist.fitted, found.whiten).rms_n
-    return tuple(Rejected(name, gain) for name, gain in sorted(gains.items(), key=lambda item: -item[1]))
+            if finalist.effect.name not in told:
+                share = 1.0 - held_out(bench, finalist.fitted, found.whiten).rms_n / before_n
+                gains[finalist.effect.name] = rms_n * share
+    best = sorted(gains.items(), key=lambda item: -item[1])
+    return tuple(Rejected(name, gain_n) for name, gain_n in best if gain_n > _LEAST_REJECTED * rms_n)
 
 
 def _traces(bench: Bench, reported: Reported) -> tuple[Trace, ...]:

@@ -195,7 +195,9 @@ def _promising(contest: Contest, explained: float) -> bool:
 def _noticeable(finalist: Finalist, before: Fitted) -> bool:
     """Is its size, or the change of a size that the plant had already, more than every machine has?"""
     size = finalist.form.parameters[0]
-    return abs(finalist.fitted.point.value(size) - before.point.value(size)) >= finalist.effect.least
+    return abs(finalist.fitted.point.value(size) - before.point.value(size)) >= max(
+        finalist.effect.least, finalist.form.least
+    )
 
 
 def _widened(bench: Bench, base: Fitted, usual: Finalist, whiten: Whiten) -> Fitted:

@@ -49,6 +49,10 @@ def read_csv(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool 
     asked = picked(form.names, mapping, str(path))
     chosen = [pick for pick in asked if pick.is_contract or not form.is_words(pick.index)]
     words = [pick.name for pick in asked if pick not in chosen]
+    if not chosen:
+        raise RecordingError(
+            f"{path}: no column of numbers; a recording is a table with a header such as time_s,command_v,force_n"
+        )
     table = _fast(form, chosen) or _Exact(form, chosen, lenient).read()
     notes = [*table.notes, *([f"columns of words, not numbers: {listed(words)}"] if words else [])]
     columns = {pick.name: _converted(table.columns[k], pick) for k, pick in enumerate(chosen) if k in table.columns}
