@@ -2,7 +2,8 @@
 
 A search holds some hundred columns as long as the recording: a million rows would take gigabytes, and would say no more
 of a cause than their most lively minutes do. So a recording beyond MOST_ROWS is cut to the stretch in which its drive
-moves most, and says so. What only hours can show (wear, drift) needs a thinner recording, not a longer one.
+moves most, and says so; rows closer than they need to be are taken together before. What only hours can show (wear,
+drift) needs a thinner recording, not a longer one.
 """
 
 from dataclasses import replace
@@ -13,12 +14,49 @@ import numpy as np
 from gateway.diagnosis.measurement import Floats, Measurement
 
 MOST_ROWS: Final = 40_000  # of all recordings together
+_CLOSEST_S: Final = 2.0e-3  # rows closer than this may be taken together: a regulator's lag is tens of milliseconds
 
 
 def excerpt(measurement: Measurement, most_rows: int) -> Measurement:
-    """The liveliest stretch of at most `most_rows` rows, with a note; the measurement itself if it is short enough."""
+    """A thinner recording where rows are closer than they need to be; of that the liveliest stretch of at most
+    `most_rows` rows, with a note; the measurement itself if it is short enough."""
     if measurement.rows <= most_rows:
         return measurement
+    row_s = float(np.median(np.diff(measurement.time_s)))
+    together = min(-(-measurement.rows // most_rows), max(int(_CLOSEST_S / row_s), 1))
+    thin = _thinned(measurement, together) if together > 1 else measurement
+    return thin if thin.rows <= most_rows else _stretch(thin, most_rows)
+
+
+def _thinned(measurement: Measurement, together: int) -> Measurement:
+    """So many rows become one: means of the readings, and the command as it stood in their middle."""
+    rows = measurement.rows // together
+    note = f"{measurement.name}: {together} rows each were taken together to one, {rows} in all"
+
+    def mean(column: Floats) -> Floats:
+        return np.asarray(column[: rows * together].reshape(rows, together).mean(axis=1))
+
+    middle = slice(together // 2, rows * together, together)
+    usable, repeated = (
+        np.asarray(np.all(flags[: rows * together].reshape(rows, together), axis=1))
+        for flags in (measurement.usable, measurement.repeated)
+    )
+    return replace(
+        measurement,
+        time_s=measurement.time_s[middle] - measurement.time_s[middle][0],
+        force_n=mean(measurement.force_n),
+        usable=usable,
+        repeated=repeated,
+        command_v=_cut(measurement.command_v, middle),
+        pressure_pa=None if measurement.pressure_pa is None else mean(measurement.pressure_pa),
+        position_m=None if measurement.position_m is None else mean(measurement.position_m),
+        covariates={name: mean(column) for name, column in measurement.covariates.items()},
+        notes=(*measurement.notes, note),
+    )
+
+
+def _stretch(measurement: Measurement, most_rows: int) -> Measurement:
+    """The liveliest stretch."""
     first = _liveliest(measurement, most_rows)
     rows = slice(first, first + most_rows)
     start_s, end_s = float(measurement.time_s[first]), float(measurement.time_s[rows.stop - 1])

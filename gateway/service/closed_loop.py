@@ -158,6 +158,11 @@ def lines(found: ClosedLoop) -> list[str]:
         f"  after / before: {found.rms_ratio:.2f}, 95 % interval {low:.2f} .. {high:.2f}",
         f"  largest error {_change(found.before_max_n, found.after_max_n)} N",
         f"  a step is within 1 N for good after {_change(found.before_settled_s, found.after_settled_s)} s",
+        *(
+            ["  no gain: the interval holds 1, what was found matters little for the force that is commanded"]
+            if low <= 1.0 <= high
+            else []
+        ),
         f"compensated: {', '.join(found.compensated) or 'nothing'}",
         *(f"not compensated: {name}: {why}" for name, why in found.not_compensated),
     ]

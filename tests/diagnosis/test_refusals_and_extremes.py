@@ -81,6 +81,14 @@ def test_what_only_the_user_can_know_is_refused_by_the_row(tmp_path: Path, what:
     assert output.startswith("E403 ")
 
 
+def test_prose_is_no_recording(tmp_path: Path) -> None:
+    letter = tmp_path / "letter.csv"
+    letter.write_text("Dear colleague\nhere is the log that you asked for\n", encoding="utf-8")
+    done = CliRunner().invoke(command, ["diagnose", str(letter)])
+    assert done.exit_code == 65
+    assert "letter.csv: no column of numbers" in done.output
+
+
 def test_a_refusal_writes_nothing(tmp_path: Path) -> None:
     path = written(tmp_path / "three.csv", {name: values[:3] for name, values in columns().items()})
     files = [str(tmp_path / name) for name in ("out.json", "out.html", "plant.yaml")]
@@ -102,6 +110,25 @@ def test_nothing_is_found_where_nothing_can_be_seen(tmp_path: Path, what: str) -
     assert code == 0
     assert document["causes"] == []
     assert document["verdict"] in ("nothing-found", "unknown")
+
+
+def test_a_command_that_never_moves_under_a_force_that_does_is_told(tmp_path: Path) -> None:
+    path = written(tmp_path / "dead.csv", columns(command_v=np.full(TIME_S.size, 2.0)))
+    done = CliRunner().invoke(command, ["diagnose", str(path)])
+    assert done.exit_code == 0
+    assert "command_v stands at 2 V throughout" in " ".join(done.output.split())
+
+
+def test_a_floor_above_the_residual_confirms_nothing(tmp_path: Path) -> None:
+    bent = {**columns(), "force_n": columns()["force_n"] * (1.0 + 0.002 * columns()["force_n"])}
+    path = written(tmp_path / "bent.csv", bent)
+    answer = tmp_path / "answer.json"
+    done = CliRunner().invoke(command, ["diagnose", str(path), "--noise-floor-n", "50", "--json", str(answer)])
+    document = json.loads(answer.read_text(encoding="utf-8"))
+    assert document["causes"]
+    assert document["verdict"] != "confirmed"
+    assert document["baseline"]["noise_floor_n"] < 1.0
+    assert "is more than the base model leaves" in " ".join(done.output.split())
 
 
 ANSWERED: dict[str, Columns] = {

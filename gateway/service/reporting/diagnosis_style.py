@@ -33,10 +33,12 @@ small.alike{color:var(--ink)}
 .numbers{width:100%}.numbers td,.numbers th+th{text-align:right}
 .meter{display:inline-block;width:5rem;height:.6rem;border-radius:3px;background:var(--grid);vertical-align:baseline}
 .meter i{display:block;height:100%;border-radius:3px;background:var(--after)}
-ol.next{padding-left:1.3rem}ol.next li{margin:.3rem 0}
+ol.next{padding-left:2rem}ol.next li{margin:.3rem 0}
 details summary{cursor:pointer;color:var(--dim)}
 @media print{details::details-content{content-visibility:visible;block-size:auto}
 figure.full,figure.across{overflow:visible}figure.full svg,figure.across svg{min-width:0}h2{break-after:avoid}
+.causes td{white-space:normal}.causes tbody th{max-width:none;min-width:7rem}.unseen tbody th{white-space:normal}
+.meter{width:2.5rem}table{font-size:.85em}ol.next{padding-left:2rem}@page{margin:14mm}
 .meter,.meter i,.band,.key i{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 """
 )
