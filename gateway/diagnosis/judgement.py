@@ -45,7 +45,7 @@ _BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain 
 _LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
 _DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
 _SAME_AREA: Final = 0.2
-_LEAST_REJECTED: Final = 1.0e-3  # of the RMS
+_LEAST_REJECTED: Final = 5.0e-3  # of the RMS
 _SEED: Final = 43
 
 
