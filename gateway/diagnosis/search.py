@@ -2,8 +2,8 @@
 
 Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
 not see, in nearly all ways to resample them; at least 2 % of the held-out squared error; and, for every effect after the
-first, a few percent of what the others explain: no form is exact, and what a cause's wrong form leaves must not be
-named. What oscillates does not count there: the rest of a sine is no bent line.
+first, a few percent of what the others explain, or much of the error that is left: no form is exact, and what a cause's
+wrong form leaves must not be named. What oscillates does not count there: the rest of a sine is no bent line.
     - Two causes together may look like a third one: where resampling does not decide, the winner's rivals are judged
       with the best companion that each finds.
     - A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
@@ -41,7 +41,8 @@ _RIVALS: Final = 2
 _WINS: Final = 0.05  # share from which a rival is looked at
 _SEED: Final = 21
 _LEAST_GAIN: Final = 0.02  # of the held-out squared error
-_LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain
+_LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain ...
+_MUCH: Final = 0.15  # ... unless it saves this much of the held-out squared error
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +79,10 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
     while len(accepted) + len(usual) + len(nameless) < MOST_EFFECTS:
         explained = _explained(base, fitted, accepted)
         winner, saved = None, 0.0
-        if _promising(contest, explained):
+        if contest.finalists and significant(contest.winner, contest.starts):
             winner = _foreseen(bench, contest, _others(effects, accepted), whiten)
             saved = _saved(bench, fitted, winner, whiten, explained)
+            saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH
         answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
         strongest = contest.winner if saved > 0.0 else None
         if answer is not None and _stands_beside(answer, strongest, explained):
@@ -182,14 +184,6 @@ def _with_companion(bench: Bench, first: Finalist, effects: Sequence[Effect], wh
     contest = hold(bench, first.fitted, others, scene_of(bench, first.fitted, whiten), whiten)
     found = [each.fitted.chi2 + each.price for each in contest.finalists if significant(each, contest.starts)]
     return first.price + min([first.fitted.chi2, *found])
-
-
-def _promising(contest: Contest, explained: float) -> bool:
-    """Is the winner more than chance, and more than what a wrong form of the `explained` effects may leave?"""
-    if not contest.finalists:
-        return False
-    winner = contest.winner
-    return significant(winner, contest.starts) and winner.gain > _LEAST_BESIDE * explained
 
 
 def _noticeable(finalist: Finalist, before: Fitted) -> bool:
