@@ -6,7 +6,7 @@ from gateway.diagnosis.catalogue_contact import MONOTONE
 from gateway.diagnosis.catalogue_regulator import LIMITS, SLOW_LAGS
 from gateway.diagnosis.effect import Effect, Form, Parameter, Scene, Start, fixed
 
-ZERO: Final = Parameter("cell", "zero_n", "N", 0.0, -1.0e4, 1.0e4, 0.05)
+ZERO: Final = Parameter("cell", "zero_n", "N", 0.0, -1.0e4, 1.0e4, 0.05, settled=True)  # fitted as the offset
 ZERO_PER_K: Final = Parameter("cell", "zero_n_per_k", "N/K", 0.0, -20.0, 20.0, 0.005)
 SPAN_PER_K: Final = Parameter("cell", "span_per_k", "1/K", 0.0, -0.2, 0.2, 5.0e-4)
 WARM_UP: Final = Parameter("cell", "warm_up_n", "N", 0.0, -50.0, 50.0, 0.05)
@@ -181,7 +181,7 @@ SENSING: Final = (
         signature="readings that should be negative are mirrored",
         excitation="forces below zero",
         experiment="pull at the load cell by hand",
-        forms=(Form(parameters=(SIGN_LOST,), probes=fixed((1.0,)), exact=True),),
+        forms=(Form(parameters=(SIGN_LOST, ZERO), probes=fixed((1.0, 0.0), (1.0, -0.3), (1.0, -1.0)), exact=True),),
         group=("backlash",),
     ),
 )

@@ -2,9 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from gateway.diagnosis.effect import Form, Parameter, Start
 from gateway.twin.plant import Plant, with_value
+
+_ZERO: Final = "cell.zero_n"
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,11 +18,16 @@ class Point:
     offsets_n: tuple[float, ...]
 
     def value(self, parameter: Parameter) -> float:
+        """Of the zero: the first recording's offset, which stands for it."""
+        if parameter.path == _ZERO:
+            return self.offsets_n[0]
         return float(getattr(getattr(self.plant, parameter.section), parameter.name))
 
     def moved(self, parameter: Parameter, value: float) -> "Point":
         """The same point with one parameter at `value`, kept within its bounds."""
         kept = min(max(float(value), parameter.low), parameter.high)
+        if parameter.path == _ZERO:  # of all recordings by as much
+            return self.with_offsets([offset_n + kept - self.offsets_n[0] for offset_n in self.offsets_n])
         return replace(self, plant=with_value(self.plant, parameter.section, parameter.name, kept))
 
     def with_offsets(self, offsets_n: Sequence[float]) -> "Point":

@@ -136,7 +136,7 @@ def test_off_equals_absent() -> None:
     """All sizes at null, whatever the shapes: bit by bit the readings of a machine that has none of it."""
     absent = readings_n(MACHINE, TIME_S, VOLTS, {})
     for effect in EFFECTS:
-        taken = {"friction.coulomb_n"} if effect.name == "coulomb-friction" else set()
+        taken = {"cell.zero_n", *(["friction.coulomb_n"] if effect.name == "coulomb-friction" else [])}  # the machine's
         off = {
             each.path: each.low + 0.3 * (min(each.high, 10.0) - each.low) if each.shape else each.null
             for each in effect.parameters
