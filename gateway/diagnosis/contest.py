@@ -113,7 +113,7 @@ def hold(
     found = wave(bench, fitted, effects, scene)
     promised, normal = scores(found, fitted, whiten)
     best = best_of_each(promised, FINALISTS)
-    problems = [Problem(each.point, _joined(fitted, each.candidate.form)) for each in best]
+    problems = [Problem(each.point, joined(fitted, each.candidate.form)) for each in best]
     refined = refine(bench, problems, whiten, _WAVES)
     finalists = [
         finalist(bench, score.candidate.effect, score.candidate.form, each, fitted, whiten)
@@ -130,7 +130,8 @@ def _defence(bench: Bench, holder: Finalist) -> float:
     return _DEFENDED * holder.gain * min(max((per_row - 1.1) / 0.4, 0.0), 1.0)
 
 
-def _joined(fitted: Fitted, form: Form) -> tuple[Parameter, ...]:
+def joined(fitted: Fitted, form: Form) -> tuple[Parameter, ...]:
+    """What moves when a form joins a model; what is settled stands as the start has it."""
     return (*fitted.free, *(each for each in form.parameters if each not in fitted.free and not each.settled))
 
 

@@ -21,7 +21,7 @@ from numpy.random import default_rng
 from gateway.diagnosis.base_fit import refit
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.candidates import remainder, wave
-from gateway.diagnosis.contest import Contest, Finalist, finalist, hold, significant
+from gateway.diagnosis.contest import Contest, Finalist, finalist, hold, joined, significant
 from gateway.diagnosis.effect import Effect, Form, Parameter
 from gateway.diagnosis.gram import held_out, orthonormal
 from gateway.diagnosis.noise import Whitener, coloured
@@ -196,10 +196,8 @@ def _noticeable(finalist: Finalist, before: Fitted) -> bool:
 
 def _widened(bench: Bench, base: Fitted, usual: Finalist, whiten: Whiten) -> Fitted:
     """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
-    point, new = base.point, tuple(each for each in usual.form.parameters if each not in base.free)
-    for parameter in new:
-        point = point.moved(parameter, usual.fitted.point.value(parameter))
-    return refine(bench, [Problem(point, (*base.free, *new))], whiten, waves=3)[0]
+    point = back_at(base.point, usual.fitted.point, usual.form.parameters)
+    return refine(bench, [Problem(point, joined(base, usual.form))], whiten, waves=3)[0]
 
 
 def _saved(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, explained: float) -> float:
