@@ -49,7 +49,7 @@ def limits(reached: tuple[float, ...]) -> tuple[float, ...]:
 
 def _slew(scene: Scene) -> tuple[Start, ...]:
     fastest = max(scene.pressure_rate_pa_per_s, 1.0e4)
-    return tuple((share * fastest - SLEW.null,) for share in (0.15, 0.3, 0.5, 0.7, 0.85, 1.0, 1.2))
+    return tuple((share * fastest - SLEW.null,) for share in (0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.2))
 
 
 def _steps(scene: Scene) -> tuple[Start, ...]:
@@ -114,7 +114,7 @@ REGULATOR: Final = (
         signature="the force is a staircase of a ramp; the residual is a saw tooth of the command",
         excitation="ramps or many different levels of the command",
         experiment="a ramp of 0.05 V/s over two volts",
-        forms=(Form(parameters=(COMMAND_STEP,), probes=_steps, exact=True),),
+        forms=(Form(parameters=(COMMAND_STEP,), probes=_steps, exact=True, everywhere=True),),
         group=("dead-band",),
     ),
     Effect(

@@ -64,6 +64,7 @@ class Contest:
     beside: Fitted
     finalists: tuple[Finalist, ...]
     shares: dict[str, float]
+    scene: Scene
     starts: int
     scores: tuple[Score, ...]
     wave: Wave
@@ -105,14 +106,15 @@ def hold(
     whiten: Whiten,
     *,
     holder: Finalist | None = None,
+    most: int = FINALISTS,
 ) -> Contest:
     """Let these effects compete beside the model `fitted`, which stands at its own optimum.
 
-    holder: an effect that has been refined before and defends its place.
+    holder: an effect that has been refined before and defends its place; most: effects that become finalists.
     """
     found = wave(bench, fitted, effects, scene)
     promised, normal = scores(found, fitted, whiten)
-    best = best_of_each(promised, FINALISTS)
+    best = best_of_each(promised, most)
     problems = [Problem(each.point, joined(fitted, each.candidate.form)) for each in best]
     refined = refine(bench, problems, whiten, _WAVES)
     finalists = [
@@ -121,7 +123,9 @@ def hold(
     ]
     finalists += [replace(holder, defence=_defence(bench, holder))] if holder else []
     finalists.sort(key=lambda each: -each.penalised)
-    return Contest(fitted, tuple(finalists), _shares(finalists), _starts(found, scene), tuple(promised), found, normal)
+    return Contest(
+        fitted, tuple(finalists), _shares(finalists), scene, _starts(found, scene), tuple(promised), found, normal
+    )
 
 
 def _defence(bench: Bench, holder: Finalist) -> float:

@@ -63,7 +63,8 @@ class Form:
 
     proportional: the response is proportional to the sizes together, whatever their signs; quadrature: the first size is
     an amplitude and the last parameter a phase, so a start means two columns, a quarter turn apart; exact: a start is
-    right as it stands or not at all, like the teeth of a saw; least: of the first parameter, as of the effect.
+    right as it stands or not at all, like the teeth of a saw; everywhere: it acts at all times, so what shows in a few
+    moments only is something else; least: of the first parameter, as of the effect.
     """
 
     parameters: tuple[Parameter, ...]
@@ -72,6 +73,7 @@ class Form:
     proportional: bool = False
     quadrature: bool = False
     exact: bool = False
+    everywhere: bool = False
     least: float = 0.0
 
 

@@ -5,6 +5,7 @@ a fit needs of it; leaving b out is a subtraction, a bootstrap is a weighted sum
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -32,10 +33,13 @@ class Normal:
         basis = orthonormal(model / scale[:, None])
         self.columns = columns - (columns @ basis.T) @ basis
         self.residual = residual - (residual @ basis.T) @ basis
-        self.raw_power = np.sum(columns**2, axis=1)
-        self.gram = self.columns @ self.columns.T
+        self.raw_power = np.einsum("ij,ij->i", columns, columns)
+        self.power = np.einsum("ij,ij->i", self.columns, self.columns)
         self.slope = self.columns @ self.residual
-        self.power = np.diag(self.gram).copy()
+
+    @cached_property
+    def gram(self) -> Floats:
+        return np.asarray(self.columns @ self.columns.T)
 
     def add(self, indices: list[int]) -> Screened:
         """Gain and sizes when these columns join the model; nothing where they are part of it already."""

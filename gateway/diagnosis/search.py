@@ -1,9 +1,10 @@
 """The search: add the winner of a contest while it pays, then let every accepted effect compete for its place again.
 
 Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
-not see, in nearly all ways to resample them; at least 2 % of the held-out squared error; and, for every effect after the
-first, a few percent of what the others explain, or much of the error that is left: no form is exact, and what a cause's
-wrong form leaves must not be named. What oscillates does not count there: the rest of a sine is no bent line.
+not see, in nearly all ways to resample them; at least 4 % of the held-out squared error, or 2 % where chi-square
+overwhelms; and, for every effect after the first, a few percent of what the others explain, or much of the error that is
+left: no form is exact, and what a cause's wrong form leaves must not be named. What oscillates does not count there: the
+rest of a sine is no bent line.
     - Two causes together may look like a third one: where resampling does not decide, the winner's rivals are judged
       with the best companion that each finds.
     - A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
@@ -22,7 +23,7 @@ from gateway.diagnosis.base_fit import refit
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.candidates import remainder, wave
 from gateway.diagnosis.contest import Contest, Finalist, finalist, hold, joined, significant
-from gateway.diagnosis.effect import Effect, Form, Parameter
+from gateway.diagnosis.effect import Effect, Form, Parameter, Scene
 from gateway.diagnosis.gram import held_out, orthonormal
 from gateway.diagnosis.noise import Whitener, coloured
 from gateway.diagnosis.point import back_at
@@ -36,11 +37,15 @@ _CLEARLY: Final = 1.15  # a nameless dependence must explain this much more than
 _CLEARLY_ALIKE: Final = 1.3  # ... or this much more, where both look at one column ...
 _MARGIN: Final = 10.0  # ... and this much more in chi-square
 _DOUBT: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
+_MOMENTS: Final = 2  # best and worst blocks without which an effect that acts everywhere ...
+_ELSEWHERE: Final = 0.3  # ... must save this much of what it saves with them
 _OVERWHELMING: Final = 80.0
 _RIVALS: Final = 2
+_COMPANIONS: Final = 2  # looked at closely for each
 _WINS: Final = 0.05  # share from which a rival is looked at
 _SEED: Final = 21
-_LEAST_GAIN: Final = 0.02  # of the held-out squared error
+_LEAST_GAIN: Final = 0.04  # of the held-out squared error; less is a trifle ...
+_LEAST_SURE_GAIN: Final = 0.02  # ... unless chi-square overwhelms
 _LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain ...
 _MUCH: Final = 0.15  # ... unless it saves this much of the held-out squared error
 
@@ -80,8 +85,10 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
         explained = _explained(base, fitted, accepted)
         winner, saved = None, 0.0
         if contest.finalists and significant(contest.winner, contest.starts):
-            winner = _foreseen(bench, contest, _others(effects, accepted), whiten)
-            saved = _saved(bench, fitted, winner, whiten, explained)
+            winner, saved = contest.winner, _saved(bench, fitted, contest.winner, whiten, explained)
+            if _matters(winner, saved):  # the name of a trifle is not worth foresight
+                winner = _foreseen(bench, contest, _others(effects, accepted), whiten)
+                saved = saved if winner is contest.winner else _saved(bench, fitted, winner, whiten, explained)
             saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH
         answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
         strongest = contest.winner if saved > 0.0 else None
@@ -91,7 +98,7 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
             fitted = refit(bench, fitted, whiten)
         elif winner is None or saved == 0.0:
             break
-        elif saved > _LEAST_GAIN and _noticeable(winner, fitted):
+        elif _matters(winner, saved) and _noticeable(winner, fitted):
             accepted.append(Accepted(winner.effect, winner.form, contest))
             fitted = winner.fitted
         else:
@@ -166,7 +173,7 @@ def _foreseen(bench: Bench, contest: Contest, effects: Sequence[Effect], whiten:
     rivals = [each for each in contest.finalists[1:] if _rivals(each, winner, contest)][:_RIVALS]
     if not rivals:
         return winner
-    costs = [_with_companion(bench, each, effects, whiten) for each in (winner, *rivals)]
+    costs = [_with_companion(bench, each, effects, contest.scene, whiten) for each in (winner, *rivals)]
     best = int(np.argmin(costs))
     return (winner, *rivals)[best] if costs[best] < costs[0] - _MARGIN else winner
 
@@ -178,12 +185,17 @@ def _rivals(other: Finalist, winner: Finalist, contest: Contest) -> bool:
     return is_other and contest.shares.get(name, 0.0) >= _WINS and significant(other, contest.starts)
 
 
-def _with_companion(bench: Bench, first: Finalist, effects: Sequence[Effect], whiten: Whitener) -> float:
-    """Chi-square and price of an effect and of the best one beside it."""
+def _with_companion(bench: Bench, first: Finalist, effects: Sequence[Effect], scene: Scene, whiten: Whitener) -> float:
+    """Chi-square and price of an effect and of the best one beside it; starts as in the scene without it."""
     others = [effect for effect in effects if effect.name != first.effect.name]
-    contest = hold(bench, first.fitted, others, scene_of(bench, first.fitted, whiten), whiten)
+    contest = hold(bench, first.fitted, others, scene, whiten, most=_COMPANIONS)
     found = [each.fitted.chi2 + each.price for each in contest.finalists if significant(each, contest.starts)]
     return first.price + min([first.fitted.chi2, *found])
+
+
+def _matters(finalist: Finalist, saved: float) -> bool:
+    """Is what it saves of the held-out squared error no trifle?"""
+    return saved > (_LEAST_SURE_GAIN if finalist.gain > _OVERWHELMING else _LEAST_GAIN)
 
 
 def _noticeable(finalist: Finalist, before: Fitted) -> bool:
@@ -204,13 +216,17 @@ def _saved(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, exp
     """Share of the held-out squared error that it saves; 0 unless it saves in nearly all ways to resample the blocks.
 
     An effect that shows in one block only (a slide that rests once, a force that is negative once) cannot be resampled;
-    an overwhelming chi-square stands for it, also beside what the effects before it have `explained`.
+    an overwhelming chi-square stands for it, also beside what the effects before it have `explained`. Not so for a saw
+    tooth: it is there all the time, and among so many teeth some meet the few moments that another form got wrong.
     """
     error_before = held_out(bench, before, whiten).errors
     saved = error_before - held_out(bench, winner.fitted, whiten).errors
     weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
-    overwhelming = winner.gain > max(_OVERWHELMING, 0.5 * explained)
-    sure = overwhelming or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
+    if winner.form.everywhere:
+        sure = float(np.sum(np.sort(saved)[_MOMENTS:-_MOMENTS])) > _ELSEWHERE * float(np.sum(saved))
+    else:
+        overwhelming = winner.gain > max(_OVERWHELMING, 0.5 * explained)
+        sure = overwhelming or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
     return max(float(np.sum(saved)), 0.0) / float(np.sum(error_before)) if sure else 0.0
 
 

@@ -169,6 +169,7 @@ def _played(targets: list[float], half_width: float) -> list[float]:
     """regulator.play over a list."""
     state, found = 0.0, []
     for target in targets:
-        state = min(max(state, target - half_width), target + half_width)
+        least, most = target - half_width, target + half_width
+        state = least if state < least else most if state > most else state
         found.append(state)
     return found
