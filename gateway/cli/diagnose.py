@@ -153,13 +153,23 @@ def _texts(answer: Answer, options: dict[str, Any]) -> dict[Path, str]:
         )
     if options["report"]:
         texts[options["report"]] = _report(answer)
-    if options["extend"]:
+    if options["extend"] and _extends(answer, options["extend"]):
         texts[options["extend"]] = _plant(answer.diagnosis, answer.sources, options["extend"].stem)
     if answer.plan is not None:
         from gateway.cli.diagnosing import next_plan
 
         texts[options["plan_file"]] = next_plan.text(answer.plan, answer.sources.name)
     return texts
+
+
+def _extends(answer: Answer, file: Path) -> bool:
+    """Is there a plant to write? Where the force says nothing, what was refitted means nothing."""
+    from gateway.service.reporting.diagnosis_words import blind
+
+    why = blind(answer.diagnosis)
+    if why:
+        click.echo(f"{file} is not written: {why}", err=True)
+    return not why
 
 
 def _planned(answer: Answer, file: Path | None) -> Answer:

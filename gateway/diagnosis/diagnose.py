@@ -12,7 +12,7 @@ from typing import Final
 from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
 from gateway.diagnosis.bench import MOTIONS, Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
-from gateway.diagnosis.catalogue_cylinder import DRAG_ASYMMETRY
+from gateway.diagnosis.catalogue_cylinder import COULOMB, DRAG_ASYMMETRY
 from gateway.diagnosis.direct import Direct, coarse, repeats, spikes
 from gateway.diagnosis.effect import Effect, Parameter
 from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
@@ -20,6 +20,7 @@ from gateway.diagnosis.judgement import judged
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import Whitener, fast_noise_n, white
 from gateway.diagnosis.refine import Fitted
+from gateway.diagnosis.remarks import nothing_to_switch_off
 from gateway.diagnosis.result import Diagnosis
 from gateway.diagnosis.screen import screen
 from gateway.diagnosis.search import search
@@ -71,6 +72,8 @@ def diagnose(
     account("screen")
     result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
     account("judgement")
+    if options.without and not _has(given, options.without):
+        result = replace(result, notes=(*result.notes, nothing_to_switch_off(options.without)))
     return replace(
         result,
         base=_with_readings_of(given, result.base),
@@ -102,6 +105,14 @@ def _prepared(plant: Plant, hidden: frozenset[str]) -> Plant:
             if not parameter.shape:
                 plant = with_value(plant, parameter.section, parameter.name, float(parameter.null))
     return plant
+
+
+def _has(plant: Plant, name: str) -> bool:
+    """Has the plant this effect, or would the base model fit it?"""
+    sizes = [parameter for parameter in BY_NAME[name].parameters if not parameter.shape]
+    if any(parameter.path == COULOMB.path for parameter in sizes):
+        return True
+    return any(getattr(getattr(plant, each.section), each.name) != each.null for each in sizes)
 
 
 def _with_readings_of(given: Plant, plant: Plant) -> Plant:

@@ -9,6 +9,7 @@ from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import fast_noise_n
 
 _MOVES: Final = 30.0  # times the noise, from which a force moves
+_STANDS: Final = 8.0  # times the noise, below which nearly all readings of a force lie that stands
 _APART: Final = 10.0  # times the floor, from which offsets are told
 
 
@@ -27,6 +28,46 @@ def remarks(measurements: Sequence[Measurement], offsets_n: Sequence[float], flo
         )
 
 
+def blind(measurements: Sequence[Measurement]) -> str:
+    """Why these recordings say nothing of the machine, as a sentence; empty where one of them does: its force moves."""
+    whys = [_blind(each) for each in measurements]
+    return whys[0] if all(whys) else ""
+
+
+def _blind(measurement: Measurement) -> str:
+    moved = _movement(measurement)
+    if not moved or _moves(measurement):
+        return ""
+    return (
+        f"{measurement.name}: the force stands at {np.mean(measurement.force_n[measurement.usable]):.3g} N while {moved}: a "
+        "cell that is not connected, or a tool that touches nothing? As it is, nothing of the machine can be told from it"
+    )
+
+
+def _moves(measurement: Measurement) -> bool:
+    """Does the force move beyond its noise?"""
+    force_n = measurement.force_n[measurement.usable]
+    low_n, high_n = np.quantile(force_n, (0.01, 0.99))
+    return bool(high_n - low_n > _STANDS * fast_noise_n(force_n))
+
+
+def _movement(measurement: Measurement) -> str:
+    """What moves the slide, and by how much; empty where nothing does."""
+    volts, pressure_pa = measurement.command_v, measurement.pressure_pa
+    if volts is not None and np.ptp(volts) > 0.0:
+        return f"command_v moves by {np.ptp(volts):.3g} V"
+    if volts is None and pressure_pa is not None and np.ptp(pressure_pa) > _STANDS * fast_noise_n(pressure_pa):
+        return f"pressure_kpa moves by {np.ptp(pressure_pa) / 1.0e3:.3g} kPa"
+    return ""
+
+
+def nothing_to_switch_off(name: str) -> str:
+    return (
+        f"--without {name}: the base model has no {name} that could be switched off, so nothing was; it competes like "
+        "every other effect"
+    )
+
+
 def too_high_a_floor(given_n: float, rms_n: float) -> str:
     return (
         f"the noise floor of {given_n:.3g} N that was given is more than the base model leaves ({rms_n:.3g} N), so it "
@@ -39,7 +80,12 @@ def _of_a_dead_drive(measurement: Measurement) -> Iterator[str]:
     if volts is None or measurement.pressure_pa is not None or np.ptp(volts) > 0.0:
         return
     force_n = measurement.force_n[measurement.usable]
-    if np.ptp(force_n) > _MOVES * fast_noise_n(force_n):
+    if not _moves(measurement):
+        yield (
+            f"{measurement.name}: command_v stands at {volts[0]:g} V throughout: the model's area and offset cannot be "
+            "told apart"
+        )
+    elif np.ptp(force_n) > _MOVES * fast_noise_n(force_n):
         yield (
             f"{measurement.name}: command_v stands at {volts[0]:g} V throughout while the force moves by "
             f"{np.ptp(force_n):.3g} N: is it the right column? Without a command that moves, no cause can be told"

@@ -17,7 +17,7 @@ from gateway.twin.plant import values
 UNSTATED: Final = "not stated"
 """Source of a number that nobody gave one for."""
 
-_SCHEMA_LINE: Final = "# yaml-language-server: $schema=../schemas/plant.json\n"
+_SCHEMA_LINE: Final = "# force-gateway schema plant > plant.json gives editors the schema\n"
 
 
 def plant_text(profile: PlantProfile, comment: str = "") -> str:

@@ -119,6 +119,27 @@ def test_a_command_that_never_moves_under_a_force_that_does_is_told(tmp_path: Pa
     assert "command_v stands at 2 V throughout" in " ".join(done.output.split())
 
 
+def said(*words: str) -> str:
+    done = CliRunner().invoke(command, ["diagnose", *words])
+    assert done.exit_code == 0, done.output
+    return " ".join(done.output.split())
+
+
+@pytest.mark.parametrize("force_n", [noise(0.05) + 3.0, np.full(TIME_S.size, 3.0)], ids=["noisy", "frozen"])
+def test_a_force_that_does_not_answer_is_told_and_gives_no_plant(tmp_path: Path, force_n: Floats) -> None:
+    path, plant = written(tmp_path / "dead.csv", columns(force_n=force_n)), tmp_path / "plant.yaml"
+    text = said(str(path), "--extend", str(plant))
+    assert "Nothing can be told dead.csv: the force stands at 3 N while command_v moves by" in text
+    assert f"{plant} is not written" in text
+    assert not plant.exists()
+
+
+def test_an_effect_that_is_not_there_cannot_be_switched_off(tmp_path: Path) -> None:
+    path = str(written(tmp_path / "plain.csv", columns()))
+    assert "the base model has no creep that could be switched off" in said(path, "--without", "creep")
+    assert "that could be switched off" not in said(path, "--without", "coulomb-friction")
+
+
 def test_a_floor_above_the_residual_confirms_nothing(tmp_path: Path) -> None:
     bent = {**columns(), "force_n": columns()["force_n"] * (1.0 + 0.002 * columns()["force_n"])}
     path = written(tmp_path / "bent.csv", bent)

@@ -31,7 +31,7 @@ def told(
     """
     yield Text()
     yield Text.assemble(
-        (words.title(diagnosis), f"bold {_COLOUR[diagnosis.verdict]}"),
+        (words.title(diagnosis), f"bold {'yellow' if words.blind(diagnosis) else _COLOUR[diagnosis.verdict]}"),
     )
     yield Text(words.sentence(diagnosis))
     yield Text()
@@ -90,7 +90,8 @@ def _causes(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     yield Text()
     for cause in diagnosis.causes:
         for name, found in cause.parameters.items():
-            yield Padding(Text(f"{found.section}.{name} = {words.estimate(found)}"), (0, 0, 0, 2))
+            told = f"{found.section}.{name} = {words.estimate(found)}{words.was(diagnosis, name, found)}"
+            yield Padding(Text(told), (0, 0, 0, 2))
     yield Text()
 
 

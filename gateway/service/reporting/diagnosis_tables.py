@@ -31,10 +31,10 @@ def causes(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
     if not diagnosis.causes:
         return ""
     heads = ("cause", "confidence", "held-out RMS", "gain", "of the excess", "parameters [95 %]")
-    return table(heads, (_cause(cause, about) for cause in diagnosis.causes), "causes")
+    return table(heads, (_cause(diagnosis, cause, about) for cause in diagnosis.causes), "causes")
 
 
-def _cause(cause: Cause, about: Mapping[str, str]) -> tuple[str, ...]:
+def _cause(diagnosis: Diagnosis, cause: Cause, about: Mapping[str, str]) -> tuple[str, ...]:
     gain = cause.gain
     won_n = gain.held_out_rms_before_n - gain.held_out_rms_after_n
     low_n, high_n = gain.ci95
@@ -45,7 +45,10 @@ def _cause(cause: Cause, about: Mapping[str, str]) -> tuple[str, ...]:
         words.gained(cause),
         f"{words.force(won_n)} N<br><small>[{words.force(low_n)}, {words.force(high_n)}]</small>",
         f"<span class='meter'><i style='width:{100.0 * share:.0f}%'></i></span> {words.percent(gain.share_of_excess)}",
-        "<br>".join(f"{escape(name)} {escape(words.estimate(found))}" for name, found in cause.parameters.items()),
+        "<br>".join(
+            escape(f"{name} {words.estimate(found)}{words.was(diagnosis, name, found)}")
+            for name, found in cause.parameters.items()
+        ),
     )
 
 

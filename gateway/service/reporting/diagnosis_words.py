@@ -4,7 +4,9 @@ from collections.abc import Iterable
 from math import floor, isfinite, log10, sqrt
 from typing import Final
 
+from gateway.diagnosis import remarks
 from gateway.diagnosis.result import Cause, Diagnosis, Estimate, Interval, Verdict
+from gateway.twin.plant import Plant
 
 _SENTENCES: Final = {
     Verdict.NOTHING_FOUND: "Nothing is missing that this recording could show.",
@@ -24,6 +26,8 @@ _PLURAL: Final = {
     "it does": "they do",
     " it ": " them ",
 }
+_NO_AREA_M2: Final = 5.0e-6
+"""What is left of the model's area where no force answers; a small signal leaves it whole."""
 _PARTIAL: Final = (
     "A cause is found, but this recording cannot tell it from others that look alike.",
     "A cause is found that explains the error; to confirm it, repeat a cycle or give the noise floor.",
@@ -35,14 +39,22 @@ _PARTIAL: Final = (
 def title(diagnosis: Diagnosis) -> str:
     """`Partial: creep or warm-up; mains-hum`."""
     names = "; ".join(label(cause) for cause in diagnosis.causes)
-    word = _TITLES[diagnosis.verdict]
+    word = "Nothing can be told" if blind(diagnosis) else _TITLES[diagnosis.verdict]
     return f"{word}: {names}" if names else word
 
 
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, and for `partial` what it lacks."""
+    if why := blind(diagnosis):
+        return f"{why}."
     told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_lack(diagnosis)]
     return _as_several(told) if len(diagnosis.causes) > 1 else told
+
+
+def blind(diagnosis: Diagnosis) -> str:
+    """Why the recordings say nothing, where they do not and nothing else was found."""
+    found = diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
+    return "" if found else remarks.blind([trace.measurement for trace in diagnosis.traces])
 
 
 def _lack(diagnosis: Diagnosis) -> int:
@@ -114,6 +126,13 @@ def estimate(found: Estimate) -> str:
     wide = isfinite(high - low) and high > low
     digits = _digits(max(abs(low), abs(high)), high - low) if wide else 3
     return f"{number(found.value, digits)}{unit} {interval(found.ci95)}"
+
+
+def was(diagnosis: Diagnosis, name: str, found: Estimate) -> str:
+    """` (0.08 before)`, where the plant that was given has the effect already, in another size."""
+    before = getattr(getattr(diagnosis.base, found.section), name) if found.section else 0.0
+    null = getattr(getattr(Plant(), found.section), name) if found.section else 0.0
+    return "" if before == null else f" ({number(before)} before)"
 
 
 def gained(cause: Cause) -> str:

@@ -11,6 +11,7 @@ import pytest
 from gateway.diagnosis.result import Diagnosis, Extended, NotIdentifiable, Verdict
 from gateway.service.reporting import diagnosis_words as words
 from gateway.service.reporting.diagnosis_page import Circumstances, diagnosis_page
+from gateway.twin.plant import with_value
 from tests.service.reporting.fake_diagnosis import FRICTION, WARMTH, diagnosis, trace
 
 ABOUT = {"load-dependent-friction": "friction in proportion to the thrust"}
@@ -190,3 +191,12 @@ def test_partial_says_what_it_lacks() -> None:
         "Causes are found, but this recording cannot tell them from others that look alike.",
         "The causes are found, and nothing is left above the noise floor.",
     ]
+
+
+def test_a_size_that_the_plant_had_already_is_told_beside_the_new_one() -> None:
+    found = FRICTION.parameters["load_dependent_n_per_n"]
+    had = replace(diagnosis(), base=with_value(diagnosis().base, "friction", "load_dependent_n_per_n", 0.08))
+    assert words.was(had, "load_dependent_n_per_n", found) == " (0.0800 before)"
+    assert "(0.0800 before)" in page(had)
+    lacked = replace(had, base=with_value(had.base, "friction", "load_dependent_n_per_n", 0.0))
+    assert words.was(lacked, "load_dependent_n_per_n", found) == ""
