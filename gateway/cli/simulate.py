@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -19,6 +19,8 @@ _WAYS = {
     "measured": "position_mm is taken for the motion of the slide",
     "measured-reversed": "position_mm is taken for the motion of the slide, and counts down when the tool moves out",
 }
+
+_MOST_STEPS: Final = 2_000_000  # one plant alone may have many
 
 
 @click.command()
@@ -69,10 +71,12 @@ def _simulated(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Fl
     from gateway.twin.replay_drive import Motion
 
     ways: tuple[Motion, ...] = ("inferred",) if measurement.position_m is None else MOTIONS
-    answers = [Replay(drive_of(measurement, way)).run([profile.plant]).reading_n[0] for way in ways]
+    replays = [Replay(drive_of(measurement, way), most_steps=_MOST_STEPS) for way in ways]
+    answers = [replay.run([profile.plant]).reading_n[0] for replay in replays]
     errors = [float(np.mean((measurement.force_n - answer)[measurement.usable] ** 2)) for answer in answers]
     best = int(np.argmin(errors))
-    return np.asarray(answers[best]), [_WAYS[ways[best]]] if measurement.position_m is not None else []
+    told = [_WAYS[ways[best]]] if measurement.position_m is not None else []
+    return np.asarray(answers[best]), [*told, *replays[best].notes]
 
 
 def _facts(measurement: "Measurement", simulated_n: "Floats") -> dict[str, Any]:

@@ -21,7 +21,10 @@ from gateway.twin.surroundings import COLUMNS, Surroundings
 
 MOTIONS: Final[tuple[Motion, ...]] = ("inferred", "measured", "measured-reversed")  # how the slide's may be known
 BLOCKS: Final = 20  # per recording, for held-out errors and resampling
-SETTLING_S: Final = 1.0  # of a recording's start are not judged, unless it begins at rest:
+SETTLING_S: Final = 1.0  # of a recording's start are not judged, unless it begins at rest at its lowest:
+_LOWEST: Final = 0.02  # of the drive's range
+_FORGOTTEN: Final = 0.15  # of the drive's range: a drive that went so far has wiped out what friction remembered ...
+_LATEST: Final = 0.25  # ... and this share of a recording may go by until it has
 REST_S: Final = 0.2  # command and force stand still for so long
 _SLACK: Final = 5.0e-3  # of the forces' range that a force at rest may wander
 SURROUNDINGS: Final = COLUMNS  # what a drive takes of a recording's covariates, and of its position
@@ -158,8 +161,7 @@ class Bench:
         parts = []
         for segment in self.segments:
             measurement = self.measurements[segment.recording]
-            settling_s = 0.0 if _begins_at_rest(measurement) else min(SETTLING_S, 0.1 * measurement.duration_s)
-            parts.append(measurement.time_s < settling_s)
+            parts.append(measurement.time_s < (0.0 if _begins_at_rest(measurement) else _settled_s(measurement)))
         return np.concatenate(parts)
 
     def _channel(self, segment: Segment) -> Floats:
@@ -170,10 +172,24 @@ class Bench:
         return measurement.pressure_pa * NOMINAL_AREA_M2
 
 
+def _settled_s(measurement: Measurement) -> float:
+    """When the state before the first row does not matter any more: lags have settled, and friction has slid."""
+    settled_s = min(SETTLING_S, 0.1 * measurement.duration_s)
+    drive = measurement.command_v if measurement.command_v is not None else measurement.pressure_pa
+    if drive is None:
+        return settled_s
+    gone = np.maximum.accumulate(drive) - np.minimum.accumulate(drive)
+    forgotten_s = float(measurement.time_s[int(np.argmax(gone >= _FORGOTTEN * gone[-1]))])
+    return min(settled_s + forgotten_s, max(settled_s, _LATEST * measurement.duration_s))
+
+
 def _begins_at_rest(measurement: Measurement) -> bool:
-    """Do command and force stand still at first, so that the state before the first row is known?"""
+    """Do command and force stand still at first, and the command at its lowest, so that the state before the first row is
+    known? Rest further up may have been reached from either side."""
     rows = measurement.time_s < REST_S
     if measurement.command_v is None or rows.sum() < 8 or np.ptp(measurement.command_v[rows]) > 0.0:
+        return False
+    if measurement.command_v[0] > np.min(measurement.command_v) + _LOWEST * np.ptp(measurement.command_v):
         return False
     first, second = np.array_split(measurement.force_n[rows & measurement.usable], 2)
     if min(first.size, second.size) < 4:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -72,17 +72,28 @@ def _quarter_turn(form: Form, start: Start) -> Start:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """What a candidate promises: gain in chi-square to first order, and where to begin its refinement."""
+    """What a candidate promises: gain in chi-square to first order, and where to begin its refinement.
+
+    power: chi-square that its start would leave if it were not in the model; alone: share of it that the model cannot absorb.
+    """
 
     candidate: Candidate
     gain: float
     point: Point
+    power: float = 0.0
+    alone: float = 0.0
 
 
-def scores(found: Wave, fitted: Fitted, whiten: Whiten) -> tuple[list[Score], Normal]:
+def scores(found: Wave, fitted: Fitted, whiten: Whiten) -> list[Score]:
     """Every candidate's promise beside the present model."""
     normal = Normal(whiten(fitted.jacobian), whiten(found.columns), whiten(fitted.residual_n))
-    return [_score(candidate, normal, fitted.point) for candidate in found.candidates], normal
+    return [_with_power(_score(candidate, normal, fitted.point), normal) for candidate in found.candidates]
+
+
+def _with_power(score: Score, normal: Normal) -> Score:
+    columns = list(score.candidate.columns)
+    power, raw_power = normal.power[columns], np.maximum(normal.raw_power[columns], 1.0e-300)
+    return replace(score, power=float(np.max(power)), alone=float(np.max(power / raw_power)))
 
 
 def _score(candidate: Candidate, normal: Normal, point: Point) -> Score:

@@ -50,10 +50,15 @@ def likely_dead_bands_pa(bench: Bench, fitted: Fitted, whiten: Whitener) -> tupl
     regulator = fitted.point.plant.regulator
     bands_pa = _BANDS_V * regulator.full_scale_pa / regulator.full_scale_v
     rigid = replace(fitted.point, plant=_rigid(fitted.point.plant))
-    without, *banded = bench.simulate([rigid, *(rigid.moved(DEAD_BAND, band_pa) for band_pa in bands_pa)])
-    columns = bench.reduced(np.array(banded) - without)
-    normal = Normal(whiten(fitted.jacobian), whiten(columns), whiten(fitted.residual_n))
-    return tuple(bands_pa[np.argsort(normal.power - 2.0 * normal.slope)[:_BEST]].tolist())
+    without = bench.simulate([rigid])
+    cost = np.zeros(bands_pa.size)
+    for part in _parts(bands_pa.size, bench.rows):
+        columns = bench.reduced(
+            bench.simulate([rigid.moved(DEAD_BAND, band_pa) for band_pa in bands_pa[part]]) - without
+        )
+        normal = Normal(whiten(fitted.jacobian), whiten(columns), whiten(fitted.residual_n))
+        cost[part] = normal.power - 2.0 * normal.slope
+    return tuple(bands_pa[np.argsort(cost)[:_BEST]].tolist())
 
 
 def _rigid(plant: Plant) -> Plant:

@@ -15,7 +15,7 @@ from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.candidates import Score, Wave, best_of_each, scores, wave
 from gateway.diagnosis.catalogue import BY_NAME
 from gateway.diagnosis.effect import Effect, Form, Parameter, Scene
-from gateway.diagnosis.gram import Normal, block_sums
+from gateway.diagnosis.gram import block_sums
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.refine import Fitted, Problem, Whiten, refine
 
@@ -67,8 +67,6 @@ class Contest:
     scene: Scene
     starts: int
     scores: tuple[Score, ...]
-    wave: Wave
-    normal: Normal
 
     @property
     def winner(self) -> Finalist:
@@ -113,7 +111,7 @@ def hold(
     holder: an effect that has been refined before and defends its place; most: effects that become finalists.
     """
     found = wave(bench, fitted, effects, scene)
-    promised, normal = scores(found, fitted, whiten)
+    promised = scores(found, fitted, whiten)
     best = best_of_each(promised, most)
     problems = [Problem(each.point, joined(fitted, each.candidate.form)) for each in best]
     refined = refine(bench, problems, whiten, _WAVES)
@@ -123,9 +121,7 @@ def hold(
     ]
     finalists += [replace(holder, defence=_defence(bench, holder))] if holder else []
     finalists.sort(key=lambda each: -each.penalised)
-    return Contest(
-        fitted, tuple(finalists), _shares(finalists), scene, _starts(found, scene), tuple(promised), found, normal
-    )
+    return Contest(fitted, tuple(finalists), _shares(finalists), scene, _starts(found, scene), tuple(promised))
 
 
 def _defence(bench: Bench, holder: Finalist) -> float:

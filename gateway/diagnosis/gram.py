@@ -51,10 +51,6 @@ class Normal:
         gain = float(sizes @ (self.slope[indices] / scale))
         return Screened(gain, sizes / scale)
 
-    def cosine(self, first: int, second: int) -> float:
-        product = np.sqrt(self.power[first] * self.power[second])
-        return float(abs(self.gram[first, second]) / product) if product > 0.0 else 0.0
-
 
 def orthonormal(rows: Floats) -> Floats:
     """Orthonormal rows that span the same."""

@@ -8,26 +8,23 @@ from collections.abc import Sequence
 from typing import Final
 
 from gateway.diagnosis.bench import Bench
-from gateway.diagnosis.candidates import Wave
+from gateway.diagnosis.candidates import Score
 from gateway.diagnosis.effect import Effect
-from gateway.diagnosis.gram import Normal
 from gateway.diagnosis.result import NotIdentifiable
 
 _VISIBLE: Final = 30.0  # chi-square that an effect must reach at a noticeable size
 
 
 def invisible(
-    bench: Bench, effects: Sequence[Effect], found: Wave, normal: Normal, taken: frozenset[str]
+    bench: Bench, effects: Sequence[Effect], scores: Sequence[Score], taken: frozenset[str]
 ) -> tuple[NotIdentifiable, ...]:
     """Effects that this recording cannot show, with the reason; `taken` are part of the base model or found."""
     strength: dict[str, float] = {}
     share: dict[str, float] = {}
-    for candidate in found.candidates:
-        name = candidate.effect.name
-        for column in candidate.columns:
-            strength[name] = max(strength.get(name, 0.0), float(normal.power[column]))
-            raw = max(float(normal.raw_power[column]), 1.0e-300)
-            share[name] = max(share.get(name, 0.0), float(normal.power[column]) / raw)
+    for score in scores:
+        name = score.candidate.effect.name
+        strength[name] = max(strength.get(name, 0.0), score.power)
+        share[name] = max(share.get(name, 0.0), score.alone)
     answers = []
     columns = bench.columns()
     for effect in effects:

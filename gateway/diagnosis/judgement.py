@@ -79,7 +79,7 @@ def judged(
     causes.sort(key=lambda cause: -cause.gain.share_of_excess)
     names = frozenset(cause.name for cause in causes)
     fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in effects}
-    unseen = invisible(bench, effects, found.first.wave, found.first.normal, names | fixed)
+    unseen = invisible(bench, effects, found.first.scores, names | fixed)
     unexplained = known_n is not None and rms_n > _ABOVE * known_n
     return Diagnosis(
         verdict=_verdict(causes, left, reached=known_n is not None and reaches, unexplained=unexplained),

@@ -107,11 +107,12 @@ def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
     for segment in bench.segments:
         if segment.is_force:
             part = white[segment.rows]
-            levels = np.array([np.mean(block**2) for block in np.array_split(part, BLOCKS)])
-            if not levels.any():
+            counted = part[bench.usable[segment.rows]]
+            if counted.size < BLOCKS or not counted.any():
                 continue
+            levels = np.array([np.mean(block**2) for block in np.array_split(counted, BLOCKS)])
             usual = float(np.median(levels))
-            apart = np.sum((levels / levels.mean() - 1.0) ** 2) * part.size / BLOCKS / 2.0
+            apart = np.sum((levels / levels.mean() - 1.0) ** 2) * counted.size / BLOCKS / 2.0
             if chi2_law.sf(apart, BLOCKS - 1) < _LEVEL and times_are_sure:
                 share = float(np.sum(np.maximum(levels - usual, 0.0)) / np.sum(levels))
                 yield Leftover("time", "louder at some times than at others", share)

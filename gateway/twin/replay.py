@@ -20,7 +20,7 @@ import numpy as np
 from gateway.twin.plant import Plant
 from gateway.twin.replay_drive import Drive, Floats
 from gateway.twin.replay_force import Forces
-from gateway.twin.replay_grid import Grid
+from gateway.twin.replay_grid import MOST_STEPS, Grid
 from gateway.twin.replay_reading import Readings
 from gateway.twin.replay_regulator import Pressures
 from gateway.twin.replay_slide import Slides
@@ -55,13 +55,15 @@ class Response:
 
 @dataclass(slots=True, eq=False)
 class Replay:
-    """One recording, ready to be run with any plants. step_s: about that of the grid; None: as fine as the rows, at most 5 ms.
+    """One recording, ready to be run with any plants. step_s: about that of the grid; None: as fine as the rows, at most 5 ms,
+    but no more than most_steps in all.
 
     notes: what was done to the recording, in sentences.
     """
 
     drive: Drive
     step_s: float | None = None
+    most_steps: int = MOST_STEPS
     grid: Grid = field(init=False)
     _pressures: Pressures = field(init=False)
     _slides: Slides = field(init=False)
@@ -69,7 +71,7 @@ class Replay:
     _readings: Readings = field(init=False)
 
     def __post_init__(self) -> None:
-        self.grid = Grid(self.drive, self.step_s)
+        self.grid = Grid(self.drive, self.step_s, self.most_steps)
         self._pressures = Pressures(self.drive, self.grid)
         self._slides = Slides(self.drive, self.grid)
         self._forces = Forces(self.grid)

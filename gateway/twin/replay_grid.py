@@ -18,7 +18,7 @@ from gateway.twin.replay_drive import Drive, Floats
 from gateway.twin.surroundings import COLUMNS, Moment
 
 COARSEST_S: Final = 5.0e-3
-MOST_STEPS: Final = 80_000
+MOST_STEPS: Final = 80_000  # where many plants share the memory
 _ALIKE: Final = 1.0e-6  # of a step
 
 
@@ -31,12 +31,12 @@ def alike(steps_s: Floats, first: int = 0) -> Real:
 class Grid:
     """Points of time, rows among them, and the surroundings at both. steps_s: a float, or (points - 1,)."""
 
-    def __init__(self, drive: Drive, step_s: float | None) -> None:
+    def __init__(self, drive: Drive, step_s: float | None, most_steps: int = MOST_STEPS) -> None:
         time_s = drive.time_s
         self.row_s = time_s
         self.rows = time_s.size
         self.notes: tuple[str, ...] = ()
-        self.step_s: float = self._step_s(time_s) if step_s is None else step_s
+        self.step_s: float = self._step_s(time_s, most_steps) if step_s is None else step_s
         self._parts = np.maximum(np.round(np.diff(time_s) / self.step_s), 1.0).astype(np.intp)
         self._has_rows = not self.notes  # else there would be too many points
         self.time_s = _divided(time_s, self._parts) if self._has_rows else _even(time_s[-1], self.step_s)
@@ -47,11 +47,11 @@ class Grid:
         self.row_moment = _moment(drive, self.row_s, self)
         self.moment = self.row_moment if self.is_rows else _moment(drive, self.time_s, self)
 
-    def _step_s(self, time_s: Floats) -> float:
+    def _step_s(self, time_s: Floats, most_steps: int) -> float:
         step_s = float(np.median(np.diff(time_s)))
         while step_s > COARSEST_S * (1.0 + _ALIKE):
             step_s *= 0.5
-        shortest_s = float(time_s[-1]) / MOST_STEPS
+        shortest_s = float(time_s[-1]) / most_steps
         if step_s < shortest_s:
             self.notes = (f"simulated in steps of {shortest_s * 1.0e3:.3g} ms, coarser than the rows",)
         return max(step_s, shortest_s)

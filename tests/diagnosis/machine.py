@@ -105,7 +105,7 @@ def plant(changes: Mapping[str, float], start: Plant = MACHINE) -> Plant:
 def readings_n(machine: Plant, time_s: Floats, volts: Floats, columns: Mapping[str, Floats]) -> Floats:
     """What the twin reads, without noise."""
     drive = Drive(time_s=time_s, command_v=volts, surroundings=Surroundings(**columns))
-    return Replay(drive).run([machine]).reading_n[0]
+    return Replay(drive, most_steps=2 * time_s.size).run([machine]).reading_n[0]
 
 
 def measurement(time_s: Floats, volts: Floats | None, force_n: Floats, columns: Mapping[str, Floats]) -> Measurement:

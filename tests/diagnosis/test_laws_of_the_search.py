@@ -53,7 +53,6 @@ def test_a_column_of_the_model_gains_nothing() -> None:
     normal = Normal(model, columns, rng.normal(size=200))
     assert normal.add([0]).gain == 0.0
     assert normal.add([1]).gain > 0.0
-    assert normal.cosine(1, 1) == pytest.approx(1.0)
 
 
 def short(constant_n: float = 0.0, columns: tuple[str, ...] = (), *, seed: int = 4, zero_n: float = 0.4) -> Measurement:

@@ -107,6 +107,9 @@ def test_the_grid_is_as_fine_as_the_rows_and_at_most_5_ms() -> None:
     replay = Replay(Drive(time_s=time_s, command_v=command_at(time_s)))
     assert replay.grid.step_s == pytest.approx(3.75e-3, rel=1.0e-3)
     assert replay.notes == ("simulated in steps of 3.75 ms, coarser than the rows",)
+    whole = Replay(Drive(time_s=time_s, command_v=command_at(time_s)), most_steps=300_000)
+    assert whole.grid.step_s == pytest.approx(1.0e-3)
+    assert whole.notes == ()
 
 
 def test_before_the_first_row_the_command_was_nothing_or_what_is_said() -> None:
