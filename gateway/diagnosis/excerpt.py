@@ -14,6 +14,7 @@ import numpy as np
 from gateway.diagnosis.measurement import Floats, Measurement
 
 MOST_ROWS: Final = 40_000  # of all recordings together
+_UNJUDGED: Final = 0.05  # of a stretch, at its beginning: a rest there is none that a machine begins with
 _CLOSEST_S: Final = 2.0e-3  # rows closer than this may be taken together: a regulator's lag is tens of milliseconds
 
 
@@ -64,11 +65,13 @@ def _stretch(measurement: Measurement, most_rows: int) -> Measurement:
         f"{measurement.name} has {measurement.rows} rows: judged are the {most_rows} in which the drive moves most, "
         f"{start_s:.0f} to {end_s:.0f} s; for slow effects record fewer rows a second"
     )
+    usable = measurement.usable[rows].copy()
+    usable[: int(_UNJUDGED * most_rows)] = False
     return replace(
         measurement,
         time_s=measurement.time_s[rows] - start_s,
         force_n=measurement.force_n[rows],
-        usable=measurement.usable[rows],
+        usable=usable,
         repeated=measurement.repeated[rows],
         command_v=_cut(measurement.command_v, rows),
         pressure_pa=_cut(measurement.pressure_pa, rows),

@@ -31,13 +31,15 @@ def test_rows_that_are_closer_than_they_need_to_be_are_taken_together() -> None:
     assert "8 rows each were taken together" in part.notes[-1]
 
 
-def test_the_liveliest_stretch_is_judged() -> None:
+def test_the_liveliest_stretch_is_judged_but_not_its_beginning() -> None:
     time_s = times_s(100.0)
     volts = np.where((time_s > 40.0) & (time_s < 70.0), 2.0 + np.round(np.sin(time_s), 2), 2.0)
     part = excerpt(long(200.0, 100.0, volts), 6000)
     assert part.rows == 6000
     assert part.time_s[0] == 0.0
     assert part.command_v is not None and np.ptp(part.command_v[300:-300]) == pytest.approx(2.0)
+    assert not part.usable[:300].any()
+    assert part.usable[300:].all()
     assert "in which the drive moves most, 40 to 70 s" in part.notes[-1]
 
 
@@ -49,5 +51,15 @@ def test_a_recording_that_begins_amid_motion_has_no_cause(first: int) -> None:
     volts = command_v(time_s) + 0.3
     force_n = readings_n(MACHINE, time_s, volts, {}) + np.random.default_rng(3).normal(0.0, 0.1, time_s.size)
     found = diagnose([measurement(time_s[rows] - time_s[first], volts[rows], force_n[rows], {})])
+    assert found.causes == ()
+    assert found.leftover == ()
+
+
+def test_a_stretch_that_begins_at_rest_has_no_cause() -> None:
+    """The slide has come down to this rest and friction holds a part of the force; taken for a beginning, it was backlash."""
+    whole = long(200.0, 170.0)
+    part = excerpt(whole, 8000)
+    assert part.command_v is not None and part.command_v[0] == 0.0
+    found = diagnose([part])
     assert found.causes == ()
     assert found.leftover == ()
