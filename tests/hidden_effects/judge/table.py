@@ -54,6 +54,7 @@ def table(rows: Sequence[Row]) -> str:
         ("... the very name first", "", rate(alone, lambda row: row["named"])),
         ("confidently wrong", "<= 2 %", rate(of_kind(answered, *HIDDEN), lambda row: row["wrong"])),
         ("two or three, exact set", ">= 90 %", rate(several, lambda row: row["right"])),
+        ("... any groups that hold it count", "", rate(several, lambda row: row["honest"])),
         ("false alarms", "<= 1 %", rate(of_kind(answered, "null"), lambda row: row["alarm"])),
         ("outside the catalogue: confirmed", "<= 3 %", rate(of_kind(answered, "outside"), lied)),
         ("outside the catalogue: described", ">= 85 %", rate(outside, lambda row: row["described"])),
