@@ -1,4 +1,4 @@
-"""`check`: is this rig file right? Every fault at once, as file:line:column, before anything moves."""
+"""`check`: is this rig file, or plant file, right? Every fault at once, as file:line:column, before anything moves."""
 
 import json
 from typing import TYPE_CHECKING, Any
@@ -9,7 +9,7 @@ from gateway.cli import exit_codes
 from gateway.cli.options import count_of, json_option
 
 if TYPE_CHECKING:
-    from gateway.profiles import Fault, Report, Rig
+    from gateway.profiles import Fault, PlantProfile, Report, Rig
 
 
 @click.command()
@@ -19,26 +19,39 @@ if TYPE_CHECKING:
 def command(context: click.Context, *, rig: str, as_json: bool) -> None:
     """Check a rig and every profile that it names.
 
-    RIG is a shipped name or a file (default: demo). Opens no port.
+    RIG is a shipped name or a file (default: demo), or a plant file, such as diagnose --extend writes. Opens no port.
     """
-    from gateway.profiles import check_report
+    from gateway.profiles import PlantProfile, Report, check_plant, check_report
 
-    report = check_report(rig)
+    plant = check_plant(rig)
+    if isinstance(plant, PlantProfile):
+        _tell_plant(plant, as_json=as_json)
+        return
+    report = check_report(rig) if plant is None else Report(plant, (), None)
     if as_json:
         click.echo(json.dumps(_document(report), indent=2))
     else:
-        _print(report)
+        _print(report, "rig does not start" if plant is None else "plant cannot be used")
     context.exit(exit_codes.CONFIGURATION if report.faults else exit_codes.OK)
 
 
-def _print(report: "Report") -> None:
-    """Faults and warnings as compilers print theirs, on stderr; what was read, on stdout."""
+def _tell_plant(plant: "PlantProfile", *, as_json: bool) -> None:
+    facts = {"plant": f"{plant.name}: {plant.description}"}
+    if as_json:
+        click.echo(json.dumps({"ok": True, "faults": [], "warnings": [], "rig": None, **facts}, indent=2))
+        return
+    for name, value in [*facts.items(), ("ok", "no faults")]:
+        click.echo(f"{name:<12} {value}")
+
+
+def _print(report: "Report", outcome: str) -> None:
+    """Faults and warnings as compilers print theirs, on stderr; what was read, on stdout. outcome: of any fault."""
     for fault in report.faults:
         click.echo(str(fault), err=True)
     for warning in report.warnings:
         click.echo(f"{warning} (warning)", err=True)
     if report.rig is None:
-        click.echo(f"{count_of(report.faults, 'fault')}; this rig does not start", err=True)
+        click.echo(f"{count_of(report.faults, 'fault')}; this {outcome}", err=True)
         return
     for name, value in _facts(report.rig).items():
         click.echo(f"{name:<12} {value}")

@@ -20,7 +20,7 @@ from gateway.diagnosis.judgement import judged
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import Whitener, fast_noise_n, white
 from gateway.diagnosis.refine import Fitted
-from gateway.diagnosis.remarks import nothing_to_switch_off
+from gateway.diagnosis.remarks import blind, nothing_to_switch_off, strange_area
 from gateway.diagnosis.result import Diagnosis
 from gateway.diagnosis.screen import screen
 from gateway.diagnosis.search import search
@@ -72,10 +72,12 @@ def diagnose(
     account("screen")
     result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
     account("judgement")
-    if options.without and not _has(given, options.without):
-        result = replace(result, notes=(*result.notes, nothing_to_switch_off(options.without)))
+    told = [nothing_to_switch_off(options.without)] if options.without and not _has(given, options.without) else []
+    if not blind(measurements) and (why := strange_area(result.base.cylinder.area_m2, given.cylinder.area_m2)):
+        told.append(why)
     return replace(
         result,
+        notes=(*result.notes, *told),
         base=_with_readings_of(given, result.base),
         plant=_with_readings_of(given, result.plant),
         spent_s=account.spent_s,

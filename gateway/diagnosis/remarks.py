@@ -10,6 +10,7 @@ from gateway.diagnosis.noise import fast_noise_n
 
 _MOVES: Final = 30.0  # times the noise, from which a force moves
 _STANDS: Final = 8.0  # times the noise, below which nearly all readings of a force lie that stands
+_STRANGE: Final = 30.0  # times larger or smaller than the start: a unit, more likely than a machine
 _APART: Final = 10.0  # times the floor, from which offsets are told
 
 
@@ -59,6 +60,17 @@ def _movement(measurement: Measurement) -> str:
     if volts is None and pressure_pa is not None and np.ptp(pressure_pa) > _STANDS * fast_noise_n(pressure_pa):
         return f"pressure_kpa moves by {np.ptp(pressure_pa) / 1.0e3:.3g} kPa"
     return ""
+
+
+def strange_area(area_m2: float, start_m2: float) -> str:
+    """A sentence where the force is of another size than the piston can give; empty else."""
+    times = area_m2 / start_m2
+    if 1.0 / _STRANGE < times < _STRANGE:
+        return ""
+    return (
+        f"the force is {times:.3g} times what the start plant's piston of {start_m2 * 1.0e4:.3g} cm2 gives: if that is no "
+        "machine of another size, force_n or the command is in another unit; --columns force_n=HEADER:mn takes it for mN"
+    )
 
 
 def nothing_to_switch_off(name: str) -> str:

@@ -13,7 +13,7 @@ from gateway.profiles.find import root, shipped
 from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
 from gateway.profiles.models import Network, ResidualWatch
 from gateway.profiles.plants import Origin, PlantProfile
-from gateway.profiles.report import Report, check_report, load_rig
+from gateway.profiles.report import Report, check_plant, check_report, load_rig
 from gateway.profiles.rig import CellLine, OutputLine, Rig
 from gateway.profiles.schema import schema
 
@@ -28,6 +28,7 @@ __all__ = [
     "Report",
     "ResidualWatch",
     "Rig",
+    "check_plant",
     "check_report",
     "load_calibration",
     "load_device",

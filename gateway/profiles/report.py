@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -17,12 +17,13 @@ from gateway.profiles.device_files import read_device
 from gateway.profiles.faults import Fault, Findings, ProfileError
 from gateway.profiles.load import asked_for, load_plant, open_profile, read_named, written_at
 from gateway.profiles.models import CellFile, Network, OutputFile, RigFile
-from gateway.profiles.plants import PlantProfile, read_plant
+from gateway.profiles.plants import ABOUT, PlantProfile, read_plant
 from gateway.profiles.register_files import read_registers
 from gateway.profiles.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
 from gateway.profiles.text import Document
-from gateway.profiles.typed import build, build_known
+from gateway.profiles.typed import build, build_known, names
 from gateway.registers.map import RegisterMap
+from gateway.twin import Plant
 
 T = TypeVar("T")
 
@@ -48,6 +49,18 @@ def check_report(name: str | Path) -> Report:
     opened = open_profile("rig", asked_for(name), findings)
     rig = _rig(opened[0], opened[1], findings) if opened else None
     return Report(_in_order(findings.faults), _in_order(findings.warnings), None if findings.faults else rig)
+
+
+def check_plant(name: str | Path) -> PlantProfile | tuple[Fault, ...] | None:
+    """The plant, or its faults, where the file is one by its keys; None where it is anything else."""
+    opened = open_profile("rig", asked_for(name), Findings())
+    if opened is None or not isinstance(opened[0].value, dict):
+        return None
+    keys = frozenset(map(str, opened[0].value)) - frozenset(ABOUT)
+    if not keys or not keys <= frozenset(part.name for part in fields(Plant)) - frozenset(names(RigFile)):
+        return None
+    plant, faults = read_plant(opened[0])
+    return plant or tuple(faults)
 
 
 def load_rig(name: str | Path) -> Rig:

@@ -8,7 +8,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from gateway.cli import exit_codes
 from gateway.ports import PortInfo
+from gateway.profiles import root
 from gateway.registers import RegisterMap
 
 
@@ -55,6 +57,19 @@ def test_check_tells_every_fault_with_its_place(here: Path, call) -> None:
     document = json.loads(call("check", "cell.yaml", "--json").output)
     assert document["ok"] is False
     assert {"file", "line", "column", "path", "message"} == set(document["faults"][0])
+
+
+def test_check_takes_a_plant_file_for_what_it_is(here: Path, call) -> None:
+    text = (root() / "plants" / "paper-slide.yaml").read_text(encoding="utf-8")
+    (here / "plant.yaml").write_text(text, encoding="utf-8")
+    done = call("check", "plant.yaml")
+    assert done.exit_code == 0
+    assert done.output.splitlines()[-1].split(maxsplit=1) == ["ok", "no faults"]
+    assert json.loads(call("check", "plant.yaml", "--json").stdout)["plant"].startswith("paper-slide: ")
+    (here / "plant.yaml").write_text(text.replace("lag_s: {value: ", "lag_s: {value: x"), encoding="utf-8")
+    done = call("check", "plant.yaml")
+    assert done.exit_code == exit_codes.CONFIGURATION
+    assert "regulator.lag_s" in done.output and "1 fault; this plant cannot be used" in done.output
 
 
 def test_check_of_the_shipped_rigs_is_ok(call) -> None:
