@@ -69,7 +69,7 @@ def test_check_takes_a_plant_file_for_what_it_is(here: Path, call) -> None:
     (here / "plant.yaml").write_text(text.replace("lag_s: {value: ", "lag_s: {value: x"), encoding="utf-8")
     done = call("check", "plant.yaml")
     assert done.exit_code == exit_codes.CONFIGURATION
-    assert "regulator.lag_s" in done.output and "1 fault; this plant cannot be used" in done.output
+    assert "regulator.lag_s" in done.output and "2 faults; this plant cannot be used" in done.output
 
 
 def test_check_of_the_shipped_rigs_is_ok(call) -> None:
