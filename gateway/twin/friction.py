@@ -78,6 +78,11 @@ def drags(friction: Friction) -> tuple[Real, Real]:
     return larger(viscous + more_out, 0.0), larger(viscous - more_out, 0.0)
 
 
+def share_of_way(drag_n_s_per_m: Real, stiffness_n_per_m: Real, step_s: Real) -> Real:
+    """How much of its way a slide behind a spring goes in one step against viscous drag (implicit Euler)."""
+    return stiffness_n_per_m / (stiffness_n_per_m + drag_n_s_per_m / step_s)
+
+
 def rested(stiction_n: Real, full_n: Real, share: Real) -> Real:
     """dwell-stiction grows towards `full_n` by this share of what is missing."""
     return stiction_n + share * (full_n - stiction_n)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.twin.elementwise import Real
-from gateway.twin.friction import drags
+from gateway.twin.friction import drags, share_of_way
 from gateway.twin.replay_drive import Floats
 from gateway.twin.replay_grid import Grid
 from gateway.twin.replay_load import Load
@@ -60,8 +60,8 @@ def _band(load: Load, steps_s: Real) -> Band:
 
 
 def _share(drag_n_s_per_m: Real, stiffness_n_per_m: float, steps_s: Real) -> Real:
-    """How much of its way a slide goes in a step."""
-    return stiffness_n_per_m / (stiffness_n_per_m + drag_n_s_per_m / steps_s) if drag_n_s_per_m > 0.0 else 1.0
+    """One number where there is no drag, whatever the steps are."""
+    return share_of_way(drag_n_s_per_m, stiffness_n_per_m, steps_s) if drag_n_s_per_m > 0.0 else 1.0
 
 
 def _bounded(low: Floats, high: Floats, back_n: float, most_n: float) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.twin.friction import BREAKAWAY_M, drags
+from gateway.twin.friction import BREAKAWAY_M, drags, share_of_way
 from gateway.twin.replay_drive import Floats
 from gateway.twin.replay_grid import Grid
 from gateway.twin.replay_load import Load
@@ -73,7 +73,7 @@ def _march(lanes: Lanes, series: list[Floats], state: Floats, forces: Floats) ->
     drives, limits, steps, lasts = series
     grows = 1.0 - np.exp(-steps / lanes.stiction_s)
     speeds = 1.0 / (lanes.stribeck_m_per_s * lasts)
-    outs, backs = (_share(drag, lanes.pad_n_per_m, steps) for drag in (lanes.out_n_s_per_m, lanes.back_n_s_per_m))
+    outs, backs = (share_of_way(drag, lanes.pad_n_per_m, steps) for drag in (lanes.out_n_s_per_m, lanes.back_n_s_per_m))
     per_n, forget = 1.0 / lanes.pad_n_per_m, -1.0 / BREAKAWAY_M
     force, travel, stiction = state[0].copy(), state[1] * _LENGTH_M, state[2].copy()
     curved, ages = bool(np.any(lanes.stribeck_n)), bool(np.any(lanes.stiction_n))
@@ -94,9 +94,3 @@ def _march(lanes: Lanes, series: list[Floats], state: Floats, forces: Floats) ->
             stiction *= np.exp(np.abs(travel) * forget)
         forces[point] = force
     state[0], state[1], state[2] = force, travel / _LENGTH_M, stiction
-
-
-def _share(drag_n_s_per_m: Floats, pad_n_per_m: Floats, steps_s: Floats) -> Floats:
-    """How much of its way a slide goes in a step."""
-    found: Floats = pad_n_per_m / (pad_n_per_m + drag_n_s_per_m / steps_s)
-    return found
