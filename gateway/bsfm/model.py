@@ -102,12 +102,24 @@ class Bsfm:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Response:
+    """How the plant follows a voltage, as a calibration measured it: dead time, then two first-order lags in series, in
+    seconds; second_lag_s 0 where one lag explains it. source: from which data, with what spread."""
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles
+    dead_time_s: float
+    lag_s: float
+    second_lag_s: float = 0.0
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
     """An immutable numbered calibration, as stored: plain values, so that YAML and registers can carry it.
 
     slip_radii_v, slip_shares: empty for the linear blend over blend_span_n. With slip stops, upload and C code still carry
     the linear blend over blend_span_n. force_limits_n: lowest and highest force that the set may be used for, as uploaded;
-    empty where nothing but the branches' reach and the rig bounds it.
+    empty where nothing but the branches' reach and the rig bounds it. response: None where it was not measured.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles
@@ -130,6 +142,7 @@ class Calibration:
     slip_radii_v: tuple[float, ...] = ()
     slip_shares: tuple[float, ...] = ()
     force_limits_n: tuple[float, ...] = ()
+    response: Response | None = None
 
     @property
     def reversal(self) -> Reversal:

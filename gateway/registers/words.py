@@ -5,13 +5,15 @@ from enum import IntEnum, IntFlag
 
 class State(IntEnum):
     """The control state. OFF: output disabled, safe voltage. READY: enabled, nothing to press with yet (setpoint 0,
-    or waiting at the pre-contact force). RAMPING: on the way. HOLDING: at the setpoint. FAULT: latched."""
+    or waiting at the pre-contact force). RAMPING: on the way. HOLDING: at the setpoint. FAULT: latched. CALIBRATING: a
+    calibration or an experiment drives the output, and commands are refused as busy."""
 
     OFF = 0
     READY = 1
     RAMPING = 2
     HOLDING = 3
     FAULT = 4
+    CALIBRATING = 5
 
 
 class Mode(IntEnum):

@@ -15,7 +15,7 @@ def test_reserved_words_inside_a_block_read_zero(bank):
 def test_proof_constants_read_as_documented(bank, register_map):
     assert bank.read_registers(400, 1) == bytes.fromhex("1234")
     assert bank.read_registers(402, 8) == bytes.fromhex("12345678 56781234 449A5000 5000449A")
-    assert bank.read_registers(410, 2) == bytes.fromhex("0001 4647")
+    assert bank.read_registers(410, 2) == bytes.fromhex("0002 4647")
     assert bank.read_registers(412, 2) == register_map.map_hash.to_bytes(4, "big")
 
 
