@@ -23,7 +23,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+REAL_TIME = ("end_to_end", "ports")
+"""Folders whose tests start processes or wait for real lines: one worker runs them one after the other, so that their
+bounds in seconds do not compete with each other."""
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    for item in items:
+        folder = item.path.relative_to(config.rootpath / "tests").parts[0]
+        item.add_marker(pytest.mark.xdist_group("real time" if folder in REAL_TIME else str(item.path)))
     if config.getoption("--long"):
         return
     skip = pytest.mark.skip(reason="needs the bigger budget: ./tools/test --long")
