@@ -6,19 +6,13 @@ control.
 """
 
 from gateway.bsfm.branches import Branches, Crossing
+from gateway.bsfm.coefficients import CoefficientFault, CoefficientLimits, CoefficientReason, Coefficients
 from gateway.bsfm.curve import ORDER_MAX, RationalBezier
 from gateway.bsfm.inverse import Status
-from gateway.bsfm.model import Bsfm, Calibration
+from gateway.bsfm.model import Bsfm, Calibration, Response
 from gateway.bsfm.reversal import FALLING, RISING, DeadBand, Direction, LinearBlend, Memory, Reversal
 from gateway.bsfm.slip import SlipStops
-from gateway.bsfm.validate import (
-    CoefficientFault,
-    CoefficientLimits,
-    CoefficientReason,
-    Coefficients,
-    validate,
-    validate_coefficients,
-)
+from gateway.bsfm.validate import validate, validate_coefficients
 
 __all__ = [
     "FALLING",
@@ -37,6 +31,7 @@ __all__ = [
     "LinearBlend",
     "Memory",
     "RationalBezier",
+    "Response",
     "Reversal",
     "SlipStops",
     "Status",

@@ -1,9 +1,8 @@
 """The model that control asks: force and share in, volts and status out; and the calibration that it is made from.
 
 The share s in [-1, 1] says where between the branches the plant is; the reversal's memory, moved with the force, gives it.
-A calibration names its reversal by its fields: slip stops where `slip_radii_v` has any, else the linear blend. Upload
-and C code carry the linear blend alone: there a calibration with slip stops acts with its `blend_span_n`, which is fitted to
-the same branches for that purpose.
+A calibration names its reversal by its fields: slip stops where `slip_radii_v` has any, else the linear blend over
+`blend_span_n`, which is kept beside stops too: it is what is left of the set for a master that cannot carry them.
 """
 
 from dataclasses import dataclass
@@ -117,9 +116,9 @@ class Response:
 class Calibration:
     """An immutable numbered calibration, as stored: plain values, so that YAML and registers can carry it.
 
-    slip_radii_v, slip_shares: empty for the linear blend over blend_span_n. With slip stops, upload and C code still carry
-    the linear blend over blend_span_n. force_limits_n: lowest and highest force that the set may be used for, as uploaded;
-    empty where nothing but the branches' reach and the rig bounds it. response: None where it was not measured.
+    slip_radii_v, slip_shares: empty for the linear blend over blend_span_n. force_limits_n: lowest and highest force that
+    the set may be used for, as uploaded; empty where nothing but the branches' reach and the rig bounds it. response: None
+    where it was not measured.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles

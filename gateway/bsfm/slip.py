@@ -19,6 +19,7 @@ from gateway.bsfm.branches import Branches
 from gateway.bsfm.reversal import FALLING, Memory
 
 STOPS_MAX: Final = 16
+STOPS_CARRIED: Final = 10  # by a set of registers, and by a fit therefore
 STIFFEST: Final = 0.95  # of h sum c/r: the voltage right after a reversal moves at most 20 times as far as on a branch
 BOUND_SHARE: Final = 0.05  # of the proof of it
 BOUND_RESOLUTION: Final = 1.0e-3  # of the voltage range: a loop narrower than that counts as that wide

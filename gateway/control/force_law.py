@@ -71,7 +71,10 @@ class ForceLaw:
         return self.model.reversal.share(self._memory)
 
     def use(self, model: Bsfm, gravity_n: float) -> None:
-        """Swap the model without a bump: the voltage difference is carried over and fades."""
+        """Swap the model without a bump: the voltage difference is carried over and fades. An equal one changes nothing,
+        for no share says as much as the memory that it would replace."""
+        if model == self.model:
+            return
         before_v, _ = self.feedforward(gravity_n)
         self.model, self._memory = model, model.reversal.at(self.blend)
         self._limits = narrowed(self._rig_limits, model.limits_n)

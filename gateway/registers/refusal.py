@@ -39,6 +39,7 @@ _WIRE: Final = {
     RefusalReason.QUANTITY: (ILLEGAL_VALUE, "W220"),
     RefusalReason.FUNCTION: (ILLEGAL_FUNCTION, "W221"),
     RefusalReason.COEFFICIENTS: (BUSY, "E401"),
+    RefusalReason.EMPTY_SLOT: (ILLEGAL_VALUE, "W331"),
 }
 """Exception code and message code of every reason; a reason without an entry cannot refuse."""
 

@@ -11,18 +11,18 @@ from typing import Final
 
 from gateway.bsfm.model import Calibration
 from gateway.modbus import Peer
-from gateway.registers.coefficients import SET_WORDS, CoefficientSet, set_crc
+from gateway.registers.coefficients import BLOCK_BYTES, HEAD_BYTES, SET_WORDS, TAIL_FROM, CoefficientSet, model_hash
 from gateway.registers.command_block import check_zeros
 from gateway.registers.image import RegisterImage
 from gateway.registers.map import RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.rules import BankRules
-from gateway.registers.words import CommitAction, CommitStatus, RefusalReason
+from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus, RefusalReason
 
 NO_SLOT: Final = 0xFFFF
 
 OnCommit = Callable[[CommitAction, bytes, Peer], None]
-"""on_commit(action, words from order through target_slot, peer); raises Refusal to refuse."""
+"""on_commit(action, words of the staging block, peer); raises Refusal to refuse."""
 OnSelect = Callable[[int, Peer], None]
 
 
@@ -35,10 +35,10 @@ class StagingBlock:
         self._image = image
         self._rules = rules
         self._first = register_map.find("order@staging").address
-        self._end = register_map.find("target_slot@staging").address + 1
         self._commit = register_map.find("commit").address
         self._select = register_map.find("slot_select").address
         self._shown = [register_map.find(name) for name in ("commit_status", "failing_index", "failing_reason")]
+        self._notice = register_map.find("commit_notice")
         self._active = [
             register_map.find(name) for name in ("length@active", "crc32@active", "model_hash", "active_slot")
         ]
@@ -58,17 +58,25 @@ class StagingBlock:
         self._check_reserved(address, data)
         self._store(address, data, peer)
 
-    def show_commit(self, status: CommitStatus, failing_index: int = 0, failing_reason: int = 0) -> None:
+    def show_commit(
+        self,
+        status: CommitStatus,
+        failing_index: int = 0,
+        failing_reason: int = 0,
+        notice: CommitNotice = NO_NOTICE,
+    ) -> None:
         """How far a commit is, from whoever serves it; checking and writing lock the block."""
         self._status = status
+        self._image.put(self._notice, notice)
         for register, value in zip(self._shown, (status, failing_index, failing_reason), strict=True):
             self._image.put(register, value)
 
     def show_active(self, calibration: Calibration, slot: int) -> None:
-        """The set in use, with its CRC; the same number is model_hash."""
+        """The set in use, with its model_hash; the same number is crc32."""
         words = CoefficientSet.of_calibration(calibration).to_words()
-        self._image.write(self._active_first, words)
-        crc = set_crc(words)
+        self._image.write(self._active_first, words[:HEAD_BYTES])
+        self._image.write(self._active_first + TAIL_FROM, words[HEAD_BYTES:])
+        crc = model_hash(calibration)
         for register, value in zip(self._active, (SET_WORDS, crc, crc, slot), strict=True):
             self._image.put(register, value)
 
@@ -100,7 +108,7 @@ class StagingBlock:
             raise Refusal(RefusalReason.COEFFICIENTS, self._commit, text, value=word)
         self._image.write(self._commit, b"\0\0")
         if word and self.on_commit is not None:
-            staged = self._image.read(self._first, self._end - self._first)
+            staged = self._image.read(self._first, BLOCK_BYTES // 2)
             self.on_commit(CommitAction(word), staged, peer)
 
     def _choose(self, peer: Peer) -> None:

@@ -1,6 +1,7 @@
 """Numbers with names that masters rely on: frozen within a map version; profiles/registers repeats them and a test compares."""
 
 from enum import IntEnum, IntFlag
+from typing import Final
 
 
 class State(IntEnum):
@@ -112,6 +113,7 @@ class RefusalReason(IntEnum):
     QUANTITY = 19
     FUNCTION = 20
     COEFFICIENTS = 21
+    EMPTY_SLOT = 30
 
 
 class CalibrationPhase(IntEnum):
@@ -149,8 +151,18 @@ class CommitStatus(IntEnum):
     FAILED = 4  # the active set stays
 
 
+class CommitNotice(IntFlag):
+    """What a master should know of the last commit, beside that it went through."""
+
+    WITHOUT_STOPS = 1 << 0  # its set came in the form of version 1 of the map: the linear blend, no response
+    KNOWN_SET = 1 << 1  # it was known here, and keeps number and name
+
+
+NO_NOTICE: Final = CommitNotice(0)
+
+
 class UploadReason(IntEnum):
-    """Why a commit failed where no coefficient is to blame: failing_reason, beside gateway.bsfm.CoefficientReason (0..10)."""
+    """Why a commit failed where no coefficient is to blame: failing_reason, beside gateway.bsfm.CoefficientReason (0..15)."""
 
     LENGTH = 20
     CRC = 21
@@ -160,3 +172,4 @@ class UploadReason(IntEnum):
     STORAGE = 25  # E431: the set is good, the disk took it not
     NOT_STORED = 26  # E432, E433: what slot or rollback name is damaged, or is not there
     DEFECT = 27  # A499: of ours
+    STOPS_CUT = 28  # the read-back of a model with more slip stops than the registers carry

@@ -2,24 +2,26 @@
 model, and only then select it durably. The functions touch the store and nothing of the loop.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from hashlib import sha256
 
 from gateway.bsfm import Bsfm, Calibration, CoefficientLimits, Coefficients, validate_coefficients
 from gateway.registers.coefficients import CoefficientSet
 from gateway.registers.staging import Staged, StagedFault
+from gateway.registers.words import NO_NOTICE, CommitNotice
 from gateway.service.calibration_store import UNKNOWN_N, CalibrationStore, StoreError
 from gateway.service.selection import Pointer
 
 
 @dataclass(frozen=True, slots=True)
 class InUse:
-    """A calibration, its model (ready, for the loop has no time to prove one), and the selection that made it active."""
+    """A calibration, its model (ready, for the loop has no time to prove one), and the selection that made it active.
+    notice: what a master should know of the commit that led to it."""
 
     calibration: Calibration
     model: Bsfm
     pointer: Pointer
+    notice: CommitNotice = NO_NOTICE
 
 
 class NotFit(Exception):  # noqa: N818  no failure of ours
@@ -57,18 +59,22 @@ class Activation:
         previous = self.store.previous()
         return self.take(previous.number, previous.slot)
 
-    def take_uploaded(self, fresh: Calibration, slot: int, known: Iterable[int]) -> InUse:
-        """Store an uploaded set, fill its slot and select it. known: numbers that may hold the very same set already."""
-        number = next((number for number in dict.fromkeys(known) if self._holds(number, fresh)), None)
-        return self.take(self.store.add(fresh) if number is None else number, slot)
+    def take_uploaded(self, fresh: Calibration, slot: int, known: Pointer) -> InUse:
+        """Store an uploaded set, fill its slot and select it. One that is known already, word for word, keeps its number, its
+        name and all that the words do not carry. known: what is in use, in slots, or was in use before; the rig's own is
+        known as well."""
+        numbers = (known.active.number, known.slots[slot] or None, *known.numbers, None)
+        for number in dict.fromkeys(numbers):
+            if self._holds(number, fresh):
+                return replace(self.take(number, slot), notice=CommitNotice.KNOWN_SET)
+        return self.take(self.store.add(fresh), slot)
 
-    def _holds(self, number: int, fresh: Calibration) -> bool:
-        """A stored set with slip stops is another one: an upload carries the linear blend alone."""
+    def _holds(self, number: int | None, fresh: Calibration) -> bool:
         try:
-            stored = self.store.load(number)
+            stored = self.store.built_in if number is None else self.store.load(number)
         except StoreError:
             return False
-        return not stored.slip_radii_v and _words(stored) == _words(fresh)
+        return stored is not None and _words(stored) == _words(fresh)
 
     def _fault(self, calibration: Calibration) -> StagedFault | None:
         for found in validate_coefficients(Coefficients.of_calibration(calibration), self.limits):
@@ -96,7 +102,10 @@ def uploaded(staged: Staged, *, name: str, rig: str, date_utc: str, source: str)
         source=source,
         rig=rig,
         data_sha256="",
+        slip_radii_v=coefficients.slip_radii_v,
+        slip_shares=coefficients.slip_shares,
         force_limits_n=staged.force_limits_n,
+        response=coefficients.response and replace(coefficients.response, source=source),
     )
     return replace(fresh, data_sha256=sha256(_words(fresh)).hexdigest())
 

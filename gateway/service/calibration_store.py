@@ -21,7 +21,7 @@ from gateway.profiles.calibrations import read_calibration
 from gateway.profiles.text import parse
 from gateway.registers.staging import SLOTS
 from gateway.service.durable import locked, make_directory, put, sealed, unsealed
-from gateway.service.selection import BUILT_IN, Pointer, Selection, read_pointer, write_pointer
+from gateway.service.selection import BUILT_IN, OWN, Pointer, Selection, read_pointer, write_pointer
 
 _NAME: Final = re.compile(r"(\d{4})\.yaml")
 _LAST: Final = 9999
@@ -98,7 +98,7 @@ class CalibrationStore:
         pointer, notes = self._pointer()
         for selection in (pointer.active, pointer.previous):
             if selection.number is None:
-                break
+                return Standing(self.built_in, selection, pointer, notes)
             try:
                 calibration = self.load(selection.number)
                 fault = why_not(calibration)
@@ -114,8 +114,8 @@ class CalibrationStore:
         nothing has changed, for one that cannot be loaded or when the disk refuses."""
         if number is not None and self.load(number) is self.built_in:
             number = None
-        if slot is not None and (number is None or not 0 <= slot < SLOTS):
-            raise StoreError(f"E433 slot {slot}: 0 .. {SLOTS - 1} take calibrations of the store")
+        if slot is not None and not 0 <= slot < SLOTS:
+            raise StoreError(f"E433 slot {slot}: there are 0 .. {SLOTS - 1}")
         return self._change(Selection(number, slot))
 
     def rollback(self) -> Pointer:
@@ -128,13 +128,14 @@ class CalibrationStore:
         pointer, _ = self._pointer()
         if pointer.generation == 0:
             raise StoreError("E433 no calibration was in use before this one: there is nothing to go back to")
-        number, slot = pointer.previous.number, pointer.previous.slot
-        kept = slot is not None and pointer.slots[slot] == number
-        return Selection(number, slot if kept else None)
+        previous = pointer.previous
+        kept = previous.slot is not None and pointer.in_slot(previous.slot) == previous
+        return previous if kept else Selection(previous.number)
 
     def slot(self, slot: int) -> int | None:
-        """The number of the calibration in a slot (0 .. 7), None when it is empty."""
-        return self._pointer()[0].slots[slot]
+        """The number of the calibration in a slot (0 .. 7), that of the built-in one included; None when it is empty."""
+        number = self._pointer()[0].slots[slot]
+        return self.built_in.number if number == OWN and self.built_in else number
 
     def _change(self, selection: Selection) -> Pointer:
         try:

@@ -3,6 +3,9 @@
 A change writes the next generation (gateway.service.durable), so the active set is the old one or the new one and never a
 mixture: number, slot and all eight slots change together. The whole generation before is kept for the case that the
 newest is damaged; others are removed.
+
+A slot may hold the rig's built-in calibration: not its number, which another rig file may give to another set, but OWN,
+which means what the rig's file names, as "none chosen" does.
 """
 
 import json
@@ -15,6 +18,7 @@ from gateway.registers.staging import SLOTS
 from gateway.registers.staging_block import NO_SLOT
 from gateway.service.durable import put, remove, sealed, unsealed
 
+OWN: Final = 0  # in a slot; numbers of the store begin at 1
 _NAME: Final = re.compile(r"active\.(\d{6,})")
 
 
@@ -36,7 +40,8 @@ BUILT_IN: Final = Selection()
 
 @dataclass(frozen=True, slots=True)
 class Pointer:
-    """active: what is in use; previous: what a rollback brings back; slots: number of the calibration in each, or None."""
+    """active: what is in use; previous: what a rollback brings back; slots: number of the calibration in each, OWN for the
+    rig's built-in one, None where it is empty."""
 
     generation: int = 0
     active: Selection = BUILT_IN
@@ -47,13 +52,18 @@ class Pointer:
     def numbers(self) -> tuple[int, ...]:
         """Calibrations of the store that this speaks of."""
         named = (self.active.number, self.previous.number, *self.slots)
-        return tuple(number for number in named if number is not None)
+        return tuple(number for number in named if number)
+
+    def in_slot(self, slot: int) -> Selection | None:
+        """What selecting a slot (0 .. 7) means; None when it is empty."""
+        number = self.slots[slot]
+        return None if number is None else Selection(number or None, slot)
 
     def with_active(self, selection: Selection, previous: Selection) -> "Pointer":
         """What holds after a change; a selection with a slot fills that slot."""
         slots = list(self.slots)
         if selection.slot is not None:
-            slots[selection.slot] = selection.number
+            slots[selection.slot] = selection.number or OWN
         return replace(self, active=selection, previous=previous, slots=tuple(slots))
 
 

@@ -4,25 +4,28 @@ wish for another calibration. The part in the loop.
 One at a time. A worker thread checks (up to milliseconds at order 15) and waits for the disk; `committed` is shown when
 the directory's fsync is through and the set is in use. Whether the output is enabled does not matter, for the controller
 swaps models without a bump. On any failure the active set stays, in the controller and on the disk. A set that is in a
-slot or in use already keeps its number, so that a master which uploads its recipe for every part does not fill the disk.
+slot or in use already keeps its number and name, so that a master which uploads its recipe for every part does not fill
+the disk, and reading the active set back and committing it changes nothing.
 
 A commit fills its slot and is in use from then on. A dry run ends in `idle` when the set would be accepted. A failure
-that is no coefficient's fault (a full disk, a damaged slot) has failing_index -1 and a reason of its own. Force limits are
+that is no coefficient's fault (a full disk, a damaged slot) has failing_index -1 and a reason of its own. commit_notice
+tells what a success does not: a set of the older, shorter form (W330), a set that was known already. Force limits are
 kept with the set: while it is in use the smaller of its limit and the rig's holds. What a tool of this machine asks for
 shows in the active block, not in commit_status, which is the masters'.
 """
 
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from gateway.modbus import Peer
+from gateway.registers.coefficients import HEAD_WORDS
 from gateway.registers.map import RegisterMap
 from gateway.registers.refusal import Refusal
-from gateway.registers.staging import StagedFault, check_staged
+from gateway.registers.staging import Staged, StagedFault, check_staged
 from gateway.registers.staging_block import StagingBlock
-from gateway.registers.words import CommitAction, CommitStatus, RefusalReason, UploadReason
+from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus, RefusalReason, UploadReason
 from gateway.service.activation import Activation, InUse, NotFit, uploaded
 from gateway.service.apart import Apart, Done, Work
 from gateway.service.calibration_store import Standing, StoreError
@@ -66,10 +69,10 @@ class Upload:
         self._rules = rules
         self._log = log
         self._calibration = standing.calibration
-        self._active = standing.selection
-        self._slots = standing.pointer.slots
+        self._pointer = replace(standing.pointer, active=standing.selection)
         self._doing = ""
         self._shows = False  # whether commit_status tells of what is being done
+        self._notice = NO_NOTICE
         self._jobs = 0
         self._said, self._failed_last = "", False
         staging.on_commit = self._on_commit
@@ -96,29 +99,34 @@ class Upload:
             self._fail(found)
         elif isinstance(found, StagedFault):
             self._fail(NotFit(found))
-        elif action is CommitAction.DRY_RUN:
-            self._end(CommitStatus.IDLE, f"info {self._doing}: the set would be accepted")
         else:
-            slot = found.slot
-            fresh = uploaded(
-                found,
-                name=f"slot-{slot}",
-                rig=self._rules.rig_name,
-                date_utc=self._rules.today(),
-                source=f"upload over Modbus by {peer.host}",
-            )
-            known = [number for number in (self._slots[slot], self._active.number, *self._slots) if number is not None]
-            self._staging.show_commit(CommitStatus.WRITING)
-            self.apart(lambda: self._activation.take_uploaded(fresh, slot, known), self._on_taken)
+            self._notice = CommitNotice.WITHOUT_STOPS if found.without_stops else NO_NOTICE
+            if action is CommitAction.DRY_RUN:
+                self._end(CommitStatus.IDLE, self._told("the set would be accepted"))
+            else:
+                self._take(found, peer)
+
+    def _take(self, found: Staged, peer: Peer) -> None:
+        fresh = uploaded(
+            found,
+            name=f"slot-{found.slot}",
+            rig=self._rules.rig_name,
+            date_utc=self._rules.today(),
+            source=f"upload over Modbus by {peer.host}",
+        )
+        known = self._pointer
+        self._staging.show_commit(CommitStatus.WRITING)
+        self.apart(lambda: self._activation.take_uploaded(fresh, found.slot, known), self._on_taken)
 
     def _on_select(self, slot: int, peer: Peer) -> None:
         self._check_free(self._rules.select_address)
-        number = self._slots[slot]
-        if number is None:
-            text = f"slot {slot} is empty; active set {self._calibration.number} unchanged"
-            raise Refusal(RefusalReason.COEFFICIENTS, self._rules.select_address, text, value=slot)
+        chosen = self._pointer.in_slot(slot)
+        if chosen is None:
+            filled = ", ".join(str(k) for k, number in enumerate(self._pointer.slots) if number is not None) or "none"
+            text = f"slot {slot} is empty, filled: {filled}; active set {self._calibration.number} unchanged"
+            raise Refusal(RefusalReason.EMPTY_SLOT, self._rules.select_address, text, value=slot)
         self._begin(f"slot {slot} selected by {peer}", CommitStatus.WRITING)
-        self.apart(lambda: self._activation.take(number, slot), self._on_taken)
+        self.apart(lambda: self._activation.take(chosen.number, slot), self._on_taken)
 
     def _check_free(self, address: int) -> None:
         if self._doing:
@@ -139,8 +147,8 @@ class Upload:
         return {
             "active": self._calibration.number,
             "name": self._calibration.name,
-            "slot": self._active.slot,
-            "built_in": self._active.number is None,
+            "slot": self._pointer.active.slot,
+            "built_in": self._pointer.active.number is None,
             "job": self._jobs,
             "busy": bool(self._doing),
             "said": self._said,
@@ -158,7 +166,7 @@ class Upload:
 
     def _begin(self, what: str, status: CommitStatus | None) -> None:
         self._jobs += 1
-        self._doing, self._shows = what, status is not None
+        self._doing, self._shows, self._notice = what, status is not None, NO_NOTICE
         if status is not None:
             self._staging.show_commit(status)
 
@@ -168,13 +176,15 @@ class Upload:
             return
         taken: InUse = result
         self._calibration = taken.calibration
-        self._active, self._slots = taken.pointer.active, taken.pointer.slots
+        self._pointer = taken.pointer
         self.on_use(taken)
-        self._end(CommitStatus.COMMITTED, f"info {self._doing}: {_described(taken)}")
+        self._notice |= taken.notice
+        self._end(CommitStatus.COMMITTED, self._told(_described(taken)))
 
     def _fail(self, error: Exception) -> None:
         """NotFit and StoreError are answers; anything else is our defect, which must not stop the control."""
         index, reason, active = _NO_COEFFICIENT, int(UploadReason.DEFECT), self._calibration.number
+        self._notice = NO_NOTICE
         if isinstance(error, NotFit):
             index, reason, sentence = error.fault.index, int(error.fault.reason), error.fault.sentence(active)
         elif isinstance(error, StoreError):
@@ -188,16 +198,24 @@ class Upload:
     def _end(self, status: CommitStatus, sentence: str, index: int = 0, reason: int = 0) -> None:
         self._doing, self._said, self._failed_last = "", sentence, status is CommitStatus.FAILED
         if self._shows:
-            self._staging.show_commit(status, index, reason)
+            self._staging.show_commit(status, index, reason, self._notice)
         self._log("calibration", sentence)
+
+    def _told(self, what: str) -> str:
+        """The log line of something that went well, with what the notice says."""
+        known = "; known here, it keeps number and name" if self._notice & CommitNotice.KNOWN_SET else ""
+        if self._notice & CommitNotice.WITHOUT_STOPS:
+            old = f"length {HEAD_WORDS}, as of map version 1: no slip stops, no response"
+            return f"W330 {self._doing}: {what}; {old}{known}"
+        return f"info {self._doing}: {what}{known}"
 
 
 def _described(taken: InUse) -> str:
-    """`calibration 17 (slot-3) in use, slot 3: bsfm n=2, 1.2 .. 65.1 N`."""
+    """`calibration 17 (slot-3) in use, slot 3: bsfm n=2, slip, 7 stops, 1.2 .. 65.1 N`."""
     calibration, slot = taken.calibration, taken.pointer.active.slot
     where = "" if slot is None else f", slot {slot}"
     low_n, high_n = calibration.allowed_n
     return (
         f"calibration {calibration.number} ({calibration.name}) in use{where}: "
-        f"{calibration.kind}, {low_n:.1f} .. {high_n:.1f} N"
+        f"{calibration.kind}, {calibration.reversal_kind}, {low_n:.1f} .. {high_n:.1f} N"
     )

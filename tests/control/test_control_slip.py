@@ -63,6 +63,17 @@ def test_changing_the_reversal_makes_no_bump():
     assert force_law.feedforward(0.0)[0] == pytest.approx(before_v, abs=1e-12)
 
 
+def test_an_equal_model_swapped_in_leaves_the_memory_of_every_stop():
+    """The share alone would give the same voltage now and another one after the next reversal."""
+    swapped, kept = law(slip()), law(slip())
+    for each in (swapped, kept):
+        go(each, 30.0, 15.0, 20.0)
+    swapped.use(slip(), 0.0)
+    assert [go(swapped, force_n) for force_n in (18.0, 24.0, 16.0)] == [
+        go(kept, force_n) for force_n in (18.0, 24.0, 16.0)
+    ]
+
+
 def test_tilting_the_payload_moves_no_stop():
     force_law = law(slip())
     go(force_law, 30.0, 18.0)

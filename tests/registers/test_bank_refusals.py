@@ -208,7 +208,7 @@ def test_every_refusal_is_told_with_its_peer(bank, master):
 
 def test_reserved_words_accept_zero(bank, master):
     before = bank.command
-    for address in (130, 226, 227, 264, 401, 1650):
+    for address in (130, 226, 227, 264, 401, 1646, 1659):
         master.write(address, 0)
     master.write(13, 0, 0, 0)
     assert bank.command.force_setpoint_n == before.force_setpoint_n

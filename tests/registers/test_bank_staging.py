@@ -3,6 +3,7 @@
 import struct
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -59,10 +60,15 @@ def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
         force_low_n=1.0,
         force_high_n=59.0,
         blend_span_n=3.0,
+        stops=3,
+        slip_radii_v=(0.25, 0.5, 1.5),
+        slip_shares=(0.5, 0.375, 0.125),
+        response_s=(0.0625, 0.125, 0.25),
     )
     words = given.to_words()
     bank.write_registers(1000, words[:200], master.peer)
-    bank.write_registers(1100, words[200:], master.peer)
+    bank.write_registers(1100, words[200:280], master.peer)
+    bank.write_registers(1150, words[280:], master.peer)
     expected = {
         "order": 2,
         "range_high": 8.0,
@@ -72,10 +78,20 @@ def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
         "falling_b_2": 32.0,
     }
     expected |= {"falling_w_0": 40.0, "force_low": 1.0, "force_high": 59.0, "blend_span": 3.0}
+    expected |= {"slip_stops": 3, "dead_time": 0.0625, "lag": 0.125, "second_lag": 0.25}
+    expected |= {
+        "slip_radius_0": 0.25,
+        "slip_radius_2": 1.5,
+        "slip_radius_9": 0.0,
+        "slip_share_1": 0.375,
+        "slip_share_9": 0.0,
+    }
     for name, value in expected.items():
         register = register_map.find(f"{name}@staging")
         assert register.decode(bank.read_registers(register.address, register.words)) == value, name
-    assert CoefficientSet.from_words(words).rising_handles_n[:3] == given.rising_handles_n
+    found = CoefficientSet.from_words(words)
+    assert (found.rising_handles_n[:3], found.slip_shares[:3]) == (given.rising_handles_n, given.slip_shares)
+    assert (found.stops, found.response_s) == (3, given.response_s)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +99,8 @@ def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
     [
         ((1001, 1), RefusalReason.RESERVED),
         ((1140, 140, 1), RefusalReason.RESERVED),
-        ((1199, 5), RefusalReason.RESERVED),
+        ((1151, 5), RefusalReason.RESERVED),
+        ((1157, 0, 5), RefusalReason.RESERVED),
         ((1146, 3), RefusalReason.READ_ONLY),
         ((1145, 1), RefusalReason.COEFFICIENTS),
         ((1145, 9), RefusalReason.OUT_OF_RANGE),
@@ -98,13 +115,13 @@ def test_what_staging_refuses_leaves_no_trace(master, words, reason):
 
 def test_commit_is_passed_on_with_the_staged_words_and_reads_zero(bank, master):
     seen = []
-    bank.staging.on_commit = lambda action, words, peer: seen.append((action, len(words), words[-2:], peer))
+    bank.staging.on_commit = lambda action, words, peer: seen.append((action, len(words), words[288:290], peer))
     master.write(1144, 5, 1)
     assert (master.word(1144), master.word(1145)) == (5, 0)
     master.write(1145, 2)
     master.write(1145, 0)
     assert [entry[0] for entry in seen] == [CommitAction.COMMIT, CommitAction.DRY_RUN]
-    assert seen[0][1:] == (290, b"\0\5", master.peer)
+    assert seen[0][1:] == (400, b"\0\5", master.peer)
 
 
 def test_a_commit_that_its_server_refuses_changes_nothing(bank, master):
@@ -133,20 +150,22 @@ def test_a_slot_is_selected_by_its_number(bank, master):
 
 
 def test_the_active_set_is_read_back_with_its_crc(bank, register_map):
-    bank.set_active_model(CALIBRATION, slot=4)
-    words = bank.read_registers(1500, 100) + bank.read_registers(1600, 40)
+    given = replace(CALIBRATION, slip_radii_v=(0.5, 1.0), slip_shares=(0.75, 0.25))
+    bank.set_active_model(given, slot=4)
+    words = bank.read_registers(1500, 100) + bank.read_registers(1600, 40) + bank.read_registers(1650, 50)
     assert len(words) == SET_BYTES
-    assert words == CoefficientSet.of_calibration(CALIBRATION).to_words()
+    assert words == CoefficientSet.of_calibration(given).to_words()
     crc = zlib.crc32(words).to_bytes(4, "big")
-    assert bank.read_registers(1640, 1) == (140).to_bytes(2, "big")
+    assert bank.read_registers(1640, 1) == (190).to_bytes(2, "big")
     assert bank.read_registers(1642, 2) == bank.read_registers(414, 2) == crc
     assert bank.read_registers(1644, 1) == b"\0\4"
     register = register_map.find("falling_b_1@active")
     assert register.decode(bank.read_registers(register.address, 2)) == 30.0
+    assert bank.read_registers(register_map.find("slip_stops@active").address, 1) == b"\0\2"
 
 
 def test_sets_that_cannot_be_carried_are_said():
-    with pytest.raises(ValueError, match="at most 16"):
+    with pytest.raises(ValueError, match="17 numbers in an array of at most 16"):
         CoefficientSet(16, 0.0, 1.0, (0.0,) * 17, (), (), (), 0.0, 1.0, 0.0).to_words()
-    with pytest.raises(ValueError, match="a set has 280"):
+    with pytest.raises(ValueError, match="4 bytes, a set has 380, or 280"):
         CoefficientSet.from_words(bytes(4))

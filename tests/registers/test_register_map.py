@@ -8,7 +8,7 @@ import pytest
 from gateway.bsfm.validate import CoefficientReason
 from gateway.registers import MapError, RegisterMap, UnknownRegister
 from gateway.registers import words as w
-from gateway.registers.coefficients import SET_WORDS
+from gateway.registers.coefficients import HEAD_WORDS, SET_WORDS, TAIL_FROM, UNUSED_WORDS
 from gateway.registers.residual_cause import ResidualCause
 
 COMMAND = (
@@ -76,7 +76,12 @@ ENUMERATIONS = {
     "commit": w.CommitAction,
     "commit_status": w.CommitStatus,
 }
-FLAGS = {"control_word": w.ControlBit, "status_word": w.StatusBit, "warning_word": w.WarningBit}
+FLAGS = {
+    "control_word": w.ControlBit,
+    "status_word": w.StatusBit,
+    "warning_word": w.WarningBit,
+    "commit_notice": w.CommitNotice,
+}
 
 
 @pytest.mark.parametrize("name", ENUMERATIONS)
@@ -96,12 +101,23 @@ def test_failing_reasons_are_those_of_the_checks(register_map):
 
 def test_active_block_is_laid_out_like_staging(register_map):
     first = register_map.find("order@staging").address, register_map.find("order@active").address
-    common = [register for register in register_map.registers_of("staging") if register.address < 1000 + SET_WORDS]
-    for staged in [*common, register_map.find("length@staging"), register_map.find("crc32@staging")]:
-        active = register_map.find(f"{staged.name}@active")
-        assert active.address - first[1] == staged.address - first[0]
-        assert (active.type, active.unit, active.access) == (staged.type, staged.unit, "R")
-    assert max(register.address + register.words for register in common) == 1000 + SET_WORDS
+    active = {register.name: register for register in register_map.registers_of("active")}
+    staging = register_map.registers_of("staging")
+    for staged in (register for register in staging if register.name in active):
+        found = active.pop(staged.name)
+        assert found.address - first[1] == staged.address - first[0]
+        assert (found.type, found.unit, found.access) == (staged.type, staged.unit, "R")
+    assert set(active) == {"active_slot", "commit_notice"}
+
+
+def test_a_sets_words_are_the_registers_of_the_two_stretches_that_the_crc_covers(register_map):
+    held = {
+        register.address - 1000 + k for register in register_map.registers_of("staging") for k in range(register.words)
+    }
+    stretches = {*range(HEAD_WORDS), *range(TAIL_FROM, TAIL_FROM + SET_WORDS - HEAD_WORDS)}
+    assert stretches - held == set(UNUSED_WORDS)
+    assert len(stretches) == SET_WORDS == 190 and max(stretches) == 199
+    assert f"{SET_WORDS}: 1000-1139, then 1150-1199. {HEAD_WORDS}:" in register_map.find("length@staging").text
 
 
 def test_a_bare_name_means_the_int16_register(register_map):

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.bsfm.validate import CoefficientLimits, CoefficientReason, Coefficients
-from gateway.registers.coefficients import SET_BYTES, CoefficientSet, set_crc
-from gateway.registers.staging import STAGED_BYTES, StagedFault, check_staged
+from gateway.bsfm import CoefficientLimits, CoefficientReason, Coefficients, Response
+from gateway.registers.coefficients import BLOCK_BYTES, SET_BYTES, CoefficientSet, set_crc, words_of_block
+from gateway.registers.staging import StagedFault, check_staged
+from gateway.registers.values import float32
 from gateway.registers.words import UploadReason
 
 LIMITS = CoefficientLimits(cell_range_n=100.0)
@@ -27,9 +28,17 @@ GOOD = CoefficientSet(
 )
 
 
-def staged(given: CoefficientSet = GOOD, *, length: int = 140, slot: int = 3, crc: int | None = None) -> bytes:
+SLIP = replace(
+    GOOD, stops=2, slip_radii_v=(0.5, 1.0), slip_shares=(0.75, 0.25), response_s=(float32(0.08), float32(0.1), 0.0)
+)
+
+
+def staged(given: CoefficientSet = GOOD, *, length: int = 190, slot: int = 3, crc: int | None = None) -> bytes:
+    """A staging block: 140 words of the set, the trailer, 5 words of the commit, 50 words of the set."""
     words = given.to_words()
-    return words + struct.pack(">H2xIH", length, set_crc(words) if crc is None else crc, slot)
+    covered = words[:280] if length == 140 else words
+    trailer = struct.pack(">H2xIH", length, set_crc(covered) if crc is None else crc, slot)
+    return words[:280] + trailer + bytes(10) + words[280:]
 
 
 def fault_of(words: bytes) -> StagedFault:
@@ -39,11 +48,26 @@ def fault_of(words: bytes) -> StagedFault:
 
 
 def test_a_good_set_comes_out_with_its_slot():
-    coefficients, force_limits_n, slot = check_staged(staged(), LIMITS)
+    coefficients, force_limits_n, slot, without_stops = check_staged(staged(), LIMITS)
     assert isinstance(coefficients, Coefficients)
-    assert (force_limits_n, slot) == ((1.0, 59.0), 3)
+    assert (force_limits_n, slot, without_stops) == ((1.0, 59.0), 3, False)
+    assert (coefficients.slip_radii_v, coefficients.slip_shares, coefficients.response) == ((), (), None)
     assert coefficients.rising_handles_n == GOOD.rising_handles_n
     assert coefficients.falling_weights == pytest.approx(GOOD.falling_weights)
+
+
+def test_stops_and_response_come_out_as_they_were_sent():
+    coefficients = check_staged(staged(SLIP), LIMITS).coefficients
+    assert (coefficients.slip_radii_v, coefficients.slip_shares) == ((0.5, 1.0), (0.75, 0.25))
+    assert coefficients.response == Response(dead_time_s=0.08, lag_s=0.1), "the decimals that were meant"
+
+
+def test_a_set_of_140_words_has_no_stops_whatever_lies_above():
+    found = check_staged(staged(SLIP, length=140), LIMITS)
+    assert found.without_stops
+    assert (found.coefficients.slip_radii_v, found.coefficients.response) == ((), None)
+    assert fault_of(staged(SLIP, length=140, crc=set_crc(SLIP.to_words()))).reason is UploadReason.CRC
+    assert fault_of(staged(length=190, crc=set_crc(GOOD.to_words()[:280]))).reason is UploadReason.CRC
 
 
 def test_order_15_fits():
@@ -96,20 +120,30 @@ def test_length_crc_slot_and_unused_word_are_checked():
     assert fault_of(staged(length=139)).reason is UploadReason.LENGTH
     assert fault_of(staged(crc=0)).reason is UploadReason.CRC
     assert fault_of(staged(slot=8)).reason is UploadReason.TARGET_SLOT
-    words = bytearray(staged())
-    words[3] = 1
-    words[284:288] = set_crc(bytes(words[:SET_BYTES])).to_bytes(4, "big")
-    assert fault_of(bytes(words)).reason is UploadReason.UNUSED_NOT_ZERO
+    for unused in (1, 151, 158, 159):
+        words = bytearray(staged())
+        words[2 * unused + 1] = 1
+        words[284:288] = set_crc(words_of_block(bytes(words))).to_bytes(4, "big")
+        assert fault_of(bytes(words)).reason is UploadReason.UNUSED_NOT_ZERO
 
 
-@given(st.integers(0, 8 * SET_BYTES - 1))
-def test_no_flipped_bit_passes(bit):
-    words = bytearray(staged())
+@given(st.integers(0, 8 * SET_BYTES - 1), st.sampled_from([GOOD, SLIP]))
+def test_no_flipped_bit_passes(bit, given_set):
+    """Of the number of stops one may make a cut read-back of it, which is said first."""
+    words = bytearray(staged(given_set))
+    byte = bit // 8 + (20 if bit // 8 >= 280 else 0)
+    words[byte] ^= 1 << bit % 8
+    assert fault_of(bytes(words)).reason in (UploadReason.CRC, *[UploadReason.STOPS_CUT] * (byte == 301))
+
+
+@given(st.integers(0, 8 * 280 - 1))
+def test_no_flipped_bit_of_140_words_passes(bit):
+    words = bytearray(staged(length=140))
     words[bit // 8] ^= 1 << bit % 8
     assert fault_of(bytes(words)).reason is UploadReason.CRC
 
 
 def test_nothing_staged_is_refused():
-    assert fault_of(bytes(STAGED_BYTES)).reason is UploadReason.LENGTH
-    with pytest.raises(ValueError, match="290 are needed"):
+    assert fault_of(bytes(BLOCK_BYTES)).reason is UploadReason.LENGTH
+    with pytest.raises(ValueError, match="400 are needed"):
         check_staged(bytes(10), LIMITS)

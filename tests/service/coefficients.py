@@ -1,10 +1,14 @@
 """Sets of coefficients for tests: recognisable by one number, of any order."""
 
 import struct
+from collections.abc import Iterator
 from dataclasses import replace
 
 from gateway.bsfm import Calibration
-from gateway.registers.coefficients import CoefficientSet, set_crc
+from gateway.registers.coefficients import HEAD_BYTES, HEAD_WORDS, SET_WORDS, TAIL_FROM, CoefficientSet, set_crc
+
+STRETCHES = ((0, 145), (TAIL_FROM, 200))
+"""Words of the staging block that an upload writes: before and after those of the commit."""
 
 
 def calibration(mark: int = 0, *, order: int = 2, number: int = 1, **changes: object) -> Calibration:
@@ -40,7 +44,24 @@ def mark_of(given: Calibration) -> int:
     return mark
 
 
-def staged(given: CoefficientSet, *, length: int = 140, slot: int = 0, crc: int | None = None) -> bytes:
-    """Order through target_slot, as big-endian words."""
+def staged(given: CoefficientSet, *, length: int = SET_WORDS, slot: int = 0, crc: int | None = None) -> bytes:
+    """The staging block of an upload, 400 bytes. length HEAD_WORDS: as masters of map version 1 fill it."""
     words = given.to_words()
-    return words + struct.pack(">H2xIH", length, set_crc(words) if crc is None else crc, slot)
+    head, tail = words[:HEAD_BYTES], words[HEAD_BYTES:]
+    if length == HEAD_WORDS:
+        words, tail = head, bytes(len(tail))
+    trailer = struct.pack(">H2xIH", length, set_crc(words) if crc is None else crc, slot)
+    return head + trailer + bytes(10) + tail
+
+
+def swapped(number: float) -> float:
+    """What a master sends that has the two words of a float32 the other way round."""
+    data = struct.pack(">f", number)
+    return float(struct.unpack(">f", data[2:] + data[:2])[0])
+
+
+def requests_of(block: bytes, most: int = 123) -> Iterator[tuple[int, bytes]]:
+    """(address, words) of the writes that fill the staging block so, `most` words at a time."""
+    for first, end in STRETCHES:
+        for at in range(first, end, most):
+            yield 1000 + at, block[2 * at : 2 * min(at + most, end)]

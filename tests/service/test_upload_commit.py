@@ -7,15 +7,20 @@ from random import Random
 
 import pytest
 
-from gateway.bsfm import CoefficientReason
-from gateway.registers.coefficients import SET_BYTES, CoefficientSet
-from gateway.registers.words import CommitStatus, RefusalReason, UploadReason
+from gateway.bsfm import CoefficientReason, Response
+from gateway.registers.coefficients import CoefficientSet, model_hash, words_of_block
+from gateway.registers.words import CommitNotice, CommitStatus, RefusalReason, UploadReason
 from gateway.service.calibration_store import UNKNOWN_N
-from tests.service.coefficients import calibration, staged
+from tests.service.coefficients import calibration, staged, swapped
 from tests.service.disk import disk
 from tests.service.upload_bench import COMMIT, DRY_RUN, OWN, PEER
 
 GOOD = CoefficientSet.of_calibration(calibration(16))
+SLIP = CoefficientSet.of_calibration(
+    calibration(
+        16, slip_radii_v=(0.25, 0.5, 1.0), slip_shares=(0.25, 0.5, 0.25), response=Response(dead_time_s=0.08, lag_s=0.1)
+    )
+)
 NOTHING, COMMITTED, FAILED = (CommitStatus.IDLE, 0, 0), (CommitStatus.COMMITTED, 0, 0), CommitStatus.FAILED
 NO_SLOT = 0xFFFF
 
@@ -24,17 +29,23 @@ def changed(**changes: object) -> CoefficientSet:
     return replace(GOOD, **changes)
 
 
+def slipping(**changes: object) -> bytes:
+    return staged(replace(SLIP, **changes))
+
+
 def test_a_committed_set_is_in_use_and_reads_back_as_sent(bench):
     words = staged(GOOD, slot=3)
     assert bench.commit(words) == COMMITTED
-    assert bench.active_words == words[:SET_BYTES]
+    assert bench.active_words == words_of_block(words)
     assert bench.bank.read_registers(1642, 2) == words[284:288], "the CRC of the active set is the CRC that was sent"
     assert bench.active_slot == 3
     (taken,) = bench.used
     assert bench.shown == [CommitStatus.WRITING], "committed is not said before the set is in use"
     assert taken.calibration.number == 2
     assert taken.model.voltage_v(26.0, 1.0)[0] == pytest.approx(4.0)
-    assert bench.log == [f"info upload by {PEER}: calibration 2 (slot-3) in use, slot 3: psfm n=2, 0.0 .. 52.0 N"]
+    assert bench.log == [
+        f"info upload by {PEER}: calibration 2 (slot-3) in use, slot 3: psfm n=2, blend 5 N, 0.0 .. 52.0 N"
+    ]
 
 
 def test_what_an_upload_does_not_tell_is_not_made_up(bench):
@@ -54,7 +65,7 @@ def test_every_order_is_carried_and_starts_again_after_a_restart(bench, order):
     words = staged(CoefficientSet.of_calibration(given), slot=order % 8)
     assert bench.commit(words) == COMMITTED
     again = bench.restarted()
-    assert again.active_words == bench.active_words == words[:SET_BYTES]
+    assert again.active_words == bench.active_words == words_of_block(words)
     assert again.active_slot == order % 8
 
 
@@ -62,12 +73,12 @@ def test_single_words_are_enough_for_a_master_that_has_only_fc06(bench):
     words = staged(CoefficientSet.of_calibration(calibration(3, order=15)), slot=1)
     order = list(range(0, len(words), 2))
     Random(4).shuffle(order)
-    for at in order:
+    for at in (at for at in order if not 290 <= at < 300):
         bench.write(1000 + at // 2, int.from_bytes(words[at : at + 2], "big"))
     bench.write(1145, COMMIT)
     bench.run()
     assert bench.outcome == COMMITTED
-    assert bench.active_words == words[:SET_BYTES]
+    assert bench.active_words == words_of_block(words)
 
 
 @pytest.mark.parametrize("most", [1, 2, 7, 64, 100, 123])
@@ -81,7 +92,7 @@ def test_it_does_not_matter_how_the_writes_are_split(bench, most):
 
 def test_the_last_part_and_the_commit_may_travel_together(bench):
     words = staged(GOOD, slot=5)
-    bench.stage(words[: 2 * 140])
+    bench.stage(words[:280] + bytes(20) + words[300:])
     bench.write(1140, *(int.from_bytes(words[at : at + 2], "big") for at in range(280, 290, 2)), COMMIT)
     bench.run()
     assert bench.outcome == COMMITTED
@@ -113,7 +124,27 @@ CHECKS = [
     (staged(changed(blend_span_n=-1.0)), -1, CoefficientReason.BLEND_SPAN),
     (staged(changed(force_high_n=53.0)), -1, UploadReason.FORCE_LIMITS),
     (staged(changed(force_low_n=-1.0)), -1, UploadReason.FORCE_LIMITS),
-    (bytes(290), -1, UploadReason.LENGTH),
+    (bytes(400), -1, UploadReason.LENGTH),
+    (slipping(stops=12), -1, UploadReason.STOPS_CUT),
+    (slipping(stops=17), -1, CoefficientReason.SLIP_STOPS),
+    (slipping(stops=2), 66, UploadReason.UNUSED_NOT_ZERO),
+    (slipping(slip_shares=(0.25, 0.5, 0.25, 0.125)), 83, UploadReason.UNUSED_NOT_ZERO),
+    (slipping(slip_radii_v=(0.25, 0.25, 1.0)), 65, CoefficientReason.SLIP_RADIUS),
+    (slipping(slip_radii_v=(0.0, 0.5, 1.0)), 64, CoefficientReason.SLIP_RADIUS),
+    (slipping(slip_radii_v=(-0.25, 0.5, 1.0)), 64, CoefficientReason.SLIP_RADIUS),
+    (slipping(slip_radii_v=(0.25, 0.5, 1e9)), 66, CoefficientReason.SLIP_RADIUS),
+    (slipping(slip_radii_v=(0.25, float("inf"), 1.0)), 65, CoefficientReason.NOT_FINITE),
+    (slipping(slip_radii_v=(0.25, swapped(0.5), 1.0)), 65, CoefficientReason.WORDS_SWAPPED),
+    (slipping(slip_shares=(0.25, float("nan"), 0.25)), 81, CoefficientReason.NOT_FINITE),
+    (slipping(slip_shares=(-0.25, 1.0, 0.25)), 80, CoefficientReason.SLIP_SHARE),
+    (slipping(slip_shares=(0.25, 0.5, 0.2501)), 80, CoefficientReason.SLIP_SHARE),
+    (slipping(slip_shares=(swapped(0.25), 0.5, 0.25)), 80, CoefficientReason.WORDS_SWAPPED),
+    (slipping(slip_radii_v=(0.001, 0.5, 1.0)), 64, CoefficientReason.SLIP_STIFFNESS),
+    (slipping(response_s=(1.5, 0.1, 0.0)), 96, CoefficientReason.RESPONSE),
+    (slipping(response_s=(0.0, -0.1, 0.0)), 97, CoefficientReason.RESPONSE),
+    (slipping(response_s=(0.0, 0.1, 2.5)), 98, CoefficientReason.RESPONSE),
+    (slipping(response_s=(float("nan"), 0.1, 0.0)), 96, CoefficientReason.NOT_FINITE),
+    (slipping(response_s=(swapped(0.08), 0.1, 0.0)), 96, CoefficientReason.WORDS_SWAPPED),
 ]
 
 
@@ -128,6 +159,7 @@ def test_a_set_that_fails_a_check_changes_nothing_and_says_where_and_why(bench, 
     assert sentence.startswith("E401 ")
     assert reason.name.lower() in sentence
     assert sentence.endswith("active set 1 unchanged")
+    assert (bench.notice, bench.model_hash) == (CommitNotice(0), model_hash(OWN))
     assert (f"index {index}" in sentence) == (index >= 0)
     assert bench.commit(staged(GOOD)) == COMMITTED, "and the next good set passes"
 

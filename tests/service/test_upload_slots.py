@@ -4,7 +4,7 @@ import pytest
 
 from gateway.registers.words import CommitStatus, RefusalReason, UploadReason
 from tests.service.coefficients import calibration
-from tests.service.upload_bench import OWN, PEER
+from tests.service.upload_bench import OWN, PEER, Bench
 
 COMMITTED = (CommitStatus.COMMITTED, 0, 0)
 NO_SLOT = 0xFFFF
@@ -40,8 +40,9 @@ def test_a_selected_slot_is_in_use_now_and_after_a_restart(filled):
 def test_an_empty_slot_is_refused_at_once(filled, slot):
     before = filled.active_words
     refusal = filled.refused(1149, slot)
-    assert (refusal.code, refusal.reason, refusal.address) == (6, RefusalReason.COEFFICIENTS, 1149)
-    assert refusal.sentence == f"E401 slot {slot} is empty; active set 4 unchanged"
+    assert (refusal.code, refusal.reason, refusal.address) == (3, RefusalReason.EMPTY_SLOT, 1149)
+    assert refusal.sentence == f"W331 slot {slot} is empty, filled: 1, 2, 3; active set 4 unchanged"
+    assert refusal.value == slot
     assert (filled.active_words, filled.work) == (before, [])
 
 
@@ -75,9 +76,32 @@ def test_the_same_set_again_keeps_its_number_and_fills_no_disk(filled):
     assert filled.store.slot(3) == 5
 
 
-def test_the_built_in_set_uploaded_is_a_calibration_of_its_own(bench):
-    assert bench.upload_of(OWN, 2) == COMMITTED
-    assert (bench.store.slot(2), bench.active_slot) == (2, 2)
+def test_a_slot_may_hold_the_built_in_set_under_its_own_number(filled):
+    assert filled.upload_of(OWN, 6) == COMMITTED
+    assert (filled.store.slot(6), filled.active_slot, filled.used[-1].calibration) == (1, 6, OWN)
+    assert filled.upload.status()["built_in"]
+    filled.write(1149, 3)
+    filled.run()
+    for again in (filled, filled.restarted()):
+        again.write(1149, 6)
+        again.run()
+        assert (again.outcome, again.active_slot, again.used[-1].calibration) == (COMMITTED, 6, OWN)
+        assert again.restarted().active_slot == 6
+    assert [entry.number for entry in filled.store.list()] == [2, 3, 4]
+    filled.upload_of(calibration(40), 6)
+    filled.upload.rollback()
+    filled.run()
+    assert (filled.active_slot, filled.used[-1].calibration) == (NO_SLOT, OWN), "slot 6 holds another one now"
+
+
+def test_a_slot_with_the_built_in_set_means_what_the_rig_says_and_never_a_number_of_the_store(bench, register_map):
+    """The rig's file may name another calibration one day, even one with a number that the store has."""
+    bench.upload_of(calibration(10), 1)
+    bench.upload_of(OWN, 2)
+    other = Bench(bench.state, register_map, calibration(77, number=2))
+    other.write(1149, 2)
+    other.run()
+    assert other.used[-1].calibration == calibration(77, number=2)
 
 
 def test_going_back_twice_goes_forth_again(filled):

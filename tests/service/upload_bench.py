@@ -11,12 +11,12 @@ import pytest
 from gateway.bsfm import Calibration, CoefficientLimits
 from gateway.modbus import Peer
 from gateway.registers import BankRules, Refusal, RegisterBank, RegisterMap
-from gateway.registers.coefficients import SET_BYTES, CoefficientSet
-from gateway.registers.words import CommitStatus
+from gateway.registers.coefficients import CoefficientSet, words_of_block
+from gateway.registers.words import CommitNotice, CommitStatus
 from gateway.service.activation import Activation, InUse
 from gateway.service.calibration_store import CalibrationStore
 from gateway.service.upload import Upload, UploadRules
-from tests.service.coefficients import calibration, staged
+from tests.service.coefficients import calibration, requests_of, staged
 
 PEER = Peer("10.0.0.1", 40000)
 OWN = calibration(8, number=1)
@@ -29,13 +29,14 @@ class Bench:
 
     state: Path
     register_map: RegisterMap
+    own: Calibration = OWN
     work: list[tuple[Callable[[], Any], Callable[[Any], None]]] = field(default_factory=list)
     log: list[str] = field(default_factory=list)
     used: list[InUse] = field(default_factory=list)
     shown: list[CommitStatus] = field(default_factory=list)  # what a master reads in the moment of each
 
     def __post_init__(self) -> None:
-        self.store = CalibrationStore(self.state, OWN)
+        self.store = CalibrationStore(self.state, self.own)
         rules = BankRules(rig_name="demo", force_max_n=60.0, allow_plain_upload=True)
         self.bank = RegisterBank(self.register_map, rules, now=lambda: 0.0)
         activation = Activation(self.store, CoefficientLimits(cell_range_n=100.0))
@@ -80,9 +81,9 @@ class Bench:
         return caught.value
 
     def stage(self, words: bytes, most: int = 123) -> None:
-        """Order through target_slot, `most` words at a time."""
-        for at in range(0, len(words), 2 * most):
-            self.bank.write_registers(1000 + at // 2, words[at : at + 2 * most], PEER)
+        """A staging block, `most` words at a time."""
+        for address, part in requests_of(words, most):
+            self.bank.write_registers(address, part, PEER)
 
     def commit(self, words: bytes, action: int = COMMIT) -> tuple[CommitStatus, int, int]:
         """Stage, commit and let it end; the outcome."""
@@ -105,7 +106,19 @@ class Bench:
 
     @property
     def active_words(self) -> bytes:
-        return self.bank.read_registers(1500, 100) + self.bank.read_registers(1600, SET_BYTES // 2 - 100)
+        return words_of_block(self.active_block)
+
+    @property
+    def active_block(self) -> bytes:
+        return self.bank.read_registers(1500, 100) + self.bank.read_registers(1600, 100)
+
+    @property
+    def model_hash(self) -> int:
+        return int.from_bytes(self.bank.read_registers(414, 2), "big")
+
+    @property
+    def notice(self) -> CommitNotice:
+        return CommitNotice(int.from_bytes(self.bank.read_registers(1645, 1), "big"))
 
     @property
     def active_slot(self) -> int:
@@ -113,4 +126,4 @@ class Bench:
 
     def restarted(self) -> "Bench":
         """The next process on the same state directory."""
-        return Bench(self.state, self.register_map)
+        return Bench(self.state, self.register_map, self.own)

@@ -208,6 +208,21 @@ ENTRIES: Final = (
         "The output is enabled with a force, a fault is latched, or another calibration or its fit is running.",
         "Write 0 to control_word (and reset a fault), wait for phase stored, then ask again.",
     ),
+    Entry(
+        "W330",
+        "a set without slip stops",
+        "A commit had the length 140: the form of map version 1, which carries a linear blend and no measured response.",
+        "A master's program that was written for map version 1. The set is in use as it was sent.",
+        "Send the whole set, length 190: force-gateway upload FILE --print-frames shows how.",
+    ),
+    Entry(
+        "W331",
+        "slot is empty",
+        "slot_select named a slot that no commit has filled. Exception 03; the active set stays.",
+        "Slots count from 0, and are filled by commits with that target_slot, on this gateway's state directory.",
+        "force-gateway calibration list shows which slots are filled; upload the set with --slot.",
+        "EMPTY_SLOT",
+    ),
 )
 
 REFUSAL_CODES: Final = {RefusalReason[entry.name]: entry.code for entry in ENTRIES if entry.name} | {
