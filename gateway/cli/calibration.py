@@ -31,6 +31,7 @@ def command() -> None:
 def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
     """List the calibrations of a state directory; * is in use."""
     from gateway.cli.calibrations import opened
+    from gateway.service.selection import OWN
 
     store = opened(state_directory(state, rig), rig)
     standing, entries = store.standing(), store.list()
@@ -43,11 +44,14 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
     click.echo("  NUMBER  made        model     reversal        forces              rms N   max N  slots  name")
     if store.built_in:
         mark = "*" if standing.selection.number is None else " "
-        click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, ())} (the rig's own)")
+        click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, _slots(standing, OWN))} (the rig's own)")
     for entry in entries:
         mark = "*" if standing.selection.number == entry.number else " "
-        slots = [slot for slot, number in enumerate(standing.pointer.slots) if number == entry.number]
-        told = _line(entry.calibration, slots) if entry.calibration else f"unusable: {entry.fault}"
+        told = (
+            _line(entry.calibration, _slots(standing, entry.number))
+            if entry.calibration
+            else f"unusable: {entry.fault}"
+        )
         click.echo(f"{mark} {entry.number:<8}{told}")
 
 
@@ -166,13 +170,18 @@ def _facts(entry: "Entry", standing: "Standing") -> dict[str, Any]:
     return {
         "number": entry.number,
         "active": standing.selection.number == entry.number,
-        "slots": [slot for slot, number in enumerate(standing.pointer.slots) if number == entry.number],
+        "slots": _slots(standing, entry.number),
         "fault": entry.fault or None,
         "calibration": asdict(entry.calibration) if entry.calibration else None,
     }
 
 
-def _line(calibration: "Calibration", slots: "list[int] | tuple[()]") -> str:
+def _slots(standing: "Standing", number: int) -> list[int]:
+    """Those that hold this calibration."""
+    return [slot for slot, held in enumerate(standing.pointer.slots) if held == number]
+
+
+def _line(calibration: "Calibration", slots: list[int]) -> str:
     low_n, high_n = calibration.allowed_n
     forces = f"{low_n:.1f} .. {high_n:.1f} N"
     rms, worst = (f"{error_n:.3f}" if error_n >= 0.0 else "-" for error_n in (calibration.rms_n, calibration.max_n))

@@ -66,7 +66,11 @@ def _upload(calibration: "Calibration", register_map: "RegisterMap", options: di
 
     check_only = options["dry_run"] and not options["print_frames"]
     action = CommitAction.DRY_RUN if check_only else CommitAction.COMMIT
-    return upload_of(calibration, register_map, slot=options["slot"], action=action, fc06=options["fc06"])
+    try:
+        return upload_of(calibration, register_map, slot=options["slot"], action=action, fc06=options["fc06"])
+    except ValueError as error:
+        text = f"E406 {error}: name the file as the rig's calibration, or fit it with fewer"
+        raise CliError(text, exit_codes.DATA) from None
 
 
 def _sent(upload: "Upload", register_map: "RegisterMap", options: dict[str, Any]) -> dict[str, Any]:
@@ -78,16 +82,19 @@ def _sent(upload: "Upload", register_map: "RegisterMap", options: dict[str, Any]
     with master:
         master.send(upload.requests)
         master.outcome(upload)
-        committed = not options["dry_run"]
+        committed, known = not options["dry_run"], False
         if committed:
             master.check_active(upload, options["slot"])
-        return {"committed": committed, "active": master.calibration_id(), "slot": options["slot"]}
+            known = master.is_known_set()
+        active = master.calibration_id()
+        return {"committed": committed, "active": active, "slot": options["slot"], "known": known}
 
 
 def _sentence(calibration: "Calibration", told: dict[str, Any]) -> str:
     if not told["committed"]:
         return f"{calibration.name} passes every check; nothing was stored, active set {told['active']} unchanged"
+    known = "; the gateway knew it, and keeps its number and name" if told["known"] else ""
     return (
         f"{calibration.name} is in use as calibration {told['active']}, slot {told['slot']}: "
-        "durable, and read back word by word"
+        f"{calibration.reversal_kind}, durable, and read back word by word{known}"
     )

@@ -1,9 +1,9 @@
 """An upload as the Modbus requests that make it, for our own master and for those who program a PLC.
 
-FC16 in four requests: head with the rising branch, the falling branch with limits and span, the trailer with length, CRC
-and slot, the commit. The last two are apart so that a PLC that resends one part never commits half a set. All 16 places
-of each array are written, unused ones as 0, for an earlier upload may have left something there. With FC06 each word is
-a request of its own; the two words that no register has stay out.
+FC16 in five requests: head with the rising branch, the falling branch with limits and span, slip stops and response, the
+trailer with length, CRC and slot, the commit. The last two are apart so that a PLC that resends one part never commits
+half a set. All places of each array are written, unused ones as 0, for an earlier upload may have left something there.
+With FC06 each word is a request of its own; the words that no register has stay out.
 """
 
 import struct
@@ -13,6 +13,7 @@ from itertools import groupby
 from typing import Any, Final
 
 from gateway.bsfm import Calibration
+from gateway.bsfm.slip import STOPS_CARRIED
 from gateway.modbus.mbap import Adu, encode
 from gateway.modbus.pdu import (
     READ_HOLDING_REGISTERS,
@@ -23,7 +24,7 @@ from gateway.modbus.pdu import (
     write_registers_request,
 )
 from gateway.registers import Register, RegisterMap
-from gateway.registers.coefficients import SET_BYTES, SET_WORDS, CoefficientSet, set_crc
+from gateway.registers.coefficients import HEAD_BYTES, SET_WORDS, TAIL_FROM, CoefficientSet, set_crc
 from gateway.registers.words import CommitAction
 
 _PER_LINE: Final = 32  # bytes of a frame in one line of text
@@ -55,9 +56,10 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """words: order through target_slot; commit is the last request; poll is repeated until commit_status tells the end."""
+    """set_words: what the active block must read back; commit is the last request; poll is repeated until commit_status tells
+    the end."""
 
-    words: bytes
+    set_words: bytes
     staging: tuple[Request, ...]
     commit: Request
     poll: Request
@@ -66,25 +68,22 @@ class Upload:
     def requests(self) -> tuple[Request, ...]:
         return (*self.staging, self.commit)
 
-    @property
-    def set_words(self) -> bytes:
-        """What the active block must read back."""
-        return self.words[:SET_BYTES]
-
 
 def upload_of(
     calibration: Calibration, register_map: RegisterMap, *, slot: int, action: CommitAction, fc06: bool
 ) -> Upload:
-    """The requests that stage a calibration and then act."""
-    own = CoefficientSet.of_calibration(calibration).to_words()
-    words = own + struct.pack(">H2xIH", SET_WORDS, set_crc(own), slot)
+    """The requests that stage a calibration and then act. ValueError for more slip stops than the registers carry."""
+    if (stops := len(calibration.slip_radii_v)) > STOPS_CARRIED:
+        raise ValueError(f"{calibration.name} has {stops} slip stops, the registers carry {STOPS_CARRIED}")
+    words = CoefficientSet.of_calibration(calibration).to_words()
+    trailer = struct.pack(">H2xIH", SET_WORDS, set_crc(words), slot)
     commit_address = register_map.find("commit").address
     commit = (action.value,)
     text = "commit: check, store and use" if action is CommitAction.COMMIT else "commit word 2: check only"
-    first = register_map.find("order@staging").address
+    parts = tuple(_parts(words, trailer, register_map))
     return Upload(
         words,
-        tuple(_single(words, first, register_map) if fc06 else _parts(words, first, register_map)),
+        tuple(_single(parts, register_map)) if fc06 else parts,
         Request(text, WRITE_REGISTER if fc06 else WRITE_REGISTERS, commit_address, commit),
         Request(
             "commit_status, failing_index, failing_reason: until status is 3 or 4 (0 after a check only)",
@@ -95,21 +94,25 @@ def upload_of(
     )
 
 
-def _parts(words: bytes, first: int, register_map: RegisterMap) -> Iterator[Request]:
-    """The three FC16 of the staging."""
-    starts = [register_map.find(f"{name}@staging").address for name in ("order", "falling_b_0", "length")]
-    names = ("order, range, rising branch", "falling branch, force limits, blend span", "length, CRC-32, target slot")
-    ends = [*starts[1:], first + len(words) // 2]
-    for name, start, end in zip(names, starts, ends, strict=True):
-        yield Request(name, WRITE_REGISTERS, start, _words(words[2 * (start - first) : 2 * (end - first)]))
+def _parts(words: bytes, trailer: bytes, register_map: RegisterMap) -> Iterator[Request]:
+    """The FC16 of the staging, the trailer last."""
+    first = register_map.find("order@staging").address
+    falling = register_map.find("falling_b_0@staging").address
+    head, tail, half = words[:HEAD_BYTES], words[HEAD_BYTES:], 2 * (falling - first)
+    yield Request("order, range, rising branch", WRITE_REGISTERS, first, _words(head[:half]))
+    yield Request("falling branch, force limits, blend span", WRITE_REGISTERS, falling, _words(head[half:]))
+    yield Request("slip stops, response", WRITE_REGISTERS, first + TAIL_FROM, _words(tail))
+    trailer_at = register_map.find("length@staging").address
+    yield Request("length, CRC-32, target slot", WRITE_REGISTERS, trailer_at, _words(trailer))
 
 
-def _single(words: bytes, first: int, register_map: RegisterMap) -> Iterator[Request]:
+def _single(parts: tuple[Request, ...], register_map: RegisterMap) -> Iterator[Request]:
     """Word by word."""
     names = register_names(register_map)
-    for address, word in enumerate(_words(words), first):
-        if address in names:
-            yield Request(names[address], WRITE_REGISTER, address, (word,))
+    for part in parts:
+        for address, word in enumerate(part.words, part.address):
+            if address in names:
+                yield Request(names[address], WRITE_REGISTER, address, (word,))
 
 
 def register_names(register_map: RegisterMap) -> dict[int, str]:

@@ -11,12 +11,16 @@ from gateway.cli.errors import CliError
 from gateway.cli.refused import explained
 from gateway.cli.upload_frames import Request, Upload
 from gateway.modbus.pdu import WRITE_REGISTER
-from gateway.registers.words import CommitStatus, UploadReason
+from gateway.registers.coefficients import HEAD_WORDS, TAIL_FROM
+from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
 
 _OURS: Final = (UploadReason.STORAGE, UploadReason.DEFECT)
 _PATIENCE_S = 10.0  # a disk may be slow, a hung one is no disk
 _POLL_S: Final = 0.01
-_PLACES: Final = ("rising handle", "rising weight", "falling handle", "falling weight")
+_PLACES: Final = (
+    "rising handle", "rising weight", "falling handle", "falling weight", "slip radius", "slip share", "response",
+)  # fmt: skip
+_RESPONSE: Final = ("dead time", "lag", "second lag")
 
 
 class Master(GatewayClient):
@@ -51,14 +55,23 @@ class Master(GatewayClient):
                 raise CliError(f"E431 after {_PATIENCE_S:g} s the gateway is still {name}: a disk that hangs?")
             time.sleep(_POLL_S)
 
+    def is_known_set(self) -> bool:
+        """Whether the gateway knew the committed set already, so that number and name are the old ones."""
+        with explained(self):
+            (word,) = self.read_words(self.register_map.find("commit_notice").address, 1)
+        return bool(word & CommitNotice.KNOWN_SET)
+
     def check_active(self, upload: Upload, slot: int) -> None:
         """The active block holds what was sent, word for word."""
+        sent = struct.unpack(f">{len(upload.set_words) // 2}H", upload.set_words)
         first = self.register_map.find("order@active").address
+        places = [*range(first, first + HEAD_WORDS)]
+        places += range(first + TAIL_FROM, first + TAIL_FROM + len(sent) - HEAD_WORDS)
         with explained(self):
-            words = self.read_words(first, len(upload.set_words) // 2)
+            words = self.read_words(first, HEAD_WORDS)
+            words += self.read_words(first + TAIL_FROM, len(sent) - HEAD_WORDS)
             (seen,) = self.read_words(self.register_map.find("active_slot").address, 1)
-        sent = struct.unpack(f">{len(words)}H", upload.set_words)
-        different = [first + at for at, (own, found) in enumerate(zip(sent, words, strict=True)) if own != found]
+        different = [at for at, own, found in zip(places, sent, words, strict=True) if own != found]
         if different or seen != slot:
             where = f"{len(different)} words differ, the first at {different[0]}" if different else f"slot {seen}"
             raise CliError(f"E434 committed, but another set is in use now ({where}): another master was quicker?")
@@ -75,4 +88,5 @@ def place(index: int) -> str:
     """failing_index in words: `index 50, falling weight 2`."""
     if not 0 <= index < 16 * len(_PLACES):
         return "the whole set"
-    return f"index {index}, {_PLACES[index // 16]} {index % 16}"
+    name = f"{_PLACES[index // 16]} {index % 16}"
+    return f"index {index}, {_RESPONSE[index - 96] if 96 <= index < 99 else name}"

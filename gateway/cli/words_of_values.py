@@ -31,7 +31,8 @@ def shown(reading: Reading) -> str:
         return register.values.get(int(value), f"{int(value)} (no name)")
     if register.name == "owner_ip":
         return str(IPv4Address(int(value))) if value else "nobody"
-    number = f"{value:.{register.decimals}f}"
+    is_plain = register.type == "float32" and not register.unit  # a share, a weight, a constant
+    number = f"{value:.6g}" if is_plain else f"{value:.{register.decimals}f}"
     return f"{number} {register.unit}" if register.unit else number
 
 

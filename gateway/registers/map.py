@@ -17,7 +17,7 @@ from gateway.registers.values import WordOrder, pack_number, unpack_number, word
 PLAIN_BLOCKS = ("command", "status")
 """Blocks whose registers a bare NAME means."""
 
-_DECIMALS = {"N": 2, "N/s": 1, "deg": 1, "V": 3}
+_DECIMALS = {"N": 2, "N/s": 1, "deg": 1, "V": 3, "s": 4}
 
 
 class UnknownRegister(LookupError):  # noqa: N818  reads as what it is

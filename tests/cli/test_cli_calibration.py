@@ -40,6 +40,12 @@ def test_list_shows_all_and_which_one_is_used(state, call):
     ]
 
 
+def test_the_rigs_own_shows_the_slots_that_hold_it(state, call):
+    CalibrationStore(state, load_calibration("demo")).use(None, 6)
+    line = call("calibration", "list", "--state", state).output.splitlines()[1]
+    assert line.startswith("* 1 ") and "0.131   0.401  6      demo" in line
+
+
 def test_an_empty_state_has_the_rigs_own(tmp_path, call):
     done = call("calibration", "list", "--state", tmp_path / "nothing")
     assert done.output.splitlines()[1].startswith("* 1 ")

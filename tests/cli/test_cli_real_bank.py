@@ -1,9 +1,12 @@
 """The client verbs against the real register bank: what a newcomer gets wrong is answered with the code that explains it."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm import Response
+from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
 from gateway.registers.words import RefusalReason, State
@@ -31,6 +34,13 @@ def test_a_force_is_commanded_and_read_back(bank: RegisterBank, gateway: str, ca
     assert facts["state"]["text"] == "holding"
     assert facts["force_measured"]["value"] == 11.97
     assert facts["force_measured@float_cdab"]["value"] == pytest.approx(11.97)
+
+
+def test_shares_weights_and_short_times_are_shown_with_their_digits(bank: RegisterBank, gateway: str, call) -> None:
+    bank.set_active_model(replace(load_calibration("demo"), response=Response(dead_time_s=0.0803, lag_s=0.1)))
+    names = ("slip_share_2@active", "rising_w_1@active", "dead_time@active", "slip_stops@active")
+    facts = json.loads(call("read", *names, "--json", "--gateway", gateway).output)
+    assert [facts[name]["text"] for name in names] == ["0.265977", "9.67112", "0.0803 s", "7"]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from gateway.bsfm import CoefficientLimits
 from gateway.cli.uploading import place
 from gateway.modbus import MbapFramer, Peer, answer
+from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.coefficients import CoefficientSet
 from gateway.registers.command import Status
@@ -69,7 +70,8 @@ def address(gateway: Gateway, serve):
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "mine.yaml"
-    path.write_text(as_text(calibration(16)), encoding="utf-8")
+    stops = {"slip_radii_v": (0.25, 0.5, 1.0), "slip_shares": (0.25, 0.5, 0.25)}
+    path.write_text(as_text(calibration(16, **stops)), encoding="utf-8")
     return path
 
 
@@ -77,11 +79,15 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("order", [1, 2, 15])
 def test_an_upload_is_stored_used_and_read_back(gateway, address, call, tmp_path, order, fc06):
     path = tmp_path / "set.yaml"
-    given = calibration(order, order=order)
+    stops = {"slip_radii_v": (0.25, 0.5, 1.0), "slip_shares": (0.25, 0.5, 0.25)} if order == 2 else {}
+    given = calibration(order, order=order, **stops)
     path.write_text(as_text(given), encoding="utf-8")
     done = call("upload", path, "--slot", 5, *fc06, "--gateway", address)
     assert done.exit_code == 0, done.output
-    assert done.output == f"mark {order} is in use as calibration 2, slot 5: durable, and read back word by word\n"
+    told = (
+        f"mark {order} is in use as calibration 2, slot 5: {given.reversal_kind}, durable, and read back word by word\n"
+    )
+    assert done.output == told
     assert gateway.store.slot(5) == 2
     assert (
         CoefficientSet.of_calibration(gateway.store.load(2)).to_words()
@@ -91,7 +97,30 @@ def test_an_upload_is_stored_used_and_read_back(gateway, address, call, tmp_path
 
 def test_a_shipped_calibration_has_a_name_only(gateway, address, call):
     done = call("upload", "demo", "--json", "--gateway", address)
-    assert json.loads(done.output) == {"sent": True, "committed": True, "active": 2, "slot": 0}
+    assert json.loads(done.output) == {"sent": True, "committed": True, "active": 2, "slot": 0, "known": False}
+    assert gateway.store.load(2).reversal_kind == "slip, 7 stops"
+
+
+def test_a_calibration_that_the_gateway_knows_keeps_its_number_and_its_name(gateway, address, call, tmp_path):
+    number = gateway.store.add(load_calibration("demo"))
+    gateway.upload.apart = lambda work, done: done(work())
+    gateway.upload.use(number)
+    for options in ((), ("--fc06",)):
+        done = call("upload", "demo", "--slot", 3, *options, "--gateway", address)
+        assert done.output == (
+            "demo is in use as calibration 2, slot 3: slip, 7 stops, durable, and read back word by word; "
+            "the gateway knew it, and keeps its number and name\n"
+        )
+    assert [(entry.number, entry.calibration.name) for entry in gateway.store.list()] == [(2, "demo")]
+
+
+def test_more_stops_than_the_registers_carry_are_told_before_anything_is_sent(call, tmp_path):
+    path = tmp_path / "many.yaml"
+    many = {"slip_radii_v": tuple(0.25 * k for k in range(1, 12)), "slip_shares": (*(0.09,) * 10, 0.1)}
+    path.write_text(as_text(calibration(4, **many)), encoding="utf-8")
+    done = call("upload", path, "--gateway", "127.0.0.1:9")
+    assert done.exit_code == 65
+    assert done.stderr.startswith("E406 mark 4 has 11 slip stops, the registers carry 10: ")
 
 
 def test_a_dry_run_is_the_gateways_own(gateway, address, call, file):
@@ -153,11 +182,11 @@ def test_a_commit_that_never_ends_is_waited_for_with_a_bound(gateway, address, c
 
 def test_another_set_than_the_one_sent_is_noticed(gateway, address, call, file):
     gateway.upload.on_use = lambda taken: gateway.bank.set_active_model(
-        replace(taken.calibration, blend_span_n=9.0), taken.pointer.active.slot_word
+        replace(taken.calibration, slip_shares=(0.5, 0.25, 0.25)), taken.pointer.active.slot_word
     )
     done = call("upload", file, "--gateway", address)
     assert done.exit_code == 1
-    assert done.stderr.startswith("E434 committed, but another set is in use now (1 words differ, the first at 1638)")
+    assert done.stderr.startswith("E434 committed, but another set is in use now (2 words differ, the first at 1680)")
 
 
 # -- frames
@@ -180,25 +209,28 @@ def test_printed_frames_played_by_anybody_make_the_upload(gateway, call, file, f
     assert all(told[0] < 0x80 for told in answers)
     assert struct.unpack(">HHH", answers[-1][2:]) == (CommitStatus.COMMITTED, 0, 0)
     assert gateway.store.slot(6) == 2
+    assert gateway.store.load(2).slip_radii_v == (0.25, 0.5, 1.0)
     assert gateway.words(1500, 100) == CoefficientSet.of_calibration(calibration(16)).to_words()[:200]
-    assert len(frames) == (145 if fc06 else 5)
+    assert len(frames) == (192 if fc06 else 6)
 
 
 def test_printing_with_a_dry_run_needs_no_gateway(call, file):
     done = call("upload", file, "--print-frames", "--dry-run", "--gateway", "127.0.0.1:9")
     assert done.exit_code == 0
     lines = done.output.splitlines()
-    assert lines[0] == "frame 1 of 5  FC16 write 70 words at 1000 (41001): order, range, rising branch"
+    assert lines[0] == "frame 1 of 6  FC16 write 70 words at 1000 (41001): order, range, rising branch"
     assert lines[1].startswith("    00 01 00 00 00 93 01 10 03 E8 00 46 8C 00 02 00 00")
     assert "    1010  4250 0000  rising_b_2 = 52 N" in lines
     assert "    1012  0000 x 26  rising_b_3 .. rising_b_15 = 0" in lines
+    assert "    1150  0003       slip_stops = 3" in lines
+    assert "    1184  3E80 0000  slip_share_2 = 0.25" in lines
     assert "    1145  0001       commit = 1" in lines
     assert not [line for line in lines if len(line) > 120 and "commit_status" not in line]
 
 
 def test_printing_alone_sends_as_well(gateway, address, call, file):
     done = call("upload", file, "--print-frames", "--gateway", address)
-    assert done.output.startswith("frame 1 of 5")
+    assert done.output.startswith("frame 1 of 6")
     assert done.output.endswith("durable, and read back word by word\n")
     assert gateway.store.slot(0) == 2
 
@@ -211,7 +243,15 @@ def test_no_request_is_longer_than_modbus_allows(call, file):
 
 @pytest.mark.parametrize(
     ("index", "words"),
-    [(0, "index 0, rising handle 0"), (50, "index 50, falling weight 2"), (-1, "the whole set"), (64, "the whole set")],
+    [
+        (0, "index 0, rising handle 0"),
+        (50, "index 50, falling weight 2"),
+        (73, "index 73, slip radius 9"),
+        (80, "index 80, slip share 0"),
+        (97, "index 97, lag"),
+        (-1, "the whole set"),
+        (112, "the whole set"),
+    ],
 )
 def test_an_index_is_told_as_a_place(index, words):
     assert place(index) == words

@@ -114,7 +114,7 @@ ENTRIES: Final = (
         "E401",
         "coefficients refused",
         "An uploaded calibration failed a check; index and reason are in failing_index and failing_reason.",
-        "Float words in the wrong order, a CRC over the wrong range, or branches that cross or do not rise.",
+        "Float words in the wrong order, a CRC over the wrong range, branches that cross or do not rise, or stops too stiff.",
         "Read failing_index and failing_reason; the active set is unchanged, so there is no hurry.",
     ),
     Entry(
@@ -144,6 +144,13 @@ ENTRIES: Final = (
         "The target exists and would be overwritten.",
         "You ran the same verb before, or chose a name that is taken.",
         "Take another name, or --force where the verb has it.",
+    ),
+    Entry(
+        "E406",
+        "more slip stops than an upload carries",
+        "The calibration has more slip stops than the registers have room for; nothing was sent.",
+        "A calibration file made by other means than this program's fit, which gives no more than fit.",
+        "Name the file as the rig's calibration (calibration: FILE), or fit it with fewer stops.",
     ),
     Entry(
         "E421",
