@@ -7,11 +7,17 @@ the same registers, so each has both names. The JSON form repeats names: (name, 
 import csv
 import io
 import json
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Any, Final
 
 from gateway.registers.map import Block, Register, RegisterMap
 from gateway.registers.values import WordOrder
 
+MOST_READ, MOST_WRITTEN = 125, 123
+"""Words of one request, by the Modbus specification."""
+ACTING: Final = ("commit", "slot_select")
+"""Registers that do something when they are written, and are written alone therefore."""
 FORMATS: Final = ("markdown", "csv", "json")
 _HEADINGS: Final = ("4xxxx/3xxxx", "address", "hex", "R/W", "name", "type", "scale", "unit", "range", "text")
 
@@ -55,17 +61,52 @@ def _section(register_map: RegisterMap, block: Block) -> str:
 
 
 def _how_to(register_map: RegisterMap, block: Block) -> list[str]:
-    """The whole block in the words of the masters that people use."""
-    last = max(register.address + register.words for register in register_map.registers_of(block.name))
-    words = min(last - block.first, 125)
-    place = f"MB_DATA_ADDR 4{block.first + 1:04d}, MB_DATA_LEN {words}"
-    lines = [f"S7 MB_CLIENT: MB_MODE 0 reads, {place}"]
-    if block.name == "command":
-        lines.append(f"S7 MB_CLIENT: MB_MODE 1 writes, {place}")
+    """The whole block in the words of the masters that people use, in as many requests as Modbus needs."""
+    registers = register_map.registers_of(block.name)
+    reads = list(_requests(registers, MOST_READ))
+    lines = [f"S7 MB_CLIENT: MB_MODE 0 reads, {_s7_place(each)}" for each in reads]
+    for run in _writable_runs(registers):
+        lines += [f"S7 MB_CLIENT: MB_MODE 1 writes, {_s7_place(each)}" for each in _requests(run, MOST_WRITTEN)]
+    return lines + [_mbpoll(block, each) for each in reads]
+
+
+def _requests(registers: Sequence[Register], most: int) -> Iterator[list[Register]]:
+    """Neighbours that one request carries, none of them cut, words between them included."""
+    held: list[Register] = []
+    for register in registers:
+        if held and register.address + register.words - held[0].address > most:
+            yield held
+            held = []
+        held.append(register)
+    if held:
+        yield held
+
+
+def _writable_runs(registers: Sequence[Register]) -> list[list[Register]]:
+    """What may be written in one stretch: up to the next register that is read only. Last those that act, each alone."""
+    stretches = groupby(registers, lambda register: register.name if register.name in ACTING else register.access)
+    runs = [list(run) for kind, run in stretches if kind != "R"]
+    return sorted(runs, key=lambda run: run[0].name in ACTING)
+
+
+def _span(registers: Sequence[Register]) -> tuple[int, int]:
+    """(first address, words)."""
+    first, last = registers[0], registers[-1]
+    return first.address, last.address + last.words - first.address
+
+
+def _s7_place(registers: Sequence[Register]) -> str:
+    first, words = _span(registers)
+    names = registers[0].name if len(registers) == 1 else f"{registers[0].name} .. {registers[-1].name}"
+    return f"MB_DATA_ADDR 4{first + 1:04d}, MB_DATA_LEN {words} ({names})"
+
+
+def _mbpoll(block: Block, registers: Sequence[Register]) -> str:
+    first, words = _span(registers)
     if not block.repeats:
-        return [*lines, f"mbpoll -1 -p 5020 -r {block.first + 1} -c {words} HOST"]
+        return f"mbpoll -1 -p 5020 -r {first + 1} -c {words} HOST"
     option = " -B" if block.word_order is WordOrder.ABCD else ""
-    return [*lines, f"mbpoll -1 -p 5020 -t 4:float{option} -r {block.first + 1} -c {words // 2} HOST"]
+    return f"mbpoll -1 -p 5020 -t 4:float{option} -r {first + 1} -c {words // 2} HOST"
 
 
 def _csv(register_map: RegisterMap) -> str:

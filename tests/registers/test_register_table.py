@@ -3,10 +3,12 @@
 import csv
 import io
 import json
+import re
 
 import pytest
 
 from gateway.registers import render_block, render_registers
+from gateway.registers.image import RegisterImage
 from gateway.registers.words import State
 
 FIELDS = [
@@ -77,6 +79,51 @@ def test_markdown_has_all_blocks_and_the_masters_own_words(register_map):
     assert "mbpoll -1 -p 5020 -t 4:float -r 301 -c 46 HOST" in text
     widths = {line.count("|") for line in text.splitlines() if line.startswith("|")}
     assert widths == {11}
+
+
+S7_ROW = re.compile(r"- S7 MB_CLIENT: MB_MODE (\d) (reads|writes), MB_DATA_ADDR 4(\d{4}), MB_DATA_LEN (\d+) \(")
+MBPOLL_ROW = re.compile(r"- mbpoll -1 -p 5020 (-t 4:float )?(-B )?-r (\d+) -c (\d+) HOST")
+
+
+def rows_of(text: str, mode: int) -> list[tuple[int, int]]:
+    """(first address, words) of every S7 row."""
+    found = [tuple(map(int, (kind, name, words))) for kind, _, name, words in S7_ROW.findall(text)]
+    return [(name - 1, words) for kind, name, words in found if kind == mode]
+
+
+def addresses(rows: list[tuple[int, int]]) -> list[int]:
+    return [first + k for first, words in rows for k in range(words)]
+
+
+def test_the_s7_rows_read_every_block_whole_and_cut_no_value(bank, register_map):
+    rows = rows_of(render_registers(register_map, "markdown"), 0)
+    read = addresses(rows)
+    assert len(read) == len(set(read))
+    assert {at for r in register_map.registers for at in range(r.address, r.address + r.words)} <= set(read)
+    assert max(words for _, words in rows) <= 125
+    for first, words in rows:
+        assert len(bank.read_registers(first, words)) == 2 * words
+        assert RegisterImage(register_map).cuts_value(first, words) is None
+    staging, active = ([(a - base, n) for a, n in rows if base <= a < base + 200] for base in (1000, 1500))
+    assert staging == active == [(0, 124), (124, 76)]
+
+
+def test_the_s7_rows_write_all_that_may_be_written_and_what_acts_alone(make_bank, master_of, register_map):
+    rows = rows_of(render_registers(register_map, "markdown"), 1)
+    written = addresses(rows)
+    assert {r.address for r in register_map.registers if r.is_writable} <= set(written)
+    assert max(words for _, words in rows) <= 123
+    assert rows[-2:] == [(1145, 1), (1149, 1)], "after the set that they act on"
+    master = master_of(make_bank(allow_plain_upload=True), "10.0.0.1")
+    for first, words in rows:
+        if first != 1149 and first != 416:  # would select a slot; takes 1234.5 only
+            master.write(first, *(0,) * words)
+
+
+def test_the_mbpoll_rows_read_the_same(register_map):
+    text = render_registers(register_map, "markdown")
+    told = [(int(name) - 1, (2 if typed else 1) * int(count)) for typed, _, name, count in MBPOLL_ROW.findall(text)]
+    assert told == rows_of(text, 0)
 
 
 def test_one_block_can_be_shown_alone(register_map):
