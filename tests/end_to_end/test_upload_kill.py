@@ -17,10 +17,10 @@ import psutil
 import pytest
 
 from gateway.profiles import load_calibration
-from gateway.registers.coefficients import SET_BYTES, CoefficientSet
+from gateway.registers.coefficients import CoefficientSet, words_of_block
 from gateway.service.calibration_store import CalibrationStore
 from tests.end_to_end.conftest import RunningGateway, start, stop
-from tests.service.coefficients import calibration, mark_of, staged
+from tests.service.coefficients import calibration, mark_of, requests_of, staged
 
 KILLS = 50
 PER_STATE = 25
@@ -132,15 +132,17 @@ def words_of(mark: int) -> bytes:
     return staged(CoefficientSet.of_calibration(calibration(mark)), slot=mark % 8)
 
 
-def stage(gateway: RunningGateway, staged_set: bytes) -> None:
-    words = struct.unpack(">145H", staged_set)
-    for at in (0, 100):
-        assert not gateway.write(1000 + at, *words[at : at + 100]).isError()
+def sent(mark: int) -> bytes:
+    return words_of_block(words_of(mark))
+
+
+def stage(gateway: RunningGateway, block: bytes) -> None:
+    for address, part in requests_of(block, 100):
+        assert not gateway.write(address, *struct.unpack(f">{len(part) // 2}H", part)).isError()
 
 
 def active_set(gateway: RunningGateway) -> bytes:
-    words = gateway.words(1500, 100) + gateway.words(1600, 40)
-    return struct.pack(f">{SET_BYTES // 2}H", *words)
+    return words_of_block(struct.pack(">200H", *gateway.words(1500, 100), *gateway.words(1600, 100)))
 
 
 def await_commit(gateway: RunningGateway) -> None:
@@ -190,15 +192,15 @@ def test_the_gateway_killed_in_a_commit_comes_back_with_the_old_set_or_the_new_o
                 control.kill()
                 reconnect(gateway)
                 found = active_set(gateway)
-                assert found in (words_of(mark)[:SET_BYTES], words_of(mark + 1)[:SET_BYTES])
-                is_new = found == words_of(mark + 1)[:SET_BYTES]
+                assert found in (sent(mark), sent(mark + 1))
+                is_new = found == sent(mark + 1)
                 seen["new" if is_new else "old"] += 1
                 mark += is_new
                 assert gateway.words(1644, 1) == [mark % 8]
                 assert gateway.status()["state"] == 0
             kill_all(gateway)
             gateway = start(tmp_path / "state", "--sim")
-            assert active_set(gateway) == words_of(mark)[:SET_BYTES]
+            assert active_set(gateway) == sent(mark)
     finally:
         stop(gateway)
     print(f"after the kills {seen}")
@@ -216,7 +218,7 @@ def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
     running.write(1145, 1)
     await_commit(running)
     assert running.words(122, 1) == [2], "the new number is there with the word committed"
-    assert (active_set(running), running.words(1644, 1)) == (words[:SET_BYTES], [7])
+    assert (active_set(running), running.words(1644, 1)) == (words_of_block(words), [7])
     bump_mv = abs(running.status()["output_voltage"] - before["output_voltage"])
     assert bump_mv <= 30
     worst, deadline_s = 0, time.monotonic() + 2.0

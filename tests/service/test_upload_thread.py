@@ -99,6 +99,31 @@ def test_a_swap_while_pressing_moves_the_voltage_no_faster_than_the_slew_limit(t
         assert abs(control.plant.force_n - 20.0) < 1.0
 
 
+def test_committing_the_read_back_while_pressing_leaves_every_later_voltage_as_it_would_have_been(
+    tmp_path, register_map
+):
+    """With slip stops, whose memory no share tells whole: reversals after the commit would show a lost one."""
+    own = calibration(8, number=1, slip_radii_v=(0.4, 0.8, 1.5), slip_shares=(0.5, 0.25, 0.25))
+
+    def voltages(commits: bool) -> list[float]:
+        service = Bench(tmp_path / str(commits), register_map, own)
+        control = ControlBench()
+        control.controller.use(own.model(), 1)
+        service.upload.on_use = lambda taken: control.controller.use(taken.model, taken.calibration.number)
+        control.run(0.2)
+        control.enable(30.0)
+        control.run(1.0)
+        for force_n in (18.0, 24.0, 12.0, 21.0):
+            control.force(force_n)
+            control.run(0.3)
+            if commits:
+                assert service.upload_of(own, 3)[0] is CommitStatus.COMMITTED
+        assert control.controller.calibration_id == 1
+        return [voltage_v for _, voltage_v in control.voltages()]
+
+    assert voltages(commits=True) == voltages(commits=False)
+
+
 def test_a_swap_leaves_a_voltage_that_is_driven_directly_alone(bench: Bench):
     control = ControlBench()
     bench.upload.on_use = lambda taken: control.controller.use(taken.model, taken.calibration.number)
