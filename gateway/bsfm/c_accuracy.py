@@ -12,7 +12,6 @@ from gateway.bsfm.branches import Branches
 from gateway.bsfm.c_tables import Tables, rounded
 from gateway.bsfm.float32_model import Float32, Float32Model
 from gateway.bsfm.model import Bsfm, Calibration
-from gateway.bsfm.reversal import LinearBlend
 
 POINTS = 17
 GRID = 128  # a multiple of POINTS - 1, so that the points of the table are measured too
@@ -36,7 +35,7 @@ def self_test_of(calibration: Calibration, tables: Tables) -> SelfTest:
     """ValueError if float32 cannot follow this calibration."""
     branches, single = calibration.model().branches, Float32Model(tables)
     grid = tuple(_point(branches, tables, i / GRID) for i in range(GRID + 1))
-    reversals = tuple(_replayed(Bsfm(branches, LinearBlend(calibration.blend_span_n)), tables))
+    reversals = tuple(_replayed(Bsfm(branches, calibration.reversal), tables))
     error_n = max(_force_error_n(single, point) for point in grid)
     error_v = max(*(_voltage_error_v(single, point) for point in grid), _reversal_error_v(single, reversals))
     low_n, high_n = tables.reached_n
@@ -78,7 +77,7 @@ def _reversal_error_v(single: Float32Model, reversals: tuple[tuple[float, float]
 
 
 def _replayed(model: Bsfm, tables: Tables) -> list[tuple[float, float]]:
-    """What the double model answers to a rise, partial reversals, a full one, a second rise and a repetition."""
+    """What the double model answers to a rise, partial reversals, loops within loops, a full fall and a repetition."""
     last_n, memory = tables.reached_n[0], model.reversal.start()
     record = []
     for force_n in map(rounded, _commands_n(tables)):
@@ -91,12 +90,9 @@ def _replayed(model: Bsfm, tables: Tables) -> list[tuple[float, float]]:
 def _commands_n(tables: Tables) -> tuple[float, ...]:
     low_n, high_n = tables.shared_n
     range_n = high_n - low_n
-    top_n, step_n = low_n + 0.7 * range_n, min(tables.blend_span_n / 4, 0.2 * range_n)
-    shares = (0.1, 0.9, 0.4, 0.4)
-    return (
-        low_n + 0.3 * range_n, top_n, top_n - step_n, top_n - 2 * step_n, top_n - step_n,
-        *(low_n + share * range_n for share in shares),
-    )  # fmt: skip
+    step = 0.05 if tables.radii_v else min(tables.blend_span_n / 4 / range_n, 0.2)
+    shares = (0.3, 0.7, 0.7 - step, 0.7 - 2 * step, 0.7 - step, 0.55, 0.64, 0.6, 0.66, 0.1, 0.9, 0.4, 0.4)
+    return tuple(low_n + share * range_n for share in shares)
 
 
 def _tolerance(error: float, size: float) -> float:

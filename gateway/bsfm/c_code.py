@@ -1,15 +1,18 @@
 """C from a calibration: one header and one source, float32, for a controller that has no gateway beside it.
 
 The C text lies beside this file in c_templates, with ${...} where a calibration's numbers and names go; the inverse has a
-template per order (1, 2, above). Decisions: coefficients are constants in the source, so that there is nothing to
-initialise; loops over a constant order instead of unrolled formulas, so that order 15 stays readable; NaN is found by
-its bits, because -ffast-math deletes comparisons with it; no assert, no double, no libm beyond sqrtf (none for order 1).
+template per order (1, 2, above), the reversal one per policy (linear blend, slip stops). Decisions: coefficients are
+constants in the source, so that there is nothing to initialise; loops over a constant order and number of stops instead of
+unrolled formulas, so that order 15 stays readable; NaN is found by its bits, because -ffast-math deletes comparisons with
+it; no assert, no double, no libm beyond sqrtf (none for order 1). The measured response is told, not used: this code has
+no time in it.
 A double rounded to float32 is written with nine digits, which is exact.
 """
 
 import re
 from importlib.resources import files
 from string import Template
+from typing import Final
 
 from gateway import VERSION
 from gateway.bsfm.c_accuracy import SelfTest, self_test_of
@@ -31,6 +34,7 @@ def c_source(calibration: Calibration) -> dict[str, str]:
     tables = tables_of(calibration)
     test = self_test_of(calibration, tables)
     names = {**_texts(calibration), **_numbers(calibration, tables), **_tests(tables, test), **_code(tables)}
+    names |= _reversal(calibration, tables, names)
     return {
         f"{names['p']}.h": Template(_template("header.h")).substitute(names),
         f"{names['p']}.c": "\n".join(Template(_template(part)).substitute(names) for part in SOURCE_PARTS),
@@ -105,6 +109,45 @@ def _code(tables: Tables) -> dict[str, str]:
         "fields": "\n".join(f"    {declared} /* {meaning} */" for declared, meaning, _ in _fields(tables.rising)),
         "rising": _initialiser(tables.rising),
         "falling": _initialiser(tables.falling),
+    }
+
+
+def _reversal(calibration: Calibration, tables: Tables, names: dict[str, str]) -> dict[str, str]:
+    """Texts that depend on the policy, and its templates filled in. names: what they need beside."""
+    policy = "slip" if tables.radii_v else "blend"
+    own = _slip(tables) if tables.radii_v else _BLEND
+    response = calibration.response
+    lags = (
+        f"dead time {response.dead_time_s:g} s, lags {response.lag_s:g} and {response.second_lag_s:g} s"
+        if response
+        else ""
+    )
+    told = {"response_told": f" *   response     {lags}: not in this code\n" if lags else ""}
+    filled = {
+        name: Template(_template(f"reversal_{policy}{end}")).substitute({**names, **own}).rstrip("\n") + last
+        for name, end, last in (("reversal", ".c", "\n"), ("reversal_api", ".h", "\n"))
+    }
+    return {**own, **told, **filled, "reversal_told": Template(own["reversal_told"]).substitute(names)}
+
+
+_BLEND: Final = {
+    "reversal_told": "linear blend of the branches over $span N",
+    "memory": "    float blend;     /* 1 on the rising branch, -1 on the falling one, between them after a reversal */",
+    "rest": ", rising",
+}
+
+
+def _slip(tables: Tables) -> dict[str, str]:
+    stops = len(tables.radii_v)
+    radii = ", ".join(f"{radius_v:.3g}" for radius_v in tables.radii_v)
+    return {
+        "reversal_told": f"slip stops: {stops}, which give way over {radii} V",
+        "memory": f"    float places[{stops}]; /* of the slip stops, -1 .. 1: where they stand since the last reversals */",
+        "rest": ", fallen there",
+        "stops": str(stops),
+        "radii": _wrapped(tables.radii_v),
+        "shares": _wrapped(tables.shares),
+        "stiffness_f": _literal(tables.stiffness_per_v),
     }
 
 

@@ -6,11 +6,13 @@ keep each product of the Newton form within 1e-36 .. 1e36), and branches that st
 """
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb, frexp, ldexp
 
+from gateway.bsfm.branches import Branches
 from gateway.bsfm.curve import RationalBezier
 from gateway.bsfm.model import Calibration
+from gateway.bsfm.slip import SlipStops
 
 VOLTAGE_LIMIT_V = 1.0e3
 FORCE_LIMIT_N = 1.0e6
@@ -40,6 +42,9 @@ class Tables:
     blend_span_n: float
     rising: BranchTable
     falling: BranchTable
+    radii_v: tuple[float, ...] = ()  # of slip stops; none: the linear blend
+    shares: tuple[float, ...] = ()
+    stiffness_per_v: float = 0.0
 
     @property
     def reached_n(self) -> tuple[float, float]:
@@ -76,11 +81,24 @@ def tables_of(calibration: Calibration) -> Tables:
         blend_span_n=rounded(calibration.blend_span_n),
         rising=_branch_table("rising", calibration.rising_handles_n, calibration.rising_weights),
         falling=_branch_table("falling", calibration.falling_handles_n, calibration.falling_weights),
+        radii_v=tuple(map(rounded, calibration.slip_radii_v)),
+        shares=tuple(map(rounded, calibration.slip_shares)),
     )
     low_n, high_n = found.shared_n
     if low_n >= high_n:
         raise ValueError("the branches share no force: one begins where the other ends")
-    return found
+    return replace(found, stiffness_per_v=_stiffness_per_v(found)) if found.radii_v else found
+
+
+def _stiffness_per_v(tables: Tables) -> float:
+    """Of the rounded stops, rounded. ValueError where they are too stiff for the rounded branches."""
+    stops = SlipStops(tables.radii_v, tables.shares)
+    curves = [
+        RationalBezier(tables.x0_v, tables.x1_v, table.handles_n, table.weights)
+        for table in (tables.rising, tables.falling)
+    ]
+    stops.check(Branches(*curves))
+    return rounded(stops.stiffness_per_v)
 
 
 def _branch_table(name: str, handles_n: tuple[float, ...], weights: tuple[float, ...]) -> BranchTable:

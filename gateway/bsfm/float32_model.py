@@ -48,7 +48,7 @@ class CommandState:
     """The caller-owned struct of the C."""
 
     force_n: Float32
-    blend: Float32
+    memory: list[Float32]  # the blend, or the places of the slip stops
     voltage_v: Float32
 
 
@@ -60,6 +60,8 @@ class Float32Model:
         self.x0, self.x1, self.x_span = Float32(tables.x0_v), Float32(tables.x1_v), Float32(tables.x_span_v)
         self.lowest, self.highest = _float32s(tables.reached_n)
         self.blend_span = Float32(tables.blend_span_n)
+        self.radii, self.shares = _float32s(tables.radii_v), _float32s(tables.shares)
+        self.stiffness = Float32(tables.stiffness_per_v)
         self.rising, self.falling = _Branch(tables.rising), _Branch(tables.falling)
         self.rounds_max = 0  # most Newton rounds that any call has taken
 
@@ -101,8 +103,16 @@ class Float32Model:
         rising_n, _ = self._force_of(self.rising, voltage_v)
         return falling_n + (_HALF + _HALF * blend) * (rising_n - falling_n), status
 
+    def share(self, state: CommandState) -> Float32:
+        if not self.radii:
+            return state.memory[0]
+        total = _ZERO
+        for share, place in zip(self.shares, state.memory, strict=True):
+            total = total + share * place
+        return _clipped(total, -_ONE, _ONE)
+
     def reset(self) -> CommandState:
-        return CommandState(self.lowest, _ONE, self.x0)
+        return CommandState(self.lowest, [-_ONE] * len(self.radii) or [_ONE], self.x0)
 
     def command(self, state: CommandState, force_n: Float32) -> Answer:
         if self._is_damaged(state):
@@ -110,14 +120,47 @@ class Float32Model:
         if not isfinite(force_n):
             return state.voltage_v, Code.INVALID
         reached_n = _clipped(force_n, self.lowest, self.highest)
-        state.blend = self.blend(state.blend, reached_n - state.force_n)
+        self._move_to(state, reached_n)
         state.force_n = reached_n
-        state.voltage_v, status = self.voltage(force_n, state.blend)
+        state.voltage_v, status = self.voltage(force_n, self.share(state))
         return state.voltage_v, status
 
     def _is_damaged(self, state: CommandState) -> bool:
         inside = self.lowest <= state.force_n <= self.highest and self.x0 <= state.voltage_v <= self.x1
-        return not (inside and _is_blend(state.blend))
+        return not (inside and all(map(_is_blend, state.memory)))
+
+    def _move_to(self, state: CommandState, force_n: Float32) -> None:
+        if not self.radii:
+            state.memory[0] = self.blend(state.memory[0], force_n - state.force_n)
+            return
+        if force_n == state.force_n:
+            return
+        from_middle_v, from_half_v = self._middle_and_half(state.force_n)
+        middle_v, half_v = self._middle_and_half(force_n)
+        stuck_v = middle_v - from_middle_v + self.share(state) * (half_v - from_half_v)
+        travel_v = self._travel(state, stuck_v, half_v)
+        state.memory = [
+            _clipped(place + travel_v / radius, -_ONE, _ONE)
+            for place, radius in zip(state.memory, self.radii, strict=True)
+        ]
+
+    def _middle_and_half(self, force_n: Float32) -> tuple[Float32, Float32]:
+        rising_v, _ = self._voltage_of(self.rising, force_n)
+        falling_v, _ = self._voltage_of(self.falling, force_n)
+        return _HALF * (rising_v + falling_v), _HALF * (rising_v - falling_v)
+
+    def _travel(self, state: CommandState, stuck_v: Float32, half_v: Float32) -> Float32:
+        way = _ONE if stuck_v > 0 else -_ONE
+        distance_v, stiffness = abs(stuck_v), half_v * self.stiffness
+        travel_v = distance_v / (_ONE - stiffness)
+        for radius, share, place in zip(self.radii, self.shares, state.memory, strict=True):
+            left = _ONE - way * place
+            if travel_v <= radius * left:
+                break
+            distance_v = distance_v + half_v * share * left
+            stiffness = stiffness - half_v * share / radius
+            travel_v = distance_v / (_ONE - stiffness)
+        return way * travel_v
 
     def _force_of(self, branch: _Branch, voltage_v: Float32) -> Answer:
         if not isfinite(voltage_v):

@@ -3,7 +3,8 @@
 Two fits: `fit_stops` leaves the branches as they are, `fit_joint` moves them with the stops (METHOD.md: minor-loop points in
 the fit). The joint fit is the one that pays: branches that were fitted to a staircase already contain its two turns, and no
 selection between them can take these out again. Radii stand on a grid, from a fraction of the loop's width to a share of
-the range; the non-negative fit picks few of them. Shares below SMALLEST_SHARE are dropped and the rest fitted again.
+the range; the non-negative fit picks few of them. Shares below SMALLEST_SHARE, and the smallest of more than a set of
+registers carries, are dropped and the rest fitted again.
 
 Both are robust: one round of Huber weights after the first fit. The joint fit is a small least-squares problem with the
 shares projected out, and a ridge on the log weights, which the data leave open. It is held to what may drive a plant
@@ -24,7 +25,7 @@ from gateway.bsfm.fit_result import verdicts_of
 from gateway.bsfm.ladder import Ladder
 from gateway.bsfm.model import Bsfm
 from gateway.bsfm.reversal import LinearBlend
-from gateway.bsfm.slip import SlipStops, half_width_bound_v
+from gateway.bsfm.slip import STOPS_CARRIED, SlipStops, half_width_bound_v
 from gateway.bsfm.slip_problem import SlipProblem, Walk
 from gateway.bsfm.slip_search import SlipSearch
 
@@ -143,7 +144,9 @@ def _huber(problem: SlipProblem, error_n: Floats) -> Floats:
 
 def _result(problem: SlipProblem, branches: Branches, *, joint: bool) -> SlipFit:
     """Few stops: the small shares dropped, the others fitted again."""
-    keep = problem.shares(branches) >= SMALLEST_SHARE
+    first = problem.shares(branches)
+    largest = np.isin(np.arange(len(first)), np.argsort(first)[-STOPS_CARRIED:])
+    keep = largest & (first >= SMALLEST_SHARE)
     problem.radii_v, problem.places = problem.radii_v[keep], problem.places[:, keep]
     shares = problem.shares(branches)
     error_n = problem.errors_n(branches, shares)[problem.weight > 0.0]

@@ -10,16 +10,18 @@ import subprocess
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gateway.bsfm import Calibration
+from gateway.bsfm import Calibration, SlipStops
 from gateway.bsfm.c_code import c_source
 from gateway.bsfm.c_tables import tables_of
 from gateway.bsfm.float32_model import ROUNDS_MAX, Code, Float32, Float32Model
+from gateway.bsfm.slip import STIFFEST, half_width_bound_v
 from gateway.profiles import load_calibration
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="NO gcc: the generated C was NOT compared")
@@ -47,6 +49,19 @@ def calibration(order: int, seed: int, spread: float = 1.2, **changes: object) -
     return Calibration(**{"name": f"order_{order}", **facts, **texts, **changes})
 
 
+def stops(count: int, first_v: float) -> dict[str, Any]:
+    shares = np.random.default_rng(count).uniform(0.0, 1.0, count)
+    radii_v = first_v * np.geomspace(1.0, 4.0, count)
+    return {"slip_radii_v": tuple(radii_v.tolist()), "slip_shares": tuple((shares / shares.sum()).tolist())}
+
+
+def stiffest(given: Calibration, radii: tuple[float, ...], shares: tuple[float, ...]) -> dict[str, Any]:
+    """Stops with nearly the least radii that these branches bear."""
+    widest_v = half_width_bound_v(given.model().branches)
+    scale = 1.0001 * widest_v * SlipStops(radii, shares).stiffness_per_v / STIFFEST
+    return {"slip_radii_v": tuple(scale * radius for radius in radii), "slip_shares": shares}
+
+
 ORDINARY = {"demo": load_calibration("demo"), **{f"order_{n}": calibration(n, seed=n) for n in (1, 2, 3, 5, 15)}}
 HARD = {
     "free_ends": calibration(3, 31, x0_v=-2.0, x1_v=7.7, blend_span_n=0.0, falling_handles_n=(-3.0, 8.0, 9.5, 33.0)),
@@ -55,6 +70,14 @@ HARD = {
     "flat_end": calibration(4, 34, falling_handles_n=(0.5, 0.5, 0.5, 20.0, 40.0)),
     "straight": calibration(2, 35, rising_handles_n=(0.0, 18.0, 36.0), rising_weights=(1.0, 1.0, 1.0)),
 }
+SLIP = {
+    "one_stop": calibration(1, 41, slip_radii_v=(1.5,), slip_shares=(1.0,)),
+    "sixteen_stops": calibration(3, 42, 0.3, **stops(16, 1.2)),
+    "stops_of_order_15": calibration(15, 43, 0.3, **stops(10, 1.0)),
+    "stiffest_stops": calibration(2, 44, 0.3, **stiffest(calibration(2, 44, 0.3), (0.3, 0.5, 2.0), (0.6, 0.3, 0.1))),
+    "stops_with_free_ends": calibration(3, 45, 0.3, falling_handles_n=(-3.0, 8.0, 25.0, 44.0), **stops(5, 2.0)),
+}
+ORDINARY |= SLIP
 CASES = {**ORDINARY, **HARD}
 every_case = pytest.mark.parametrize("name", CASES)
 every_level = pytest.mark.parametrize("level", LEVELS)
@@ -99,8 +122,14 @@ def expected(name: str, function: str) -> list[tuple[float, Code]]:
     return [(float(value), code) for value, code in (answer(Float32(x)) for x in FUNCTIONS[function](name))]
 
 
-class State(ctypes.Structure):
-    _fields_ = (("force_n", ctypes.c_float), ("blend", ctypes.c_float), ("voltage_v", ctypes.c_float))
+def state_of(stops: int) -> type[ctypes.Structure]:
+    """The caller-owned struct; memory is the blend where there are no stops."""
+    memory = ctypes.c_float * max(1, stops)
+
+    class State(ctypes.Structure):
+        _fields_ = (("force_n", ctypes.c_float), ("memory", memory), ("voltage_v", ctypes.c_float))
+
+    return State
 
 
 @dataclass
@@ -109,6 +138,7 @@ class Library:
 
     loaded: ctypes.CDLL
     prefix: str
+    stops: int
 
     def each(self, function: str, rows: Iterable[tuple[float, ...]], *first: object) -> list[tuple[float, int]]:
         found, result = [], ctypes.c_float()
@@ -118,13 +148,18 @@ class Library:
             found.append((result.value, code))
         return found
 
-    def reset(self) -> State:
-        state = State()
+    def reset(self) -> Any:
+        state = state_of(self.stops)()
         self.loaded[f"{self.prefix}_reset"](ctypes.byref(state))
         return state
 
-    def command(self, state: State, forces_n: Iterable[float]) -> list[tuple[float, int]]:
+    def command(self, state: Any, forces_n: Iterable[float]) -> list[tuple[float, int]]:
         return self.each("command", ((force_n,) for force_n in forces_n), ctypes.byref(state))
+
+    def share(self, state: Any) -> float:
+        call = self.loaded[f"{self.prefix}_share"]
+        call.restype = ctypes.c_float
+        return float(call(ctypes.byref(state)))
 
     def blend(self, blend: float, delta_n: float) -> float:
         call = self.loaded[f"{self.prefix}_blend"]
@@ -139,7 +174,7 @@ def compiled(directory: Path, name: str, level: str) -> Library:
     command = ["gcc", *STRICT, level, EXACT, "-shared", "-fPIC", "-o", "code.so", f"{prefix}.c", "-lm"]
     done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return Library(ctypes.CDLL(str(directory / "code.so")), prefix)
+    return Library(ctypes.CDLL(str(directory / "code.so")), prefix, len(CASES[name].slip_radii_v))
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +234,8 @@ def test_commands_with_reversals_agree_to_the_bit(library, name, level):
     build = library(name, level)
     state = build.reset()
     assert bits(build.command(state, forces)) == bits(wanted)
-    assert (state.force_n, state.blend, state.voltage_v) == (memory.force_n, memory.blend, memory.voltage_v)
+    assert (state.force_n, [*state.memory], state.voltage_v) == (memory.force_n, memory.memory, memory.voltage_v)
+    assert build.share(state) == model.share(memory)
 
 
 @pytest.mark.parametrize("name", ORDINARY)
@@ -256,12 +292,15 @@ def test_nan_and_infinity_hold_the_last_voltage_and_change_nothing(library):
 
 
 @needs_gcc
-@pytest.mark.parametrize("damage", ["blend nan", "blend 1.5", "force_n inf", "force_n -5", "voltage_v 9"])
+@pytest.mark.parametrize("damage", ["memory nan", "memory 1.5", "force_n inf", "force_n -5", "voltage_v 9"])
 def test_a_damaged_state_gives_the_lowest_voltage(library, damage):
     build = library("demo", "-O2")
     build.command(state := build.reset(), [30.0])
     field, value = damage.split()
-    setattr(state, field, float(value))
+    if field == "memory":
+        state.memory[build.stops - 1] = float(value)
+    else:
+        setattr(state, field, float(value))
     assert build.command(state, [30.0]) == [(0.0, Code.INVALID)]
     assert build.command(build.reset(), [30.0])[0][1] == Code.OK
 
@@ -272,25 +311,51 @@ def test_a_command_beyond_the_range_is_remembered_as_the_end_it_reached(library)
     state = build.reset()
     assert build.command(state, [1e30])[0] == (8.0, Code.HIGH)
     build.command(state, [float(model_of("demo").highest)])
-    assert state.blend == 1.0
+    assert build.share(state) == 1.0
 
 
 @needs_gcc
-def test_chatter_neither_drifts_nor_jumps(library):
-    build = library("demo", "-O2")
-    build.command(state := build.reset(), [30.0, 29.0])
-    start = state.blend
-    voltages = [v for v, _ in build.command(state, [29.05, 28.95] * 20_000 + [29.0])]
-    assert abs(state.blend - start) < 1e-4
+@pytest.mark.parametrize("name", ["order_2", "demo", "stiffest_stops", "stops_of_order_15"])
+def test_chatter_neither_drifts_nor_jumps(library, name):
+    """A closed loop of commands ends where it began, as in double, however often it is gone round."""
+    build = library(name, "-O2")
+    build.command(state := build.reset(), [30.0, 25.0, 28.0, 27.95])
+    ((first_v, _),) = build.command(state, [28.0])
+    first = build.share(state)
+    voltages = [v for v, _ in build.command(state, [27.95, 28.0] * 20_000)]
+    assert abs(build.share(state) - first) < 1e-4
+    assert abs(voltages[-1] - first_v) < 1e-4
     assert max(voltages) - min(voltages) < 0.05
 
 
 @needs_gcc
 def test_a_delta_that_is_no_number_moves_no_blend(library):
-    build = library("demo", "-O2")
+    build = library("order_2", "-O2")
     assert [build.blend(0.25, delta) for delta in (NAN, INF, -INF, 0.0)] == [0.25] * 4
-    half_n = ORDINARY["demo"].blend_span_n / 2
+    half_n = ORDINARY["order_2"].blend_span_n / 2
     assert build.blend(0.25, 100.0) == 1.0 and build.blend(-1.0, half_n) == 0.0
+
+
+def along_n(name: str) -> list[float]:
+    """Reversals of all sizes within what both branches reach."""
+    low_n, high_n = CASES[name].model().force_range_n
+    rng = np.random.default_rng(3)
+    turns = low_n + (high_n - low_n) * rng.uniform(0.02, 0.98, 60)
+    paths = [np.linspace(a, b, 5)[1:] for a, b in pairwise(turns)]
+    forces: list[float] = np.concatenate(paths).astype(np.float32).tolist()
+    return forces
+
+
+@pytest.mark.parametrize("name", [*SLIP, "demo", "order_2", "order_15"])
+def test_commands_with_reversals_stay_near_the_double_model(name):
+    model, single = CASES[name].model(), model_of(name)
+    state, memory = single.reset(), model.reversal.start()
+    last_n = float(single.lowest)
+    for force_n in along_n(name):
+        memory = model.moved(memory, last_n, force_n)
+        last_n = force_n
+        wanted_v, _ = model.voltage_v(force_n, model.share(memory))
+        assert abs(float(single.command(state, Float32(force_n))[0]) - wanted_v) < 2e-5
 
 
 @needs_gcc

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.bsfm import Calibration
+from gateway.bsfm import Calibration, Response
 from gateway.bsfm.c_code import c_source
 from gateway.bsfm.c_tables import tables_of
 from gateway.profiles import load_calibration
@@ -124,6 +124,22 @@ def test_the_self_test_catches_a_damaged_constant(tmp_path, name):
 
 
 @needs_gcc
+@pytest.mark.parametrize("array", ["RADII_V", "SHARES"])
+def test_the_self_test_catches_a_damaged_stop(tmp_path, array):
+    (prefix,) = written(tmp_path, CASES["demo"])
+    source = (tmp_path / f"{prefix}.c").read_text("ascii")
+    (tmp_path / "main.c").write_text(f'#include "{prefix}.h"\nint main(void) {{ return {prefix}_self_test() != 0; }}\n')
+    table = tables_of(CASES["demo"])
+    for constant in table.radii_v if array == "RADII_V" else table.shares:
+        literal = f"{constant:.9g}"
+        at = source.index(literal, source.index(f"{array}[STOPS] = "))
+        damaged = source[:at] + f"{constant * 1.001:.9g}" + source[at + len(literal) :]
+        (tmp_path / f"{prefix}.c").write_text(damaged, encoding="ascii")
+        compiled(tmp_path, "gcc", "-o", "program", "main.c", f"{prefix}.c", "-lm")
+        assert subprocess.run([tmp_path / "program"], check=False).returncode == 1, literal
+
+
+@needs_gcc
 @pytest.mark.parametrize("name", ["order_1", "demo", "order_15"])
 def test_the_object_needs_nothing_but_sqrtf_and_owns_no_memory(tmp_path, name):
     (prefix,) = written(tmp_path, CASES[name])
@@ -161,10 +177,18 @@ def test_the_header_says_where_it_comes_from_and_what_it_is_not():
     sources = c_source(CASES["demo"])
     assert sorted(sources) == ["bsfm_demo.c", "bsfm_demo.h"]
     header = sources["bsfm_demo.h"].split("*/")[0]
-    told = ('1 "demo" of 2026-11-21', "twin of plant paper-slide", "RMS 0.131 N", "0 .. 8 V", "blend span 14 N")
-    told = (*told, "slip stops, where the calibration has them, are not exported")
+    told = ('1 "demo" of 2026-11-21', "twin of plant paper-slide", "RMS 0.131 N", "0 .. 8 V")
+    told = (*told, "slip stops: 7, which give way over 0.144, 0.445, 0.589, 1.04, 1.37, 1.82, 3.2 V")
     for words in (*told, "force-gateway 0.1.0", "sha256 9698ef5c", "not a safety device", "bsfm_demo_command(&state,"):
         assert words in header
+
+
+def test_the_header_tells_the_response_that_the_code_does_not_use():
+    measured = replace(CASES["demo"], response=Response(dead_time_s=0.08, lag_s=0.072, second_lag_s=0.07))
+    header, source = (c_source(measured)[f"bsfm_demo.{end}"] for end in "hc")
+    assert " *   response     dead time 0.08 s, lags 0.072 and 0.07 s: not in this code\n *   generator" in header
+    assert source == c_source(CASES["demo"])["bsfm_demo.c"]
+    assert "response     " not in c_source(CASES["demo"])["bsfm_demo.h"]
 
 
 def test_the_same_calibration_gives_the_same_ascii_text():
@@ -202,6 +226,7 @@ def test_every_order_with_a_usable_slope_becomes_c(order):
         ({"x0_v": 4.9999999}, "too narrow"),
         ({"x1_v": 1e6}, "at most 1000 V"),
         ({"blend_span_n": 1e9}, "blend span"),
+        ({"slip_radii_v": (0.001,), "slip_shares": (1.0,)}, "slip stops give way over"),
     ],
 )
 def test_what_float32_cannot_carry_is_refused_with_a_sentence(changes, words):

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier, SlipStops
+from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier, SlipStops, slip_fit
 from gateway.bsfm.fit import fit
 from gateway.bsfm.fit_problem import Floats
 from gateway.bsfm.fit_result import verdicts_of
@@ -98,6 +98,17 @@ def test_on_another_walk_slip_beats_the_blend_and_the_blend_beats_switching() ->
     assert "switched" in switched.policy and "blend" in blend.policy and "joint" in stops.policy
     assert 3.0 * stops.rms_n < blend.rms_n < 0.5 * switched.rms_n
     assert isinstance(blend.model.reversal, LinearBlend) and stops.model == slip.model
+
+
+def test_a_fit_never_gives_more_stops_than_registers_carry(monkeypatch) -> None:
+    """As on data that ask for more: the bound is lowered instead, for no known data ask for more than seven."""
+    whole = fit_stops(TRUTH.branches, [walk(TURNS_V, 1)])
+    assert 4 <= len(whole.stops.radii_v) <= slip_fit.STOPS_CARRIED == 10
+    monkeypatch.setattr(slip_fit, "STOPS_CARRIED", 3)
+    cut = fit_stops(TRUTH.branches, [walk(TURNS_V, 1)])
+    assert len(cut.stops.radii_v) == 3 and set(cut.stops.radii_v) <= set(whole.stops.radii_v)
+    assert sum(cut.stops.shares) == pytest.approx(1.0)
+    assert cut.rms_n < 1.5 * whole.rms_n
 
 
 def test_wild_points_hardly_move_the_stops() -> None:

@@ -56,12 +56,14 @@ def test_a_voltage_change_or_a_force_that_is_no_number_is_refused(bad):
         stops.moved(BRANCHES, stops.start(), 1.0, nan)
 
 
-def test_the_shipped_calibration_has_stops_and_carries_a_blend_for_upload_and_c():
+def test_the_shipped_calibration_has_stops_and_its_c_code_too_and_keeps_a_blend_beside_them():
     calibration = load_calibration("demo")
     assert calibration.model().reversal == SlipStops(calibration.slip_radii_v, calibration.slip_shares)
     plain = replace(calibration, slip_radii_v=(), slip_shares=())
     assert plain.model().reversal == LinearBlend(calibration.blend_span_n)
-    assert c_source(plain) == c_source(calibration)
+    code, plain_code = (c_source(each)["bsfm_demo.c"] for each in (calibration, plain))
+    assert "enum { STOPS = 7 };" in code and "BLEND_SPAN_N" not in code
+    assert "BLEND_SPAN_N = 14.0f;" in plain_code and "STOPS" not in plain_code
 
 
 @pytest.mark.parametrize("fields", [{"slip_radii_v": (0.5, 1.0)}, {"slip_shares": (1.0,)}])

@@ -5,9 +5,9 @@
  *   source       $source
  *   data         sha256 $sha256
  *   fit          order $order, residual RMS $rms N, largest $largest N
- *   range        $x0 .. $x1 V, $force_min .. $force_max N on both branches, blend span $span N
- *   reversal     the linear blend over that span: slip stops, where the calibration has them, are not exported
- *   generator    force-gateway $version
+ *   range        $x0 .. $x1 V, $force_min .. $force_max N on both branches
+ *   reversal     $reversal_told
+$response_told *   generator    force-gateway $version
  *   accuracy     against the same model in double: force within $error_n N, voltage within $error_v V (measured)
  *
  * This is not a safety device. It computes; it does not supervise. Limits on force and voltage, a watchdog and a safe
@@ -56,24 +56,19 @@ typedef enum {
 /* What is remembered between commands; owned by the caller, started by ${p}_reset. */
 typedef struct {
     float force_n;   /* the last command, within what the branches reach */
-    float blend;     /* 1 on the rising branch, -1 on the falling one, between them after a reversal */
+$memory
     float voltage_v; /* the last answer, held while a command is invalid */
 } ${p}_state;
 
-/* State at rest: lowest voltage and force, rising. */
+/* State at rest: lowest voltage and force$rest. Also whenever the tool has been vented. */
 void ${p}_reset(${p}_state *state);
 
-/* Voltage for the next commanded force; moves the blend by the change of command, so give it setpoints, not measured
- * (noisy) forces. INVALID leaves the state as it was and answers with the last voltage; if the state itself is
- * damaged (not reset, overwritten), with the lowest one. */
+/* Voltage for the next commanded force. Changes of command move what is remembered of reversals, so give it setpoints,
+ * not measured (noisy) forces. INVALID leaves the state as it was and answers with the last voltage; if the state itself
+ * is damaged (not reset, overwritten), with the lowest one. */
 ${p}_status ${p}_command(${p}_state *state, float force_n, float *voltage_v);
 
-/* The same without memory: the caller keeps the blend. ${p}_blend is the blend after the force has moved by delta_n;
- * a delta that is not finite moves nothing. */
-${p}_status ${p}_voltage(float force_n, float blend, float *voltage_v);
-${p}_status ${p}_force(float voltage_v, float blend, float *force_n);
-float ${p}_blend(float blend, float delta_n);
-
+$reversal_api
 /* One branch: rising while the voltage grows, falling while it shrinks. */
 ${p}_status ${p}_rising_force(float voltage_v, float *force_n);
 ${p}_status ${p}_falling_force(float voltage_v, float *force_n);

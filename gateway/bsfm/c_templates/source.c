@@ -15,7 +15,6 @@ static const float X1_V = $x1_f;
 static const float X_SPAN_V = $x_span_f;
 static const float LOWEST_N = $lowest_f; /* reached by one branch or both */
 static const float HIGHEST_N = $highest_f;
-static const float BLEND_SPAN_N = $span_f;
 
 typedef struct {
 $fields
@@ -137,17 +136,6 @@ ${p}_status ${p}_falling_voltage(float force_n, float *voltage_v)
     return voltage_of(&FALLING, force_n, voltage_v);
 }
 
-float ${p}_blend(float blend, float delta_n)
-{
-    if (is_finite(delta_n) && (delta_n > 0.0f || delta_n < 0.0f)) {
-        if (magnitude(delta_n) >= BLEND_SPAN_N) {
-            return delta_n > 0.0f ? 1.0f : -1.0f;
-        }
-        blend = blend + 2.0f * delta_n / BLEND_SPAN_N;
-    }
-    return clipped(blend, -1.0f, 1.0f);
-}
-
 ${p}_status ${p}_voltage(float force_n, float blend, float *voltage_v)
 {
     const float rising_share = 0.5f + 0.5f * blend;
@@ -184,18 +172,19 @@ ${p}_status ${p}_force(float voltage_v, float blend, float *force_n)
     return status;
 }
 
+$reversal
 void ${p}_reset(${p}_state *state)
 {
     state->force_n = LOWEST_N;
-    state->blend = 1.0f;
     state->voltage_v = X0_V;
+    start(state);
 }
 
 static int is_damaged(const ${p}_state *state)
 {
     const float force_n = state->force_n;
     const float voltage_v = state->voltage_v;
-    return !is_blend(state->blend) || !is_finite(force_n) || !is_finite(voltage_v) || force_n < LOWEST_N ||
+    return is_memory_damaged(state) || !is_finite(force_n) || !is_finite(voltage_v) || force_n < LOWEST_N ||
            force_n > HIGHEST_N || voltage_v < X0_V || voltage_v > X1_V;
 }
 
@@ -212,9 +201,9 @@ ${p}_status ${p}_command(${p}_state *state, float force_n, float *voltage_v)
         return ${P}_INVALID;
     }
     reached_n = clipped(force_n, LOWEST_N, HIGHEST_N);
-    state->blend = ${p}_blend(state->blend, reached_n - state->force_n);
+    move_to(state, reached_n);
     state->force_n = reached_n;
-    status = ${p}_voltage(force_n, state->blend, voltage_v);
+    status = ${p}_voltage(force_n, ${p}_share(state), voltage_v);
     state->voltage_v = *voltage_v;
     return status;
 }
