@@ -120,24 +120,21 @@ def half_width_bound_v(branches: Branches) -> float:
     """Nowhere is the loop wider than this, in V, half of it; at most BOUND_SHARE too much.
 
     Both inverses grow, so the ends of a range of forces bound all of it: rise(high) - fall(low). Ranges are halved until
-    that is close to the widest place seen.
+    that is close to the widest place seen. An uploaded set waits for this, so no voltage is reckoned twice.
     """
     rising, falling = branches.rising, branches.falling
     low_n, high_n = min(rising.handles[0], falling.handles[0]), max(rising.handles[-1], falling.handles[-1])
     seen_v = BOUND_RESOLUTION * (rising.x1 - rising.x0)
     proven_v = 0.0
-    ranges = [_bounded(branches, low_n, high_n)]
+    ranges = [(low_n, high_n, falling.inverse(low_n)[0], rising.inverse(high_n)[0])]
     while ranges:
-        bound_v, start_n, end_n = ranges.pop()
+        start_n, end_n, start_v, end_v = ranges.pop()
+        bound_v = 0.5 * (end_v - start_v)
         if bound_v <= (1.0 + BOUND_SHARE) * seen_v:
             proven_v = max(proven_v, bound_v)
             continue
         middle_n = 0.5 * (start_n + end_n)
-        seen_v = max(seen_v, middle_and_half(branches, middle_n)[1])
-        ranges += [_bounded(branches, start_n, middle_n), _bounded(branches, middle_n, end_n)]
+        rising_v, falling_v = rising.inverse(middle_n)[0], falling.inverse(middle_n)[0]
+        seen_v = max(seen_v, 0.5 * (rising_v - falling_v))
+        ranges += [(start_n, middle_n, start_v, rising_v), (middle_n, end_n, falling_v, end_v)]
     return proven_v
-
-
-def _bounded(branches: Branches, low_n: float, high_n: float) -> tuple[float, float, float]:
-    bound_v = 0.5 * (branches.rising.inverse(high_n)[0] - branches.falling.inverse(low_n)[0])
-    return bound_v, low_n, high_n

@@ -53,6 +53,7 @@ class Comparison:
                 name: {"rms_n": found.rms_n, "max_n": found.max_n, "at_v": self.place_v(found)}
                 for name, found in self.branches.items()
             },
+            "reversal": [self.a.reversal_kind, self.b.reversal_kind],
             "blend_span_n": [self.a.blend_span_n, self.b.blend_span_n],
         }
 
@@ -76,7 +77,10 @@ def compared(a: Calibration, b: Calibration) -> Comparison:
 
 def table(comparison: Comparison) -> str:
     """For the terminal: the figures, then the branches at a few voltages."""
-    lines = [f"A  {_title(comparison.a)}", f"B  {_title(comparison.b)}", ""]
+    lines = [
+        f"{name}  {_title(each)}, {each.reversal_kind}" for name, each in (("A", comparison.a), ("B", comparison.b))
+    ]
+    lines.append("")
     for name, found in comparison.branches.items():
         place_v = comparison.place_v(found)
         lines.append(f"{name:<8} B - A  {found.rms_n:7.3f} N RMS, at most {found.max_n:+.3f} N at {place_v:.2f} V")

@@ -5,12 +5,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
-from gateway.bsfm import Calibration, Response
+from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, Response, validate_coefficients
 from gateway.profiles import load_calibration
 from gateway.registers import RegisterMap
 from gateway.registers.coefficients import HEAD_WORDS, CoefficientSet, model_hash, set_crc, words_of_block
+from gateway.registers.staging import Staged, check_staged
 from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
+from gateway.service.activation import uploaded
 from gateway.service.calibration_store import StoreError
 from tests.service.coefficients import calibration, requests_of, staged
 from tests.service.upload_bench import COMMIT, DRY_RUN, OWN, PEER, Bench
@@ -115,6 +119,39 @@ def test_a_set_that_was_in_use_before_or_that_the_rig_names_is_known_too(tmp_pat
     assert (status["active"], status["name"], status["slot"], bench.notice) == (1, "demo", 1, CommitNotice.KNOWN_SET)
     assert bench.upload_of(replace(DEMO, name="another name"), 1) == COMMITTED
     assert bench.upload.status()["name"] == "demo", "a name is not carried"
+
+
+@st.composite
+def calibrations(draw: st.DrawFn) -> Calibration:
+    """Any order, reversal, limits and response, in doubles that no float32 carries."""
+    third = draw(st.floats(0.9, 1.1))
+    order, count = draw(st.sampled_from((1, 2, 3, 5, 15))), draw(st.integers(0, 10))
+    given = calibration(draw(st.integers(0, 400)), order=order, blend_span_n=9.0 * third)
+    weights = [1.0, *draw(st.lists(st.floats(0.7, 1.4), min_size=order, max_size=order))]
+    given = replace(given, rising_weights=tuple(weights), falling_weights=tuple(weights))
+    if count:
+        parts = draw(st.lists(st.floats(0.05, 1.0), min_size=count, max_size=count))
+        radii = tuple(third * (0.9 + k / 3.0) for k in range(count))
+        given = replace(given, slip_radii_v=radii, slip_shares=tuple(part / sum(parts) for part in parts))
+    if draw(st.booleans()):
+        given = replace(given, force_limits_n=(third, 30.0 * third))
+    if draw(st.booleans()):
+        seconds = draw(st.tuples(st.floats(0.0, 1.0), st.floats(0.001, 2.0), st.floats(0.0, 2.0)))
+        given = replace(given, response=Response(dead_time_s=seconds[0], lag_s=seconds[1], second_lag_s=seconds[2]))
+    return given
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(calibrations())
+def test_whatever_a_calibration_is_its_words_make_the_same_words_again(given_set):
+    limits = CoefficientLimits(cell_range_n=150.0)
+    assume(not validate_coefficients(Coefficients.of_calibration(given_set), limits))
+    found = check_staged(staged(CoefficientSet.of_calibration(given_set), slot=1), limits)
+    assert isinstance(found, Staged), found
+    again = uploaded(found, name="x", rig="", date_utc="", source="")
+    assert CoefficientSet.of_calibration(again).to_words() == CoefficientSet.of_calibration(given_set).to_words()
+    assert model_hash(again) == model_hash(given_set)
+    again.model()
 
 
 CHANGES = {
