@@ -213,6 +213,12 @@ def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
     words = staged(CoefficientSet.of_calibration(better), slot=7)
     running.write(0, 1, 2000)
     running.wait_until(lambda status: status["state"] == HOLDING)
+    own, block = running.words(414, 2), struct.pack(">200H", *running.words(1500, 100), *running.words(1600, 100))
+    stage(running, block[:288] + struct.pack(">H", 7) + block[290:])
+    running.write(1145, 1)
+    await_commit(running)
+    facts = [running.words(address, count) for address, count in ((122, 1), (414, 2), (1644, 1))]
+    assert facts == [[1], own, [7]], "the read-back of the shipped set is the shipped set"
     stage(running, words)
     before = running.status()
     running.write(1145, 1)
