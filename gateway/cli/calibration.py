@@ -36,8 +36,13 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
     store = opened(state_directory(state, rig), rig)
     standing, entries = store.standing(), store.list()
     if as_json:
-        facts = [_facts(entry, standing) for entry in entries]
-        click.echo(json.dumps({"active": _number(standing), "notes": standing.notes, "calibrations": facts}, indent=2))
+        facts = {
+            "active": _number(standing),
+            "notes": standing.notes,
+            "built_in": _built_in(store.built_in, standing),
+            "calibrations": [_facts(entry, standing) for entry in entries],
+        }
+        click.echo(json.dumps(facts, indent=2))
         return
     for note in standing.notes:
         click.echo(note, err=True)
@@ -166,11 +171,25 @@ def _number(standing: "Standing") -> int | None:
     return standing.calibration.number if standing.calibration else None
 
 
+def _built_in(own: "Calibration | None", standing: "Standing") -> dict[str, Any] | None:
+    """The rig's own calibration, which is no file of the store."""
+    from gateway.registers.coefficients import model_hash
+    from gateway.service.selection import OWN
+
+    if own is None:
+        return None
+    active, slots = standing.selection.number is None, _slots(standing, OWN)
+    return {"number": own.number, "name": own.name, "active": active, "slots": slots, "model_hash": model_hash(own)}
+
+
 def _facts(entry: "Entry", standing: "Standing") -> dict[str, Any]:
+    from gateway.registers.coefficients import model_hash
+
     return {
         "number": entry.number,
         "active": standing.selection.number == entry.number,
         "slots": _slots(standing, entry.number),
+        "model_hash": entry.calibration and model_hash(entry.calibration),
         "fault": entry.fault or None,
         "calibration": asdict(entry.calibration) if entry.calibration else None,
     }

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.profiles import load_calibration
+from gateway.registers.coefficients import model_hash
 from gateway.service.calibration_store import CalibrationStore, as_text
 from tests.service.coefficients import calibration, mark_of
 
@@ -44,6 +45,16 @@ def test_the_rigs_own_shows_the_slots_that_hold_it(state, call):
     CalibrationStore(state, load_calibration("demo")).use(None, 6)
     line = call("calibration", "list", "--state", state).output.splitlines()[1]
     assert line.startswith("* 1 ") and "0.131   0.401  6      demo" in line
+    facts = json.loads(call("calibration", "list", "--state", state, "--json").output)
+    own = {
+        "number": 1,
+        "name": "demo",
+        "active": True,
+        "slots": [6],
+        "model_hash": model_hash(load_calibration("demo")),
+    }
+    assert facts["built_in"] == own
+    assert facts["calibrations"][0]["model_hash"] == model_hash(calibration(16)) != own["model_hash"]
 
 
 def test_an_empty_state_has_the_rigs_own(tmp_path, call):
