@@ -2,6 +2,9 @@
 model, and only then select it durably. The functions touch the store and nothing of the loop.
 """
 
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
 
@@ -61,15 +64,22 @@ class Activation:
 
     def take_uploaded(self, fresh: Calibration, slot: int, known: Pointer) -> InUse:
         """Store an uploaded set, fill its slot and select it. One that is known already, word for word, keeps its number, its
-        name and all that the words do not carry. known: what is in use, in slots, or was in use before; the rig's own is
-        known as well."""
-        numbers = (known.active.number, known.slots[slot] or None, *known.numbers, None)
-        for number in dict.fromkeys(numbers):
+        name and all that the words do not carry: what is in use before all, then what is in the slot."""
+        for number in dict.fromkeys((known.active.number, known.slots[slot] or None, None, *self._like(fresh))):
             if self._holds(number, fresh):
                 return replace(self.take(number, slot), notice=CommitNotice.KNOWN_SET)
         return self.take(self.store.add(fresh), slot)
 
+    def _like(self, fresh: Calibration) -> Iterator[int]:
+        """Numbers of the store that seem to be this set, the last one first."""
+        words = _words(fresh)
+        for number, stored in self.store.glances():
+            with suppress(ValueError, struct.error, OverflowError):
+                if _words(stored) == words:
+                    yield number
+
     def _holds(self, number: int | None, fresh: Calibration) -> bool:
+        """Whether a stored set, None: the built-in one, is whole and the very same."""
         try:
             stored = self.store.built_in if number is None else self.store.load(number)
         except StoreError:

@@ -8,14 +8,15 @@ else the one before it, else the built-in one. There is no clock here: dates com
 The methods wait for the disk. Processes and threads may call them at the same time.
 """
 
+import contextlib
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from gateway.bsfm.model import Calibration
+from gateway.bsfm.model import Calibration, Response
 from gateway.profiles import ProfileError
 from gateway.profiles.calibrations import read_calibration
 from gateway.profiles.text import parse
@@ -78,6 +79,13 @@ class CalibrationStore:
     def list(self) -> Entries:
         """Every calibration of the store by number, damaged ones with their fault."""
         return [self._entry(number) for number in self._numbers()]
+
+    def glances(self) -> Iterator[tuple[int, Calibration]]:
+        """Every calibration, the last one first, as its file reads at a glance: a search through hundreds of them must not
+        keep the loop waiting. Nothing is checked, so `load` what is found; what cannot be read is passed over."""
+        for number in reversed(self._numbers()):
+            with contextlib.suppress(OSError, ValueError, TypeError):
+                yield number, _glanced((self.directory / _file_name(number)).read_text(encoding="utf-8"))
 
     def load(self, number: int) -> Calibration:
         """A calibration by its number, that of the built-in one included. StoreError when it is not there or damaged."""
@@ -190,6 +198,15 @@ class CalibrationStore:
 def as_text(calibration: Calibration) -> str:
     """A calibration as YAML, in the form of the shipped ones: values as JSON, which is YAML and loses no digit."""
     return "".join(f"{name}: {json.dumps(value, ensure_ascii=False)}\n" for name, value in asdict(calibration).items())
+
+
+def _glanced(text: str) -> Calibration:
+    """`as_text` backwards, for what it has written alone. ValueError or TypeError for anything else."""
+    lines = (line.partition(": ") for line in text.splitlines() if not line.startswith("#"))
+    facts = {name: json.loads(value) for name, _, value in lines}
+    facts = {name: tuple(value) if isinstance(value, list) else value for name, value in facts.items()}
+    response = facts.pop("response", None)
+    return Calibration(**facts, response=Response(**response) if response else None)
 
 
 def _readable(calibration: Calibration) -> bytes:

@@ -110,6 +110,40 @@ def test_a_set_sent_by_a_master_is_the_same_model_but_for_float32(name, tmp_path
         assert bench.store.load(2).response == found.response
 
 
+def test_a_set_anywhere_in_the_store_is_known_and_a_damaged_one_is_not(tmp_path, register_map):
+    bench = Bench(tmp_path, register_map)
+    named = {
+        name: replace(each, name=name)
+        for name, each in GIVEN.items()
+        if name not in ("blend", "limits beyond the branches")
+    }
+    numbers = {name: bench.store.add(each) for name, each in named.items()}
+    for name, number in numbers.items():
+        assert bench.upload_of(GIVEN[name], 1) == COMMITTED
+        status = bench.upload.status()
+        assert (status["active"], status["name"], bench.notice) == (number, name, CommitNotice.KNOWN_SET)
+    path = bench.store.directory / f"{numbers['shipped']:04d}.yaml"
+    path.write_text(path.read_text().replace('name: "shipped"', 'name: "another"'))
+    assert bench.upload_of(DEMO, 1) == COMMITTED
+    assert (bench.upload.status()["name"], bench.notice) == ("slot-1", 0)
+
+
+def test_a_search_through_the_store_reads_few_files_whole(tmp_path, register_map, monkeypatch):
+    """Reading one whole takes milliseconds of processor, during which the loop waits for its turn."""
+    bench = Bench(tmp_path, register_map)
+    for mark in range(20, 40):
+        bench.store.add(calibration(mark))
+    (bench.store.directory / "0007.yaml").write_bytes(b"# crc32 0\nnumber: [\n")
+    loaded: list[int] = []
+    load = bench.store.load
+    monkeypatch.setattr(bench.store, "load", lambda number: loaded.append(number) or load(number))
+    assert bench.upload_of(calibration(27), 1) == COMMITTED
+    assert (bench.upload.status()["name"], bench.notice) == ("mark 27", CommitNotice.KNOWN_SET)
+    assert set(loaded) == {9}
+    assert bench.upload_of(calibration(50), 1) == COMMITTED
+    assert set(loaded) == {9, 22}, "what is in use, and the new one"
+
+
 def test_a_set_that_was_in_use_before_or_that_the_rig_names_is_known_too(tmp_path, register_map):
     bench = Bench(tmp_path, register_map, DEMO)
     assert bench.upload_of(calibration(5), 0) == COMMITTED
