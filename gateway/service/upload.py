@@ -3,8 +3,8 @@ wish for another calibration. The part in the loop.
 
 One at a time. A worker thread checks (up to milliseconds at order 15) and waits for the disk; `committed` is shown when
 the directory's fsync is through and the set is in use. Whether the output is enabled does not matter, for the controller
-swaps models without a bump. On any failure the active set stays, in the controller and on the disk. A set that is in a
-slot or in use already keeps its number and name, so that a master which uploads its recipe for every part does not fill
+swaps models without a bump. On any failure the active set stays, in the controller and on the disk. A set that the store
+has, or the rig's own, keeps its number and name, so that a master which uploads its recipe for every part does not fill
 the disk, and reading the active set back and committing it changes nothing.
 
 A commit fills its slot and is in use from then on. A dry run ends in `idle` when the set would be accepted. A failure
