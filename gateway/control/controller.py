@@ -2,9 +2,9 @@
 reasons.
 
 Order of a step: read the sample, obey the edges of the command, look for a first cause, then pursue. So a command that
-arrives with its own step acts in that step, and no voltage is decided after a fault was seen. Enable, reset and tare
-act on their rise; everything else is level. A refused edge changes nothing, says why, and asks for the command to be
-cleared, so that the registers do not show an enable that is not there.
+arrives with its own step acts in that step, and no voltage is decided after a fault was seen. Whether a command can be
+taken is asked before (`refusal_of`), by the bank inside the write; a step refuses nothing of it. An edge that cannot be
+taken and comes all the same is a defect of ours, with what belongs to one: the safe voltage and a latched INTERNAL.
 """
 
 from math import inf
@@ -15,13 +15,14 @@ from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.contact import ContactSense
 from gateway.control.decision import Outcome, Standing, output_of, safe_output, warning_bits
 from gateway.control.demand import Demand, ramped_down
-from gateway.control.follower import CommandFollower
+from gateway.control.edges import EdgeJudge, Situation
+from gateway.control.follower import CommandFollower, Edges
 from gateway.control.inputs import Line, Output
 from gateway.control.ladder_stairs import RunPlan
 from gateway.control.motion import Motion, Moved
 from gateway.control.pursuit import Moment, Pursuit
-from gateway.control.reading import NO_READING, Reader
-from gateway.control.reasons import enable_refused, fault_sentence
+from gateway.control.reading import NO_READING, Reader, Reading, at_time
+from gateway.control.reasons import fault_sentence
 from gateway.control.response import ModelResponse
 from gateway.control.settings import ControlSettings, LeaseAction
 from gateway.control.state_table import ENABLED_STATES, Event, next_state
@@ -29,6 +30,7 @@ from gateway.control.supervision import Finding, Supervisor, finding
 from gateway.control.telling import Telling
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
+from gateway.registers.edges import Asked, EdgeRefusal
 from gateway.registers.words import ControlBit, FaultCode, RefusalReason, State
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
@@ -61,9 +63,11 @@ class Controller:
         self._motion = Motion(self._pursuit, response, self.calibrating)
         self._supervisor = Supervisor(settings)
         self._reader = Reader(settings.supervision, compensation.cell)
+        self._judge = EdgeJudge(self._follower, self._reader.zero, self.calibrating)
         self._contact = ContactSense(settings.defaults.contact_threshold_n)
         self._reading = NO_READING
         self._last_s: float | None = None
+        self._line = Line()
         self._fault, self._faulted_s = FaultCode.NONE, -inf
         self._restarted = unclean_restart
         self._stopping = self._ramping_down = self._master_lost = False
@@ -88,6 +92,15 @@ class Controller:
         self._follower.use(model)
         self.calibration_id = calibration_id
 
+    def refusal_of(self, now_s: float, asked: Asked, line: Line) -> EdgeRefusal | None:
+        """Why a command cannot be taken at this moment; None: the next step takes it. Nothing changes by asking."""
+        return self._judge.refusal(asked, self._situation(now_s, line))
+
+    def refusal_of_run(self, now_s: float, plan: AnyPlan) -> str:
+        """The same for a run that this machine wants to begin: a sentence, empty where it can; by the line as it last was."""
+        refused = self._judge.of_run(plan, self._situation(now_s, self._line))
+        return f"W305 {refused.text}" if refused else ""
+
     def safe_output(self, fault: FaultCode) -> Output:
         """What to write when `step` raised."""
         return safe_output(fault, self._settings.limits.safe_voltage_v)
@@ -101,19 +114,20 @@ class Controller:
             self._motion.rest()
             if self.state is not State.FAULT:
                 self.state, self._fault, self._faulted_s = State.FAULT, FaultCode.INTERNAL, now_s
+            self._follower.expect_clearing()
             raise
 
     # -- the order of a step
 
     def _step(self, now_s: float, command: Command, sample: ForceSample | None, line: Line) -> Output:
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
-        self._last_s = now_s
+        self._last_s, self._line = now_s, line
         self._outcome = Outcome()
         self._motion.elapse(dt_s)
-        rises, falls = self._follower.take(now_s, command)
+        edges = self._follower.take(now_s, command)
         self._outside_n = self._compensation.outside_n(command.tilt_angle_rad, line.feed_mm_s)
         self._sense(now_s, sample, line)
-        self._obey(now_s, rises, falls, line)
+        self._obey(now_s, edges, line)
         if self.state in ENABLED_STATES:
             self._supervise(now_s, line)
         if self.state in ENABLED_STATES:
@@ -136,20 +150,51 @@ class Controller:
             self._supervisor.observe_rest(reading)
             self._telling.stuck(self._supervisor.is_stuck, reading, self._outcome.events)
 
-    def _obey(self, now_s: float, rises: int, falls: int, line: Line) -> None:
-        stopped = falls & _ENABLE or (falls & _CALIBRATE and self.calibrating.running)
-        if stopped and self.state in ENABLED_STATES:
+    def _situation(self, now_s: float, line: Line) -> Situation:
+        reading = at_time(
+            self._reading, now_s - (now_s if self._last_s is None else self._last_s), self._settings.supervision
+        )
+        return Situation(
+            now_s=now_s,
+            state=self.state,
+            faulted_s=self._faulted_s,
+            reading=reading,
+            block=self._block_in_off(now_s, reading, line),
+            voltage_v=self._pursuit.stage.voltage_v,
+            applied_n=self._pursuit.law.applied_n,
+            expected_n=self._motion.expected_rise_n,
+            ramps_down=self._ramping_down or self._stopping,
+        )
+
+    def _obey(self, now_s: float, edges: Edges, line: Line) -> None:
+        """What the bank has let through, in the order in which it was judged."""
+        if edges.stops and self.state in ENABLED_STATES:
             self._disable(f"info disabled by {self._follower.who}")
-        if rises & _RESET and self.state is State.FAULT:
-            self._reset(now_s)
-        if rises & _TARE:
+        elif edges.falls & _CALIBRATE and self.calibrating.running:
+            self._end_run(f"info calibration stopped by {self._follower.who}")
+        if edges.rises & _RESET:
+            self._reset()
+        if edges.rises & _TARE:
             self._tare()
-        if rises & _ENABLE and self.state not in ENABLED_STATES:
-            self._enable(now_s, line)
-        asked = self.calibrating.take_asked()
-        if rises & _CALIBRATE or asked:
-            self._calibrate(now_s, line, asked)
+        if edges.rises & _ENABLE and self.state not in ENABLED_STATES:
+            self._enable(now_s)
+        if edges.rises & _CALIBRATE:
+            self._begin_run(now_s, RunPlan(), f"info calibration begun by {self._follower.who}")
+        self._obey_this_machine(now_s)
         self._ramping_down = self._ramping_down or self._stopping
+
+    def _obey_this_machine(self, now_s: float) -> None:
+        """A run that was asked for at this machine; refused, it leaves everything as it is."""
+        asked = self.calibrating.take_asked()
+        if asked is None:
+            return
+        self.calibrating.refused = self.refusal_of_run(now_s, asked)
+        if self.calibrating.refused:
+            self._outcome.events.append(self.calibrating.refused)
+            return
+        if asked.tare:
+            self._tare()
+        self._begin_run(now_s, asked, "info calibration begun by this machine", is_local=True)
 
     # -- edges of the command
 
@@ -158,67 +203,57 @@ class Controller:
         self._let_go(sentence)
 
     def _let_go(self, sentence: str) -> None:
-        """The output goes to the safe voltage, the command and its owner with it."""
+        """The output goes to the safe voltage, and the command with it."""
         self._motion.rest()
         self._ramping_down = self._master_lost = self._telling.said_unreachable = False
-        self._outcome.release_owner = True
-        self._refuse(sentence)
-
-    def _refuse(self, sentence: str) -> None:
         self._outcome.events.append(sentence)
         self._outcome.clear_command = True
         self._follower.expect_clearing()
 
-    def _reset(self, now_s: float) -> None:
-        refused = self._follower.reset_refused(now_s, self._faulted_s)
-        if refused:
-            self._refuse(refused)
-            return
+    def _reset(self) -> None:
+        self.state = next_state(self.state, Event.RESET)
         self._outcome.events.append(f"info fault {self._fault.name} reset by {self._follower.who}")
-        self.state, self._fault = next_state(self.state, Event.RESET), FaultCode.NONE
+        self._fault = FaultCode.NONE
         self._restarted = False
 
     def _tare(self) -> None:
-        pressing = self.state in ENABLED_STATES and self._pursuit.stage.voltage_v > 0.0
-        refused = "" if self._reading.is_fresh else "no fresh load-cell sample"
-        if self.state is State.FAULT or pressing:
-            refused = "disable the output or set the force to 0 first"
-        moved_n, sentence = self._reader.zero.tare(self._follower.demand.gravity_n, refused)
+        moved_n = self._reader.zero.take(self._follower.demand.gravity_n)
         self._supervisor.rise.shift(moved_n)
-        self._outcome.events.append(sentence)
+        self._outcome.events.append(f"info tare: zero at {self._reader.zero.zero_n:.2f} N")
 
-    def _enable(self, now_s: float, line: Line) -> None:
-        block = self._block(now_s, line)
-        if block:
-            self._refuse(enable_refused(block))
-            return
+    def _enable(self, now_s: float) -> None:
         self.state = next_state(self.state, Event.ENABLE)
+        self._started(now_s, f"info enabled by {self._follower.who}")
+
+    def _started(self, now_s: float, sentence: str) -> None:
         self._restarted = False
         self._supervisor.start()
         self._follower.lease.start(now_s)
-        self._outcome.events.append(f"info enabled by {self._follower.who}")
+        self._outcome.events.append(sentence)
 
-    def _calibrate(self, now_s: float, line: Line, asked: AnyPlan | None) -> None:
-        """Bit 5 has risen, or this machine asks."""
-        if self.state is State.OFF:
-            self._enable(now_s, line)
-        if self.state is not State.READY or self.calibrating.is_busy or self._pursuit.law.applied_n > 0.0:
-            self._refuse(f"W305 calibration refused: state {self.state.name}, allowed from OFF or READY with force 0")
-            return
-        if asked and asked.tare:
-            self._tare()
-        self.calibrating.begin(asked or RunPlan(), is_local=asked is not None)
-        self._outcome.events.append(f"info calibration begun by {'this machine' if asked else self._follower.who}")
+    def _begin_run(self, now_s: float, plan: AnyPlan, sentence: str, *, is_local: bool = False) -> None:
+        self.state = next_state(self.state, Event.CALIBRATE)
+        self.calibrating.begin(plan, is_local=is_local)
+        self._started(now_s, sentence)
+
+    def _end_run(self, sentence: str) -> None:
+        """However it ended, but by a fault or a disable: the force goes to 0 along the rig's ramp, then the output off."""
+        self._motion.leave_run()
+        self._ramping_down = True
+        self._outcome.events.append(sentence)
 
     def _block(self, now_s: float, line: Line) -> RefusalReason:
         """Why an enable would be refused now."""
         if self.state is State.FAULT:
             return RefusalReason.FAULT_LATCHED
+        if self.state is State.CALIBRATING:
+            return RefusalReason.CALIBRATING
         if self.state is not State.OFF:
             return RefusalReason.NONE
-        if self._stopping:
-            return RefusalReason.NOT_READY
-        return self._supervisor.enable_block(now_s, self._reading, line)
+        return self._block_in_off(now_s, self._reading, line)
+
+    def _block_in_off(self, now_s: float, reading: Reading, line: Line) -> RefusalReason:
+        return RefusalReason.NOT_READY if self._stopping else self._supervisor.enable_block(now_s, reading, line)
 
     # -- supervision
 
@@ -242,11 +277,12 @@ class Controller:
         age_ms = self._follower.lease.age_s(now_s) * 1e3
         seen = f"master lost: {'' if connected else 'connection closed, '}heartbeat unchanged for {age_ms:.0f} ms"
         action = self._settings.supervision.lease_action
+        self._outcome.release_owner = True
         if action is LeaseAction.FAULT:
             self._fail(now_s, finding(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
             return
-        self._master_lost = self._outcome.release_owner = True
-        self._ramping_down = action is LeaseAction.RAMP
+        self._master_lost = True
+        self._ramping_down = self._ramping_down or action is LeaseAction.RAMP or self.calibrating.running
         words = "ramping to 0 N" if self._ramping_down else "holding the last setpoint"
         self._outcome.events.append(fault_sentence(FaultCode.MASTER_LOST, f"{seen}, {words}"))
 
@@ -258,14 +294,26 @@ class Controller:
         return ramped_down(demand, self._settings) if self._ramping_down else demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
-        if self.calibrating.running:
-            must_end = self._ramping_down or self._master_lost
-            self._follow(now_s, self._motion.climb(now_s, self._reading, must_end=must_end))
+        if self.calibrating.running and not self._climb(now_s):
             return
         moment = self._moment(now_s, dt_s)
         self._follow(now_s, self._motion.pursue(self._target(), moment, ramps_down=self._ramping_down))
         measured_n = self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
         self._telling.unreachable(self._pursuit, measured_n, moment.expected_n, self._outcome.events)
+
+    def _climb(self, now_s: float) -> bool:
+        """One step of the run; True when it has just ended, and the ramp down begins."""
+        if self._ramping_down:
+            self._end_run("info calibration stopped: ramping down")
+            return True
+        moved = self._motion.climb(now_s, self._reading)
+        if said := self.calibrating.take_said():
+            self._outcome.events.append(said)
+        if isinstance(moved, Event) or moved.fault:
+            self._follow(now_s, moved)
+            return False
+        self._end_run(moved.sentence)
+        return True
 
     def _moment(self, now_s: float, dt_s: float) -> Moment:
         expected_n = self._motion.expected_n + self._given_n
@@ -291,8 +339,9 @@ class Controller:
             block=self._block(now_s, line),
             warnings=warning_bits(int(line.warnings), self._pursuit, self._restarted, self._master_lost),
             touching=self._contact.touching,
-            accepted_n=self._target().force_n if enabled else 0.0,
+            accepted_n=self.calibrating.target_n or self._target().force_n if enabled else 0.0,
             expected_cell_n=self._motion.expected_n + self._outside_n,
             calibration_phase=self.calibrating.phase,
             calibration_progress=self.calibrating.progress,
+            calibration_time_left_s=self.calibrating.eta_s,
         )

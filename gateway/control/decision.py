@@ -37,6 +37,7 @@ class Standing:
     expected_cell_n: float
     calibration_phase: int = 0
     calibration_progress: float = 0.0
+    calibration_time_left_s: float = 0.0
 
 
 def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
@@ -49,7 +50,6 @@ def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
         fault=fault,
         enable_block=RefusalReason.FAULT_LATCHED,
         clear_command=True,
-        release_owner=True,
         events=(fault_sentence(fault, "safe voltage written"),),
     )
 
@@ -58,7 +58,7 @@ def status_bits(standing: Standing, pursuit: Pursuit) -> int:
     enabled = standing.state in ENABLED_STATES
     return (
         (_ENABLED if enabled else 0)
-        | (_READY if enabled or not standing.block else 0)
+        | (_READY if not standing.block else 0)
         | (_CONTACT if standing.touching else 0)
         | (_IN_BAND if pursuit.in_band else 0)
         | (_FAULT if standing.state is State.FAULT else 0)
@@ -82,7 +82,7 @@ def warning_bits(word: int, pursuit: Pursuit, restarted: bool, master_lost: bool
 def output_of(command: Command, standing: Standing, pursuit: Pursuit, reading: Reading, outcome: Outcome) -> Output:
     """The frozen answer. The measured force is nan unless fresh and usable: a stale number with an age is still a lie
     to most readers."""
-    is_force = command.mode is Mode.FORCE
+    is_force = command.mode is Mode.FORCE or standing.state is State.CALIBRATING
     believed = reading.is_fresh and reading.is_usable
     return Output(
         pursuit.stage.voltage_v,
@@ -94,7 +94,7 @@ def output_of(command: Command, standing: Standing, pursuit: Pursuit, reading: R
         standing.fault,
         WarningBit(standing.warnings),
         force_measured_n=reading.contact_n if believed else nan,
-        force_requested_n=command.force_setpoint_n,
+        force_requested_n=command.force_requested_n,
         force_accepted_n=standing.accepted_n if is_force else 0.0,
         force_applied_n=pursuit.law.applied_n if is_force else 0.0,
         model_residual_n=reading.cell_n - standing.expected_cell_n if believed else nan,
@@ -103,6 +103,7 @@ def output_of(command: Command, standing: Standing, pursuit: Pursuit, reading: R
         sequence_echo=command.command_sequence,
         calibration_phase=standing.calibration_phase,
         calibration_progress=standing.calibration_progress,
+        calibration_time_left_s=standing.calibration_time_left_s,
         enable_block=standing.block,
         clear_command=outcome.clear_command,
         release_owner=outcome.release_owner,

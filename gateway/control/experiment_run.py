@@ -24,7 +24,7 @@ class ExperimentRun:
     end_phase: Final = CalibrationPhase.RECORDED
 
     def __init__(self, plan: ExperimentPlan, settings: ControlSettings, model: Bsfm) -> None:
-        self.plan = plan
+        self.plan, self.model = plan, model
         limits = settings.limits
         self.schedule = Schedule(segments_of(plan, limits, model), limits.safe_voltage_v)
         top_v = self.schedule.top_v

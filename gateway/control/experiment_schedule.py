@@ -58,8 +58,8 @@ class _Range:
             low_n, high_n = (self.model.branches.rising.value(end_v) for end_v in (self.low_v, self.top_v))
             raise ValueError(
                 f"{told}, allowed {self.low_v:g} .. {self.top_v:g} V (about {max(0.0, low_n):.0f} .. {high_n:.0f} N): "
-                f"beyond lie the rig's limits, the end of the calibration in use, or the over-force trip at "
-                f"{self.limits.over_force_n:g} N"
+                f"beyond lie the rig's limits (force_max_n = {self.limits.force_max_n:g} N), the end of the calibration in "
+                f"use, or the over-force trip at {self.limits.over_force_n:g} N"
             )
         return min(max(volts, self.low_v), self.top_v)
 

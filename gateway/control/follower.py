@@ -1,6 +1,7 @@
 """Follows the command block: which bits rose and fell, what is demanded, and whether the heartbeat moved."""
 
 from dataclasses import replace
+from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
 from gateway.control.demand import Demand, demand_of
@@ -10,6 +11,20 @@ from gateway.control.settings import ControlSettings
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit
 
+_ENABLE, _CALIBRATE = int(ControlBit.ENABLE), int(ControlBit.START_CALIBRATION)
+_MOMENTARY: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
+
+
+class Edges(NamedTuple):
+    """Bits of the control word that rose and that fell; stops: the output is to go off, whatever else."""
+
+    rises: int = 0
+    falls: int = 0
+    stops: bool = False
+
+
+NO_EDGES: Final = Edges()
+
 
 class CommandFollower:
     """`demand` is the last one that made sense; `not_finite` names the number that did not, or is empty."""
@@ -18,6 +33,7 @@ class CommandFollower:
         self.command = Command()
         self.demand: Demand = demand_of(self.command, settings)
         self.not_finite = ""
+        self._word = 0
         self.lease = Lease(settings.supervision.lease_s)
         self._settings = self._rig_settings = settings
         self._adopt_heartbeat = False
@@ -29,29 +45,37 @@ class CommandFollower:
         self._demand()
 
     def expect_clearing(self) -> None:
-        """The bank is asked to zero the command: the next heartbeat value is its doing and not a beat."""
+        """The bank is asked to zero the command: no bit stands any more, and the next heartbeat value is its doing and not a
+        beat."""
+        self._word = 0
         self._adopt_heartbeat = True
 
-    def take(self, now_s: float, command: Command) -> tuple[int, int]:
-        """Returns the control bits that rose and those that fell; none for a command that was taken before."""
+    def edges_of(self, command: Command) -> Edges:
+        """What changes in the control word with this command. Reset, tare and takeover act whenever they are written as 1."""
+        word = int(command.control_word)
+        if command.number == self.command.number:
+            word &= ~_MOMENTARY  # the bank's own change of a command that has acted
+        rises, falls = word & ~self._word, self._word & ~word
+        return Edges(rises, falls, command.stops or bool(falls & _ENABLE and not rises & _CALIBRATE))
+
+    def take(self, now_s: float, command: Command) -> Edges:
+        """From now on this is the command; none of its edges act twice."""
         if command is self.command:
-            return 0, 0
-        before, after = int(self.command.control_word), int(command.control_word)
+            return NO_EDGES
+        edges = self.edges_of(command)
+        self._word = 0 if edges.stops else int(command.control_word) & ~_MOMENTARY
         self.command = command
         if self._adopt_heartbeat:
             self._adopt_heartbeat = False
-            self.lease.adopt(command.heartbeat)
+            if not command.control_word:
+                self.lease.adopt(command.heartbeat)
         self.lease.observe(now_s, command.heartbeat)
         self._demand()
-        return after & ~before, before & ~after
+        return edges
 
-    def reset_refused(self, now_s: float, faulted_s: float) -> str:
-        """Why a reset of a fault of faulted_s is refused now; empty where it is not."""
-        if self.command.control_word & ControlBit.ENABLE or self.command.force_setpoint_n != 0.0:
-            return "W302 reset refused: write setpoint 0 and enable 0 with the reset bit"
-        if not self.lease.is_fresh_since(faulted_s, now_s):
-            return "W302 reset refused: the heartbeat has not changed since the fault"
-        return ""
+    def demanded(self, command: Command) -> Demand:
+        """What this command would demand. NotFiniteError as `demand_of`."""
+        return demand_of(command, self._settings)
 
     def _demand(self) -> None:
         try:

@@ -55,9 +55,10 @@ class Output:
     sequence_echo: int = 0
     calibration_phase: int = 0
     calibration_progress: float = 0.0
+    calibration_time_left_s: float = 0.0
     enable_block: RefusalReason = RefusalReason.NONE  # why an enable would be refused now
-    clear_command: bool = False  # service: bank.clear_command()
-    release_owner: bool = False  # service: bank.release_owner()
+    clear_command: bool = False  # service: bank.clear_command(): the output went off
+    release_owner: bool = False  # service: bank.release_owner(): the lease is over
     events: tuple[str, ...] = ()  # sentences for the log, each starting with its code or "info"
 
 

@@ -64,7 +64,7 @@ class LadderRun:
         self.noise_n = self.rest_n = 0.0
         self.unsettled = 0
         self.done = 0
-        self._model = model
+        self.model = model
         self._rest_v = settings.limits.safe_voltage_v
         self._began_s: float | None = None
         self._stair_s: float | None = None
@@ -95,6 +95,18 @@ class LadderRun:
     def direction(self) -> float:
         """Which branch the plant is on, as a blend state."""
         return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
+
+    def leave_out(self, now_s: float, voltage_v: float, *, was_there: bool) -> bool:
+        """No stair from now on is as high as this voltage; whether any is left. was_there: the output has been; then the
+        same stair below it is another one on the way down than on the way up."""
+        left = [stair for stair in self.stairs[self.done :] if stair.voltage_v < voltage_v]
+        last_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
+        if not was_there and left and left[0].direction < 0 and left[0].voltage_v >= last_v:
+            left = left[1:]
+        self.stairs = (*self.stairs[: self.done], *left)
+        self._stair_s = now_s
+        self._window.clear()
+        return bool(left)
 
     @property
     def _stair(self) -> Stair:
@@ -162,7 +174,7 @@ class LadderRun:
         if row.stair.phase is not CalibrationPhase.CHECK or row.stair.direction < 0:
             return
         volts = row.stair.voltage_v
-        expected_n = self._model.force_n(volts, 1.0) - self._model.force_n(self._rest_v, 1.0)
+        expected_n = self.model.force_n(volts, 1.0) - self.model.force_n(self._rest_v, 1.0)
         rise_n = row.force_n - self.rest_n
         if expected_n < LEAST_EXPECTED_N or LOWEST_SHARE * expected_n <= rise_n <= HIGHEST_SHARE * expected_n:
             return

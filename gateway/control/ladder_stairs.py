@@ -19,6 +19,7 @@ TURNS: Final = (0.0, 0.875, 0.25, 0.625, 0.375, 0.5625, 0.125, 0.75, 0.4375, 0.6
 CHECK_SHARES: Final = (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0)
 FIRST_STAIR_N: Final = 4.0  # of the check: enough to see the sign, little enough if the scale is ten times off
 OVER_FORCE_SHARE: Final = 0.93  # the largest planned force, of the one that trips: friction and noise need the rest
+FORCE_MAX_SHARE: Final = 0.985  # and of the largest that the rig allows: what is measured must not pass that one
 MOST_STAIRS: Final = 20_000
 
 
@@ -67,10 +68,15 @@ def stairs_of(plan: RunPlan, limits: Limits, model: Bsfm) -> tuple[Stair, ...]:
 
 
 def highest_voltage_v(limits: Limits, model: Bsfm) -> float:
-    """As far as limits and calibration go without nearing the over-force trip, to a tenth of a volt."""
+    """As far as limits and calibration go without nearing the over-force trip or force_max_n, to a hundredth of a volt."""
     allowed_v = min(limits.voltage_max_v, model.voltage_range_v[1])
-    force_v, _ = model.branches.rising.inverse(OVER_FORCE_SHARE * limits.over_force_n)
-    return int(10.0 * min(allowed_v, force_v) + 1.0e-6) / 10.0
+    force_v, _ = model.branches.rising.inverse(highest_force_n(limits))
+    return int(100.0 * min(allowed_v, force_v) + 1.0e-6) / 100.0
+
+
+def highest_force_n(limits: Limits) -> float:
+    """The largest force that a run may plan."""
+    return min(FORCE_MAX_SHARE * limits.force_max_n, OVER_FORCE_SHARE * limits.over_force_n)
 
 
 def _top(asked_v: float | None, limits: Limits, model: Bsfm) -> float:
@@ -84,6 +90,11 @@ def _top(asked_v: float | None, limits: Limits, model: Bsfm) -> float:
         raise ValueError(
             f"v_max = {asked_v:g} V makes {expected_n:.0f} N by the calibration in use, over-force trips at "
             f"{limits.over_force_n:g} N: at most {highest_voltage_v(limits, model):g} V"
+        )
+    if expected_n > limits.force_max_n:
+        raise ValueError(
+            f"v_max = {asked_v:g} V makes {expected_n:.1f} N by the calibration in use, the rig allows force_max_n = "
+            f"{limits.force_max_n:g} N: at most {highest_voltage_v(limits, model):g} V"
         )
     return asked_v
 

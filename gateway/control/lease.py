@@ -44,3 +44,7 @@ class Lease:
         if self._length_s is None:
             return True
         return self._changed_s > since_s and now_s - self._changed_s <= self._length_s
+
+    def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
+        """The same, were this value observed now."""
+        return heartbeat != self._heartbeat or self.is_fresh_since(since_s, now_s)

@@ -7,7 +7,7 @@ disables the output with a sentence. What the model expects is kept beside it, a
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
-from gateway.control.calibrating import RAMPING_DOWN, Calibrating
+from gateway.control.calibrating import Calibrating
 from gateway.control.demand import Demand
 from gateway.control.force_law import ModelError
 from gateway.control.limits import NotFiniteError
@@ -45,6 +45,14 @@ class Motion:
     def rest(self) -> None:
         """The safe voltage at once; a run ends with it."""
         self.pursuit.rest()
+        self._calibrating.rest()
+
+    def leave_run(self) -> None:
+        """A run has ended: the force law goes on from its force, and no higher than where the voltage would lead."""
+        run = self._calibrating.run
+        if run is not None:
+            towards_n = run.model.force_n(self.pursuit.stage.voltage_v, run.direction)
+            self.pursuit.law.take_over(min(towards_n, self.response.force_n(run.direction)), run.direction)
         self._calibrating.end()
 
     @property
@@ -57,10 +65,8 @@ class Motion:
         """The same above the force at rest."""
         return self.response.rise_n(self.pursuit.law.blend)
 
-    def climb(self, now_s: float, reading: Reading, *, must_end: bool) -> Moved:
-        """One step of the run. must_end: the output ramps down, or the master is lost."""
-        if must_end:
-            return RAMPING_DOWN
+    def climb(self, now_s: float, reading: Reading) -> Moved:
+        """One step of the run."""
         return self._calibrating.climb(now_s, reading, self.pursuit, self.response) or Event.MOVE
 
     def pursue(self, demand: Demand, moment: Moment, *, ramps_down: bool) -> Moved:

@@ -1,7 +1,7 @@
 """What a sample means at the time of a step: corrected for known defects of the cell, zeroed, gravity compensated, with its
 age and whether it can be used."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Final
 
@@ -28,6 +28,12 @@ class Reading:
 
 
 NO_READING: Final = Reading()
+
+
+def at_time(reading: Reading, later_s: float, supervision: Supervision) -> Reading:
+    """The same reading later_s after it was made: older, and perhaps no longer fresh; not new any more."""
+    age_s = reading.age_s + max(0.0, later_s)
+    return replace(reading, age_s=age_s, interval_s=0.0, is_new=False, is_fresh=age_s <= supervision.sample_timeout_s)
 
 
 class Reader:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from gateway.registers.words import FaultCode, RefusalReason
+from gateway.registers.words import FaultCode
 
 FAULT_CODES: Final[dict[FaultCode, str]] = {
     FaultCode.SIGN_INVERTED: "A302",
@@ -22,13 +22,6 @@ FAULT_CODES: Final[dict[FaultCode, str]] = {
     FaultCode.INTERNAL: "A499",
 }
 """What `explain` knows each fault by."""
-
-_BLOCKS: Final[dict[RefusalReason, str]] = {
-    RefusalReason.FAULT_LATCHED: "a fault is latched: write setpoint 0, enable 0, then the reset bit",
-    RefusalReason.CELL_SILENT: "no fresh load-cell sample: check power and wires of the amplifier",
-    RefusalReason.OUTPUT_FAULT: "the output device does not answer as it should: check its line",
-    RefusalReason.NOT_READY: "not ready: first acknowledgement pending, cell overloaded or force stuck, or stopping",
-}
 
 
 def fault_sentence(fault: FaultCode, detail: str) -> str:
@@ -66,10 +59,6 @@ def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -
         f"A301 calibration stopped: {voltage_v:.2f} V out, the force rose by {rise_n:.1f} N where {expected_n:.1f} N were "
         "expected: no air, valve closed or no contact"
     )
-
-
-def enable_refused(reason: RefusalReason) -> str:
-    return f"W301 enable refused: {_BLOCKS[reason]}"
 
 
 def stuck_sentence(measured_n: float, limit_n: float) -> str:

@@ -2,8 +2,9 @@
 
 OFF: output disabled, safe voltage (after start, disable, reset, restart). READY: enabled with nothing to pursue:
 setpoint 0, or waiting at the pre-contact force for contact. RAMPING: the target moves or the force is out of band.
-HOLDING: in band for the in-band time. FAULT: latched; there is no (FAULT, FAILED), so that a fault has exactly one
-first cause.
+HOLDING: in band for the in-band time. CALIBRATING: a calibration or an experiment has the output, until the ramp after
+its end has reached 0; it waits and settles by its own rules. FAULT: latched; there is no (FAULT, FAILED), so that a fault
+has exactly one first cause.
 """
 
 from enum import Enum
@@ -20,13 +21,17 @@ class Event(Enum):
     SETTLE = "settle"  # in band for the in-band time
     FAILED = "failed"  # supervision found a first cause
     RESET = "reset"  # accepted fault reset
+    CALIBRATE = "calibrate"  # a run begins
 
 
 _OFF, _READY, _RAMPING, _HOLDING, _FAULT = State.OFF, State.READY, State.RAMPING, State.HOLDING, State.FAULT
+_CALIBRATING = State.CALIBRATING
 
 TRANSITIONS: Final[dict[tuple[State, Event], State]] = {
     (_OFF, Event.ENABLE): _READY,
     (_OFF, Event.FAILED): _FAULT,  # only a defect of ours fails while off
+    (_OFF, Event.CALIBRATE): _CALIBRATING,
+    (_READY, Event.CALIBRATE): _CALIBRATING,
     (_READY, Event.WAIT): _READY,
     (_READY, Event.MOVE): _RAMPING,
     (_READY, Event.SETTLE): _HOLDING,
@@ -42,10 +47,13 @@ TRANSITIONS: Final[dict[tuple[State, Event], State]] = {
     (_HOLDING, Event.SETTLE): _HOLDING,
     (_HOLDING, Event.DISABLE): _OFF,
     (_HOLDING, Event.FAILED): _FAULT,
+    (_CALIBRATING, Event.MOVE): _CALIBRATING,
+    (_CALIBRATING, Event.DISABLE): _OFF,
+    (_CALIBRATING, Event.FAILED): _FAULT,
     (_FAULT, Event.RESET): _OFF,
 }
 
-ENABLED_STATES: Final = frozenset({_READY, _RAMPING, _HOLDING})
+ENABLED_STATES: Final = frozenset({_READY, _RAMPING, _HOLDING, _CALIBRATING})
 
 
 class TransitionError(Exception):

@@ -1,4 +1,4 @@
-"""The zero of the load cell: the mean of recent samples, taken on the rise of the tare bit.
+"""The zero of the load cell: the mean of recent samples, taken when the tare bit is written.
 
 Allowed only while nothing presses on purpose: output off, or enabled with setpoint 0; and only on a steady, usable
 signal, so that a force that is still decaying cannot become the zero. The payload's weight is added first: after a tare
@@ -22,7 +22,7 @@ class Zero:
     def __init__(self, supervision: Supervision) -> None:
         self.zero_n = 0.0
         self._recent_n: deque[float] = deque(maxlen=_WINDOW)
-        self._largest_spread_n = max(5.0 * supervision.sample_quantum_n, 0.5)
+        self.largest_spread_n = max(5.0 * supervision.sample_quantum_n, 0.5)
         self._largest_n = _LARGEST_SHARE * supervision.saturation_n
 
     def observe(self, force_n: float) -> None:
@@ -33,23 +33,20 @@ class Zero:
         """The stream was interrupted: what came before does not describe now."""
         self._recent_n.clear()
 
-    def tare(self, gravity_n: float, refused: str = "") -> tuple[float, str]:
-        """Take the zero, unless refused: by how much it moved, N, and the sentence for the log; gravity_n as in `demand`."""
+    def take(self, gravity_n: float) -> float:
+        """Take the zero: by how much it moved, N; gravity_n as in `demand`. Ask `unsteady` first."""
         before_n = self.zero_n
-        reason = refused or self._unsteady(gravity_n)
-        if reason:
-            return 0.0, f"W303 tare refused: {reason}"
         self.zero_n = self._mean_n() + gravity_n
-        return self.zero_n - before_n, f"info tare: zero at {self.zero_n:.2f} N"
+        return self.zero_n - before_n
 
-    def _unsteady(self, gravity_n: float) -> str:
+    def unsteady(self, gravity_n: float) -> str:
         """Why the recent samples are no zero, in numbers; empty where they are one."""
         recent = self._recent_n
         if len(recent) < _FEWEST:
             return f"{len(recent)} usable samples, at least {_FEWEST} are needed"
         spread_n, mean_n = max(recent) - min(recent), self._mean_n()
-        if spread_n > self._largest_spread_n:
-            return f"force not steady: {spread_n:.2f} N between samples, allowed {self._largest_spread_n:.2f} N"
+        if spread_n > self.largest_spread_n:
+            return f"force not steady: {spread_n:.2f} N between samples, allowed {self.largest_spread_n:.2f} N"
         if abs(mean_n + gravity_n) > self._largest_n:
             return f"{mean_n:.1f} N at rest, allowed {self._largest_n:.0f} N: stuck in contact or wrong cell"
         return ""

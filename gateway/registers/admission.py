@@ -1,18 +1,29 @@
 """May this write of the command block be used, and what does it become? All checks, in order, before anything is stored.
 
-Values (03), owner (06), what a reset needs (03), then what an enable needs (04, 06 or 0x0B).
+Values (03), owner (06), what control says to the edges and to a write while it is busy (`Decide`), then what stands in the
+write itself or is known to the bank alone: a reset needs setpoint 0 (03), an enable the byte-order proof (06).
+
+Who clears enable wants the output off, and is never refused; an edge beside it is decided all the same, so that a lone
+start_calibration or tare while a force is held is an answer with a reason, and no stop. start_calibration alone keeps the
+output: then the bit takes enable's place.
 """
 
+from dataclasses import replace
 from typing import Final, NamedTuple
 
+from gateway.registers.command import Command
 from gateway.registers.command_block import (
     CONTROL_WORD,
     FORCE_SETPOINT,
+    HEARTBEAT,
+    NAMES,
+    SEQUENCE,
     VOLTAGE_SETPOINT,
     CommandBlock,
     Values,
 )
 from gateway.registers.echo import ByteOrderEcho
+from gateway.registers.edges import Asked, Decide, decide_nothing
 from gateway.registers.map import Block
 from gateway.registers.ownership import Ownership
 from gateway.registers.refusal import Refusal
@@ -22,65 +33,138 @@ from gateway.registers.words import ControlBit, RefusalReason
 ENABLE: Final = int(ControlBit.ENABLE)
 RESET: Final = int(ControlBit.RESET_FAULT)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
-STARTS: Final = int(ControlBit.ENABLE | ControlBit.START_CALIBRATION)
+CALIBRATE: Final = int(ControlBit.START_CALIBRATION)
+STARTS: Final = ENABLE | CALIBRATE
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
+ALL_BITS: Final = 0xFFFF
+_SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
-_BLOCKED: Final = {
-    RefusalReason.FAULT_LATCHED: "a fault is latched: see fault_code, then write force_setpoint 0 and reset_fault (bit 1)",
-    RefusalReason.NOT_READY: "not ready yet: wait for bit 1 (ready) of status_word",
-    RefusalReason.OUTPUT_FAULT: "the output device does not answer as it should: power, cable, baud?",
-    RefusalReason.CELL_SILENT: "no fresh sample of the load cell: power, cable, stream mode?",
-    RefusalReason.BYTE_ORDER_UNPROVEN: "this rig wants 1234.5 in byte_order_echo first, in your client's word order",
-    RefusalReason.BUSY: "busy with something else: try again",
-}
+
+class Write(NamedTuple):
+    """A write of the command block. touched: bits of the control word that the master has named (coils name some)."""
+
+    block: Block
+    address: int
+    data: bytes
+    host: str
+    touched: int = ALL_BITS
 
 
 class Admitted(NamedTuple):
-    """values: to store; written: control word, edge bits included; kept: what reads back; is_stop: enable was cleared."""
+    """values: to store; kept: control word that reads back; command: what control gets, edge bits included; is_stop: the
+    output goes off; is_taken_over: this host owns from now on, explicitly."""
+
+    values: Values
+    kept: int
+    command: Command
+    is_stop: bool
+    is_taken_over: bool
+    is_held: bool
+
+
+class _Wish(NamedTuple):
+    """What a write wants, as far as its host may want it."""
 
     values: Values
     written: int
-    kept: int
     is_stop: bool
 
 
 class Admission:
-    """enable_block: why an enable would be refused now, as control publishes it."""
+    """decide: what control says to a write. is_calibrating: a run has the output. lowered_from_n: of the setpoint in use,
+    what the master wrote, 0 where nothing was lowered."""
 
     def __init__(self, commands: CommandBlock, ownership: Ownership, echo: ByteOrderEcho, rules: BankRules) -> None:
-        self.enable_block = RefusalReason.NONE
+        self.decide: Decide = decide_nothing
+        self.is_calibrating = False
+        self.lowered_from_n = 0.0
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
         self._rules = rules
+        self._is_held = False
 
-    def admit(self, block: Block, address: int, data: bytes, host: str) -> Admitted | None:
+    def admit(self, write: Write, number: int, now_s: float) -> Admitted | None:
         """What a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
-        commands = self._commands
-        values = commands.decode(block, address, data)
-        count = len(data) // 2
-        commands.check_known(values, block)
-        word_at = commands.address(block, CONTROL_WORD)
-        sets_word = address <= word_at < address + count
-        written, before = int(values[CONTROL_WORD]), int(commands.values[CONTROL_WORD])
-        is_stop = bool(before & ENABLE and not written & ENABLE)
-        if not self._may_command(host, written):
-            if is_stop:
-                values, written = commands.values.copy(), 0
-            elif sets_word and not written and count == block_words(block):
-                return None
-            else:
-                raise self._not_owner(address, host)
+        commands, before = self._commands, self._commands.values
+        wish = self._wish(write)
+        if wish is None:
+            return None
+        values, written, is_stop = wish
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
+        command = commands.command(values, written, number, now_s, write.host)
+        if is_stop:
+            command = replace(command, stops=True)
+        elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write):
+            command = replace(command, lowered_from_n=self.lowered_from_n)
+        word_at = commands.address(write.block, CONTROL_WORD)
+        self._ask(command, values, word_at)
+        rises = written & ~int(before[CONTROL_WORD])
         if written & RESET:
             self._check_reset(values, written, word_at)
-        if written & ~before & STARTS:
-            self._check_enable(host, written, word_at)
-        return Admitted(values, written, 0 if is_stop else written & ~EDGE_BITS, is_stop)
+        if rises & STARTS:
+            self._check_starts(write.host, rises, written, word_at)
+        kept = 0 if is_stop else written & ~EDGE_BITS
+        return Admitted(values, kept, command, is_stop, bool(written & TAKE), self._held_by(write, written))
 
-    def _may_command(self, host: str, written: int) -> bool:
-        return self._ownership.admits(host) or bool(written & TAKE and self._ownership.may_take_over(host))
+    def took(self, admitted: Admitted) -> None:
+        """The write has been stored."""
+        self._is_held = admitted.is_held
+        self.lowered_from_n = admitted.command.lowered_from_n
+
+    # -- what the write wants
+
+    def _wish(self, write: Write) -> _Wish | None:
+        commands = self._commands
+        values = commands.decode(write.block, write.address, write.data)
+        commands.check_known(values, write.block)
+        written, before = int(values[CONTROL_WORD]), int(commands.values[CONTROL_WORD])
+        falls = before & ~written
+        is_stop = bool(falls & ENABLE and not written & ~before & CALIBRATE) or self._is_bare_stop(write, written)
+        if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
+            return _Wish(values, written, is_stop)
+        if is_stop:
+            return _Wish(commands.values.copy(), 0, True)
+        if falls & CALIBRATE:
+            return _Wish(commands.values.copy(), before & ~CALIBRATE, False)
+        if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
+            return None
+        raise self._not_owner(write.address, write.host)
+
+    def _is_bare_stop(self, write: Write, written: int) -> bool:
+        """During a run that this machine has begun the control word holds no bit that could fall: then 0 in the control word
+        alone, meant for enable, is a stop. A cyclic block of zeros is none."""
+        before = int(self._commands.values[CONTROL_WORD])
+        is_idle = not (written | before) & STARTS and not written & EDGE_BITS
+        return (
+            self.is_calibrating
+            and is_idle
+            and bool(write.touched & ENABLE)
+            and tuple(self._offsets(write)) == (CONTROL_WORD,)
+        )
+
+    def _offsets(self, write: Write) -> range:
+        """Which words of the command block are written whole."""
+        return self._commands.offsets(write.block, write.address, len(write.data) // 2)
+
+    def _held_by(self, write: Write, written: int) -> bool:
+        """Whether a master that writes in cycles holds start_calibration at 1: only its own 0 lets the next 1 count."""
+        is_told = CONTROL_WORD in self._offsets(write) and bool(write.touched & CALIBRATE)
+        if not is_told or not self._ownership.admits(write.host):
+            return self._is_held
+        return bool(written & CALIBRATE) and (
+            self._is_held or bool(int(self._commands.values[CONTROL_WORD]) & CALIBRATE)
+        )
+
+    # -- why not
+
+    def _ask(self, command: Command, values: Values, word_at: int) -> None:
+        before = self._commands.values
+        changes = tuple(name for k, name in enumerate(NAMES) if values[k] != before[k] and k not in _SILENT)
+        refused = self.decide(Asked(command, changes))
+        if refused:
+            raise Refusal(refused.reason, word_at, refused.text, value=float(command.control_word))
 
     def _not_owner(self, address: int, host: str) -> Refusal:
         cure = (
@@ -97,21 +181,17 @@ class Admission:
             for k, field in enumerate(self._commands.fields)
             if field is not None and k in (FORCE_SETPOINT, VOLTAGE_SETPOINT) and values[k]
         ]
-        if written & ENABLE:
-            held.insert(0, "enable is 1")
+        held[:0] = [
+            f"{name} is 1" for bit, name in ((ENABLE, "enable"), (CALIBRATE, "start_calibration")) if written & bit
+        ]
         if held:
             text = f"reset_fault needs enable 0 and setpoint 0: {' and '.join(held)}"
             raise Refusal(RefusalReason.RESET_NEEDS_ZERO, word_at, text, value=float(written))
 
-    def _check_enable(self, host: str, written: int, word_at: int) -> None:
-        reason = self.enable_block
-        if not reason and self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
-            reason = RefusalReason.BYTE_ORDER_UNPROVEN
-        if reason:
-            text = f"enable refused: {_BLOCKED.get(reason, reason.name.lower())}"
-            raise Refusal(reason, word_at, text, value=float(written))
-
-
-def block_words(block: Block) -> int:
-    """Registers of the control word alone in this face."""
-    return 2 if block.repeats else 1
+    def _check_starts(self, host: str, rises: int, written: int, word_at: int) -> None:
+        if rises & CALIBRATE and self._is_held:
+            text = "start_calibration was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
+            raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
+        if self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
+            text = "enable refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"
+            raise Refusal(RefusalReason.BYTE_ORDER_UNPROVEN, word_at, text, value=float(written))

@@ -4,12 +4,14 @@ refused.
 Checks run in FIELDBUS's order: address (02), whole values (03), values (03), owner (06), then what the state allows.
 Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal registers. One accepted
 write is one Command, handed on inside the write, so that a setpoint acts before its answer is sent. The Command carries
-the edge bits as written, each write with a new number; in the registers they read back as 0.
+the edge bits as written, each write with a new number; in the registers they read back as 0. Whether an edge can be taken
+now control says, asked before anything is stored (`on_asked`): what is accepted here is done there.
 
 Decisions: a write to a read-only register is 02, as to an address that cannot be written. Refused reads are noted like
 refused writes, so that a newcomer's 40001 can be explained. Clearing enable also clears control_word, force_setpoint
 and voltage_setpoint (an old voltage must not wait for the next enable), releases the ownership, and is granted to any
-peer: then nothing else of its write is taken. byte_order_echo takes 1234.5 in both word orders and reads back as
+peer, as is clearing start_calibration: then nothing else of its write is taken. A takeover in the write that disables
+holds. byte_order_echo takes 1234.5 in both word orders and reads back as
 written; it proves the order of one host.
 """
 
@@ -23,10 +25,11 @@ from gateway.bsfm.model import Calibration
 from gateway.modbus import Peer
 from gateway.modbus.bits import pack_bits
 from gateway.registers.addresses import no_such_address
-from gateway.registers.admission import EDGE_BITS, TAKE, Admission, Admitted
+from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, Admitted, Write
 from gateway.registers.command import Command, Status
 from gateway.registers.command_block import CONTROL_WORD, FORCE_SETPOINT, VOLTAGE_SETPOINT, CommandBlock, check_zeros
 from gateway.registers.echo import ByteOrderEcho
+from gateway.registers.edges import Decide
 from gateway.registers.image import RegisterImage
 from gateway.registers.map import Block, RegisterMap
 from gateway.registers.ownership import Ownership, ip_number
@@ -34,7 +37,7 @@ from gateway.registers.refusal import Refusal
 from gateway.registers.rules import BankRules
 from gateway.registers.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.status_block import StatusBlock
-from gateway.registers.words import ControlBit, RefusalReason
+from gateway.registers.words import ControlBit, RefusalReason, State
 
 BITS: Final = 16
 READER: Final = Peer("a reader")
@@ -69,6 +72,7 @@ class RegisterBank:
         self._image.put(register_map.find("map_version"), register_map.version)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
         self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
+        self._shown_owner: str | None = None
         self._show_owner()
         self.publish(Status())
 
@@ -112,41 +116,67 @@ class RegisterBank:
                 )
             mask = sum(1 << (address - first + k) for k in range(len(values)))
             bits = sum(bool(value) << (address - first + k) for k, value in enumerate(values))
-            self._write(first, (self._image.word(first) & ~mask | bits).to_bytes(2, "big"), peer)
+            self._write(first, (self._image.word(first) & ~mask | bits).to_bytes(2, "big"), peer, mask)
         except Refusal as refusal:
             raise self._noted(refusal, peer) from None
 
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
         """One word, under the same checks as any write."""
-        word = self._image.word(address) if self._room[address] else 0
-        self.write_registers(address, (word & and_mask | or_mask & ~and_mask & 0xFFFF).to_bytes(2, "big"), peer)
+        word, touched = self._image.word(address) if self._room[address] else 0, ~and_mask & ALL_BITS
+        try:
+            self._write(address, (word & and_mask | or_mask & touched).to_bytes(2, "big"), peer, touched)
+        except Refusal as refusal:
+            raise self._noted(refusal, peer) from None
+
+    @property
+    def on_asked(self) -> Decide:
+        """Asked before a write of the command block is stored: None takes it, an EdgeRefusal is the answer to it."""
+        return self._admission.decide
+
+    @on_asked.setter
+    def on_asked(self, decide: Decide) -> None:
+        self._admission.decide = decide
 
     def publish(self, status: Status) -> None:
-        """Show what control and service know; from now on an enable is refused for status.enable_block."""
-        self._admission.enable_block = status.enable_block
+        """Show what control and service know."""
+        self._admission.is_calibrating = status.state is State.CALIBRATING
         self._status.publish(status)
 
     def clear_command(self) -> None:
-        """Control's doing after a fault or the lease's end: control_word and setpoints to 0. No new Command number."""
+        """Control's doing when the output went off: control_word and setpoints to 0. No new Command number."""
         values = self._commands.values
         if values[CONTROL_WORD] or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT] or self.command.control_word:
             cleared = values.copy()
             cleared[FORCE_SETPOINT] = cleared[VOLTAGE_SETPOINT] = 0.0
             self._commands.store(cleared, 0)
-            self.command = replace(
-                self.command, control_word=ControlBit(0), force_setpoint_n=0.0, voltage_setpoint_v=0.0
-            )
+            self._admission.lowered_from_n = 0.0
+            self._amend(force_setpoint_n=0.0, voltage_setpoint_v=0.0, lowered_from_n=0.0)
+        self._ownership.rest()
+        self._show_owner()
 
     def release_owner(self) -> None:
         """Nobody owns the setpoint any more (unless the rig names the owner)."""
-        if self._ownership.release():
-            self._show_owner()
+        self._ownership.release()
+        self._show_owner()
 
-    def set_active_model(self, calibration: Calibration, slot: int = NO_SLOT) -> None:
+    def set_active_model(self, calibration: Calibration, slot: int = NO_SLOT) -> str:
         """Show the coefficients in use in the active block, and their hash, and hold to their force limits. slot: which
-        recipe they are, if any."""
+        recipe they are, if any. Returns a sentence where the setpoint in use had to be lowered, else an empty one."""
         self._commands.allow_force(calibration.force_limits_n, f"calibration {calibration.number}")
         self.staging.show_active(calibration, slot)
+        lowered = self._commands.lower_force()
+        if lowered is None:
+            return ""
+        before_n, after_n = lowered
+        self._admission.lowered_from_n = requested_n = self.command.force_requested_n or before_n
+        self._amend(force_setpoint_n=after_n, lowered_from_n=requested_n)
+        allowed = f"calibration {calibration.number} allows no more"
+        return f"W314 force_setpoint lowered from {before_n:.2f} N to {after_n:.2f} N: {allowed}"
+
+    def _amend(self, **changes: float) -> None:
+        """The command in use becomes another one without a write: same number, none of its edges again."""
+        word = ControlBit(int(self._commands.values[CONTROL_WORD]))
+        self.command = replace(self.command, control_word=word, stops=False, **changes)  # type: ignore[arg-type]
 
     def _noted(self, refusal: Refusal, peer: Peer) -> Refusal:
         self._status.show_refusal(refusal)
@@ -162,7 +192,7 @@ class RegisterBank:
         words.append(Block("status_word", self._bits[1], self._bits[1] + BITS - 1))
         raise no_such_address(words, address, count)
 
-    def _write(self, address: int, data: bytes, peer: Peer) -> None:
+    def _write(self, address: int, data: bytes, peer: Peer, touched: int = ALL_BITS) -> None:
         count = len(data) // 2
         if not 0 < count <= self._room[address]:
             raise no_such_address(self._blocks, address, count)
@@ -177,7 +207,7 @@ class RegisterBank:
             text = f"{cut.name}@{cut.block} is the registers {cut.address} and {cut.address + 1}: write both in one request"
             raise Refusal(RefusalReason.HALF_VALUE, address, text)
         if self._commands.holds(block, address):
-            self._write_command(block, address, data, peer)
+            self._write_command(Write(block, address, data, peer.host, touched), peer)
         elif block.name == "proof":
             self._write_echo(address, data, peer)
         else:
@@ -194,37 +224,43 @@ class RegisterBank:
             self.last_writer["byte_order_echo"] = peer, self._now()
             self._tell(f"byte_order_echo {order.upper()}: use block {'200' if order == 'abcd' else '300'}", peer)
 
-    def _write_command(self, block: Block, address: int, data: bytes, peer: Peer) -> None:
-        admitted = self._admission.admit(block, address, data, peer.host)
+    def _write_command(self, write: Write, peer: Peer) -> None:
+        now_s = self._now()
+        admitted = self._admission.admit(write, self.command.number + 1, now_s)
         if admitted is None:
             return
         before, owner = self._commands.values, self._ownership.owner
         self._commands.store(admitted.values, admitted.kept)
-        self._settle_owner(admitted, peer.host)
-        now_s = self._now()
-        for name in self._commands.names(block, address, len(data) // 2):
+        self._admission.took(admitted)
+        self._settle_owner(admitted, write.host)
+        for name in self._commands.names(write.block, write.address, len(write.data) // 2):
             self.last_writer[name] = peer, now_s
-        self.command = self._commands.command(admitted.written, self.command.number + 1, now_s, peer.host)
+        self.command = admitted.command
         self.on_command(self.command)
         if self.on_accepted is not None:
             self._tell(self._sentence(before, owner, admitted), peer)
 
     def _settle_owner(self, admitted: Admitted, host: str) -> None:
-        values = admitted.values
-        if admitted.written & TAKE or admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT]:
-            changed = self._ownership.take(host)
+        ownership, values = self._ownership, admitted.values
+        if admitted.is_taken_over:
+            ownership.take(host, explicitly=True)
+        elif admitted.is_stop:
+            ownership.release()
+        elif admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT]:
+            ownership.take(host)
         else:
-            changed = self._ownership.release()
-        if changed:
-            self._show_owner()
+            ownership.rest()
+        self._show_owner()
 
     def _show_owner(self) -> None:
-        self._status.show_owner(ip_number(self._ownership.owner))
+        if self._ownership.owner != self._shown_owner:
+            self._shown_owner = self._ownership.owner
+            self._status.show_owner(ip_number(self._shown_owner))
 
     def _sentence(self, before: list[float], owner: str | None, admitted: Admitted) -> str:
         """What an accepted write changed; empty when nothing that people want to know."""
         changes = self._commands.differences(before, admitted.values)
-        edges = (admitted.written & EDGE_BITS & ~TAKE) or 0
+        edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE
         asked = ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
         now_owner = self._ownership.owner
         owners = f"owner {owner or 'nobody'} -> {now_owner or 'nobody'}" if owner != now_owner else ""

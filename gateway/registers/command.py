@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import nan
 
-from gateway.registers.words import ControlBit, FaultCode, LimitedBy, Mode, RefusalReason, State
+from gateway.registers.words import ControlBit, FaultCode, LimitedBy, Mode, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,6 +11,8 @@ class Command:
     """One accepted write of the command block, whole, SI units. 0 in the fields named in FIELDBUS means the rig's default.
 
     number counts accepted writes (control sees a new one by it); received_s is monotonic; peer is the writer's address.
+    stops: whatever the control word was, this write wants the output off. lowered_from_n: what the master wrote as setpoint
+    before a calibration with a smaller limit lowered it, 0 where none did.
     """
 
     control_word: ControlBit = ControlBit(0)  # noqa: RUF009  flags are immutable
@@ -29,6 +31,13 @@ class Command:
     number: int = 0
     received_s: float = 0.0
     peer: str = ""
+    stops: bool = False
+    lowered_from_n: float = 0.0
+
+    @property
+    def force_requested_n(self) -> float:
+        """The setpoint as the master wrote it."""
+        return self.lowered_from_n or self.force_setpoint_n
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,5 +67,5 @@ class Status:
     calibration_phase: int = 0
     calibration_progress: float = 0.0
     calibration_stored: int = 0
+    calibration_time_left_s: float = 0.0
     residual_cause: int = 0  # ResidualCause
-    enable_block: RefusalReason = RefusalReason.NONE

@@ -66,6 +66,17 @@ class CommandBlock:
             rules = replace(rules, setpoint_min_n=low_n, force_max_n=high_n, force_source=source)
         self.fields = self._fields(rules)
 
+    def lower_force(self) -> tuple[float, float] | None:
+        """Take an accepted setpoint that the limits in use forbid down to the largest allowed; (before, after), None where
+        it is within them."""
+        field, setpoint_n = self.fields[FORCE_SETPOINT], self.values[FORCE_SETPOINT]
+        if field is None or setpoint_n <= field.high:
+            return None
+        lowered = self.values.copy()
+        lowered[FORCE_SETPOINT] = field.high
+        self.store(lowered, int(lowered[CONTROL_WORD]))
+        return setpoint_n, field.high
+
     def _fields(self, rules: BankRules) -> tuple[CommandField | None, ...]:
         count, registers = len(self.values), self._registers
         named = (command_field(register, rules, self._map_name) for register in registers)
@@ -80,12 +91,17 @@ class CommandBlock:
         """Where a word of the command block is in this face."""
         return self._first + offset if not block.repeats else block.repeats["command"] + 2 * offset
 
+    def offsets(self, block: Block, address: int, count: int) -> range:
+        """Which words of the command block a write of these words sets, reserved ones among them."""
+        if not block.repeats:
+            return range(address - self._first, address - self._first + count)
+        start = (address - block.repeats["command"] + 1) // 2
+        return range(start, start + count // 2)
+
     def names(self, block: Block, address: int, count: int) -> Sequence[str]:
         """The registers that a write of these words sets."""
-        if not block.repeats:
-            return NAMES[address - self._first : address - self._first + count]
-        start = (address - block.repeats["command"] + 1) // 2
-        return NAMES[start : start + count // 2]
+        offsets = self.offsets(block, address, count)
+        return NAMES[offsets.start : offsets.stop]
 
     def decode(self, block: Block, address: int, data: bytes) -> Values:
         """A candidate: the accepted values with those of this write put over them. Refusal (03) for a bad one."""
@@ -155,9 +171,9 @@ class CommandBlock:
             else:
                 self._image.write(base, words_swapped_from_little_endian(self._low_first.pack(*candidate)))
 
-    def command(self, control_word: int, number: int, received_s: float, peer: str) -> Command:
-        """The accepted values in SI units. control_word: as written, edge bits included."""
-        v = self.values
+    def command(self, values: Values, control_word: int, number: int, received_s: float, peer: str) -> Command:
+        """These values in SI units. control_word: as written, edge bits included."""
+        v = values
         return Command(
             control_word=_CONTROL_WORDS[control_word],
             force_setpoint_n=v[1],

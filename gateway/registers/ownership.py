@@ -1,8 +1,9 @@
 """Who may command: the first host that does, or the one that the rig names.
 
-A master owns from the write that enables or sets a setpoint other than 0; a write that leaves enable and setpoints at 0
-commands nothing and neither takes nor keeps the ownership. Disable, the lease's end (`release`) and an explicit takeover
-change it. Identity is the host, not the connection: a master that reconnects is the same master.
+A master owns from the write that enables or sets a setpoint other than 0; when its command is at rest again (enable and
+setpoints 0), so is that ownership (`rest`). Who has taken over explicitly keeps it, whatever else is written or happens, until
+disable, the lease's end (both `release`), another takeover or a restart. Identity is the host, not the connection: a master
+that reconnects is the same master.
 """
 
 from ipaddress import IPv4Address, IPv6Address, ip_address
@@ -13,11 +14,12 @@ NOT_IPV4: Final = 0xFFFFFFFF
 
 
 class Ownership:
-    """owner: the host that owns the setpoint, None for nobody."""
+    """owner: the host that owns the setpoint, None for nobody; is_explicit: it has said so (bit 3)."""
 
     def __init__(self, configured: str | None) -> None:
         self._configured = configured
         self.owner: str | None = configured
+        self.is_explicit = False
 
     def admits(self, host: str) -> bool:
         """Whether this host may command without taking over."""
@@ -26,19 +28,21 @@ class Ownership:
     def may_take_over(self, host: str) -> bool:
         return self._configured is None or self._configured == host
 
-    def take(self, host: str) -> bool:
-        """True when that changed the owner. A configured owner stays."""
-        changed = self.owner != host and self._configured is None
-        if changed:
+    def take(self, host: str, *, explicitly: bool = False) -> None:
+        """A configured owner stays."""
+        if self._configured is None:
+            self.is_explicit = explicitly or (self.is_explicit and self.owner == host)
             self.owner = host
-        return changed
 
-    def release(self) -> bool:
-        """True when that changed the owner. A configured owner stays."""
-        changed = self.owner is not None and self._configured is None
-        if changed:
-            self.owner = None
-        return changed
+    def rest(self) -> None:
+        """Nothing is commanded any more. Who took over explicitly stays."""
+        if not self.is_explicit:
+            self.release()
+
+    def release(self) -> None:
+        """Disabled, or the lease is over. A configured owner stays."""
+        self.is_explicit = False
+        self.owner = self._configured
 
 
 def ip_number(host: str | None) -> int:

@@ -39,6 +39,14 @@ _WIRE: Final = {
     RefusalReason.QUANTITY: (ILLEGAL_VALUE, "W220"),
     RefusalReason.FUNCTION: (ILLEGAL_FUNCTION, "W221"),
     RefusalReason.COEFFICIENTS: (BUSY, "E401"),
+    RefusalReason.HEARTBEAT_STALE: (ILLEGAL_VALUE, "W302"),
+    RefusalReason.NOTHING_TO_RESET: (DEVICE_FAILURE, "W312"),
+    RefusalReason.TARE_REFUSED: (DEVICE_FAILURE, "W303"),
+    RefusalReason.CALIBRATION_REFUSED: (DEVICE_FAILURE, "W305"),
+    RefusalReason.CALIBRATING: (BUSY, "W310"),
+    RefusalReason.FITTING: (BUSY, "W311"),
+    RefusalReason.CALIBRATION_HELD: (DEVICE_FAILURE, "W313"),
+    RefusalReason.STOPPING: (BUSY, "W315"),
     RefusalReason.EMPTY_SLOT: (ILLEGAL_VALUE, "W331"),
 }
 """Exception code and message code of every reason; a reason without an entry cannot refuse."""

@@ -48,10 +48,20 @@ _SOURCES: Final = {
     "calibration_progress": "calibration_progress",
     "calibration_stored": "calibration_stored",
     "residual_cause": "residual_cause",
+    "calibration_time_left": "calibration_time_left_s",
 }
 """Register -> field of Status."""
 
-_UNITS_PER_SI: Final = {"": 1.0, "N": 1.0, "mV": 1.0e3, "ms": 1.0e3, "us": 1.0e6, "kPa": 1.0e-3, "permille": 1.0e3}
+_UNITS_PER_SI: Final = {
+    "": 1.0,
+    "N": 1.0,
+    "s": 1.0,
+    "mV": 1.0e3,
+    "ms": 1.0e3,
+    "us": 1.0e6,
+    "kPa": 1.0e-3,
+    "permille": 1.0e3,
+}
 BANK_REGISTERS: Final = ("owner_ip", "refusal_address", "refusal_reason", "refusal_value")
 
 

@@ -24,8 +24,8 @@ class Mode(IntEnum):
 
 class ControlBit(IntFlag):
     ENABLE = 1 << 0
-    RESET_FAULT = 1 << 1  # acts on its rise
-    TARE = 1 << 2  # acts on its rise
+    RESET_FAULT = 1 << 1  # acts whenever written as 1
+    TARE = 1 << 2  # acts whenever written as 1
     TAKE_OWNERSHIP = 1 << 3
     VALVE_PULL = 1 << 4
     START_CALIBRATION = 1 << 5
@@ -113,6 +113,14 @@ class RefusalReason(IntEnum):
     QUANTITY = 19
     FUNCTION = 20
     COEFFICIENTS = 21
+    HEARTBEAT_STALE = 22  # W302: a reset where there is a lease, without a new heartbeat
+    NOTHING_TO_RESET = 23
+    TARE_REFUSED = 24  # W303
+    CALIBRATION_REFUSED = 25  # W305: the state or the plan forbids it
+    CALIBRATING = 26  # W310: a calibration or an experiment has the output
+    FITTING = 27  # W311: the last ladder is not fitted yet
+    CALIBRATION_HELD = 28  # W313: bit 5 was kept at 1 beyond the end of the run that it began
+    STOPPING = 29  # W315: the force is on its way to 0, and then the output is off
     EMPTY_SLOT = 30
 
 

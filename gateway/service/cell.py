@@ -244,7 +244,9 @@ class Cell:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
         self.controller.use(self._rig.model_of(taken.calibration, taken.model), taken.calibration.number)
         self._recordings.calibration_number = taken.calibration.number
-        self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
+        lowered = self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
+        if lowered:
+            self._log("calibration", lowered)
         self.gateway.refresh()
 
     def _write_output(self, data: bytes) -> None:

@@ -1,6 +1,7 @@
 """One rig, wired: the way of one setpoint through the house, and the way of a measured force back.
 
-A master's write calls `on_command` inside the bank's write, so the voltage is on its way before the master has its answer.
+A master's write calls `on_asked` and, where control can take it, `on_command` inside the bank's write: so the answer is
+control's own, and the voltage is on its way before the master has it.
 The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Clock and ports come in as arguments; the
 same class runs behind ptys, behind real ports and in virtual time. No exception of ours may leave the last voltage
 standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
@@ -17,6 +18,7 @@ from gateway.devices.messages import ForceSample
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command
+from gateway.registers.edges import Asked, EdgeRefusal
 from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.words import FaultCode, WarningBit
 from gateway.service.ladder_keeper import LadderKeeper
@@ -64,6 +66,12 @@ class Gateway:
         self._log = log
         self._last_tick_s: float | None = None
         bank.on_command = self._on_command
+        bank.on_asked = self._on_asked
+
+    def _on_asked(self, asked: Asked) -> EdgeRefusal | None:
+        """Before the bank stores a write: whether control can take it at this moment."""
+        now_s = self._clock()
+        return self.controller.refusal_of(now_s, asked, self._line(now_s))
 
     def _on_command(self, command: Command) -> None:
         self.owner_connected = True

@@ -19,7 +19,7 @@ from gateway.devices.messages import ForceSample
 from gateway.profiles import Rig
 from gateway.profiles.plan_files import plain, plan_of
 from gateway.recording import Recorder
-from gateway.registers.words import CalibrationPhase, RefusalReason, State
+from gateway.registers.words import CalibrationPhase
 from gateway.service.fit_child import FitChild, Result
 from gateway.service.run_recording import COLUMNS, RunRecording
 
@@ -61,6 +61,8 @@ class LadderKeeper:
             self._calibrating.ask_stop("info calibration stopped at this machine")
         elif "plan" in request:
             self._start(request["plan"], tuple(int(number) for number in request.get("continues", ())))
+        if refused := self._calibrating.take_refused():
+            raise ValueError(refused)
         return self.status()
 
     def _tried(self, plan: AnyPlan) -> Answer:
@@ -80,17 +82,8 @@ class LadderKeeper:
 
     def _start(self, fields: Any, continues: tuple[int, ...]) -> None:
         plan = _plan_of(fields)
-        decision = self._decision
-        if self._calibrating.running or self._child:
-            raise ValueError("W305 a calibration is running: wait for its end, or stop it")
-        if decision is None or decision.state not in (State.OFF, State.READY):
-            raise ValueError(
-                f"W305 calibration needs state OFF or READY, it is {decision.state.name if decision else 'none'}"
-            )
-        if decision.enable_block:
-            raise ValueError(
-                f"W305 calibration refused: {_WORDS.get(decision.enable_block, decision.enable_block.name)}"
-            )
+        if refused := self._controller.refusal_of_run(self._clock(), plan):
+            raise ValueError(refused)
         self._calibrating.ask(plan)
         self._continues, self._ended, self._result = continues, "", {}
 
@@ -123,7 +116,7 @@ class LadderKeeper:
             self._begin()
         elif self._recording is not None and not calibrating.running:
             self._end(decision)
-        elif calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
+        elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
 
     def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
@@ -186,14 +179,6 @@ class LadderKeeper:
         else:
             self._calibrating.phase = CalibrationPhase.REFUSED
             self._log("calibration", str(result.get("refused")))
-
-
-_WORDS: Final = {
-    RefusalReason.FAULT_LATCHED: "a fault is latched, reset it first",
-    RefusalReason.NOT_READY: "not ready: force at rest too high, or first words of a device pending",
-    RefusalReason.OUTPUT_FAULT: "the output device does not answer",
-    RefusalReason.CELL_SILENT: "no fresh sample of the load cell",
-}
 
 
 def _asks(plan: AnyPlan) -> Answer:

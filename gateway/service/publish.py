@@ -64,7 +64,7 @@ def status_of(output: Output, health: LoopHealth, pressure_pa: float, known: Kno
         missed_ticks=health.missed_ticks,
         calibration_phase=output.calibration_phase,
         calibration_progress=output.calibration_progress,
+        calibration_time_left_s=output.calibration_time_left_s,
         calibration_stored=known.calibration_stored,
         residual_cause=known.residual_cause,
-        enable_block=output.enable_block,
     )

@@ -15,9 +15,12 @@ from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.control import Controller, ControlSettings, Limits, Line, Output, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
+from gateway.registers.edges import Asked, EdgeRefusal
 from gateway.registers.words import ControlBit, FaultCode, Mode
 
 STEP_S = 0.001
+MOMENTARY = ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP
+"""Bits that read back as 0."""
 
 
 def bsfm(scale: float = 1.0, span_n: float = 6.0) -> Bsfm:
@@ -104,6 +107,7 @@ class Bench:
         self.cell_silent = self.output_silent = self.cell_frozen = self.loop_blocked = False
         self.alter_sample: Callable[[ForceSample], ForceSample] = lambda sample: sample
         self.releases = 0
+        self.refused: EdgeRefusal | None = None
         self.clearing_zeroes_heartbeat = self.ignores_clearing = False
 
     @property
@@ -115,10 +119,16 @@ class Bench:
         return self.history[-1].output
 
     def write(self, **changes: object) -> Output:
-        """A master's write of some registers, as the bank would pass it on."""
+        """A master's write of some registers, as the bank would pass it on, or keep to itself (`refused`)."""
         number = self.command.number + 1
         changed = {**changes, "number": number, "received_s": self.now_s, "peer": "10.0.0.5"}
-        self.command = replace(self.command, **changed)  # type: ignore[arg-type]
+        stands = replace(self.command, control_word=self.command.control_word & ~MOMENTARY)
+        wanted = replace(stands, **changed)  # type: ignore[arg-type]
+        silent = {"control_word", "heartbeat", "command_sequence"}
+        names = tuple(name for name in changes if name not in silent and changes[name] != getattr(stands, name))
+        self.refused = self.controller.refusal_of(self.now_s, Asked(wanted, names), self.line)
+        if self.refused is None:
+            self.command = wanted
         return self.step()
 
     def enable(self, force_n: float = 0.0, **changes: object) -> Output:

@@ -206,9 +206,16 @@ OTHERS: Final = (
     Entry(
         "A330",
         "calibration stopped",
-        "A calibration run ended before its last stair; the output went to the safe voltage and the data are kept.",
+        "A calibration run ended before its last stair; the force went to 0 and the data are kept.",
         "Nobody followed the run any more (a closed terminal), or the recording could not be written.",
         "force-gateway calibrate --resume goes on with the groups that are missing; df -h shows a full disk.",
+    ),
+    Entry(
+        "A350",
+        "a run reached the rig's largest force",
+        "A calibration or an experiment measured nearly force_max_n: a ladder leaves out the stairs above, an experiment ends.",
+        "This plant makes more force for a voltage than the calibration in use expects.",
+        "Nothing: the new calibration ends there. Raise force_max_n in the rig file only if tool and workpiece take more.",
     ),
     Entry(
         "A346",

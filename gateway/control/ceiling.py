@@ -1,0 +1,77 @@
+"""A run stays below the rig's largest force, whatever the calibration in use expects: by what the load cell says.
+
+Two looks. Before a higher stair: where the force would go on as it rose up to here (the secant of the last two settled
+stairs, or the model scaled to what was measured, whichever is more), it must not pass the ceiling. And at every sample of a
+rising stair, for what rises otherwise. The ceiling is force_max_n less what noise makes of single readings.
+"""
+
+from collections import deque
+from typing import Final
+
+from gateway.bsfm import Bsfm
+from gateway.bsfm.ladder_plan import RISING
+from gateway.control.ladder_run import LadderRow
+from gateway.control.reading import Reading
+
+_SAMPLES: Final = 3
+_LEAST_MARGIN_N: Final = 0.25
+_SIGMAS: Final = 3.0
+
+
+class Ceiling:
+    """force_max_n: contact force that the rig allows; model: the calibration in use."""
+
+    def __init__(self, force_max_n: float, model: Bsfm, rest_v: float) -> None:
+        self._force_max_n = force_max_n
+        self._model = model
+        self._rest_v = rest_v
+        self._recent_n: deque[float] = deque(maxlen=_SAMPLES)
+        self._given_n = 0.0
+        self._last: tuple[float, float] | None = None
+        self._before: tuple[float, float] | None = None
+
+    @property
+    def measured_n(self) -> float:
+        """Contact force of the last samples, 0 before the first."""
+        return sum(self._recent_n) / len(self._recent_n) if self._recent_n else 0.0
+
+    def observe(self, reading: Reading) -> None:
+        """Every reading."""
+        if reading.is_new and reading.is_usable:
+            self._recent_n.append(reading.contact_n)
+            self._given_n = reading.contact_n - reading.cell_n
+
+    def settled(self, row: LadderRow) -> None:
+        """A stair that has ended."""
+        if row.stair.direction < 0:
+            self._last = self._before = None
+        else:
+            self._before, self._last = self._last, (row.stair.voltage_v, row.force_n)
+
+    def is_reached(self, noise_n: float) -> bool:
+        """Whether the force of now is as high as it may be."""
+        return len(self._recent_n) == _SAMPLES and self.measured_n >= self._ceiling_n(noise_n)
+
+    def is_beyond(self, voltage_v: float, noise_n: float) -> bool:
+        """Whether a stair of this voltage would pass the ceiling, after the ones that have settled."""
+        return self._expected_n(voltage_v) + self._given_n > self._ceiling_n(noise_n)
+
+    def _ceiling_n(self, noise_n: float) -> float:
+        return self._force_max_n - max(_LEAST_MARGIN_N, _SIGMAS * noise_n)
+
+    def _expected_n(self, voltage_v: float) -> float:
+        """Cell force of a higher stair, by those below it; 0 where there is none to go by."""
+        if self._last is None or voltage_v <= self._last[0]:
+            return 0.0
+        last_v, last_n = self._last
+        rest_n, here_n, there_n = (self._model.force_n(v, float(RISING)) for v in (self._rest_v, last_v, voltage_v))
+        rise_n = here_n - rest_n
+        by_model_n = (there_n - here_n) * (last_n - rest_n) / rise_n if rise_n > 0.0 else 0.0
+        return last_n + max(by_model_n, self._by_secant_n(voltage_v))
+
+    def _by_secant_n(self, voltage_v: float) -> float:
+        assert self._last
+        if self._before is None or self._last[0] <= self._before[0]:
+            return 0.0
+        (before_v, before_n), (last_v, last_n) = self._before, self._last
+        return (last_n - before_n) * (voltage_v - last_v) / (last_v - before_v)

@@ -1,0 +1,35 @@
+"""What the bank asks control before it takes a write, and what control answers.
+
+An edge (enable, reset, tare, start calibration) is decided inside the write that carries it, by control, for control alone
+knows whether it can take it; the decision is the answer to the master. Only what control has not refused is stored.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+from gateway.registers.command import Command
+from gateway.registers.words import ControlBit, RefusalReason
+
+
+class Asked(NamedTuple):
+    """A write that would be taken. command: as it would be handed on; changes: names of the registers that it would change,
+    control_word, heartbeat and command_sequence apart."""
+
+    command: Command
+    changes: tuple[str, ...] = ()
+
+
+class EdgeRefusal(NamedTuple):
+    """Why a write cannot be taken now. bit: the edge that stands for it, 0 where it is the whole write; text: for people,
+    without the code."""
+
+    reason: RefusalReason
+    bit: ControlBit
+    text: str
+
+
+Decide: TypeAlias = Callable[[Asked], EdgeRefusal | None]
+
+
+def decide_nothing(asked: Asked) -> None:
+    """Stands for control where there is none: everything is taken."""
