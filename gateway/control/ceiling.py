@@ -1,8 +1,8 @@
 """A run stays below the rig's largest force, whatever the calibration in use expects: by what the load cell says.
 
-Two looks. Before a higher stair: where the force would go on as it rose up to here (the secant of the last two settled
-stairs, or the model scaled to what was measured, whichever is more), it must not pass the ceiling. And at every sample of a
-rising stair, for what rises otherwise. The ceiling is force_max_n less what noise makes of single readings.
+Two looks. Before a higher stair: were the force to go on as it rose from the stair before to this one, in the shape of the
+calibration in use, it must not pass the ceiling. And at every sample of a rising stair, for what rises otherwise. The
+ceiling is force_max_n less what noise makes of single readings.
 """
 
 from collections import deque
@@ -63,15 +63,11 @@ class Ceiling:
         """Cell force of a higher stair, by those below it; 0 where there is none to go by."""
         if self._last is None or voltage_v <= self._last[0]:
             return 0.0
-        last_v, last_n = self._last
-        rest_n, here_n, there_n = (self._model.force_n(v, float(RISING)) for v in (self._rest_v, last_v, voltage_v))
-        rise_n = here_n - rest_n
-        by_model_n = (there_n - here_n) * (last_n - rest_n) / rise_n if rise_n > 0.0 else 0.0
-        return last_n + max(by_model_n, self._by_secant_n(voltage_v))
-
-    def _by_secant_n(self, voltage_v: float) -> float:
-        assert self._last
-        if self._before is None or self._last[0] <= self._before[0]:
-            return 0.0
-        (before_v, before_n), (last_v, last_n) = self._before, self._last
-        return (last_n - before_n) * (voltage_v - last_v) / (last_v - before_v)
+        (last_v, last_n), (before_v, before_n) = self._last, self._before or (self._rest_v, 0.0)
+        before_model_n, last_model_n, model_n = (
+            self._model.force_n(volts, float(RISING)) for volts in (before_v, last_v, voltage_v)
+        )
+        model_rise_n = last_model_n - before_model_n
+        if model_rise_n <= 0.0:
+            return last_n
+        return last_n + max(0.0, last_n - before_n) * (model_n - last_model_n) / model_rise_n

@@ -263,10 +263,15 @@ class Controller:
         found = found or self._supervisor.first_cause(now_s, self._reading, line, self._motion.expected_rise_n)
         if found:
             self._fail(now_s, found)
-        elif self.calibrating.is_local or not self._follower.lease.is_lost(now_s, line.owner_connected):
+        elif self._goes_on_alone or not self._follower.lease.is_lost(now_s, line.owner_connected):
             self._master_lost = self._master_lost and self._ramping_down
         elif not self._master_lost:
             self._lose_master(now_s, line.owner_connected)
+
+    @property
+    def _goes_on_alone(self) -> bool:
+        """No master is needed: a run of this machine, or the way to 0 after any run."""
+        return self.calibrating.is_local or (self.state is State.CALIBRATING and not self.calibrating.running)
 
     def _fail(self, now_s: float, found: Finding) -> None:
         self.state = next_state(self.state, Event.FAILED)

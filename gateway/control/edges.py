@@ -118,15 +118,18 @@ class EdgeJudge:
         if edges.rises & _ENABLE and state not in ENABLED_STATES:
             yield from _some(_blocked(_in(state, at), ControlBit.ENABLE))
         if edges.rises & _CALIBRATE:
-            held = " and ".join(name for name, value in _setpoints(command) if value)
-            if held:
-                yield _no_run(RefusalReason.CALIBRATION_REFUSED, f"{held} is not 0: a run begins without force")
             yield from _some(self.of_run(RunPlan(), _in(state, at)))
+            if held := _setpoints(command):
+                why = f"{' and '.join(held)}: a run begins with setpoint 0"
+                yield _no_run(RefusalReason.CALIBRATION_REFUSED, why)
 
     def _reset(self, command: Command, at: Situation) -> EdgeRefusal | None:
         if at.state is not State.FAULT:
             text = f"reset refused: no fault is latched, state {at.state.name}"
             return EdgeRefusal(RefusalReason.NOTHING_TO_RESET, ControlBit.RESET_FAULT, text)
+        if held := _held(command):
+            text = f"reset_fault needs enable 0 and setpoint 0: {' and '.join(held)}"
+            return EdgeRefusal(RefusalReason.RESET_NEEDS_ZERO, ControlBit.RESET_FAULT, text)
         if not self._follower.lease.would_be_fresh_since(at.faulted_s, at.now_s, command.heartbeat):
             text = f"reset refused: heartbeat = {command.heartbeat} as at the fault: write another value with the reset"
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
@@ -177,8 +180,17 @@ def _no_run(reason: RefusalReason, why: str) -> EdgeRefusal:
     return EdgeRefusal(reason, ControlBit.START_CALIBRATION, f"calibration refused: {why}")
 
 
-def _setpoints(command: Command) -> tuple[tuple[str, float], ...]:
-    return ("force_setpoint", command.force_setpoint_n), ("voltage_setpoint", command.voltage_setpoint_v)
+def _held(command: Command) -> list[str]:
+    """What a reset would let loose."""
+    bits = ((ControlBit.ENABLE, "enable is 1"), (ControlBit.START_CALIBRATION, "start_calibration is 1"))
+    return [words for bit, words in bits if command.control_word & bit] + _setpoints(command)
+
+
+def _setpoints(command: Command) -> list[str]:
+    """Those that are not 0."""
+    force_n, voltage_v = command.force_setpoint_n, command.voltage_setpoint_v
+    force = [f"force_setpoint is {force_n:.2f} N"] if force_n else []
+    return force + ([f"voltage_setpoint is {1e3 * voltage_v:.0f} mV"] if voltage_v else [])
 
 
 def _some(refused: EdgeRefusal | None) -> Iterator[EdgeRefusal]:

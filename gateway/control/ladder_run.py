@@ -97,9 +97,15 @@ class LadderRun:
         return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
 
     def leave_out(self, now_s: float, voltage_v: float, *, was_there: bool) -> bool:
-        """No stair from now on is as high as this voltage; whether any is left. was_there: the output has been; then the
-        same stair below it is another one on the way down than on the way up."""
-        left = [stair for stair in self.stairs[self.done :] if stair.voltage_v < voltage_v]
+        """No stair from now on is as high as this voltage; whether any is left. was_there: the output has been; if not, the
+        smaller stairs of the ladder may still try after a check, and the same stair is no other one on the way down."""
+        phase = self._stair.phase
+        tries_again = phase is CalibrationPhase.CHECK and not was_there
+        left = [
+            stair
+            for stair in self.stairs[self.done :]
+            if stair.voltage_v < voltage_v or (tries_again and stair.phase is not phase)
+        ]
         last_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
         if not was_there and left and left[0].direction < 0 and left[0].voltage_v >= last_v:
             left = left[1:]

@@ -1,7 +1,7 @@
 """May this write of the command block be used, and what does it become? All checks, in order, before anything is stored.
 
-Values (03), owner (06), what control says to the edges and to a write while it is busy (`Decide`), then what stands in the
-write itself or is known to the bank alone: a reset needs setpoint 0 (03), an enable the byte-order proof (06).
+Values (03), owner (06), what control says to the edges and to a write while it is busy (`Decide`), then what the bank alone
+knows: whether start_calibration was held at 1 (04), and whether an enable has its byte-order proof (06).
 
 Who clears enable wants the output off, and is never refused; an edge beside it is decided all the same, so that a lone
 start_calibration or tare while a force is held is an answer with a reason, and no stop. start_calibration alone keeps the
@@ -31,7 +31,6 @@ from gateway.registers.rules import BankRules
 from gateway.registers.words import ControlBit, RefusalReason
 
 ENABLE: Final = int(ControlBit.ENABLE)
-RESET: Final = int(ControlBit.RESET_FAULT)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
 CALIBRATE: Final = int(ControlBit.START_CALIBRATION)
 STARTS: Final = ENABLE | CALIBRATE
@@ -101,8 +100,6 @@ class Admission:
         word_at = commands.address(write.block, CONTROL_WORD)
         self._ask(command, values, word_at)
         rises = written & ~int(before[CONTROL_WORD])
-        if written & RESET:
-            self._check_reset(values, written, word_at)
         if rises & STARTS:
             self._check_starts(write.host, rises, written, word_at)
         kept = 0 if is_stop else written & ~EDGE_BITS
@@ -174,19 +171,6 @@ class Admission:
         )
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
-
-    def _check_reset(self, values: Values, written: int, word_at: int) -> None:
-        held = [
-            f"{field.name} is {field.shown(values[k])}"
-            for k, field in enumerate(self._commands.fields)
-            if field is not None and k in (FORCE_SETPOINT, VOLTAGE_SETPOINT) and values[k]
-        ]
-        held[:0] = [
-            f"{name} is 1" for bit, name in ((ENABLE, "enable"), (CALIBRATE, "start_calibration")) if written & bit
-        ]
-        if held:
-            text = f"reset_fault needs enable 0 and setpoint 0: {' and '.join(held)}"
-            raise Refusal(RefusalReason.RESET_NEEDS_ZERO, word_at, text, value=float(written))
 
     def _check_starts(self, host: str, rises: int, written: int, word_at: int) -> None:
         if rises & CALIBRATE and self._is_held:

@@ -9,7 +9,8 @@ from gateway.bsfm import Response
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
-from gateway.registers.words import RefusalReason, State
+from gateway.registers.edges import EdgeRefusal
+from gateway.registers.words import ControlBit, RefusalReason, State
 
 
 @pytest.fixture
@@ -69,10 +70,14 @@ def test_what_a_newcomer_gets_wrong_has_its_code(
         (RefusalReason.CELL_SILENT, "W215"),
         (RefusalReason.OUTPUT_FAULT, "W214"),
         (RefusalReason.NOT_READY, "W213"),
+        (RefusalReason.HEARTBEAT_STALE, "W302"),
+        (RefusalReason.TARE_REFUSED, "W303"),
+        (RefusalReason.CALIBRATION_REFUSED, "W305"),
+        (RefusalReason.CALIBRATING, "W310"),
     ],
 )
 def test_an_enable_that_is_refused_says_why(block: RefusalReason, code: str, bank, gateway: str, call) -> None:
-    bank.publish(Status(enable_block=block))
+    bank.on_asked = lambda asked: EdgeRefusal(block, ControlBit.ENABLE, "enable refused: as control says")
     answer = call("write", "control_word=enable", "--gateway", gateway)
     assert answer.exit_code == 1
     assert answer.stderr.startswith(f"{code} "), answer.stderr

@@ -94,7 +94,8 @@ def test_disable_is_the_safe_voltage_at_once_and_asks_to_clear_the_command():
     bench.run(1.0)
     output = bench.disable()
     assert (output.state, output.voltage_v) == (State.OFF, 0.0)
-    assert output.clear_command and output.release_owner
+    assert output.clear_command
+    assert not output.release_owner, "the bank has done that: it knows who disabled"
     assert bench.command.force_setpoint_n == 0.0
 
 
@@ -121,8 +122,10 @@ def test_an_enable_that_is_blocked_changes_nothing_and_says_why():
     bench.cell_silent = True
     bench.run(0.2)
     output = bench.enable(12.0)
-    assert (output.state, output.voltage_v, output.clear_command) == (State.OFF, 0.0, True)
-    assert output.events[0].startswith("W301 enable refused: no fresh load-cell sample")
+    assert bench.refused is not None
+    assert (bench.refused.reason, bench.refused.bit) == (RefusalReason.CELL_SILENT, ControlBit.ENABLE)
+    assert bench.refused.text.startswith("enable refused: no fresh sample of the load cell")
+    assert (output.state, output.voltage_v, output.clear_command) == (State.OFF, 0.0, False)
 
 
 def test_a_refused_enable_does_not_come_true_later_by_itself():

@@ -53,9 +53,9 @@ def test_newtons_are_those_of_the_rising_branch() -> None:
 @pytest.mark.parametrize(
     ("moves", "sentence"),
     [
-        ((Move(do=Do.STEP, to_v=9.5),), "move 1 (step): 9.5 V, allowed 0 .. 7.8 V (about 0 .. 55 N)"),
+        ((Move(do=Do.STEP, to_v=9.5),), "move 1 (step): 9.5 V, allowed 0 .. 6.98 V (about 0 .. 49 N)"),
         ((Move(do=Do.STEP, to_n=70.0),), "70 N, allowed up to"),
-        ((Move(do=Do.STEP, to_v=7.5), Move(do=Do.REVERSALS, size_v=2.0, times=1, hold_s=1.0)), "2 V around 7.5 V"),
+        ((Move(do=Do.STEP, to_v=6.5), Move(do=Do.REVERSALS, size_v=2.0, times=1, hold_s=1.0)), "2 V around 6.5 V"),
         ((Move(do=Do.STEP, to_v=0.2), Move(do=Do.REVERSALS, size_v=1.0, times=1, hold_s=1.0)), "1 V around 0.2 V"),
     ],
 )
@@ -110,6 +110,8 @@ def test_a_run_goes_through_zero_and_check_and_then_by_the_clock_to_its_end_at_z
         assert record.output.voltage_v == pytest.approx(moved.voltage_v(record.time_s - ran[0].time_s), abs=0.03) or (
             record.time_s - ran[0].time_s < 0.1  # the slew limit of the first step
         )
+    assert bench.last.state is State.CALIBRATING, "the force goes to 0 along the ramp"
+    bench.run(0.5)
     assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
     assert any(event.startswith("info experiment short done") for event in bench.events)
 
@@ -134,7 +136,7 @@ def test_a_stop_ends_it_at_zero_volts() -> None:
     bench.run(1.5)
     assert bench.last.voltage_v > 2.0
     bench.controller.calibrating.ask_stop("info calibration stopped at this machine")
-    bench.run(0.05)
+    bench.run(0.4)
     assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
     assert bench.last.calibration_phase == CalibrationPhase.STOPPED
 

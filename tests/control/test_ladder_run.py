@@ -24,8 +24,13 @@ def begun(bench: Bench, plan: RunPlan = SHORT) -> Bench:
 
 
 def finished(bench: Bench) -> Bench:
-    """Until the run has ended, one way or another."""
-    ended = bench.seconds_until(lambda output: output.calibration_phase > CalibrationPhase.MINOR_LOOPS, LONG_S)
+    """Until the run has ended, one way or another, and the output is off."""
+    ended = bench.seconds_until(
+        lambda output: (
+            output.calibration_phase > CalibrationPhase.MINOR_LOOPS and output.state in (State.OFF, State.FAULT)
+        ),
+        LONG_S,
+    )
     assert ended < LONG_S
     return bench
 
@@ -38,6 +43,7 @@ def rows_of(bench: Bench, plan: RunPlan) -> list[LadderRow]:
         row = bench.controller.calibrating.last_row
         if row and row not in rows[-1:]:
             rows.append(row)
+    bench.run(0.5)
     return rows
 
 
@@ -92,16 +98,20 @@ def test_progress_never_falls_and_the_eta_reaches_the_end() -> None:
     assert at_s + eta_s == pytest.approx(total_s, rel=0.15)
 
 
-def test_bit_5_starts_it_and_clearing_it_ends_it_at_once_at_zero_volts() -> None:
+def test_bit_5_starts_it_and_clearing_it_ends_it_along_the_ramp() -> None:
     bench = Bench(seed=7)
     bench.run(0.5)
     bench.write(control_word=ControlBit.START_CALIBRATION)
     bench.run(4.0)
-    assert bench.last.state is State.RAMPING
-    assert bench.last.voltage_v > 0.0
+    assert bench.last.state is State.CALIBRATING
+    standing_v, standing_n = bench.last.voltage_v, bench.last.force_applied_n
+    assert standing_v > 1.5
     output = bench.write(control_word=ControlBit(0))
-    assert (output.state, output.voltage_v) == (State.OFF, 0.0)
     assert output.calibration_phase == CalibrationPhase.STOPPED
+    assert (output.state, output.voltage_v) == (State.CALIBRATING, pytest.approx(standing_v, abs=0.35))
+    took_s = bench.seconds_until(lambda output: output.state is State.OFF, 2.0)
+    assert took_s == pytest.approx(standing_n / bench.settings.defaults.force_ramp_n_per_s, abs=0.02)
+    assert bench.last.voltage_v == 0.0
 
 
 def test_disable_ends_it_too() -> None:
@@ -109,7 +119,7 @@ def test_disable_ends_it_too() -> None:
     bench.run(0.5)
     bench.write(control_word=ControlBit.ENABLE | ControlBit.START_CALIBRATION)
     bench.run(4.0)
-    assert bench.last.state is State.RAMPING
+    assert bench.last.state is State.CALIBRATING
     output = bench.write(control_word=ControlBit.START_CALIBRATION)
     assert (output.state, output.voltage_v) == (State.OFF, 0.0)
 
@@ -130,7 +140,10 @@ def test_while_holding_a_force_it_is_refused_and_the_force_stays() -> None:
     bench.run(2.0)
     held_v = bench.voltage_v
     bench.write(control_word=ControlBit.ENABLE | ControlBit.START_CALIBRATION)
-    assert any(event.startswith("W305") for event in bench.events)
+    assert bench.refused
+    assert bench.refused.text.startswith("calibration refused: ")
+    bench.run(3.0)
+    assert bench.last.state is State.HOLDING
     assert not bench.controller.calibrating.running
     assert bench.voltage_v == pytest.approx(held_v, abs=0.2)
 
@@ -167,7 +180,9 @@ def test_wrong_sign_wrong_scale_and_no_answer_stop_it_in_the_check(plant, fault,
 
 
 def test_over_force_acts_during_the_run() -> None:
-    bench = begun(Bench(seed=13, gain_n_per_v=12.0))
+    bench = begun(Bench(seed=13))
+    bench.run(5.0)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 60.0)
     finished(bench)
     assert bench.last.fault is FaultCode.OVER_FORCE
     assert bench.last.state is State.FAULT
@@ -196,7 +211,7 @@ def test_a_stop_of_the_service_ends_it() -> None:
     bench = begun(Bench(seed=16))
     bench.run(3.0)
     bench.controller.stop()
-    bench.run(0.05)
+    bench.run(0.4)
     assert bench.controller.stopped
     assert bench.last.voltage_v == 0.0
 
@@ -215,7 +230,7 @@ def test_an_asked_stop_keeps_what_was_learned_and_says_so() -> None:
     bench = begun(Bench(seed=17))
     bench.run(3.0)
     bench.controller.calibrating.ask_stop("info calibration stopped by a person")
-    bench.run(0.05)
+    bench.run(0.4)
     assert bench.last.calibration_phase == CalibrationPhase.STOPPED
     assert bench.last.state is State.OFF
     assert "info calibration stopped by a person" in bench.events

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from gateway.modbus import ModbusError, Peer
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
-from gateway.registers.words import ControlBit, RefusalReason
+from gateway.registers.edges import Asked, EdgeRefusal
+from gateway.registers.words import ControlBit, RefusalReason, State
 
 PEERS = [Peer("10.0.0.1", 1), Peer("10.0.0.2", 2), Peer("fe80::1", 3)]
 ADDRESSES = st.one_of(
@@ -43,7 +44,7 @@ STEPS = st.one_of(
     st.tuples(st.just("bits"), st.integers(0, 120), st.lists(st.booleans(), min_size=1, max_size=17)),
     st.tuples(st.just("mask"), ADDRESSES, st.tuples(WORD, WORD)),
     st.tuples(st.just("read"), ADDRESSES, st.integers(1, 125)),
-    st.tuples(st.just("publish"), st.floats(), st.sampled_from([RefusalReason.NONE, RefusalReason.FAULT_LATCHED])),
+    st.tuples(st.just("publish"), st.floats(), st.sampled_from(State)),
     st.tuples(st.just("clear"), st.just(0), st.just(0)),
 )
 
@@ -54,6 +55,12 @@ def memory(bank: RegisterBank) -> bytes:
     for first, count in ((118, 4), (268, 8), (368, 8)):
         data[2 * first : 2 * (first + count)] = bytes(2 * count)
     return bytes(data)
+
+
+def control_says(asked: Asked) -> EdgeRefusal | None:
+    """Now and then no, by what it is asked."""
+    refuses = int(asked.command.force_setpoint_n) % 3 == 1
+    return EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, "tare refused") if refuses else None
 
 
 def perform(bank: RegisterBank, step: tuple, peer: Peer) -> None:
@@ -67,7 +74,7 @@ def perform(bank: RegisterBank, step: tuple, peer: Peer) -> None:
     elif kind == "read":
         assert len(bank.read_registers(address, argument)) == 2 * argument
     elif kind == "publish":
-        bank.publish(Status(force_measured_n=address, pressure_pa=address, enable_block=argument))
+        bank.publish(Status(force_measured_n=address, pressure_pa=address, state=argument))
     else:
         bank.clear_command()
         bank.release_owner()
@@ -81,6 +88,7 @@ def test_no_sequence_of_requests_breaks_the_bank(register_map, steps):
     bank.on_accepted = lambda sentence, peer: None
     handed = []
     bank.on_command = handed.append
+    bank.on_asked = control_says
     for step, peer in steps:
         before = memory(bank), bank.command, bank.owner, len(handed), dict(bank.last_writer)
         try:

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from gateway.registers import Status
-from gateway.registers.words import ControlBit, RefusalReason, State
+from gateway.registers.edges import Asked, EdgeRefusal
+from gateway.registers.words import ControlBit, RefusalReason
 
 R = RefusalReason
 NAN = math.nan
@@ -29,7 +29,7 @@ BAD_WORDS = [
     ((0, 0x10), 3, R.UNSUPPORTED_BIT, 0, 16.0, "W217 control_word bit 4 (valve_pull): rig demo has nothing behind it"),
     ((0, 0x8001), 3, R.UNSUPPORTED_BIT, 0, 0x8001, "W217 control_word bit 15: rig demo"),
     ((13, 1), 3, R.RESERVED, 13, 1.0, "W209 address 13 is reserved: 1 was written"),
-    ((130, 7), 3, R.RESERVED, 130, 7.0, "W209"),
+    ((131, 7), 3, R.RESERVED, 131, 7.0, "W209"),
     ((401, 7), 3, R.RESERVED, 401, 7.0, "W209"),
     ((226, 7), 3, R.RESERVED, 226, 7.0, "W209"),
     ((264, 7), 3, R.RESERVED, 264, 7.0, "W209"),
@@ -110,40 +110,43 @@ def test_the_first_bad_value_refuses_the_whole_write(master):
 
 
 @pytest.mark.parametrize(
-    ("block", "code", "label"),
+    ("reason", "code", "label"),
     [
         (R.FAULT_LATCHED, 4, "W212"),
         (R.OUTPUT_FAULT, 4, "W214"),
         (R.CELL_SILENT, 0x0B, "W215"),
         (R.NOT_READY, 6, "W213"),
+        (R.HEARTBEAT_STALE, 3, "W302"),
+        (R.NOTHING_TO_RESET, 4, "W312"),
+        (R.TARE_REFUSED, 4, "W303"),
+        (R.CALIBRATION_REFUSED, 4, "W305"),
+        (R.CALIBRATING, 6, "W310"),
+        (R.FITTING, 6, "W311"),
+        (R.STOPPING, 6, "W315"),
     ],
 )
-def test_enable_is_refused_while_control_says_why(bank, master, block, code, label):
-    bank.publish(Status(state=State.FAULT, enable_block=block))
-    for write, words in ((master.write, (0, 1, 1200)), (master.write, (0, 1))):
+def test_what_control_says_no_to_is_the_answer_to_the_write(bank, master, reason, code, label):
+    bank.on_asked = lambda asked: EdgeRefusal(
+        reason, ControlBit.ENABLE, f"{asked.command.force_setpoint_n:g} N refused"
+    )
+    for write, words in ((master.write, (0, 1, 1200)), (master.write, (0, 1)), (master.write_float, (200, 1.0))):
         refusal = master.refusal(write, *words)
-        assert (refusal.code, refusal.reason) == (code, block)
-        assert refusal.sentence.startswith(f"{label} enable refused: ")
-    assert master.refusal(bank.write_bits, 0, [True], master.peer).reason is block
-    master.write(1, 500)  # a setpoint may be prepared
-    bank.publish(Status())
-    master.write(0, 1)
+        assert (refusal.code, refusal.reason, refusal.value) == (code, reason, 1.0)
+        assert refusal.address == (200 if write == master.write_float else 0)
+        assert refusal.sentence == f"{label} {'12' if len(words) == 3 else '0'} N refused"
+    assert master.refusal(bank.write_bits, 0, [True], master.peer).reason is reason
+    assert master.refusal(bank.mask_write, 0, 0xFFFE, 1, master.peer).reason is reason
 
 
-def test_what_runs_already_is_not_refused_by_enable_block(bank, master):
-    master.write(0, 1, 1200)
-    bank.publish(Status(enable_block=R.NOT_READY))
-    master.write(0, 1, 1300)
-    assert bank.command.force_setpoint_n == 13.0
-
-
-def test_reset_needs_setpoint_and_enable_zero(master):
-    master.write(1, 1200)
-    refusal = master.refusal(master.write, 0, ControlBit.RESET_FAULT)
-    assert (refusal.code, refusal.reason) == (3, R.RESET_NEEDS_ZERO)
-    assert "force_setpoint is 12.00 N" in refusal.sentence
-    assert master.refusal(master.write, 0, 3, 0).reason is R.RESET_NEEDS_ZERO
-    master.write(0, 2, 0)
+def test_control_is_asked_before_anything_is_stored_and_told_what_would_change(bank, master, commands):
+    asked = []
+    bank.on_asked = asked.append
+    master.write(0, 1, 1200, 300, 0, 9)
+    assert asked[-1] == Asked(commands[-1], ("force_setpoint", "force_ramp"))
+    master.write(0, 1, 1200, 300, 0, 10)
+    assert asked[-1].changes == ()
+    master.write(6, 100)
+    assert asked[-1].changes == ("tilt_angle",)
 
 
 def test_a_rig_may_demand_the_byte_order_proof_of_each_host(make_bank, master_of):
@@ -208,7 +211,7 @@ def test_every_refusal_is_told_with_its_peer(bank, master):
 
 def test_reserved_words_accept_zero(bank, master):
     before = bank.command
-    for address in (130, 226, 227, 264, 401, 1646, 1659):
+    for address in (131, 226, 227, 264, 401, 1646, 1659):
         master.write(address, 0)
     master.write(13, 0, 0, 0)
     assert bank.command.force_setpoint_n == before.force_setpoint_n

@@ -29,7 +29,7 @@ BLOCKS = {
     "staging": (1000, 1199),
     "active": (1500, 1699),
 }
-SCALES = {"N": 0.01, "N/s": 0.1, "mV": 1, "deg": 0.1, "ms": 1, "g": 1, "us": 1, "kPa": 1, "permille": 1, "": 1}
+SCALES = {"s": 1, "N": 0.01, "N/s": 0.1, "mV": 1, "deg": 0.1, "ms": 1, "g": 1, "us": 1, "kPa": 1, "permille": 1, "": 1}
 
 
 def test_blocks_are_those_of_the_contract(register_map):

@@ -208,7 +208,7 @@ ENTRIES: Final = (
         "W310",
         "busy: a calibration runs",
         "A command came while a calibration or an experiment has the output (state calibrating). Exception 06.",
-        "The ladder that bit 5 or somebody at the gateway's machine has begun is not done; calibration_time_left says how long.",
+        "What bit 5 or somebody at the gateway's machine has begun is not done; calibration_time_left says how long.",
         "Wait for state off, or end the run: control_word 0 (clearing bit 5 alone takes the force to 0 along the ramp).",
         "CALIBRATING",
     ),
