@@ -1,7 +1,8 @@
 """`write`: registers by name, in engineering units, all of them in one request where Modbus allows."""
 
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,14 +16,16 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True)
 @click.option("--dry-run", is_flag=True, help="Say what would be sent, and send nothing that writes.")
+@click.option(
+    "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory: tells why in numbers."
+)
 @gateway_options
 @json_option
-def command(
-    *, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, unit: int, map_name: str, as_json: bool
-) -> None:
+def command(*, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, as_json: bool, **options: Any) -> None:
     """Write registers by name, in engineering units.
 
-    NAME=VALUE in the register's unit; modes and bits by name. Those of one block go out in one request.
+    NAME=VALUE in the register's unit; modes and bits by name. Those of one block go out in one request. A request that the
+    gateway refuses ends with exit code 1, what it refused, why, and what to do.
 
     Example: force-gateway write force_setpoint=12 control_word=enable
     """
@@ -30,13 +33,13 @@ def command(
     from gateway.cli.refused import explained
     from gateway.profiles import load_register_map
 
-    register_map = load_register_map(map_name)
+    register_map = load_register_map(options["map_name"])
     wanted = [_assignment(register_map, text) for text in assignments]
     _refuse_doubles(wanted)
-    with GatewayClient(*endpoint, unit, register_map) as client:
+    with GatewayClient(*endpoint, options["unit"], register_map) as client:
         with explained(client):
             frames = client.frames(wanted)
-        with explained(client, frames):
+        with explained(client, frames, options["state"]):
             for frame in [] if dry_run else frames:
                 client.write(frame)
     _tell(frames, wanted, dry_run=dry_run, as_json=as_json)

@@ -98,7 +98,7 @@ class Admission:
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write):
             command = replace(command, lowered_from_n=self.lowered_from_n)
         word_at = commands.address(write.block, CONTROL_WORD)
-        self._ask(command, values, word_at)
+        self._ask(command, values, write)
         rises = written & ~int(before[CONTROL_WORD])
         if rises & STARTS:
             self._check_starts(write.host, rises, written, word_at)
@@ -156,12 +156,15 @@ class Admission:
 
     # -- why not
 
-    def _ask(self, command: Command, values: Values, word_at: int) -> None:
+    def _ask(self, command: Command, values: Values, write: Write) -> None:
         before = self._commands.values
         changes = tuple(name for k, name in enumerate(NAMES) if values[k] != before[k] and k not in _SILENT)
         refused = self.decide(Asked(command, changes))
-        if refused:
+        if refused and refused.bit:
+            word_at = self._commands.address(write.block, CONTROL_WORD)
             raise Refusal(refused.reason, word_at, refused.text, value=float(command.control_word))
+        if refused:
+            raise Refusal(refused.reason, write.address, refused.text)
 
     def _not_owner(self, address: int, host: str) -> Refusal:
         cure = (

@@ -58,6 +58,7 @@ class RegisterBank:
         self.on_refusal: Callable[[Refusal, Peer], None] = lambda refusal, peer: None
         self.on_accepted: Callable[[str, Peer], None] | None = None
         self.last_writer: dict[str, tuple[Peer, float]] = {}
+        self.last_refusal: Refusal | None = None
         self.identity: Mapping[int, bytes] = _identity(register_map, rules)
         self._now = now
         self._blocks = register_map.blocks
@@ -179,6 +180,7 @@ class RegisterBank:
         self.command = replace(self.command, control_word=word, stops=False, **changes)  # type: ignore[arg-type]
 
     def _noted(self, refusal: Refusal, peer: Peer) -> Refusal:
+        self.last_refusal = refusal
         self._status.show_refusal(refusal)
         self.on_refusal(refusal, peer)
         return refusal

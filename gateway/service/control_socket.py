@@ -1,9 +1,9 @@
 """`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
 
-record on|off|status, calibration runs, the calibration in use and its change, last writers of each register, what the
-residual watch has found (its process tells it here, others may read it), the loop's health, and faults
-of a simulated rig (passed on to the rig's own socket by the tools themselves). Mode 0600: whoever may write the state
-directory may ask.
+record on|off|status, calibration runs, the calibration in use and its change, last writers of each register and the sentence
+of the last refusal, what the residual watch has found (its process tells it here, others may read it), the loop's health,
+and faults of a simulated rig (passed on to the rig's own socket by the tools themselves). Mode 0600: whoever may write the
+state directory may ask.
 """
 
 from dataclasses import dataclass
@@ -38,6 +38,7 @@ class ControlSocket(JsonLineServer):
             "calibration": self._calibration,
             "calibrate": asked.ladder.answer,
             "last-writer": self._last_writer,
+            "last-refusal": self._last_refusal,
             "health": self._health_figures,
             "residual": asked.watch.answer,
         }
@@ -65,6 +66,13 @@ class ControlSocket(JsonLineServer):
         bank = self._asked.bank
         writers = {name: {"peer": str(peer), "time_s": at_s} for name, (peer, at_s) in bank.last_writer.items()}
         return {"owner": bank.owner, "writers": writers}
+
+    def _last_refusal(self, request: dict[str, Any]) -> dict[str, Any]:
+        """What the last-refusal registers stand for, in the gateway's own words; empty before the first."""
+        refusal = self._asked.bank.last_refusal
+        if refusal is None:
+            return {"sentence": ""}
+        return {"address": refusal.address, "reason": int(refusal.reason), "sentence": refusal.sentence}
 
     def _health_figures(self, request: dict[str, Any]) -> dict[str, Any]:
         health = self._asked.health

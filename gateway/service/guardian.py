@@ -49,8 +49,13 @@ class RunOptions:
     def state_directory(self) -> Path:
         if self.state is not None:
             return self.state
-        home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
-        return Path(home) / "force-gateway" / Path(self.rig).stem
+        return default_state_root() / Path(self.rig).stem
+
+
+def default_state_root() -> Path:
+    """Where the state directories of rigs are that were given none."""
+    home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
+    return Path(home) / "force-gateway"
 
 
 def run(options: RunOptions) -> int:

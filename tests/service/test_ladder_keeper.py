@@ -70,6 +70,6 @@ def test_without_a_fresh_sample_or_while_pressing_no_run_begins(tmp_path: Path) 
     wired.run(0.5)
     wired.write(0, ENABLE, 1200)
     wired.run(0.5)
-    with pytest.raises(ValueError, match="W305 calibration needs state OFF or READY, it is "):
+    with pytest.raises(ValueError, match="W305 calibration refused: state HOLDING, it begins from OFF"):
         keeper.answer({"plan": PLAN})
     assert not keeper.status()["running"]

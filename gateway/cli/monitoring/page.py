@@ -21,6 +21,7 @@ _STATE_STYLE: Final = {
     State.RAMPING: "black on cyan",
     State.HOLDING: "black on green",
     State.FAULT: "bold white on red",
+    State.CALIBRATING: "bold white on blue",
 }
 _SHOWN_BITS: Final = {
     StatusBit.CONTACT: "green",
@@ -50,12 +51,25 @@ def _header(view: View) -> Text:
     text.append(
         f" {known.name if known is not None else '?'} ", style=_STATE_STYLE.get(known, "") if known is not None else ""
     )
-    for bit, style in _SHOWN_BITS.items():
-        if track.has_status(bit):
-            text.append(f"  {(bit.name or '').lower().replace('_', ' ')}", style=style)
-    text.append(f"   {_settled(track)}")
+    if known is State.CALIBRATING:
+        text.append(f"  {_run(track)}", style="bold")
+    else:
+        for bit, style in _SHOWN_BITS.items():
+            if track.has_status(bit):
+                text.append(f"  {(bit.name or '').lower().replace('_', ' ')}", style=style)
+        text.append(f"   {_settled(track)}")
     text.append(f"   {view.where}", style="dim")
     return text
+
+
+def _run(track: Track) -> str:
+    """`ladder 43 %, 1:20 left`: how far a calibration or an experiment is. Empty for a gateway without these registers."""
+    if "calibration_phase" not in track.readings:
+        return ""
+    phase = track.readings["calibration_phase"].register.values.get(int(track.value("calibration_phase")), "?")
+    told = f"{phase.replace('_', ' ')} {track.value('calibration_progress') / 10:.0f} %"
+    left_s = track.value("calibration_time_left")
+    return told if isnan(left_s) else f"{told}, {int(left_s) // 60}:{int(left_s) % 60:02d} left"
 
 
 def _settled(track: Track) -> str:
@@ -71,10 +85,10 @@ def _settled(track: Track) -> str:
 
 def _numbers(view: View) -> Table:
     track = view.track
-    measured_n, setpoint_n = track.value("force_measured"), track.value("force_requested")
+    measured_n, setpoint_n = track.value("force_measured"), track.wanted_n
     numbers = (
         ("measured N", measured_n, 2, "-", "bold cyan"),
-        ("setpoint N", setpoint_n, 2, "-", "yellow"),
+        ("target N" if track.is_calibrating else "setpoint N", setpoint_n, 2, "-", "yellow"),
         ("error N", measured_n - setpoint_n, 2, "+", "green" if track.has_status(StatusBit.IN_BAND) else "white"),
         ("output V", track.value("output_voltage") / 1e3, 3, "-", "magenta"),
     )

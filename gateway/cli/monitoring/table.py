@@ -36,6 +36,9 @@ _FIRST: Final = (
     "missed_ticks",
     "loop_time",
     "calibration_id",
+    "calibration_phase",
+    "calibration_progress",
+    "calibration_time_left",
 )
 """Registers in the order in which a small terminal shows them."""
 

@@ -11,7 +11,7 @@ from math import isnan, nan
 from typing import Final
 
 from gateway.cli.client import Reading
-from gateway.registers.words import StatusBit
+from gateway.registers.words import State, StatusBit
 
 WINDOW_S: Final = 60.0
 
@@ -59,7 +59,7 @@ class Track:
         self.readings = {reading.register.name: reading for reading in readings}
         for name, reading in self.readings.items():
             self._note_change(name, reading.words)
-        point = Point(time_s, self.value("force_measured"), self.value("force_requested"))
+        point = Point(time_s, self.value("force_measured"), self.wanted_n)
         self._settle(point)
         self.points.append(point)
         while self.points[0].time_s < time_s - WINDOW_S:
@@ -69,6 +69,15 @@ class Track:
         """In the register's unit; NaN when unavailable, or not in the map."""
         reading = self.readings.get(name)
         return float(reading.value) if reading else nan
+
+    @property
+    def is_calibrating(self) -> bool:
+        return self.value("state") == State.CALIBRATING
+
+    @property
+    def wanted_n(self) -> float:
+        """The setpoint; in a calibration or an experiment its own target, N."""
+        return self.value("force_accepted" if self.is_calibrating else "force_requested")
 
     def change_age_s(self, name: str) -> float | None:
         """How long ago a register changed; None when it has not since the monitor began."""
