@@ -14,7 +14,7 @@ from gateway.control.ladder_run import LadderRow
 from gateway.control.reading import Reading
 
 _SAMPLES: Final = 3
-_LEAST_MARGIN_N: Final = 0.25
+_LEAST_MARGIN_N: Final = 0.4
 _SIGMAS: Final = 3.0
 
 

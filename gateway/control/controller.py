@@ -238,7 +238,7 @@ class Controller:
 
     def _end_run(self, sentence: str) -> None:
         """However it ended, but by a fault or a disable: the force goes to 0 along the rig's ramp, then the output off."""
-        self._motion.leave_run()
+        self._motion.leave_run(self._given_n)
         self._ramping_down = True
         self._outcome.events.append(sentence)
 
@@ -299,7 +299,9 @@ class Controller:
         return ramped_down(demand, self._settings) if self._ramping_down else demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
-        if self.calibrating.running and not self._climb(now_s):
+        if self.state is State.CALIBRATING:
+            if not self.calibrating.running or self._climb(now_s):
+                self._follow(now_s, self._motion.descend(self._target(), dt_s, self._given_n))
             return
         moment = self._moment(now_s, dt_s)
         self._follow(now_s, self._motion.pursue(self._target(), moment, ramps_down=self._ramping_down))

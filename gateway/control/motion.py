@@ -4,6 +4,7 @@ One step answers with an event of the state table, or with a Finding: of a fault
 disables the output with a sentence. What the model expects is kept beside it, as both and the supervision compare with it.
 """
 
+from collections.abc import Callable
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
@@ -47,12 +48,14 @@ class Motion:
         self.pursuit.rest()
         self._calibrating.rest()
 
-    def leave_run(self) -> None:
-        """A run has ended: the force law goes on from its force, and no higher than where the voltage would lead."""
+    def leave_run(self, given_n: float) -> None:
+        """A run has ended: the force law goes on from its force, and no higher than where the voltage would lead. given_n as
+        in `use`."""
         run = self._calibrating.run
         if run is not None:
             towards_n = run.model.force_n(self.pursuit.stage.voltage_v, run.direction)
-            self.pursuit.law.take_over(min(towards_n, self.response.force_n(run.direction)), run.direction)
+            reached_n = min(towards_n, self.response.force_n(run.direction))
+            self.pursuit.law.take_over(reached_n + given_n, run.direction)
         self._calibrating.end()
 
     @property
@@ -71,8 +74,23 @@ class Motion:
 
     def pursue(self, demand: Demand, moment: Moment, *, ramps_down: bool) -> Moved:
         """One step towards the demand. ramps_down: there is nothing left to do once the force is 0."""
+        return self._moved(lambda: self.pursuit.step(demand, moment), ramps_down=ramps_down)
+
+    def descend(self, demand: Demand, dt_s: float, given_n: float) -> Moved:
+        """One step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that is
+        being calibrated may not fit, and never up."""
+        return self._moved(lambda: self._descended(demand, dt_s, given_n), ramps_down=True)
+
+    def _descended(self, demand: Demand, dt_s: float, given_n: float) -> Event:
+        law = self.pursuit.law
+        law.advance(0.0, demand.ramp_n_per_s, dt_s, given_n)
+        voltage_v, _ = law.feedforward(given_n)
+        self.pursuit.follow(min(voltage_v, self.pursuit.stage.voltage_v), law.applied_n, law.blend)
+        return Event.MOVE
+
+    def _moved(self, move: Callable[[], Event], *, ramps_down: bool) -> Moved:
         try:
-            event = self.pursuit.step(demand, moment)
+            event = move()
         except ModelError as error:
             return finding(FaultCode.MODEL_INVALID, str(error))
         except NotFiniteError as error:

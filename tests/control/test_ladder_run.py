@@ -51,7 +51,7 @@ def rows_of(bench: Bench, plan: RunPlan) -> list[LadderRow]:
 def roomy() -> ControlSettings:
     """Of a rig whose plant stays below its largest force all the way up."""
     control = settings()
-    return replace(control, limits=replace(control.limits, force_max_n=54.0))
+    return replace(control, limits=replace(control.limits, force_max_n=54.0, over_force_n=55.0))
 
 
 def test_a_whole_run_visits_every_stair_and_ends_off_at_the_safe_voltage() -> None:

@@ -16,7 +16,7 @@ from gateway.recording import read_recording
 from gateway.service.calibration_store import CalibrationStore
 from tests.end_to_end.conftest import RunningGateway, start, stop
 
-OFF, READY, RAMPING = 0, 1, 2
+OFF, CALIBRATING = 0, 5
 PHASE, CHECK, LADDER, STOPPED = 126, 2, 3, 7
 START_CALIBRATION = 1 << 5
 
@@ -73,7 +73,7 @@ def test_a_quick_ladder_gives_a_numbered_calibration_that_agrees_with_the_shippe
 
 def test_a_register_bit_starts_it_and_clearing_it_ends_it_with_the_data_kept(patient) -> None:
     assert not patient.write(0, START_CALIBRATION).isError()
-    patient.wait_until(lambda status: status["state"] == RAMPING, within_s=3.0)
+    patient.wait_until(lambda status: status["state"] == CALIBRATING, within_s=3.0)
     patient.wait_until(lambda status: status["output_voltage"] > 500, within_s=5.0)
     assert patient.words(PHASE, 1) == [CHECK]
     refused = calibrated(patient.state)
