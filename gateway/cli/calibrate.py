@@ -48,7 +48,7 @@ def command(
 ) -> None:
     """Measure a ladder and make a numbered calibration of it, or run and record an experiment (--plan).
 
-    Runs on the gateway of this machine. Ctrl-C goes to 0 V and keeps the data. Nothing is activated: that is
+    Runs on the gateway of this machine. Ctrl-C takes the force to 0 and keeps the data. Nothing is activated: that is
     `calibration use N`.
     """
     from gateway.cli.calibrating.follow import follow

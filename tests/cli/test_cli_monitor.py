@@ -244,3 +244,18 @@ def test_ctrl_c_leaves_the_live_page_cleanly(fake) -> None:
     assert b"\x1b[?1049l" in shown[-40:]  # ... and the screen as it was
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
     assert "measured N" in plain
+
+
+def test_a_run_shows_its_phase_its_force_its_target_and_the_time_left(register_map: RegisterMap) -> None:
+    track = Track()
+    values = {
+        "state": State.CALIBRATING, "status_word": StatusBit.ENABLED, "calibration_phase": 3, "calibration_progress": 430,
+        "calibration_time_left": 80, "force_measured": 41.5, "force_accepted": 43.0, "force_applied": 42.1,
+    }  # fmt: skip
+    track.add(0.0, poll_of(register_map, **values))
+    text = "\n".join(text_of(View(track, "here", 100, 34)))
+    assert " CALIBRATING " in text
+    assert "ladder 43 %, 1:20 left" in text
+    assert "target N" in text
+    assert "not enabled" not in text
+    assert track.points[-1] == Point(0.0, 41.5, 43.0)

@@ -30,6 +30,46 @@ def test_every_enabled_state_can_be_left_by_disable_and_by_a_fault():
         assert TRANSITIONS[state, Event.FAILED] is State.FAULT
 
 
+def test_every_pair_of_state_and_event_is_meant_so():
+    """A dash is a pair that must not happen: it raises."""
+    events = (
+        Event.ENABLE,
+        Event.DISABLE,
+        Event.WAIT,
+        Event.MOVE,
+        Event.SETTLE,
+        Event.FAILED,
+        Event.RESET,
+        Event.CALIBRATE,
+    )
+    rows = {
+        State.OFF: "ready - - - - fault - calibrating",
+        State.READY: "- off ready ramping holding fault - calibrating",
+        State.RAMPING: "- off ready ramping holding fault - -",
+        State.HOLDING: "- off ready ramping holding fault - -",
+        State.FAULT: "- - - - - - off -",
+        State.CALIBRATING: "- off - calibrating - fault - -",
+    }
+    assert set(events) == set(Event)
+    assert set(rows) == set(State)
+    for state, row in rows.items():
+        for event, name in zip(events, row.split(), strict=True):
+            if name == "-":
+                with pytest.raises(TransitionError):
+                    next_state(state, event)
+            else:
+                assert next_state(state, event) is State[name.upper()]
+
+
+def test_an_edge_that_was_not_asked_about_is_a_defect_and_no_silence():
+    """What control would refuse never reaches its step: the bank asks. If it comes all the same, the fault is ours."""
+    bench = ready()
+    bench.command = Command(control_word=ControlBit.RESET_FAULT, number=99)
+    with pytest.raises(TransitionError):
+        bench.step()
+    assert bench.controller.state is State.FAULT
+
+
 def test_only_reset_leaves_fault():
     assert [event for state, event in TRANSITIONS if state is State.FAULT] == [Event.RESET]
 

@@ -1,4 +1,4 @@
-"""Follows a run to its end with a progress bar; Ctrl-C ends it at 0 V, a second one leaves at once."""
+"""Follows a run to its end with a progress bar; Ctrl-C takes the force to 0, a second one leaves at once."""
 
 import time
 from math import isnan
