@@ -94,6 +94,9 @@ class Controller:
 
     def refusal_of(self, now_s: float, asked: Asked, line: Line) -> EdgeRefusal | None:
         """Why a command cannot be taken at this moment; None: the next step takes it. Nothing changes by asking."""
+        is_busy = self.state is State.CALIBRATING or self._ramping_down or self._stopping
+        if not is_busy and not self._follower.edges_of(asked.command).rises:
+            return None  # most writes: a setpoint, a heartbeat
         return self._judge.refusal(asked, self._situation(now_s, line))
 
     def refusal_of_run(self, now_s: float, plan: AnyPlan) -> str:

@@ -84,10 +84,10 @@ class EdgeJudge:
         is_calibrating = at.state is State.CALIBRATING
         if not is_calibrating and not (at.ramps_down and at.state in ENABLED_STATES):
             return None
-        acts = edges.rises & ~_TAKE
-        if not acts and not asked.changes:
+        acts, changes = edges.rises & ~_TAKE, asked.changes()
+        if not acts and not changes:
             return None
-        asks = ", ".join((*asked.changes, *(bit.name.lower() for bit in ControlBit if acts & bit and bit.name)))
+        asks = ", ".join((*changes, *(bit.name.lower() for bit in ControlBit if acts & bit and bit.name)))
         if is_calibrating:
             return EdgeRefusal(RefusalReason.CALIBRATING, _WHOLE, f"{asks} refused: {self._running()}")
         seen = f"{at.applied_n:.1f} N on the way to 0 N, then the output is off"

@@ -132,14 +132,11 @@ class Admission:
     def _is_bare_stop(self, write: Write, written: int) -> bool:
         """During a run that this machine has begun the control word holds no bit that could fall: then 0 in the control word
         alone, meant for enable, is a stop. A cyclic block of zeros is none."""
+        if not self.is_calibrating or not write.touched & ENABLE:
+            return False
         before = int(self._commands.values[CONTROL_WORD])
         is_idle = not (written | before) & STARTS and not written & EDGE_BITS
-        return (
-            self.is_calibrating
-            and is_idle
-            and bool(write.touched & ENABLE)
-            and tuple(self._offsets(write)) == (CONTROL_WORD,)
-        )
+        return is_idle and tuple(self._offsets(write)) == (CONTROL_WORD,)
 
     def _offsets(self, write: Write) -> range:
         """Which words of the command block are written whole."""
@@ -147,6 +144,8 @@ class Admission:
 
     def _held_by(self, write: Write, written: int) -> bool:
         """Whether a master that writes in cycles holds start_calibration at 1: only its own 0 lets the next 1 count."""
+        if not self._is_held and not written & CALIBRATE:
+            return False
         is_told = CONTROL_WORD in self._offsets(write) and bool(write.touched & CALIBRATE)
         if not is_told or not self._ownership.admits(write.host):
             return self._is_held
@@ -157,14 +156,16 @@ class Admission:
     # -- why not
 
     def _ask(self, command: Command, values: Values, write: Write) -> None:
-        before = self._commands.values
-        changes = tuple(name for k, name in enumerate(NAMES) if values[k] != before[k] and k not in _SILENT)
-        refused = self.decide(Asked(command, changes))
+        refused = self.decide(Asked(command, lambda: self._changes(values)))
         if refused and refused.bit:
             word_at = self._commands.address(write.block, CONTROL_WORD)
             raise Refusal(refused.reason, word_at, refused.text, value=float(command.control_word))
         if refused:
             raise Refusal(refused.reason, write.address, refused.text)
+
+    def _changes(self, values: Values) -> tuple[str, ...]:
+        before = self._commands.values
+        return tuple(name for k, name in enumerate(NAMES) if values[k] != before[k] and k not in _SILENT)
 
     def _not_owner(self, address: int, host: str) -> Refusal:
         cure = (

@@ -249,7 +249,8 @@ class RegisterBank:
         elif admitted.is_stop:
             ownership.release()
         elif admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT]:
-            ownership.take(host)
+            if ownership.admits(host):  # not who has only ended a run
+                ownership.take(host)
         else:
             ownership.rest()
         self._show_owner()

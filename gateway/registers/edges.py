@@ -12,11 +12,11 @@ from gateway.registers.words import ControlBit, RefusalReason
 
 
 class Asked(NamedTuple):
-    """A write that would be taken. command: as it would be handed on; changes: names of the registers that it would change,
-    control_word, heartbeat and command_sequence apart."""
+    """A write that would be taken. command: as it would be handed on; changes: tells the names of the registers that it would
+    change, control_word, heartbeat and command_sequence apart (most writes are taken without anybody asking for them)."""
 
     command: Command
-    changes: tuple[str, ...] = ()
+    changes: Callable[[], tuple[str, ...]] = tuple
 
 
 class EdgeRefusal(NamedTuple):

@@ -126,7 +126,7 @@ class Bench:
         wanted = replace(stands, **changed)  # type: ignore[arg-type]
         silent = {"control_word", "heartbeat", "command_sequence"}
         names = tuple(name for name in changes if name not in silent and changes[name] != getattr(stands, name))
-        self.refused = self.controller.refusal_of(self.now_s, Asked(wanted, names), self.line)
+        self.refused = self.controller.refusal_of(self.now_s, Asked(wanted, lambda: names), self.line)
         if self.refused is None:
             self.command = wanted
         return self.step()

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gateway.registers.edges import Asked, EdgeRefusal
+from gateway.registers.edges import EdgeRefusal
 from gateway.registers.words import ControlBit, RefusalReason
 
 R = RefusalReason
@@ -140,13 +140,13 @@ def test_what_control_says_no_to_is_the_answer_to_the_write(bank, master, reason
 
 def test_control_is_asked_before_anything_is_stored_and_told_what_would_change(bank, master, commands):
     asked = []
-    bank.on_asked = asked.append
+    bank.on_asked = lambda one: asked.append((one.command, one.changes(), len(commands)))
     master.write(0, 1, 1200, 300, 0, 9)
-    assert asked[-1] == Asked(commands[-1], ("force_setpoint", "force_ramp"))
     master.write(0, 1, 1200, 300, 0, 10)
-    assert asked[-1].changes == ()
     master.write(6, 100)
-    assert asked[-1].changes == ("tilt_angle",)
+    assert [command for command, _, _ in asked] == commands
+    assert [changes for _, changes, _ in asked] == [("force_setpoint", "force_ramp"), (), ("tilt_angle",)]
+    assert [seen for _, _, seen in asked] == [0, 1, 2], "before the command goes out"
 
 
 def test_a_rig_may_demand_the_byte_order_proof_of_each_host(make_bank, master_of):

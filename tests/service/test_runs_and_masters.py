@@ -79,6 +79,15 @@ def test_clearing_bit_5_alone_of_an_enabled_run_ends_in_off_and_not_in_ready() -
     assert rack.word("control_word") == 0
 
 
+def test_who_ends_the_run_of_another_master_does_not_own_it() -> None:
+    rack = with_ramp().calibrating(ENABLE | CALIBRATE)
+    rack.write(0, ENABLE, peer=OTHER)
+    assert rack.state is State.CALIBRATING
+    assert rack.bank.owner == OWNER.host
+    rack.until(State.OFF, 2.0)
+    assert rack.bank.owner is None
+
+
 def test_a_run_of_this_machine_is_stopped_by_0_in_the_control_word_alone_and_not_by_a_cyclic_block() -> None:
     rack = locally(Rack()).run(2.0)
     for beat in range(5):

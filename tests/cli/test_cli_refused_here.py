@@ -1,0 +1,83 @@
+"""A write that is refused ends with 1 and says why: by the registers, and on its machine in the gateway's own words."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.cli import refused
+from gateway.cli.errors import CliError
+from gateway.registers import BankRules, RegisterBank, RegisterMap
+from gateway.registers.edges import EdgeRefusal
+from gateway.registers.words import ControlBit, RefusalReason
+
+OWN = "tare refused: 1.56 V are out: disable the output or set the force to 0 first"
+
+
+@pytest.fixture
+def gateway(register_map: RegisterMap, serve) -> str:
+    bank = RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
+    bank.on_asked = lambda asked: EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, OWN)
+    address: str = serve(bank).address
+    return address
+
+
+def answering(answers: dict[str, dict[str, object]]):
+    """Stands for the control sockets of this machine, by the name of their directory."""
+
+    def ask(state: Path, request: dict[str, str]) -> dict[str, object]:
+        if state.name not in answers:
+            raise CliError("E140 nobody there")
+        return answers[state.name]
+
+    return ask
+
+
+def test_elsewhere_the_registers_say_why_and_what_to_do(gateway: str, call, monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    answer = call("write", "control_word=tare", "--gateway", gateway)
+    assert answer.exit_code == 1
+    assert answer.stdout == ""
+    first, cure = answer.stderr.strip().split("\n")
+    assert first.startswith(
+        "W303 tare refused: exception 04 (device or state forbids it) to write 1 at 0; control_word = 4"
+    )
+    assert "force-gateway explain W303" in cure
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["--state", "where run puts it"])
+def test_on_its_machine_the_gateway_says_it_itself(
+    gateway: str, call, monkeypatch, tmp_path: Path, given: bool
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    for name in ("another", "demo"):
+        (tmp_path / "force-gateway" / name).mkdir(parents=True)
+        (tmp_path / "force-gateway" / name / "control.sock").touch()
+    another = {"address": 1, "reason": 5, "sentence": "W204 of another gateway"}
+    own = {"address": 0, "reason": int(RefusalReason.TARE_REFUSED), "sentence": f"W303 {OWN}"}
+    monkeypatch.setattr("gateway.cli.control_socket.ask", answering({"another": another, "demo": own}))
+    options = ("--state", str(tmp_path / "force-gateway" / "demo")) if given else ()
+    answer = call("write", "control_word=tare", "--gateway", gateway, *options)
+    assert answer.exit_code == 1
+    assert answer.stderr.split("\n")[1] == f"  {OWN}"
+    assert "another gateway" not in answer.stderr
+
+
+def test_only_a_gateway_of_this_machine_is_asked_for_its_words(tmp_path: Path) -> None:
+    (tmp_path / "demo").mkdir()
+    (tmp_path / "demo" / "control.sock").touch()
+
+    class Client:
+        def __init__(self, where: str) -> None:
+            self.where = where
+
+    near = {
+        where: bool(refused._sockets_near(Client(where), tmp_path))
+        for where in ("127.0.0.1:5020", "::1:5020", "localhost:1", "10.0.0.7:5020", "cell-3:5020")
+    }  # type: ignore[arg-type]
+    assert near == {
+        "127.0.0.1:5020": True,
+        "::1:5020": True,
+        "localhost:1": True,
+        "10.0.0.7:5020": False,
+        "cell-3:5020": False,
+    }
