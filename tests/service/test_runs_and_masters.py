@@ -11,6 +11,7 @@ from gateway.control import LeaseAction
 from gateway.control.experiment_plan import Do, ExperimentPlan, Move, Part
 from gateway.control.ladder_stairs import RunPlan
 from gateway.profiles import load_calibration
+from gateway.registers.refusal import Refusal
 from gateway.registers.words import CalibrationPhase, FaultCode, RefusalReason, State
 from tests.control.bench import settings
 from tests.service.rack import CALIBRATE, ENABLE, OTHER, OWNER, RESET, TAKE, TARE, Rack, with_limits
@@ -86,6 +87,14 @@ def test_who_ends_the_run_of_another_master_does_not_own_it() -> None:
     assert rack.bank.owner == OWNER.host
     rack.until(State.OFF, 2.0)
     assert rack.bank.owner is None
+
+
+def test_another_masters_enable_during_a_run_is_refused_and_no_end_of_it() -> None:
+    rack = with_ramp().calibrating()
+    with pytest.raises(Refusal) as refused:
+        rack.write(0, ENABLE, 900, peer=OTHER)
+    assert refused.value.reason is RefusalReason.NOT_OWNER
+    assert rack.state is State.CALIBRATING and rack.bank.owner == OWNER.host
 
 
 def test_a_run_of_this_machine_is_stopped_by_0_in_the_control_word_alone_and_not_by_a_cyclic_block() -> None:
