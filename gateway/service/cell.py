@@ -97,7 +97,7 @@ class Cell:
             self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
         )
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
-        self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log)
+        self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log.speaking_for("watch"))
         self._control_socket = ControlSocket(
             self._state,
             Asked(

@@ -20,6 +20,7 @@ from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.cell import Cell, StartError
+from gateway.service.event_file import EventFile
 from gateway.service.event_log import EventLog
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.realtime import use_realtime
@@ -32,21 +33,24 @@ def main(arguments: list[str]) -> int:
     link = socket.socket(fileno=int(arguments[0]))
     link.setblocking(False)
     options = json.loads(arguments[1])
-    try:
-        rig = load(options)
-    except ProfileError as error:
-        print("\n".join(str(fault) for fault in error.faults), file=sys.stderr)
-        return EXIT_CONFIGURATION
-    notes = use_realtime() if options["realtime"] else ()
-    with EventLog() as log, asyncio.Runner(loop_factory=_loop_factory()) as runner:
+    with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
-            return runner.run(run(rig, options, link, log, notes))
-        except StartError as error:
-            print(error, file=sys.stderr)
-            return error.exit_code
-        except PortError as error:
-            print(error, file=sys.stderr)
-            return error.exit_code
+            rig = load(options)
+            notes = use_realtime() if options["realtime"] else ()
+            with asyncio.Runner(loop_factory=_loop_factory()) as runner:
+                return runner.run(run(rig, options, link, log, notes))
+        except ProfileError as error:
+            faults = "\n".join(str(fault) for fault in error.faults)
+            return _not_started(log, faults, EXIT_CONFIGURATION, f"E151 the rig file has faults:\n{faults}")
+        except (StartError, PortError) as error:
+            return _not_started(log, str(error), error.exit_code, str(error))
+
+
+def _not_started(log: EventLog, sentence: str, exit_code: int, event: str) -> int:
+    """A person in front of the terminal is told as by any verb; the file keeps it for whoever looks later."""
+    print(sentence, file=sys.stderr)
+    log.note("start", event)
+    return exit_code
 
 
 def load(options: dict[str, Any]) -> Rig:

@@ -21,6 +21,8 @@ from typing import Any
 
 from gateway.service import link
 from gateway.service.children import Child, shared_memory, spawn_control, spawn_rig, spawn_watch
+from gateway.service.event_file import EventFile
+from gateway.service.event_log import EventLog
 from gateway.service.safe_line import SafeLine
 from gateway.service.watch_keeper import WatchKeeper
 
@@ -71,13 +73,15 @@ def run(options: RunOptions) -> int:
                 file=sys.stderr,
             )
             return EXIT_DEVICE
-        return Guardian(options, state).watch()
+        with EventLog(source="guardian", file=EventFile(state)) as log:
+            return Guardian(options, state, log).watch()
 
 
 @dataclass
 class Guardian:
     options: RunOptions
     state: Path
+    log: EventLog
     control: Child | None = None
     rig: Child | None = None
     watch_keeper: WatchKeeper | None = None
@@ -192,6 +196,7 @@ class Guardian:
             print(json.dumps(message.body["info"] | {"pids": pids}), flush=True)
         elif not self.announced:
             print(message.body["banner"], flush=True)
+        self.log.note("start", f"ready: rig {self.options.rig}, modbus tcp {host}:{port}, processes {pids}")
         self.announced = True
 
     def _provide_watch(self, wanted: dict[str, Any] | None) -> None:
@@ -200,7 +205,9 @@ class Guardian:
             return
         if self.watch_keeper is None:
             arguments = wanted | {"rig": self.options.rig, "state": str(self.state), "ring": self.ring}
-            self.watch_keeper = WatchKeeper(lambda: spawn_watch(arguments))
+            self.watch_keeper = WatchKeeper(
+                lambda: spawn_watch(arguments), lambda sentence: self.log("watch", sentence)
+            )
         self.watch_keeper.start(time.monotonic())
 
     def _on_silence(self) -> int | None:
@@ -226,6 +233,7 @@ class Guardian:
         self._drop_line()  # our copy of the descriptor carries the port's lock, which the next control process needs
         code = self.control.wait()
         if self.stop_deadline_s is not None:
+            self.log.note("stop", f"stopped as asked: safe voltage {_wire(acknowledged)}")
             return EXIT_OK
         if not self.announced and code > 0:
             return code  # it told the user why: configuration, device, permission
@@ -234,13 +242,10 @@ class Guardian:
     def _restart(self, how: str, code: int, acknowledged: bool | None) -> int | None:
         now_s = time.monotonic()
         self.restarts_s = [at_s for at_s in self.restarts_s if now_s - at_s < _RESTART_WINDOW_S] + [now_s]
-        wire = {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]
         cause = self.first_cause or f"control process {how} ({_exit_word(code)})"
-        print(f"A401 {cause}: safe voltage {wire}", file=sys.stderr, flush=True)
+        self.log("restart", f"A401 {cause}: safe voltage {_wire(acknowledged)}")
         if len(self.restarts_s) > _RESTARTS:
-            print(
-                "A402 five restarts in 60 s: the safe voltage is held, the gateway stops", file=sys.stderr, flush=True
-            )
+            self.log("restart", "A402 five restarts in 60 s: the safe voltage is held, the gateway stops")
             return EXIT_FAILED
         self._start_control(restarted=cause)
         return None
@@ -274,6 +279,10 @@ class Guardian:
         if self.line:
             self.line.close()
             self.line = None
+
+
+def _wire(acknowledged: bool | None) -> str:
+    return {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]
 
 
 def _exit_word(code: int) -> str:

@@ -5,7 +5,6 @@ takes a few milliseconds), its death is read like any other event, and a start t
 library only.
 """
 
-import sys
 from collections.abc import Callable
 from math import inf
 from typing import Final
@@ -17,15 +16,10 @@ PAUSES_S: Final = (5.0, 30.0, 120.0)
 _LONG_LIFE_S: Final = 900.0  # a watch that lived this long begins to count anew
 
 
-def _complain(sentence: str) -> None:
-    sys.stderr.write(sentence + "\n")
-    sys.stderr.flush()
-
-
 class WatchKeeper:
     """spawn: starts the process, OSError when that fails; say: a sentence for people. Times are monotonic seconds."""
 
-    def __init__(self, spawn: Callable[[], Child], say: Callable[[str], None] = _complain) -> None:
+    def __init__(self, spawn: Callable[[], Child], say: Callable[[str], None]) -> None:
         self._spawn = spawn
         self._say = say
         self._child: Child | None = None

@@ -111,6 +111,20 @@ ENTRIES: Final = (
         "force-gateway record status shows what it is doing.",
     ),
     Entry(
+        "E150",
+        "events are not kept",
+        "The disk did not take a line of events.jsonl. Control goes on; the lines are still on the gateway's stderr.",
+        "The disk is full, read-only or gone, or the state directory was removed.",
+        "df -h on the state directory; once lines are taken again, the next one says how many are missing.",
+    ),
+    Entry(
+        "E151",
+        "gateway did not start: the rig file has faults",
+        "The rig file could not be used; every fault is in the event, with its line and column.",
+        "It was edited since the last start, or belongs to another version.",
+        "force-gateway check RIG shows the same; mend it and start again.",
+    ),
+    Entry(
         "E401",
         "coefficients refused",
         "An uploaded calibration failed a check; index and reason are in failing_index and failing_reason.",
