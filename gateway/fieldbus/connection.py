@@ -21,12 +21,10 @@ from typing import Final, Protocol, cast
 from gateway.fieldbus.limits import LogGate
 from gateway.fieldbus.peers import Peers, address_of
 from gateway.fieldbus.settings import ServerSettings
-from gateway.modbus.errors import TARGET_SILENT
 from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
-from gateway.modbus.pdu import exception_pdu
 from gateway.modbus.peer import Peer
-from gateway.modbus.server import DataBank, answer
+from gateway.modbus.server import DataBank, answer, refuse_unit
 
 BUFFER_BYTES: Final = 1024  # 85 reads, or four of the longest requests
 
@@ -155,10 +153,11 @@ class Connection(asyncio.BufferedProtocol):
     def _answer(self, request: Adu) -> bytes:
         if self._rate is not None:
             self._rate.spend()
-        if request.unit in self._shared.settings.units:
-            pdu = answer(request.pdu, self._shared.bank, self.peer)
+        shared = self._shared
+        if request.unit in shared.settings.units:
+            pdu = answer(request.pdu, shared.bank, self.peer)
         else:
-            pdu = exception_pdu(request.pdu[0], TARGET_SILENT)
+            pdu = refuse_unit((request.unit, request.pdu), shared.settings.units, shared.bank, self.peer)
         return encode(Adu(request.transaction, request.unit, pdu))
 
     def _note_progress(self, answered: bool) -> None:

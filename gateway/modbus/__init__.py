@@ -4,7 +4,8 @@ The server faces in fieldbus and the codecs of RTU devices share it. Addresses a
 gateway.registers.
 """
 
-from gateway.modbus.errors import ModbusError
+from gateway.modbus.diagnostics import ServerId
+from gateway.modbus.errors import Fault, ModbusError, RequestError
 from gateway.modbus.host import AnswerMismatch, answer_bits, answer_data
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer
 from gateway.modbus.peer import Peer
@@ -14,10 +15,13 @@ __all__ = [
     "Adu",
     "AnswerMismatch",
     "DataBank",
+    "Fault",
     "FramingLost",
     "MbapFramer",
     "ModbusError",
     "Peer",
+    "RequestError",
+    "ServerId",
     "answer",
     "answer_bits",
     "answer_data",

@@ -4,6 +4,7 @@ Numbers are those of "MODBUS Application Protocol Specification V1.1b3", section
 our own bug and is deliberately not turned into an exception answer here (DESIGN rule 10).
 """
 
+from enum import Enum
 from typing import Final
 
 ILLEGAL_FUNCTION: Final = 0x01
@@ -30,3 +31,31 @@ class ModbusError(Exception):
     def __init__(self, code: int, sentence: str = "") -> None:
         super().__init__(sentence or NAMES.get(code, f"exception {code}"))
         self.code = code
+
+
+class Fault(Enum):
+    """What is wrong with a request that no bank has to look at, and the exception code that answers it."""
+
+    FUNCTION = "function", ILLEGAL_FUNCTION
+    QUANTITY = "quantity", ILLEGAL_VALUE  # a count, a byte count or a length that the specification does not allow
+    VALUE = "value", ILLEGAL_VALUE
+    OBJECT = "object", ILLEGAL_ADDRESS  # of a device identification
+    UNIT = "unit", TARGET_SILENT
+
+    @property
+    def code(self) -> int:
+        return int(self.value[1])
+
+
+class RequestError(ModbusError):
+    """A request refused by the rules of the protocol alone; the bank is told, so that its reason can be read.
+
+    value: the function, quantity, byte count, word or unit id that is refused. address: 0-based, None where the request
+    has none.
+    """
+
+    def __init__(self, fault: Fault, sentence: str, value: int, address: int | None = None) -> None:
+        super().__init__(fault.code, sentence)
+        self.fault = fault
+        self.value = value
+        self.address = address

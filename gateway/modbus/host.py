@@ -6,9 +6,18 @@ ids itself.
 
 from gateway.modbus.bits import unpack_bits
 from gateway.modbus.errors import ModbusError
-from gateway.modbus.pdu import ENCAPSULATED, MASK_WRITE, READ_DISCRETE_INPUTS, READ_WRITE, WRITE_COIL, WRITE_REGISTER
+from gateway.modbus.pdu import (
+    DIAGNOSTICS,
+    ENCAPSULATED,
+    MASK_WRITE,
+    READ_DISCRETE_INPUTS,
+    READ_WRITE,
+    REPORT_SERVER,
+    WRITE_COIL,
+    WRITE_REGISTER,
+)
 
-_ECHOED_WHOLE = (WRITE_COIL, WRITE_REGISTER, MASK_WRITE)
+_ECHOED_WHOLE = (WRITE_COIL, WRITE_REGISTER, DIAGNOSTICS, MASK_WRITE)
 
 
 class AnswerMismatch(Exception):  # noqa: N818  no error of ours: the wire does this
@@ -16,7 +25,8 @@ class AnswerMismatch(Exception):  # noqa: N818  no error of ours: the wire does 
 
 
 def answer_data(request: bytes, answer: bytes) -> bytes:
-    """Words or packed bits of a read, everything after the function for FC43, nothing for a write.
+    """Words or packed bits of a read, everything after the function for FC43, what FC17's
+    byte count covers, nothing for a write or FC08.
 
     Raises ModbusError with the device's code when it refused, AnswerMismatch when the answer is not this request's.
     """
@@ -29,6 +39,8 @@ def answer_data(request: bytes, answer: bytes) -> bytes:
         return _read_data(request, answer)
     if function == ENCAPSULATED:
         return answer[1:]
+    if function == REPORT_SERVER:
+        return _counted(answer)
     if answer != (request if function in _ECHOED_WHOLE else request[:5]):
         raise AnswerMismatch(f"the echo of function {function} differs from the request")
     return b""
@@ -44,4 +56,10 @@ def _read_data(request: bytes, answer: bytes) -> bytes:
     size = (count + 7) // 8 if request[0] <= READ_DISCRETE_INPUTS else 2 * count
     if len(answer) != 2 + size or answer[1] != size:
         raise AnswerMismatch(f"asked for {size} bytes, answered {len(answer) - 2}")
+    return answer[2:]
+
+
+def _counted(answer: bytes) -> bytes:
+    if len(answer) < 2 or len(answer) != 2 + answer[1]:
+        raise AnswerMismatch(f"{len(answer) - 2} bytes where the answer counts {answer[1:2].hex() or 'none'}")
     return answer[2:]

@@ -6,7 +6,8 @@ For simulated RTU devices, benches and tests; the gateway's own bank, with names
 from collections.abc import Mapping, Sequence
 
 from gateway.modbus.bits import pack_bits
-from gateway.modbus.errors import ILLEGAL_ADDRESS, ModbusError
+from gateway.modbus.diagnostics import ServerId
+from gateway.modbus.errors import ILLEGAL_ADDRESS, ModbusError, RequestError
 from gateway.modbus.peer import Peer
 
 
@@ -17,6 +18,7 @@ class MemoryBank:
         self.image = bytearray(2 * words)
         self.bits = [False] * bits
         self.identity: Mapping[int, bytes] = identity or {}
+        self.server_id = ServerId(0, True, b"")
 
     def read_registers(self, address: int, count: int) -> bytes:
         self.check_registers_readable(address, count)
@@ -42,6 +44,9 @@ class MemoryBank:
     def write_bits(self, address: int, values: Sequence[bool], _peer: Peer) -> None:
         self._check_bits(address, len(values))
         self.bits[address : address + len(values)] = map(bool, values)
+
+    def refused(self, refusal: RequestError, peer: Peer) -> None:
+        """Nobody asks a bank without meaning for its reasons."""
 
     def _check_bits(self, address: int, count: int) -> None:
         if address + count > len(self.bits):

@@ -1,7 +1,7 @@
 """Requests as bytes, both ends of the wire side by side: NAME_request() is the host's, parse_NAME() the device's.
 
 Plain functions and tuples on purpose: a frozen dataclass for each request costs more than the answer itself.
-parse_* check shape and quantity and raise ModbusError(03): a truncated PDU, surplus bytes and a byte count that
+parse_* check shape and quantity and raise RequestError(03): a truncated PDU, surplus bytes and a byte count that
 disagrees are all 03, and they are checked before any address is looked at. *_request raise ValueError: that is our own
 mistake, never the wire's.
 Source of layouts and limits: MODBUS Application Protocol V1.1b3, section 6.
@@ -12,7 +12,7 @@ from struct import Struct
 from typing import Final
 
 from gateway.modbus.bits import pack_bits, unpack_bits
-from gateway.modbus.errors import ILLEGAL_VALUE, ModbusError
+from gateway.modbus.errors import Fault, RequestError
 
 READ_COILS: Final = 1
 READ_DISCRETE_INPUTS: Final = 2
@@ -20,8 +20,10 @@ READ_HOLDING_REGISTERS: Final = 3
 READ_INPUT_REGISTERS: Final = 4
 WRITE_COIL: Final = 5
 WRITE_REGISTER: Final = 6
+DIAGNOSTICS: Final = 8
 WRITE_COILS: Final = 15
 WRITE_REGISTERS: Final = 16
+REPORT_SERVER: Final = 17
 MASK_WRITE: Final = 22
 READ_WRITE: Final = 23
 ENCAPSULATED: Final = 43
@@ -32,6 +34,7 @@ MOST_REGISTERS_READ: Final = 125
 MOST_REGISTERS_WRITTEN: Final = 123
 MOST_REGISTERS_READ_WRITE: Final = 121  # the written half of FC23
 
+_ADDRESSED: Final = frozenset((1, 2, 3, 4, 5, 6, 15, 16, 22, 23))  # the first two bytes are an address
 _TWO: Final = Struct(">BHH")  # function, address, quantity or value
 _MANY: Final = Struct(">BHHB")  # function, address, quantity, bytes that follow
 _MASK: Final = Struct(">BHHH")  # function, address, and-mask, or-mask
@@ -48,9 +51,9 @@ def read_request(function: int, address: int, count: int) -> bytes:
 def parse_read(pdu: bytes, most: int) -> tuple[int, int]:
     """address, count of FC01 to FC04."""
     if len(pdu) != _TWO.size:
-        raise _refused(f"{len(pdu)} bytes, a read has {_TWO.size}")
+        raise wrong_length(pdu, f"a read has {_TWO.size}")
     _function, address, count = _TWO.unpack(pdu)
-    _quantity(count, most)
+    _quantity(count, most, address)
     return address, count
 
 
@@ -67,7 +70,7 @@ def write_register_request(address: int, word: int) -> bytes:
 def parse_write_one(pdu: bytes) -> tuple[int, int]:
     """address, word of FC05 and FC06. The word is the server's to judge: its address comes first."""
     if len(pdu) != _TWO.size:
-        raise _refused(f"{len(pdu)} bytes, a single write has {_TWO.size}")
+        raise wrong_length(pdu, f"a single write has {_TWO.size}")
     _function, address, word = _TWO.unpack(pdu)
     return address, word
 
@@ -82,8 +85,8 @@ def write_coils_request(address: int, values: Sequence[bool]) -> bytes:
 def parse_write_coils(pdu: bytes) -> tuple[int, list[bool]]:
     """address, values of FC15; padding bits are ignored."""
     address, count, data = _parse_many(pdu)
-    _quantity(count, MOST_BITS_WRITTEN)
-    _byte_count(len(data), (count + 7) // 8)
+    _quantity(count, MOST_BITS_WRITTEN, address)
+    _byte_count(len(data), (count + 7) // 8, address)
     return address, unpack_bits(data, count)
 
 
@@ -96,8 +99,8 @@ def write_registers_request(address: int, data: bytes) -> bytes:
 def parse_write_registers(pdu: bytes) -> tuple[int, bytes]:
     """address, big-endian words of FC16."""
     address, count, data = _parse_many(pdu)
-    _quantity(count, MOST_REGISTERS_WRITTEN)
-    _byte_count(len(data), 2 * count)
+    _quantity(count, MOST_REGISTERS_WRITTEN, address)
+    _byte_count(len(data), 2 * count, address)
     return address, data
 
 
@@ -109,7 +112,7 @@ def mask_write_request(address: int, and_mask: int, or_mask: int) -> bytes:
 def parse_mask_write(pdu: bytes) -> tuple[int, int, int]:
     """address, and_mask, or_mask of FC22."""
     if len(pdu) != _MASK.size:
-        raise _refused(f"{len(pdu)} bytes, a mask write has {_MASK.size}")
+        raise wrong_length(pdu, f"a mask write has {_MASK.size}")
     _function, address, and_mask, or_mask = _MASK.unpack(pdu)
     return address, and_mask, or_mask
 
@@ -124,13 +127,13 @@ def read_write_request(read_address: int, count: int, write_address: int, data: 
 def parse_read_write(pdu: bytes) -> tuple[int, int, int, bytes]:
     """read address, count, write address, big-endian words of FC23."""
     if len(pdu) < _READ_WRITE.size:
-        raise _refused(f"{len(pdu)} bytes, a read/write has at least {_READ_WRITE.size}")
+        raise wrong_length(pdu, f"a read/write has at least {_READ_WRITE.size}")
     _function, read_address, count, write_address, written, size = _READ_WRITE.unpack_from(pdu)
     data = pdu[_READ_WRITE.size :]
-    _quantity(count, MOST_REGISTERS_READ)
-    _quantity(written, MOST_REGISTERS_READ_WRITE)
-    _byte_count(size, 2 * written)
-    _byte_count(len(data), size)
+    _quantity(count, MOST_REGISTERS_READ, read_address)
+    _quantity(written, MOST_REGISTERS_READ_WRITE, write_address)
+    _byte_count(size, 2 * written, write_address)
+    _byte_count(len(data), size, write_address)
     return read_address, count, write_address, data
 
 
@@ -142,25 +145,32 @@ def exception_pdu(function: int, code: int) -> bytes:
 def _parse_many(pdu: bytes) -> tuple[int, int, bytes]:
     """address, quantity, data of FC15 and FC16, when the byte count is that of the data."""
     if len(pdu) < _MANY.size:
-        raise _refused(f"{len(pdu)} bytes, a multiple write has at least {_MANY.size}")
+        raise wrong_length(pdu, f"a multiple write has at least {_MANY.size}")
     _function, address, count, size = _MANY.unpack_from(pdu)
     data = pdu[_MANY.size :]
-    _byte_count(len(data), size)
+    _byte_count(len(data), size, address)
     return address, count, data
 
 
-def _quantity(count: int, most: int) -> None:
+def address_in(pdu: bytes) -> int | None:
+    """The (first) address of a request, where it has one."""
+    return int.from_bytes(pdu[1:3], "big") if len(pdu) > 2 and pdu[0] in _ADDRESSED else None
+
+
+def wrong_length(pdu: bytes, expected: str) -> RequestError:
+    """The refusal of a request that is cut off or has surplus bytes. expected: `a read has 5`."""
+    sentence = f"function {pdu[0]} with {len(pdu)} bytes, {expected}"
+    return RequestError(Fault.QUANTITY, sentence, len(pdu), address_in(pdu))
+
+
+def _quantity(count: int, most: int, address: int) -> None:
     if not 1 <= count <= most:
-        raise _refused(f"quantity {count}, allowed 1 to {most}")
+        raise RequestError(Fault.QUANTITY, f"quantity {count}, allowed 1 .. {most}", count, address)
 
 
-def _byte_count(found: int, expected: int) -> None:
+def _byte_count(found: int, expected: int, address: int) -> None:
     if found != expected:
-        raise _refused(f"byte count {found}, expected {expected}")
-
-
-def _refused(sentence: str) -> ModbusError:
-    return ModbusError(ILLEGAL_VALUE, sentence)
+        raise RequestError(Fault.QUANTITY, f"byte count {found}, expected {expected}", found, address)
 
 
 def _own_quantity(count: int, most: int, odd: int = 0) -> None:

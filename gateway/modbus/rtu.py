@@ -39,7 +39,8 @@ def decode_adu(adu: bytes) -> tuple[int, bytes]:
 
 
 def request_length(adu: bytes) -> int | None:
-    """Whole length of the request that starts with these bytes; None: not yet known, or an unknown function."""
+    """Whole length of the request that starts with these bytes; None: not yet known, or a function without a length (8, and
+    what is unknown): silence alone ends it."""
     return _length(adu, _REQUEST)
 
 
@@ -92,6 +93,7 @@ _REQUEST: Final[dict[int, int | Callable[[bytes], int | None]]] = {
     P.WRITE_REGISTER: 8,
     P.WRITE_COILS: _counted(6),
     P.WRITE_REGISTERS: _counted(6),
+    P.REPORT_SERVER: 4,
     P.MASK_WRITE: 10,
     P.READ_WRITE: _counted(10),
     P.ENCAPSULATED: _identification_request,
@@ -106,6 +108,7 @@ _ANSWER: Final[dict[int, int | Callable[[bytes], int | None]]] = {
     P.WRITE_REGISTER: 8,
     P.WRITE_COILS: 8,
     P.WRITE_REGISTERS: 8,
+    P.REPORT_SERVER: _counted(2),
     P.MASK_WRITE: 10,
     P.READ_WRITE: _counted(2),
     P.ENCAPSULATED: _identification_answer,

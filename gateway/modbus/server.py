@@ -3,7 +3,7 @@
 Order (FIELDBUS): function 01, shape and quantity 03, address 02, value 03. Addresses and values are the bank's to
 judge, in that order; FC05 with a value other than 0x0000/0xFF00 is 03 only when the coil exists. FC23 checks both
 halves before it writes: the read half here by check_registers_readable, the write half by the bank, whose writes are
-all or nothing.
+all or nothing. What is refused here, before the bank has looked at it, the bank is told (refused): it keeps the reasons.
 Only ModbusError becomes an answer; anything else a bank raises is our bug and reaches the caller.
 """
 
@@ -12,7 +12,8 @@ from struct import Struct
 from typing import Final, Protocol
 
 from gateway.modbus import pdu as P  # noqa: N812  the names of function codes are constants
-from gateway.modbus.errors import ILLEGAL_FUNCTION, ILLEGAL_VALUE, ModbusError
+from gateway.modbus.diagnostics import ServerId, loopback_answer, report_answer
+from gateway.modbus.errors import Fault, ModbusError, RequestError
 from gateway.modbus.identification import identification_answer
 from gateway.modbus.peer import Peer
 
@@ -25,6 +26,10 @@ class DataBank(Protocol):
     @property
     def identity(self) -> Mapping[int, bytes]:
         """Objects of FC43/14: number to text."""
+
+    @property
+    def server_id(self) -> ServerId:
+        """What FC17 reports."""
 
     def read_registers(self, address: int, count: int) -> bytes:
         """Big-endian words. count is 1..125 already."""
@@ -44,17 +49,34 @@ class DataBank(Protocol):
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
         """One word: (word & and_mask) | (or_mask & ~and_mask)."""
 
+    def refused(self, refusal: RequestError, peer: Peer) -> None:
+        """Told of each request that the protocol's own rules have refused. Must not raise."""
+
 
 def answer(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     """Execute one request and return its answer. An empty PDU, which no framing lets through, is function 0."""
     function = pdu[0] if pdu else 0
-    handler = _HANDLERS.get(function)
-    if handler is None:
-        return P.exception_pdu(function, ILLEGAL_FUNCTION)
     try:
-        return handler(pdu, bank, peer)
+        return _HANDLERS.get(function, _not_served)(pdu, bank, peer)
+    except RequestError as refusal:
+        bank.refused(refusal, peer)
+        return P.exception_pdu(function, refusal.code)
     except ModbusError as refusal:
         return P.exception_pdu(function, refusal.code)
+
+
+def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBank, peer: Peer) -> bytes:
+    """The answer to a request (unit, PDU) for a unit that is not served here."""
+    unit, pdu = request
+    known = ", ".join(map(str, served))
+    refusal = RequestError(Fault.UNIT, f"unit id {unit}, served here: {known}", unit, P.address_in(pdu))
+    bank.refused(refusal, peer)
+    return P.exception_pdu(pdu[0], refusal.code)
+
+
+def _not_served(pdu: bytes, _bank: DataBank, _peer: Peer) -> bytes:
+    function = pdu[0] if pdu else 0
+    raise RequestError(Fault.FUNCTION, f"function {function} is not served", function)
 
 
 def _read_bits(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
@@ -71,7 +93,7 @@ def _write_coil(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     address, word = P.parse_write_one(pdu)
     if word not in (0x0000, 0xFF00):
         bank.read_bits(address, 1)
-        raise ModbusError(ILLEGAL_VALUE, f"coil value 0x{word:04X}, allowed 0x0000 and 0xFF00")
+        raise RequestError(Fault.VALUE, f"coil value 0x{word:04X}, allowed 0x0000 and 0xFF00", word, address)
     bank.write_bits(address, (word == 0xFF00,), peer)
     return pdu
 
@@ -112,6 +134,14 @@ def _encapsulated(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
     return identification_answer(pdu, bank.identity)
 
 
+def _diagnostics(pdu: bytes, _bank: DataBank, _peer: Peer) -> bytes:
+    return loopback_answer(pdu)
+
+
+def _report_server(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
+    return report_answer(pdu, bank.server_id)
+
+
 _HANDLERS: Final[Mapping[int, Callable[[bytes, DataBank, Peer], bytes]]] = {
     P.READ_COILS: _read_bits,
     P.READ_DISCRETE_INPUTS: _read_bits,
@@ -119,8 +149,10 @@ _HANDLERS: Final[Mapping[int, Callable[[bytes, DataBank, Peer], bytes]]] = {
     P.READ_INPUT_REGISTERS: _read_registers,
     P.WRITE_COIL: _write_coil,
     P.WRITE_REGISTER: _write_register,
+    P.DIAGNOSTICS: _diagnostics,
     P.WRITE_COILS: _write_coils,
     P.WRITE_REGISTERS: _write_registers,
+    P.REPORT_SERVER: _report_server,
     P.MASK_WRITE: _mask_write,
     P.READ_WRITE: _read_write,
     P.ENCAPSULATED: _encapsulated,

@@ -22,7 +22,7 @@ from typing import Final
 
 from gateway import VERSION
 from gateway.bsfm.model import Calibration
-from gateway.modbus import Peer
+from gateway.modbus import Peer, RequestError, ServerId
 from gateway.modbus.bits import pack_bits
 from gateway.registers.addresses import no_such_address
 from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, Admitted, Write
@@ -33,13 +33,14 @@ from gateway.registers.edges import Decide
 from gateway.registers.image import RegisterImage
 from gateway.registers.map import Block, RegisterMap
 from gateway.registers.ownership import Ownership, ip_number
-from gateway.registers.refusal import Refusal
+from gateway.registers.refusal import Refusal, request_refusal
 from gateway.registers.rules import BankRules
 from gateway.registers.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.status_block import StatusBlock
-from gateway.registers.words import ControlBit, RefusalReason, State
+from gateway.registers.words import ControlBit, RefusalReason, State, StatusBit
 
 BITS: Final = 16
+SERVER_ID: Final = 0x46  # "F"
 READER: Final = Peer("a reader")
 """Stands for the peer of a refused read, which is not told to the bank."""
 
@@ -81,6 +82,16 @@ class RegisterBank:
     def owner(self) -> str | None:
         """The host that may command, None for nobody yet."""
         return self._ownership.owner
+
+    @property
+    def server_id(self) -> ServerId:
+        """For FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
+        is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
+        return ServerId(SERVER_ID, not is_fault, b" ".join(self.identity[number] for number in (0, 2, 6)))
+
+    def refused(self, refusal: RequestError, peer: Peer) -> None:
+        """What the framing has refused leaves its reason as all others do."""
+        self._noted(request_refusal(refusal), peer)
 
     def read_registers(self, address: int, count: int) -> bytes:
         """Big-endian words of one block. Refusal (02) for a range that no block holds."""

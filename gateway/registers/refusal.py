@@ -6,7 +6,7 @@ Sentences begin with the code that `force-gateway explain` expands: what was see
 from math import nan
 from typing import Final
 
-from gateway.modbus import ModbusError
+from gateway.modbus import Fault, ModbusError, RequestError
 from gateway.modbus.errors import (
     BUSY,
     DEVICE_FAILURE,
@@ -48,10 +48,21 @@ _WIRE: Final = {
     RefusalReason.CALIBRATION_HELD: (DEVICE_FAILURE, "W313"),
     RefusalReason.STOPPING: (BUSY, "W315"),
     RefusalReason.EMPTY_SLOT: (ILLEGAL_VALUE, "W331"),
+    RefusalReason.UNIT: (TARGET_SILENT, "W222"),
 }
 """Exception code and message code of every reason; a reason without an entry cannot refuse."""
 
 OFF_BY_ONE: Final = "W203"
+NO_ADDRESS: Final = 0xFFFF
+"""In refusal_address: the request has no address."""
+
+_REQUEST_FAULTS: Final = {
+    Fault.FUNCTION: (RefusalReason.FUNCTION, "W221"),
+    Fault.QUANTITY: (RefusalReason.QUANTITY, "W220"),
+    Fault.VALUE: (RefusalReason.OUT_OF_RANGE, "W223"),
+    Fault.OBJECT: (RefusalReason.ADDRESS, "W224"),
+    Fault.UNIT: (RefusalReason.UNIT, "W222"),
+}
 
 
 class Refusal(ModbusError):  # noqa: N818  the glossary's word
@@ -66,6 +77,14 @@ class Refusal(ModbusError):  # noqa: N818  the glossary's word
         self.value = value
         self.sentence = f"{label or usual_label} {text}"
         super().__init__(code, self.sentence)
+
+
+def request_refusal(error: RequestError) -> Refusal:
+    """What the protocol's own rules have refused, in the words of the registers and the log."""
+    reason, label = _REQUEST_FAULTS[error.fault]
+    address = NO_ADDRESS if error.address is None else error.address
+    where = "" if error.address is None else f" at address {error.address}"
+    return Refusal(reason, address, f"{error}{where}", value=error.value, label=label)
 
 
 def quantity(value: float, decimals: int, unit: str) -> str:

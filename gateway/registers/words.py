@@ -122,6 +122,7 @@ class RefusalReason(IntEnum):
     CALIBRATION_HELD = 28  # W313: bit 5 was kept at 1 beyond the end of the run that it began
     STOPPING = 29  # W315: the force is on its way to 0, and then the output is off
     EMPTY_SLOT = 30
+    UNIT = 40
 
 
 class CalibrationPhase(IntEnum):

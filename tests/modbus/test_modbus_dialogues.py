@@ -2,8 +2,9 @@
 
 import pytest
 
-from gateway.modbus import Peer, answer, answer_bits, answer_data
+from gateway.modbus import Peer, ServerId, answer, answer_bits, answer_data
 from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.diagnostics import loopback_request, report_request
 from gateway.modbus.memory import MemoryBank
 
 PEER = Peer("127.0.0.1", 4711)
@@ -28,6 +29,7 @@ DIALOGUES = [
     pytest.param("04 0008 0001", "04 02 000a", id="6.4 read input registers"),
     pytest.param("05 00ac ff00", "05 00ac ff00", id="6.5 write single coil"),
     pytest.param("06 0001 0003", "06 0001 0003", id="6.6 write single register"),
+    pytest.param("08 0000 a537", "08 0000 a537", id="6.8 diagnostics, return query data"),
     pytest.param("0f 0013 000a 02 cd01", "0f 0013 000a", id="6.11 write multiple coils"),
     pytest.param("10 0001 0002 04 000a 0102", "10 0001 0002", id="6.12 write multiple registers"),
     pytest.param("16 0004 00f2 0025", "16 0004 00f2 0025", id="6.16 mask write register"),
@@ -54,6 +56,8 @@ def test_the_host_takes_the_printed_answers_as_its_own(request_hex: str, answer_
         (P.read_request(3, 0x6B, 3), "03 006b 0003"),
         (P.write_coil_request(0xAC, True), "05 00ac ff00"),
         (P.write_register_request(1, 3), "06 0001 0003"),
+        (loopback_request(b"\xa5\x37"), "08 0000 a537"),
+        (report_request(), "11"),
         (P.write_coils_request(0x13, [bool(int(bit)) for bit in "1011001110"]), "0f 0013 000a 02 cd01"),
         (P.write_registers_request(1, bytes.fromhex("000a0102")), "10 0001 0002 04 000a 0102"),
         (P.mask_write_request(4, 0xF2, 0x25), "16 0004 00f2 0025"),
@@ -84,3 +88,35 @@ def test_a_coil_written_is_a_discrete_input_read() -> None:
     answer(P.write_coils_request(40, [True, False, True]), served, PEER)
     request = P.read_request(P.READ_DISCRETE_INPUTS, 40, 3)
     assert answer_bits(request, answer(request, served, PEER)) == [True, False, True]
+
+
+@pytest.mark.parametrize("words", [0, 1, 2, 124, 125])
+def test_return_query_data_returns_any_words(words: int) -> None:
+    """6.8.1: "N x 2 bytes" of data, "the entire response message should be identical to the request"."""
+    request = loopback_request(bytes(range(250))[: 2 * words])
+    assert answer(request, bank(), PEER) == request
+    assert answer_data(request, request) == b""
+
+
+@pytest.mark.parametrize(
+    ("server", "answer_hex"),
+    [
+        (ServerId(0x46, True, b"fg 1"), "11 07 46 ff 66672031 ff"),
+        (ServerId(0x46, False, b"fg 1"), "11 07 46 00 66672031 00"),
+        (ServerId(7, True, b""), "11 03 07 ff ff"),
+    ],
+)
+def test_report_server_id_is_count_id_run_indicator_and_text(server: ServerId, answer_hex: str) -> None:
+    """6.13: byte count, server id, 00 = OFF or FF = ON, additional data (whose last byte repeats the indicator)."""
+    served = bank()
+    served.server_id = server
+    reply = answer(report_request(), served, PEER)
+    assert reply == bytes.fromhex(answer_hex)
+    assert answer_data(report_request(), reply) == reply[2:]
+
+
+def test_a_long_server_id_fits_in_one_answer() -> None:
+    served = bank()
+    served.server_id = ServerId(1, True, b"x" * 1000)
+    reply = answer(report_request(), served, PEER)
+    assert len(reply) == 253 and reply[1] == 251 and reply[-1] == 0xFF

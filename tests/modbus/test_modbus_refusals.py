@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.modbus import AnswerMismatch, ModbusError, Peer, answer, answer_data
+from gateway.modbus import AnswerMismatch, Fault, ModbusError, Peer, RequestError, answer, answer_data
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.memory import MemoryBank
+from gateway.modbus.server import refuse_unit
 
 PEER = Peer("127.0.0.1", 4711)
 FORBIDDEN_WORD = bytes.fromhex("dead")
@@ -25,6 +26,17 @@ class FussyBank(MemoryBank):
         super().write_registers(address, data, _peer)
 
 
+class ListeningBank(FussyBank):
+    """Keeps what it is told of."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.heard: list[tuple[Fault, int, int | None, Peer]] = []
+
+    def refused(self, refusal: RequestError, peer: Peer) -> None:
+        self.heard.append((refusal.fault, refusal.value, refusal.address, peer))
+
+
 def refusal(request_hex: str) -> int:
     """The exception code, after checking that it is one of this function and that nothing was changed."""
     served, request = FussyBank(), bytes.fromhex(request_hex)
@@ -36,7 +48,7 @@ def refusal(request_hex: str) -> int:
     return reply[1]
 
 
-@pytest.mark.parametrize("function", sorted(set(range(128)) - {1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43}))
+@pytest.mark.parametrize("function", sorted(set(range(128)) - {1, 2, 3, 4, 5, 6, 8, 15, 16, 17, 22, 23, 43}))
 def test_an_unknown_function_is_refused_under_its_own_number(function: int) -> None:
     assert answer(bytes((function, 0, 0, 0, 1)), FussyBank(), PEER) == bytes((function | 0x80, 1))
 
@@ -142,6 +154,7 @@ WHOLE_REQUESTS = [
     P.mask_write_request(0, 0, 0xFFFF),
     P.read_write_request(0, 1, 0, b"\x01\x02"),
     bytes.fromhex("2b 0e 01 00"),
+    bytes.fromhex("11"),
 ]
 
 
@@ -154,6 +167,56 @@ def test_a_truncated_or_surplus_request_is_03_and_does_nothing(request_pdu: byte
 
 def test_other_encapsulated_interfaces_are_not_served() -> None:
     assert refusal("2b 0d 0000") == 1
+
+
+@pytest.mark.parametrize("sub_function", [1, 2, 4, 10, 20, 255, 0xFFFF])
+def test_other_diagnostic_sub_functions_are_not_served(sub_function: int) -> None:
+    """6.8: "sub-function code supported: no" is exception 01."""
+    assert refusal(f"08 {sub_function:04x} 0000") == 1
+
+
+@pytest.mark.parametrize("request_hex", ["08", "08 00", "08 0000 a5", "08 0000 a537 00"])
+def test_a_diagnostic_request_without_whole_words_is_03(request_hex: str) -> None:
+    assert refusal(request_hex) == 3
+
+
+FAULTS = [
+    ("03 0005 007e", Fault.QUANTITY, 126, 5),
+    ("03 0005 0000", Fault.QUANTITY, 0, 5),
+    ("10 0007 0001 03 000100", Fault.QUANTITY, 3, 7),
+    ("17 0001 0001 0002 007a f4" + 244 * "00", Fault.QUANTITY, 122, 2),
+    ("06 0007", Fault.QUANTITY, 3, 7),
+    ("06", Fault.QUANTITY, 1, None),
+    ("05 0003 1234", Fault.VALUE, 0x1234, 3),
+    ("07", Fault.FUNCTION, 7, None),
+    ("2b 0d 0000", Fault.FUNCTION, 43, None),
+    ("08 0001 0000", Fault.FUNCTION, 8, None),
+    ("2b 0e 05 00", Fault.VALUE, 5, None),
+    ("2b 0e 04 09", Fault.OBJECT, 9, None),
+    ("11 00", Fault.QUANTITY, 2, None),
+]
+
+
+@pytest.mark.parametrize(("request_hex", "fault", "value", "address"), FAULTS)
+def test_what_the_protocol_refuses_the_bank_is_told_once(
+    request_hex: str, fault: Fault, value: int, address: int | None
+) -> None:
+    told = ListeningBank()
+    answer(bytes.fromhex(request_hex), told, PEER)
+    assert told.heard == [(fault, value, address, PEER)]
+
+
+def test_what_the_bank_refuses_itself_it_is_not_told_of() -> None:
+    told = ListeningBank()
+    for request in ("03 00c8 0001", "06 0000 dead", "05 0010 1234"):
+        answer(bytes.fromhex(request), told, PEER)
+    assert told.heard == []
+
+
+def test_a_foreign_unit_is_refused_with_its_number() -> None:
+    told = ListeningBank()
+    assert refuse_unit((9, P.read_request(3, 4, 1)), (1, 255), told, PEER) == bytes.fromhex("83 0b")
+    assert told.heard == [(Fault.UNIT, 9, 4, PEER)]
 
 
 def test_read_write_with_a_bad_read_half_writes_nothing() -> None:
