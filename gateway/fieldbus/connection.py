@@ -81,7 +81,7 @@ class Connection(asyncio.BufferedProtocol):
             return
         self.peer = Peer(str(address_of(peername[0])), peername[1])
         if (refusal := shared.peers.refusal(self.peer.host)) is not None:
-            shared.log("refused", f"{self.peer}: {refusal}", now_s)
+            shared.log("refused", f"W230 {self.peer}: {refusal}", now_s)
             self._transport.abort()
             return
         self._admit(now_s)
@@ -139,7 +139,7 @@ class Connection(asyncio.BufferedProtocol):
         if answers:
             self._write(b"".join(answers))
         if lost is not None:
-            self._close("framing", str(lost))
+            self._close("framing", f"W232 {self.peer}: {lost}")
 
     def _may_ask(self) -> bool:
         if self._rate is None:
@@ -182,7 +182,7 @@ class Connection(asyncio.BufferedProtocol):
     def pause_writing(self) -> None:
         """The transport holds more than the cap."""
         cap_bytes = self._shared.settings.write_buffer_bytes
-        self._log("unread", f"more than {cap_bytes} bytes of answers were not read, closed")
+        self._log("unread", f"W231 {self.peer}: more than {cap_bytes} bytes of answers were not read, closed")
         self.abort()
 
     def sweep(self, now_s: float) -> None:
@@ -194,9 +194,9 @@ class Connection(asyncio.BufferedProtocol):
         elif self._answered or self._resume is not None:
             self._answered, self._last_answer_s = False, now_s
         elif self._partial_since_s is not None and now_s - self._partial_since_s >= settings.partial_s:
-            self._close("partial", f"a request stayed incomplete for {settings.partial_s:g} s")
+            self._close("partial", f"W233 {self.peer}: a request stayed incomplete for {settings.partial_s:g} s")
         elif now_s - self._last_answer_s >= settings.idle_s:
-            self._close("idle", f"no request for {settings.idle_s:g} s")
+            self._close("idle", f"{self.peer}: no request for {settings.idle_s:g} s")
 
     def close(self) -> None:
         """The server closes; answers given so far are still delivered."""
@@ -221,7 +221,7 @@ class Connection(asyncio.BufferedProtocol):
             self._resume = None
 
     def _log(self, cause: str, sentence: str) -> None:
-        self._shared.log(cause, f"{self.peer}: {sentence}", self._shared.clock.time())
+        self._shared.log(cause, sentence, self._shared.clock.time())
 
     def connection_lost(self, _error: Exception | None) -> None:
         if not self._admitted:

@@ -114,7 +114,7 @@ class Cell:
         rig = self._rig
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
         self.bank.on_refusal = lambda refusal, peer: self._log(
-            f"refusal {peer.host} {refusal.reason}", f"{refusal.sentence}   ({peer})"
+            f"refusal {peer.host} {refusal.reason.name.lower()}", f"{refusal.sentence}   ({peer})"
         )
         self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer.host}", f"{sentence}   ({peer})")
         self.controller = Controller(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.fieldbus.connection import BUFFER_BYTES
-from gateway.modbus import Adu, answer, pdu
+from gateway.modbus import Fault, Adu, answer, pdu
 from gateway.modbus.mbap import encode
 from gateway.modbus.memory import MemoryBank
 from tests.fieldbus.by_hand import READ, framed
@@ -226,3 +226,24 @@ def test_a_bug_found_while_going_on_after_a_pause_is_told_too(stand: Any, delive
         made.clock.advance(2.0)
     assert far.ended == "aborted"
     made.clock.advance(5.0)
+
+
+def test_a_foreign_unit_is_told_to_the_bank_with_its_peer(stand, deliver):
+    made = stand()
+    heard = []
+    made.bank.refused = lambda refusal, peer: heard.append((refusal.fault, refusal.value, refusal.address, peer.host))
+    near, far = made.connect("10.0.0.5")
+    deliver(near, far, framed(READ, unit=9) + framed(READ, unit=1))
+    assert bytes(far.written[:9]) == bytes.fromhex("0001 0000 0003 09 83 0b")
+    assert heard == [(Fault.UNIT, 9, 0, "10.0.0.5")]
+
+
+@pytest.mark.parametrize(
+    ("data", "code"), [(b"GET / HTTP/1.1\r\n\r\n", "W232 "), (b"\x00\x01\x00\x00\x00\x06", "W233 ")]
+)
+def test_a_connection_that_is_closed_for_its_peer_s_fault_says_so_with_a_code(stand, deliver, data, code):
+    made = stand(partial_s=1.0)
+    near, far = made.connect("10.0.0.5")
+    deliver(near, far, data)
+    made.wait(2.0)
+    assert made.log[0][1].startswith(f"{code}10.0.0.5:40000: ")

@@ -5,6 +5,8 @@ from typing import Any
 
 from pymodbus.client import AsyncModbusTcpClient
 
+from gateway.modbus import ServerId
+
 
 async def connected(port: int) -> AsyncModbusTcpClient:
     client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=5, retries=0)
@@ -65,6 +67,24 @@ def test_identification_by_pymodbus(serve: Any) -> None:
         assert regular.information == running.bank.identity
         one = await client.read_device_information(read_code=4, object_id=4, device_id=1)
         assert one.information == {4: b"Name"}
+
+    dialogue(serve, talk)
+
+
+def test_return_query_data_and_server_id_by_pymodbus(serve: Any) -> None:
+    """What the diagnostic blocks of many PLCs ask before anything else."""
+
+    async def talk(client: AsyncModbusTcpClient, running: Any) -> None:
+        for data in (b"\xa5\x37", bytes(range(250))):
+            returned = await client.diag_query_data(data, device_id=1)
+            assert not returned.isError() and returned.message == data
+        running.bank.server_id = ServerId(0x46, True, b"force-gateway")
+        report = await client.report_device_id(device_id=1)
+        assert (report.identifier, report.status) == (b"F\xffforce-gateway", True)
+        running.bank.server_id = ServerId(0x46, False, b"force-gateway")
+        report = await client.report_device_id(device_id=1)
+        assert (report.identifier, report.status) == (b"F\x00force-gateway", False)
+        assert (await client.diag_restart_communication(False, device_id=1)).exception_code == 1
 
     dialogue(serve, talk)
 
