@@ -108,6 +108,7 @@ class Cell:
                 ladder=self._ladder,
                 watch=self.watch_desk,
             ),
+            self._log,
         )
 
     def _wire_gateway(self, cause: FaultCode) -> None:

@@ -3,9 +3,10 @@
 record on|off|status, calibration runs, the calibration in use and its change, last writers of each register and the sentence
 of the last refusal, what the residual watch has found (its process tells it here, others may read it), the loop's health,
 and faults of a simulated rig (passed on to the rig's own socket by the tools themselves). Mode 0600: whoever may write the
-state directory may ask.
+state directory may ask. What each verb takes stands in gateway.service.requests.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from gateway.service.json_lines import Handler, JsonLineServer
 from gateway.service.ladder_keeper import LadderKeeper
 from gateway.service.publish import LoopHealth
 from gateway.service.recordings import Recordings
+from gateway.service.requests import Ask, CalibrationRequest, RecordRequest, read
 from gateway.service.upload import Upload
 from gateway.service.watch_desk import WatchDesk
 
@@ -32,7 +34,7 @@ class Asked:
 
 
 class ControlSocket(JsonLineServer):
-    def __init__(self, state: Path, asked: Asked) -> None:
+    def __init__(self, state: Path, asked: Asked, log: Callable[[str, str], None]) -> None:
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,
@@ -42,39 +44,38 @@ class ControlSocket(JsonLineServer):
             "health": self._health_figures,
             "residual": asked.watch.answer,
         }
-        super().__init__(state / "control.sock", handlers)
+        super().__init__(state / "control.sock", handlers, log)
         self._asked = asked
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:
-        is_on = request.get("on")
+        is_on = read(RecordRequest, request).on
         if is_on is None:
             return self._asked.recordings.status()
         return self._asked.recordings.start() if is_on else self._asked.recordings.stop()
 
     def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
         """{"use": number} or {"rollback": true} begin a change; neither tells what is in use and how the last one went."""
-        if request.get("rollback"):
+        asked = read(CalibrationRequest, request)
+        if asked.rollback:
             return self._asked.upload.rollback()
-        number = request.get("use")
-        if number is None:
-            return self._asked.upload.status()
-        if type(number) is not int:
-            raise ValueError(f"use = {number}: the number of a calibration is expected")
-        return self._asked.upload.use(number)
+        return self._asked.upload.status() if asked.use is None else self._asked.upload.use(asked.use)
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
+        read(Ask, request)
         bank = self._asked.bank
         writers = {name: {"peer": str(peer), "time_s": at_s} for name, (peer, at_s) in bank.last_writer.items()}
         return {"owner": bank.owner, "writers": writers}
 
     def _last_refusal(self, request: dict[str, Any]) -> dict[str, Any]:
         """What the last-refusal registers stand for, in the gateway's own words; empty before the first."""
+        read(Ask, request)
         refusal = self._asked.bank.last_refusal
         if refusal is None:
             return {"sentence": ""}
         return {"address": refusal.address, "reason": int(refusal.reason), "sentence": refusal.sentence}
 
     def _health_figures(self, request: dict[str, Any]) -> dict[str, Any]:
+        read(Ask, request)
         health = self._asked.health
         return {
             "ticks": health.ticks,

@@ -1,5 +1,11 @@
 """A local socket that answers one JSON object per line: the control socket of a gateway, and that of a simulated rig.
 
+It lives in the control loop, so whatever is sent must cost that loop next to nothing. Everything that callers cause (a
+connection, a chunk, a request) waits in one queue; one item is done at a time, and then the queue rests nine times as long as
+that took: the socket has a tenth of the loop, however many ask. A caller has one request at a time, and the next is not
+read before its answer is taken. Raw sockets rather than asyncio's streams: those accept a hundred connections and answer
+a thousand buffered lines in one go, which is longer than a tick.
+
 A gateway works without it, so a place where no socket can be made is a sentence and no exception.
 """
 
@@ -7,76 +13,341 @@ import asyncio
 import contextlib
 import json
 import os
+import socket
+import traceback
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 Answer = dict[str, Any]
 Handler = Callable[[dict[str, Any]], Answer]
-_LONGEST_LINE = 65536
-_LONGEST_PATH = 107  # bytes, of a Unix socket's address
+_LONGEST_PATH: Final = 107  # bytes, of a Unix socket's address
+_LONGEST_ANSWER: Final = 1 << 20
+_LONGEST_SENTENCE: Final = 500
+_SHARE: Final = 0.1  # of the loop's time
+_LONGEST_REST_S: Final = 0.5
+_NO_DESCRIPTOR_S: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """idle_s: from one whole answer to the next whole request. spared_s: nobody who spoke within it makes room for another."""
+
+    callers: int = 32
+    idle_s: float = 30.0
+    spared_s: float = 1.0
+    longest_line: int = 65536
 
 
 class JsonLineServer:
     """Serves PATH (mode 0600): each line {"do": NAME, ...} goes to handlers[NAME], whose answer gets "ok": true.
 
-    A handler refuses by raising ValueError; the caller reads {"ok": false, "error": sentence}.
+    A handler refuses by raising ValueError or OSError; the caller reads {"ok": false, "error": sentence}. Anything else that it
+    raises is a defect of ours: the caller reads that, log gets the traceback, and all goes on.
     """
 
-    def __init__(self, path: Path, handlers: dict[str, Handler]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        handlers: dict[str, Handler],
+        log: Callable[[str, str], None] = lambda cause, sentence: None,
+        limits: Limits | None = None,
+    ) -> None:
+        self.limits = limits or Limits()
         self._path = path
         self._handlers = handlers
-        self._server: asyncio.Server | None = None
-        self._callers: dict[asyncio.StreamWriter, asyncio.Task[None]] = {}
+        self._log = log
+        self._listener: socket.socket | None = None
+        self._callers: dict[_Caller, None] = {}  # in the order in which they last spoke
+        self._queue: deque[Callable[[], None]] = deque()
+        self._turn: asyncio.TimerHandle | None = None
+        self._sweep_timer: asyncio.TimerHandle | None = None
 
     async def start(self) -> str:
         """Begin to serve; empty, or a sentence that says why nothing is served."""
         if (length := len(os.fsencode(self._path))) > _LONGEST_PATH:
             why = f"{length} bytes of path, a socket takes {_LONGEST_PATH}: give a shorter --state DIR"
             return f"{self._path} is not served, its tools will not find this gateway: {why}"
+        listener = socket.socket(socket.AF_UNIX)
+        listener.setblocking(False)
         previous = os.umask(0o177)
         try:
             self._path.unlink(missing_ok=True)
-            self._server = await asyncio.start_unix_server(self._serve, str(self._path), limit=_LONGEST_LINE)
+            listener.bind(str(self._path))
+            listener.listen(128)
         except OSError as error:
+            listener.close()
             return f"{self._path} is not served, its tools will not find this gateway: {error.strerror or error}"
         finally:
             os.umask(previous)
+        self._listener = listener
+        self.loop = asyncio.get_running_loop()
+        self._await_connection()
+        self._sweep()
         return ""
 
     async def close(self) -> None:
-        if self._server:
-            self._server.close()
-            await asyncio.sleep(0)  # who has just been accepted is served from here on, and so known
-            for writer in self._callers:
-                writer.transport.abort()  # a caller that reads nothing would never let go of a polite close
-            await asyncio.gather(*self._callers.values())
-            await self._server.wait_closed()
-            self._path.unlink(missing_ok=True)
+        """At once: a caller that reads nothing would never let go of a polite close."""
+        if self._listener is None:
+            return
+        self.loop.remove_reader(self._listener)
+        self._listener.close()
+        self._listener = None
+        for caller in tuple(self._callers):
+            caller.close()
+        for timer in (self._turn, self._sweep_timer):
+            if timer:
+                timer.cancel()
+        self._queue.clear()
+        self._path.unlink(missing_ok=True)
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task
-        self._callers[writer] = task
-        try:
-            while line := await reader.readline():
-                writer.write(json.dumps(self._answer(line)).encode() + b"\n")
-                await writer.drain()
-        except (ValueError, ConnectionError, asyncio.IncompleteReadError):
-            pass  # an overlong line or a caller that left: nobody is there to answer
-        finally:
-            writer.close()
-            with contextlib.suppress(ConnectionError):
-                await writer.wait_closed()
-            del self._callers[writer]
+    # -- one thing at a time
 
-    def _answer(self, line: bytes) -> Answer:
+    def wait_for(self, turn: Callable[[], None]) -> None:
+        """Put something to do at the end of the queue. It must not raise."""
+        self._queue.append(turn)
+        if self._turn is None:
+            self._turn = self.loop.call_later(0.0, self._take_turn)
+
+    def _take_turn(self) -> None:
+        self._turn = None
+        if not self._queue or self._listener is None:
+            return
+        began_s = self.loop.time()
+        self._queue.popleft()()
+        took_s = self.loop.time() - began_s
+        if self._turn is None:
+            self._turn = self.loop.call_later(min(took_s * (1.0 / _SHARE - 1.0), _LONGEST_REST_S), self._take_turn)
+
+    # -- connections
+
+    def _await_connection(self) -> None:
+        if self._listener is not None:
+            self.loop.add_reader(self._listener, self._on_connection)
+
+    def _on_connection(self) -> None:
+        assert self._listener
+        self.loop.remove_reader(self._listener)
+        self.wait_for(self._accept)
+
+    def _accept(self) -> None:
+        assert self._listener
         try:
-            request = json.loads(line)
+            peer, _ = self._listener.accept()
+        except BlockingIOError:
+            self._await_connection()
+            return
+        except OSError:  # no descriptor is left: it stays in the kernel's queue meanwhile
+            self.loop.call_later(_NO_DESCRIPTOR_S, self._await_connection)
+            return
+        self._await_connection()
+        peer.setblocking(False)
+        if len(self._callers) >= self.limits.callers and not self._make_room():
+            _say_and_close(peer, f"{self.limits.callers} connections are open, the most allowed: try again")
+            return
+        caller = _Caller(self, peer)
+        self.spoke(caller)
+        caller.listen()
+
+    def _make_room(self) -> bool:
+        """Whoever has been silent for longest goes, if that is long enough: silent callers lock nobody out."""
+        silent = next(iter(self._callers))
+        if self.loop.time() - silent.spoke_s < self.limits.spared_s:
+            return False
+        silent.dismiss("others are waiting, and nothing was asked here for longest")
+        return True
+
+    def spoke(self, caller: "_Caller") -> None:
+        caller.spoke_s = self.loop.time()
+        self._callers.pop(caller, None)
+        self._callers[caller] = None
+
+    def left(self, caller: "_Caller") -> None:
+        self._callers.pop(caller, None)
+
+    def _sweep(self) -> None:
+        oldest_s = self.loop.time() - self.limits.idle_s
+        for caller in [caller for caller in self._callers if caller.spoke_s <= oldest_s]:
+            caller.dismiss(f"no whole request for {self.limits.idle_s:g} s")
+        self._sweep_timer = self.loop.call_later(self.limits.idle_s / 4.0, self._sweep)
+
+    # -- requests
+
+    def answer(self, line: bytes) -> bytes:
+        """The answer to one line, whatever it is."""
+        try:
+            answer = self._answered(line)
+            text = _as_json(answer)
+            if len(text) > _LONGEST_ANSWER:
+                text = _as_json(_error(f"the answer would have {len(text)} bytes"))
+        except Exception as error:
+            self._log(
+                "internal", "A499 a defect of ours, in an answer of the control socket:\n" + traceback.format_exc()
+            )
+            told = f"internal error, please report it with the gateway's log: {type(error).__name__}: {error}"
+            text = _as_json(_error(told))
+        return text.encode() + b"\n"
+
+    def _answered(self, line: bytes) -> Answer:
+        try:
+            request = json.loads(line, parse_constant=_no_number)
             handler = self._handlers[request["do"]]
         except (ValueError, KeyError, TypeError, RecursionError):
-            return {"ok": False, "error": f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}'}
+            return _error(f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}')
         try:
             return {"ok": True} | handler(request)
         except (ValueError, OSError) as error:
-            return {"ok": False, "error": str(error)}
+            return _error(str(error))
+        except RecursionError:
+            return _error("nested too deeply")
+
+
+class _Caller:
+    """One connection: reads, waits for its turn, has one line answered, waits until the answer is taken."""
+
+    def __init__(self, server: JsonLineServer, peer: socket.socket) -> None:
+        self.spoke_s = 0.0
+        self._server = server
+        self._peer = peer
+        self._said = bytearray()
+        self._unsent = b""
+        self._is_last = False  # nothing more comes
+        self._is_deaf = False  # nothing more is wanted: what comes is dropped until the caller ends
+
+    def listen(self) -> None:
+        self._server.loop.add_reader(self._peer, self._on_readable)
+
+    def _on_readable(self) -> None:
+        self._server.loop.remove_reader(self._peer)
+        self._server.wait_for(self._hear)
+
+    def _hear(self) -> None:
+        if self._is_closed:
+            return
+        try:
+            chunk = self._peer.recv(self._server.limits.longest_line)
+        except BlockingIOError:
+            self.listen()
+            return
+        except OSError:
+            self.close()
+            return
+        self._is_last = not chunk
+        if not self._is_deaf:
+            self._said += chunk
+            self._answer_next()
+        elif self._is_last:
+            self.close()
+        else:
+            self.listen()
+
+    def _answer_next(self) -> None:
+        """A text without a newline before the end of the stream is a line too."""
+        if self._is_closed:
+            return
+        longest = self._server.limits.longest_line
+        end = self._said.find(b"\n") + 1 or (len(self._said) if self._is_last else 0)
+        if (end or len(self._said)) > longest:
+            self._turn_deaf(f"a line of more than {longest} bytes")
+        elif end:
+            line = bytes(self._said[:end])
+            del self._said[:end]
+            self._send(self._server.answer(line))
+        elif self._is_last:
+            self.close()
+        else:
+            self.listen()
+
+    def _send(self, data: bytes) -> None:
+        try:
+            sent = self._peer.send(data)
+        except BlockingIOError:
+            sent = 0
+        except OSError:
+            self.close()
+            return
+        if sent < len(data):
+            self._unsent = data[sent:]
+            self._server.loop.add_writer(self._peer, self._on_writable)
+        else:
+            self._server.spoke(self)
+            self._go_on()
+
+    def _on_writable(self) -> None:
+        self._server.loop.remove_writer(self._peer)
+        self._server.wait_for(self._send_rest)
+
+    def _send_rest(self) -> None:
+        if not self._is_closed:
+            data, self._unsent = self._unsent, b""
+            self._send(data)
+
+    def _go_on(self) -> None:
+        if self._said:
+            self._server.wait_for(self._answer_next)
+        elif self._is_last:
+            self.close()
+        else:
+            self.listen()
+
+    def dismiss(self, why: str) -> None:
+        """Say why, if it takes a line now, and close."""
+        if not self._unsent:
+            with contextlib.suppress(OSError):
+                self._peer.send(_as_json(_error(f"{why}: closed")).encode() + b"\n")
+        self.close()
+
+    def _turn_deaf(self, why: str) -> None:
+        """Say why and end our direction. A close now would take the sentence away from a caller that is still writing."""
+        self._said.clear()
+        self._is_deaf = True
+        with contextlib.suppress(OSError):
+            self._peer.send(_as_json(_error(f"{why}: closed")).encode() + b"\n")
+            self._peer.shutdown(socket.SHUT_WR)
+        self.listen()
+
+    @property
+    def _is_closed(self) -> bool:
+        return self._peer.fileno() < 0
+
+    def close(self) -> None:
+        if not self._is_closed:
+            self._server.loop.remove_reader(self._peer)
+            self._server.loop.remove_writer(self._peer)
+            self._peer.close()
+        self._server.left(self)
+
+
+def _error(sentence: str) -> Answer:
+    if len(sentence) > _LONGEST_SENTENCE:
+        sentence = f"{sentence[:_LONGEST_SENTENCE]} ..."
+    return {"ok": False, "error": sentence}
+
+
+def _as_json(answer: Answer) -> str:
+    """RFC 8259 has no NaN: what is not finite is null."""
+    try:
+        return json.dumps(answer, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(answer), allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _no_number(name: str) -> float:
+    raise ValueError(f"{name} is no number")
+
+
+def _say_and_close(peer: socket.socket, sentence: str) -> None:
+    with contextlib.suppress(OSError):
+        peer.send(_as_json(_error(sentence)).encode() + b"\n")
+    peer.close()

@@ -21,6 +21,7 @@ from gateway.profiles.plan_files import plain, plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase
 from gateway.service.fit_child import FitChild, Result
+from gateway.service.requests import CalibrateRequest, read
 from gateway.service.run_recording import COLUMNS, RunRecording
 
 FOLLOWED_S: Final = 3.0
@@ -54,13 +55,14 @@ class LadderKeeper:
     def answer(self, request: Answer) -> Answer:
         """{"plan": {...}, "continues": [numbers]} starts, with "dry_run": true it is only tried; {"stop": true} stops; neither
         tells how it is. ValueError refuses."""
+        asked = read(CalibrateRequest, request)
         self._followed_s = self._clock()
-        if request.get("dry_run"):
-            return self._tried(_plan_of(request.get("plan")))
-        if request.get("stop"):
+        if asked.dry_run:
+            return self._tried(_plan_of(asked.plan))
+        if asked.stop:
             self._calibrating.ask_stop("info calibration stopped at this machine")
-        elif "plan" in request:
-            self._start(request["plan"], tuple(int(number) for number in request.get("continues", ())))
+        elif asked.plan is not None:
+            self._start(asked.plan, asked.continues)
         if refused := self._calibrating.take_refused():
             raise ValueError(refused)
         return self.status()

@@ -11,7 +11,9 @@ import json
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +30,10 @@ from gateway.devices.messages import (
 )
 from gateway.ports import PacedPty
 from gateway.profiles import Rig, load_rig
+from gateway.profiles.text import Document
+from gateway.profiles.typed import build
 from gateway.service.json_lines import JsonLineServer
+from gateway.service.requests import FaultRequest, read
 from gateway.service.tick import Tick
 from gateway.twin import Plant, Twin
 from gateway.twin.plant import with_value
@@ -95,7 +100,8 @@ class SimulatedRig:
 
         ValueError on an unknown name, or a value that no plant has.
         """
-        name, is_on = request.get("name"), bool(request.get("on", True))
+        asked = read(FaultRequest, request)
+        name, is_on = asked.name, asked.on
         match name:
             case "no-air" | "no-contact" | "sign-inverted":
                 self._twin_faults[name] = is_on
@@ -105,7 +111,7 @@ class SimulatedRig:
             case "output-cut":
                 self.is_output_cut = is_on
             case "plant":
-                self._change_plant(_changed(self._plant, request.get("values", {})) if is_on else self._plant)
+                self._change_plant(_changed(self._plant, asked.values) if is_on else self._plant)
             case _:
                 raise ValueError(
                     f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, output-cut, plant"
@@ -118,27 +124,36 @@ class SimulatedRig:
         self.twin.set_sign(-1 if self._twin_faults.get("sign-inverted", False) else 1)
 
     def _change_plant(self, plant: Plant) -> None:
-        """Another machine in the place of this one, which has come to the standing command already."""
+        """Another machine in the place of this one, which has come to the standing command already. ValueError, and nothing has
+        changed, where its physics do not compute."""
+        twin = Twin(plant, self._seed + 1)
+        twin.command(self._setting_v)
+        try:
+            twin.advance(_SETTLED_S)
+            measured_n = float(twin.measured_n)
+        except ArithmeticError as error:
+            raise ValueError(f"no machine has such a plant: {error}") from None
+        if not isfinite(measured_n):
+            raise ValueError(f"no machine has such a plant: it measures {measured_n} N")
         self._seed += 1
-        self.twin = Twin(plant, self._seed)
+        self.twin = twin
         self._set_twin_faults()
-        self.twin.command(self._setting_v)
-        self.twin.advance(_SETTLED_S)
 
 
-def _changed(plant: Plant, values: Any) -> Plant:
-    """The plant with some numbers changed, by `section.field`; ValueError for what it does not have."""
-    if not isinstance(values, dict):
-        raise ValueError(f'values = {values}: {{"section.field": number}} is expected')
+def _changed(plant: Plant, values: Mapping[str, float]) -> Plant:
+    """The plant with some numbers changed, by `section.field`; ValueError for what it does not have, or cannot be."""
     for path, value in values.items():
-        section, _, field = str(path).partition(".")
+        section, _, field = path.partition(".")
         try:
             known = getattr(getattr(plant, section), field)
-            plant = with_value(plant, section, field, float(value))
-        except (AttributeError, TypeError, ValueError):
+            plant = with_value(plant, section, field, value)
+        except (AttributeError, TypeError):
             raise ValueError(f"{path} = {value}: no number of a plant, such as friction.coulomb_n = 2.5") from None
         if not isinstance(known, float):
             raise ValueError(f"{path} is no number of a plant")
+    _, faults = build(Plant, Document("plant", asdict(plant), {}))
+    if faults:
+        raise ValueError(f"{faults[0].path} {faults[0].message}")
     return plant
 
 

@@ -5,17 +5,18 @@ status register, and never the control. What it said last stands until it says o
 """
 
 from collections.abc import Callable
-from math import isfinite
 from typing import Any, Final
 
 from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.words import WarningBit
 from gateway.service.gateway import Gateway, Log
+from gateway.service.requests import ResidualRequest, read
 
 Answer = dict[str, Any]
 COUNTERS: Final = ("looks", "judged", "skipped", "cpu_s", "rms_n", "floor_n", "pause_s")
 """Numbers that the watch may tell about itself; others are not kept."""
 _LONGEST_SENTENCE: Final = 500
+_LARGEST_COUNT: Final = 1.0e15
 
 
 class WatchDesk:
@@ -32,8 +33,9 @@ class WatchDesk:
 
     def answer(self, request: Answer) -> Answer:
         """{"cause": number, "sentence": text, "counters": {...}} tells; without a cause it is asked. ValueError refuses."""
-        if "cause" in request:
-            self._hear(request)
+        told = read(ResidualRequest, request)
+        if told.cause is not None:
+            self._hear(told.cause, told)
         return self.figures() | {"sentence": self._sentence}
 
     def figures(self) -> Answer:
@@ -42,14 +44,13 @@ class WatchDesk:
         age_s = None if self._heard_s is None else round(self._clock() - self._heard_s, 3)
         return {"cause": int(cause), "name": cause.effect, "warnings": self._warnings, "age_s": age_s} | self._counters
 
-    def _hear(self, request: Answer) -> None:
-        number, sentence = request["cause"], request.get("sentence", "")
-        if type(number) is not int or number not in set(ResidualCause) or not isinstance(sentence, str):
-            raise ValueError(f"cause = {number}: a number of residual_cause is expected, with a sentence")
-        self._counters = _numbers(request.get("counters"))
+    def _hear(self, number: int, told: ResidualRequest) -> None:
+        if number not in set(ResidualCause):
+            raise ValueError(f"cause = {number}: a number of residual_cause is expected")
+        self._counters = _numbers(told.counters)
         self._heard_s = self._clock()
         cause, before = ResidualCause(number), self._gateway.residual_cause
-        self._sentence = sentence[:_LONGEST_SENTENCE]
+        self._sentence = told.sentence[:_LONGEST_SENTENCE]
         if cause is not before:
             self._change(cause)
 
@@ -66,7 +67,11 @@ class WatchDesk:
         gateway.refresh()
 
 
-def _numbers(told: Any) -> dict[str, float]:
+def _numbers(told: dict[str, Any]) -> dict[str, float]:
     """The known counters that are finite numbers."""
-    told = told if isinstance(told, dict) else {}
-    return {name: told[name] for name in COUNTERS if type(told.get(name)) in (int, float) and isfinite(told[name])}
+    return {name: told[name] for name in COUNTERS if _is_number(told.get(name))}
+
+
+def _is_number(value: Any) -> bool:
+    """No bool, and no integer beyond what a float carries, which isfinite does not take."""
+    return type(value) in (int, float) and abs(value) < _LARGEST_COUNT

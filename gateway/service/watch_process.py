@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -98,6 +99,7 @@ def run(options: dict[str, Any]) -> None:
         spent_s = time.process_time() - began_s
         rest_s = pause_s(every_s, spent_s)
         counters = watch.counters | {"cpu_s": time.process_time(), "pause_s": rest_s}
+        counters = {name: value for name, value in counters.items() if isfinite(value)}  # JSON has no NaN
         standing = watch.standing
         tell(state, {"cause": int(standing.cause), "sentence": standing.sentence, "counters": counters})
         time.sleep(rest_s)

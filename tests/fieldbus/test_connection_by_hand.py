@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.fieldbus.connection import BUFFER_BYTES
-from gateway.modbus import Fault, Adu, answer, pdu
+from gateway.modbus import Adu, Fault, answer, pdu
 from gateway.modbus.mbap import encode
 from gateway.modbus.memory import MemoryBank
 from tests.fieldbus.by_hand import READ, framed

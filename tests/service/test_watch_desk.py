@@ -70,15 +70,18 @@ def test_counters_and_age_can_be_read(wired, desk):
         {"cause": -1},
         {"cause": 12, "sentence": 5},
         {"cause": None},
+        {"cause": 12, "counters": [1, 2]},
+        {"cause": 12, "caus": 12},
     ],
 )
 def test_nonsense_is_refused_and_leaves_no_trace(wired, desk, request_):
-    with pytest.raises(ValueError, match="residual_cause"):
+    with pytest.raises(ValueError, match=r"cause|sentence|counters"):
         desk.answer(request_)
     assert wired.word("residual_cause") == 0
     assert desk.figures()["age_s"] is None
 
 
 def test_strange_counters_and_long_sentences_do_no_harm(wired, desk):
-    desk.answer({"cause": 12, "sentence": "x" * 10000, "counters": [1, 2]})
+    desk.answer({"cause": 12, "sentence": "x" * 10000, "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]}})
+    assert not {"looks", "cpu_s", "judged"} & set(desk.figures())
     assert len(wired.said("A345")[0]) < 600
