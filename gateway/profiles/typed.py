@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from types import UnionType
-from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -19,6 +19,7 @@ from gateway.profiles.sentences import is_stranger, meant_key, type_sentence, un
 from gateway.profiles.text import Document
 
 T = TypeVar("T")
+_MOST_FINDINGS: Final = 50
 
 
 @cache
@@ -50,8 +51,10 @@ def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
 
 
 def _told_once(error: ValidationError) -> list[Any]:
-    """A union reports each of its members; one finding per place is enough, the first."""
-    return list({_steps(found["loc"]): found for found in reversed(error.errors(include_url=False))}.values())[::-1]
+    """A union reports each of its members; one finding per place is enough, the first. No more than a person reads: a sentence
+    takes half a millisecond, and a hostile document may have thousands."""
+    first = error.errors(include_url=False)[:_MOST_FINDINGS]
+    return list({_steps(found["loc"]): found for found in reversed(first)}.values())[::-1]
 
 
 def _without_echoes(faults: list[Fault]) -> list[Fault]:

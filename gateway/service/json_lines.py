@@ -27,6 +27,10 @@ Handler = Callable[[dict[str, Any]], Answer]
 _LONGEST_PATH: Final = 107  # bytes, of a Unix socket's address
 _LONGEST_ANSWER: Final = 1 << 20
 _LONGEST_SENTENCE: Final = 500
+_DEEPEST: Final = 10
+_MOST_KEYS: Final = 64
+_LONGEST_KEY: Final = 100
+_MOST_VALUES: Final = 3000
 _SHARE: Final = 0.1  # of the loop's time
 _LONGEST_REST_S: Final = 0.5
 _NO_DESCRIPTOR_S: Final = 0.1
@@ -197,12 +201,12 @@ class JsonLineServer:
             handler = self._handlers[request["do"]]
         except (ValueError, KeyError, TypeError, RecursionError):
             return _error(f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}')
+        if too_much := _too_much(request):
+            return _error(too_much)
         try:
             return {"ok": True} | handler(request)
         except (ValueError, OSError) as error:
             return _error(str(error))
-        except RecursionError:
-            return _error("nested too deeply")
 
 
 class _Caller:
@@ -325,6 +329,30 @@ def _error(sentence: str) -> Answer:
     if len(sentence) > _LONGEST_SENTENCE:
         sentence = f"{sentence[:_LONGEST_SENTENCE]} ..."
     return {"ok": False, "error": sentence}
+
+
+def _too_much(request: Any) -> str:
+    """Why a request is larger than any that means something; empty for one that is not.
+
+    Checking a shape and telling what is wrong with it takes its time for each key: what could take longer than a tick or
+    two is not begun.
+    """
+    level, values = [request], 0
+    for _ in range(_DEEPEST):
+        below: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                if len(value) > _MOST_KEYS or any(len(key) > _LONGEST_KEY for key in value):
+                    return (
+                        f"an object with more than {_MOST_KEYS} keys, or a key of more than {_LONGEST_KEY} characters"
+                    )
+                below += value.values()
+            elif isinstance(value, list):
+                below += value
+        level, values = below, values + len(below)
+        if values > _MOST_VALUES:
+            return f"more than {_MOST_VALUES} values"
+    return f"nested more than {_DEEPEST} deep" if level else ""
 
 
 def _as_json(answer: Answer) -> str:

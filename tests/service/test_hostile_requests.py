@@ -4,6 +4,7 @@ Seeded: a failure names its line, and the next run has it again.
 """
 
 import json
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -162,6 +163,29 @@ def test_a_wrong_type_is_told_by_its_key(line: bytes, told: str, stage: Stage) -
     answer = stage.ask(line)
     assert answer["ok"] is False
     assert told in answer["error"]
+
+
+ENDLESS = [
+    {"x" * 20_000: 1},
+    {f"x{number}": 1 for number in range(6000)},
+    {"name": "e", "parts": [{"name": "p", "moves": [{"do": "zz"}] * 4000}]},
+    {"name": "e", "parts": [{"name": "p", "moves": [{"do": "dwell", f"h{n}": 1, f"i{n}": 1} for n in range(700)]}]},
+    {"name": "e", "parts": [{"name": "p", "moves": [{"do": "dwell", "hold_s": 1}] * 1900}]},
+    {"step_v": "9" * 60_000},
+    {"step_v": 0.01, "groups": 100, "minor_points": 2000},
+]
+
+
+@pytest.mark.parametrize("plan", ENDLESS, ids=range(len(ENDLESS)))
+def test_no_request_of_the_longest_kind_keeps_the_loop_from_its_heartbeat(plan: dict[str, Any], stage: Stage) -> None:
+    """What it costs in processor time; the guardian's patience is 100 ms. Some of these took two seconds."""
+    line = json.dumps({"do": "calibrate", "plan": plan, "dry_run": True}).encode()
+    took_s = []
+    for _ in range(3):
+        began_s = time.process_time()
+        assert stage.ask(line)["ok"] is False
+        took_s.append(time.process_time() - began_s)
+    assert min(took_s) < 0.06
 
 
 # -- the simulated rig
