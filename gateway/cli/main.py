@@ -24,6 +24,7 @@ VERBS: Final = (
     "ports",
     "schema",
     "explain",
+    "events",
     "calibration",
     "upload",
     "record",

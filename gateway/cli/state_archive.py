@@ -5,6 +5,7 @@ running gateway and are left out. Restoring extracts beside the target and then 
 archive changes nothing; what was there before is kept under another name, not deleted.
 """
 
+import contextlib
 import gzip
 import io
 import json
@@ -32,14 +33,16 @@ class ArchiveError(Exception):
 
 def pack(state: Path, target: Path) -> list[str]:
     """Write everything of `state` to `target`; the names packed. OSError when either cannot be used."""
-    files = list(_files(state))
+    files: list[Path] = []
     with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as stream:
         beside = Path(stream.name)
         try:
             with tarfile.open(fileobj=stream, mode="w:gz") as archive:
                 _add_manifest(archive, state)
-                for path in files:
-                    archive.add(path, f"{_TOP}/{path.relative_to(state)}", recursive=False)
+                for path in _files(state):
+                    with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
+                        archive.add(path, f"{_TOP}/{path.relative_to(state)}", recursive=False)
+                        files.append(path)
             stream.flush()
             os.fsync(stream.fileno())
             beside.replace(target)
