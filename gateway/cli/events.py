@@ -60,7 +60,8 @@ def command(
         raise CliError(
             f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA
         )
-    _show(EventReader(directory), _wanted(after, severity, {code.upper() for code in codes}), follow, as_json)
+    with EventReader(directory) as reader:
+        _show(reader, _wanted(after, severity, {code.upper() for code in codes}), follow, as_json)
 
 
 def _wanted(after: str, severity: str, codes: set[str]) -> Callable[[Event], bool]:
@@ -84,5 +85,3 @@ def _show(reader: EventReader, wanted: Callable[[Event], bool], follow: bool, as
             events = reader.more()
     except KeyboardInterrupt:
         return
-    finally:
-        reader.close()

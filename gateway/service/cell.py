@@ -150,7 +150,10 @@ class Cell:
         notes = await self._notes(restarted)
         if record:
             notes += self._record_from_the_start()
-        notes += tuple(filter(None, [await self._control_socket.start()]))
+        if unserved := await self._control_socket.start():
+            notes += (f"E152 {unserved}",)
+        for note in notes:
+            self._log.note("start", note)
         modbus = await self._listen(bind)
         return banner.Ready(
             rig=self._rig,

@@ -13,7 +13,7 @@ import fcntl
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, Self
 
 from gateway.service.event import Event, event_in
 
@@ -103,6 +103,12 @@ class EventReader:
                 return
             self.close()
             self._stream, self._rest = fresh, b""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def close(self) -> None:
         if self._stream is not None:

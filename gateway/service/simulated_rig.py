@@ -32,6 +32,8 @@ from gateway.ports import PacedPty
 from gateway.profiles import Rig, load_rig
 from gateway.profiles.text import Document
 from gateway.profiles.typed import build
+from gateway.service.event_file import EventFile
+from gateway.service.event_log import EventLog
 from gateway.service.json_lines import JsonLineServer
 from gateway.service.requests import FaultRequest, read
 from gateway.service.tick import Tick
@@ -157,7 +159,7 @@ def _changed(plant: Plant, values: Mapping[str, float]) -> Plant:
     return plant
 
 
-async def serve(rig: Rig, link: socket.socket, state: Path) -> None:
+async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> None:
     """Run until the guardian's end of the link closes."""
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
@@ -166,12 +168,12 @@ async def serve(rig: Rig, link: socket.socket, state: Path) -> None:
     )
     cell_pty = PacedPty(rig.load_cell.device.serial.baud, on_bytes=lambda chunk, now_s: None)
     simulated = SimulatedRig(rig, send_output=output_pty.send, send_cell=cell_pty.send, now_s=time.monotonic())
-    faults = JsonLineServer(state / "rig.sock", {"fault": simulated.fault})
+    faults = JsonLineServer(state / "rig.sock", {"fault": simulated.fault}, log)
     tick = Tick(1.0 / rig.load_cell.device.rate_hz, lambda *_: simulated.stream(time.monotonic()))
     output_pty.open()
     cell_pty.open()
     if unserved := await faults.start():
-        sys.stderr.write(f"{unserved}\n")
+        log("socket", f"E152 {unserved}")
     tick.start()
     loop.add_reader(link.fileno(), ended.set)
     link.send(json.dumps({"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}}).encode())
@@ -186,7 +188,9 @@ async def serve(rig: Rig, link: socket.socket, state: Path) -> None:
 def main(arguments: list[str]) -> int:
     link = socket.socket(fileno=int(arguments[0]))
     options = json.loads(arguments[1])
-    asyncio.run(serve(load_rig(options["rig"]).as_simulated(), link, Path(options["state"])))
+    state = Path(options["state"])
+    with EventLog(source="rig", file=EventFile(state)) as log:
+        asyncio.run(serve(load_rig(options["rig"]).as_simulated(), link, state, log))
     return 0
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from gateway.service.event_file import EventReader
 from tests.end_to_end.conftest import RunningGateway, start, stop
 from tests.end_to_end.own_devices import OwnDevices
 
@@ -80,6 +81,11 @@ def test_a_killed_control_process_has_the_safe_voltage_on_the_wire_in_time(real,
     took_s = best_of_two(real, devices, signal.SIGKILL)
     print(f"SIGKILL to the safe voltage: {took_s * 1e3:.1f} ms")
     assert took_s <= 0.025 or took_s <= STALL_S, "25 ms; a machine that is busy may take as long as for a stall"
+    with EventReader(real.state) as reader:
+        events = list(reader.kept())
+    pressed = max(n for n, event in enumerate(events) if event.source == "control" and "enabled by" in event.text)
+    deaths = [event.source for event in events[pressed:] if event.code == "A401"]
+    assert deaths == ["guardian"], "one file, in the order in which it happened"
 
 
 @pytest.mark.parametrize("half", [b"SET 51", b"MO"])

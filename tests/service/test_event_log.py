@@ -178,11 +178,8 @@ def test_alarms_that_are_only_warnings_are_those_of_the_catalogue() -> None:
 
 
 def kept(directory: Path) -> list[Event]:
-    reader = EventReader(directory)
-    try:
+    with EventReader(directory) as reader:
         return list(reader.kept())
-    finally:
-        reader.close()
 
 
 def event(text: str, source: str = "control") -> Event:

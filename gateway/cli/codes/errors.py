@@ -125,6 +125,13 @@ ENTRIES: Final = (
         "force-gateway check RIG shows the same; mend it and start again.",
     ),
     Entry(
+        "E152",
+        "no local socket for the tools",
+        "control.sock (or rig.sock of a simulated rig) could not be made in the state directory. Control works without it.",
+        "A path of more than 107 bytes, or a file system that has no sockets.",
+        "Give a shorter --state DIR, on a local disk.",
+    ),
+    Entry(
         "E401",
         "coefficients refused",
         "An uploaded calibration failed a check; index and reason are in failing_index and failing_reason.",
