@@ -118,14 +118,13 @@ class JsonLineServer:
             self._turn = self.loop.call_later(0.0, self._take_turn)
 
     def _take_turn(self) -> None:
-        self._turn = None
         if not self._queue or self._listener is None:
+            self._turn = None
             return
         began_s = time.thread_time()  # what it cost, not how long others on this machine had the processor meanwhile
         self._queue.popleft()()
         took_s = time.thread_time() - began_s
-        if self._turn is None:
-            self._turn = self.loop.call_later(min(took_s * (1.0 / _SHARE - 1.0), _LONGEST_REST_S), self._take_turn)
+        self._turn = self.loop.call_later(min(took_s * (1.0 / _SHARE - 1.0), _LONGEST_REST_S), self._take_turn)
 
     # -- connections
 
