@@ -214,6 +214,8 @@ class Controller:
         self._follower.expect_clearing()
 
     def _reset(self) -> None:
+        if self.state is State.OFF:
+            return
         self.state = next_state(self.state, Event.RESET)
         self._outcome.events.append(f"info fault {self._fault.name} reset by {self._follower.who}")
         self._fault = FaultCode.NONE

@@ -124,12 +124,14 @@ class EdgeJudge:
                 yield _no_run(RefusalReason.CALIBRATION_REFUSED, why)
 
     def _reset(self, command: Command, at: Situation) -> EdgeRefusal | None:
-        if at.state is not State.FAULT:
+        if at.state in ENABLED_STATES:
             text = f"reset refused: no fault is latched, state {at.state.name}"
             return EdgeRefusal(RefusalReason.NOTHING_TO_RESET, ControlBit.RESET_FAULT, text)
         if held := _held(command):
             text = f"reset_fault needs enable 0 and setpoint 0: {' and '.join(held)}"
             return EdgeRefusal(RefusalReason.RESET_NEEDS_ZERO, ControlBit.RESET_FAULT, text)
+        if at.state is State.OFF:
+            return None  # as many programs begin: there is no fault latched, and that is what was asked for
         if not self._follower.lease.would_be_fresh_since(at.faulted_s, at.now_s, command.heartbeat):
             text = f"reset refused: heartbeat = {command.heartbeat} as at the fault: write another value with the reset"
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)

@@ -158,7 +158,11 @@ class Bench:
         self.releases += output.release_owner
         if output.clear_command and not self.ignores_clearing:
             cleared = replace(
-                self.command, control_word=ControlBit(0), force_setpoint_n=0.0, number=self.command.number + 1
+                self.command,
+                control_word=ControlBit(0),
+                force_setpoint_n=0.0,
+                voltage_setpoint_v=0.0,
+                number=self.command.number + 1,
             )
             self.command = replace(cleared, heartbeat=0) if self.clearing_zeroes_heartbeat else cleared
         return output

@@ -64,7 +64,8 @@ def test_every_pair_of_state_and_event_is_meant_so():
 def test_an_edge_that_was_not_asked_about_is_a_defect_and_no_silence():
     """What control would refuse never reaches its step: the bank asks. If it comes all the same, the fault is ours."""
     bench = ready()
-    bench.command = Command(control_word=ControlBit.RESET_FAULT, number=99)
+    bench.enable(12.0)
+    bench.command = Command(control_word=ControlBit.ENABLE | ControlBit.RESET_FAULT, number=99)
     with pytest.raises(TransitionError):
         bench.step()
     assert bench.controller.state is State.FAULT

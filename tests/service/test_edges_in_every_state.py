@@ -124,17 +124,18 @@ PRESSING = {
     "force": State.HOLDING, "ramp": SAME, "tilt": SAME,
 }  # fmt: skip
 AT_REST = {
-    "reset": R.NOTHING_TO_RESET, "reset too": R.NOTHING_TO_RESET, "reset and enable": R.NOTHING_TO_RESET,
     "calibrate": State.CALIBRATING, "calibrate too": State.CALIBRATING, "calibrate and enable": State.CALIBRATING,
     "calibrate and force": HELD, "ramp": SAME, "tilt": SAME,
 }  # fmt: skip
 OFF = AT_REST | {
     "enable": State.READY, "enable and force": State.HOLDING, "tare": State.OFF, "tare too": State.OFF,
     "tare and force": State.OFF, "enable and tare": State.READY, "force": State.OFF,
+    "reset": SAME, "reset too": SAME, "reset and enable": R.RESET_NEEDS_ZERO,
 }  # fmt: skip
 READY = AT_REST | {
     "enable": SAME, "enable and force": State.HOLDING, "tare": State.OFF, "tare too": State.READY,
     "tare and force": State.HOLDING, "enable and tare": State.READY, "force": State.HOLDING,
+    "reset": R.NOTHING_TO_RESET, "reset too": R.NOTHING_TO_RESET, "reset and enable": R.NOTHING_TO_RESET,
 }  # fmt: skip
 FAULT = {
     "enable": FAULTY, "enable and force": FAULTY, "reset": State.OFF, "reset too": State.OFF,

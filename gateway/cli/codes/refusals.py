@@ -273,8 +273,8 @@ ENTRIES: Final = (
     Entry(
         "W312",
         "nothing to reset",
-        "The reset bit was written while no fault is latched. Exception 04.",
-        "The master resets as a matter of routine, or holds the bit at 1.",
+        "The reset bit was written while the output is enabled, so that no fault is latched. Exception 04.",
+        "The master resets as a matter of routine, or holds the bit at 1. With the output off that is answered with ok.",
         "Write the bit once, when bit 4 (fault) of status_word is set.",
         "NOTHING_TO_RESET",
     ),
