@@ -5,7 +5,7 @@ import contextlib
 import time
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.control import Controller
 from gateway.devices import cell_host, output_host
@@ -19,6 +19,7 @@ from gateway.registers.words import FaultCode, WarningBit
 from gateway.service import banner
 from gateway.service.activation import InUse
 from gateway.service.control_socket import Asked, ControlSocket
+from gateway.service.ending import EndCause, Ending
 from gateway.service.event_log import EventLog
 from gateway.service.gateway import Gateway
 from gateway.service.guardian_line import GuardianLine
@@ -44,11 +45,18 @@ class StartError(Exception):
         self.exit_code = exit_code
 
 
-def _cause_of_restart(restarted: str, *, was_unclean: bool) -> FaultCode:
-    """What the fault_code register says after an unclean end: the guardian's words, or a run that never ended."""
-    if not restarted and not was_unclean:
-        return FaultCode.NONE
-    return FaultCode.LOOP_STALLED if "stalled" in restarted else FaultCode.INTERNAL
+_FAULTS: Final = {
+    EndCause.MACHINE_BUSY: FaultCode.MACHINE_BUSY,
+    EndCause.STALLED: FaultCode.LOOP_STALLED,
+    EndCause.STOPPED: FaultCode.LOOP_STALLED,
+}
+
+
+def _cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCode:
+    """What the fault_code register says after an unclean end: the guardian's cause, or a run that never ended."""
+    if restarted:
+        return _FAULTS.get(restarted.cause, FaultCode.INTERNAL)
+    return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
 
 
 class Cell:
@@ -138,7 +146,7 @@ class Cell:
         if self._tick.is_fallback:
             self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
 
-    async def start(self, bind: list[Any] | None, *, record: bool, restarted: str) -> banner.Ready:
+    async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
         self._wire(_cause_of_restart(restarted, was_unclean=self._flag.raise_flag()))
         await self._output_port.open()
@@ -161,6 +169,11 @@ class Cell:
             notes=notes,
         )
 
+    def move_ports(self, ports: dict[str, str]) -> None:
+        """The simulated rig has been started again, elsewhere: what was lost is opened there."""
+        self._output_port.move(ports["output"])
+        self._cell_port.move(ports["load_cell"])
+
     def _record_from_the_start(self) -> tuple[str, ...]:
         """A disk that takes no recording is no reason not to control."""
         try:
@@ -169,10 +182,10 @@ class Cell:
             return (f"not recording: {error}",)
         return ()
 
-    async def _notes(self, restarted: str) -> tuple[str, ...]:
+    async def _notes(self, restarted: Ending | None) -> tuple[str, ...]:
         notes = [*self._rig.notes, *self._calibrations.notes]
         if restarted:
-            notes.append(f"restarted in OFF after: {restarted}")
+            notes.append(f"restarted in OFF after: {restarted.sentence}")
         if self._line.acknowledged_v is None:
             notes.append(await self._why_silent(self._output_port, self._rig.output))
         if self.gateway.sample is None:

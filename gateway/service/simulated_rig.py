@@ -28,6 +28,8 @@ from gateway.devices.messages import (
 )
 from gateway.ports import PacedPty
 from gateway.profiles import Rig, load_rig
+from gateway.service import link as guardian_link
+from gateway.service import priority
 from gateway.service.json_lines import JsonLineServer
 from gateway.service.tick import Tick
 from gateway.twin import Plant, Twin
@@ -159,7 +161,7 @@ async def serve(rig: Rig, link: socket.socket, state: Path) -> None:
         sys.stderr.write(f"{unserved}\n")
     tick.start()
     loop.add_reader(link.fileno(), ended.set)
-    link.send(json.dumps({"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}}).encode())
+    guardian_link.send(link, guardian_link.PTYS, {"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}})
     await ended.wait()
     loop.remove_reader(link.fileno())
     tick.close()
@@ -171,6 +173,7 @@ async def serve(rig: Rig, link: socket.socket, state: Path) -> None:
 def main(arguments: list[str]) -> int:
     link = socket.socket(fileno=int(arguments[0]))
     options = json.loads(arguments[1])
+    priority.take(priority.RIG_NICE)
     asyncio.run(serve(load_rig(options["rig"]).as_simulated(), link, Path(options["state"])))
     return 0
 

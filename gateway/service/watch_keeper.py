@@ -5,27 +5,21 @@ takes a few milliseconds), its death is read like any other event, and a start t
 library only.
 """
 
-import sys
 from collections.abc import Callable
 from math import inf
 from typing import Final
 
-from gateway.service.children import Child
+from gateway.service.children import Child, exit_word
 
 PAUSES_S: Final = (5.0, 30.0, 120.0)
 """Waiting times before it is started again; it dies once more, and that is it."""
 _LONG_LIFE_S: Final = 900.0  # a watch that lived this long begins to count anew
 
 
-def _complain(sentence: str) -> None:
-    sys.stderr.write(sentence + "\n")
-    sys.stderr.flush()
-
-
 class WatchKeeper:
     """spawn: starts the process, OSError when that fails; say: a sentence for people. Times are monotonic seconds."""
 
-    def __init__(self, spawn: Callable[[], Child], say: Callable[[str], None] = _complain) -> None:
+    def __init__(self, spawn: Callable[[], Child], say: Callable[[str], None]) -> None:
         self._spawn = spawn
         self._say = say
         self._child: Child | None = None
@@ -52,13 +46,13 @@ class WatchKeeper:
         if self._child is None and self._deaths == 0:
             self._begin(now_s)
 
-    def follow(self, readable: list[object], now_s: float) -> None:
+    def follow(self, readable: set[int], now_s: float) -> None:
         """After each wait: has it died, is it time to start it again?"""
         if self._child is not None and self._child.died in readable:
             code = self._child.wait()
             self._child.close()
             self._child = None
-            self._died(f"ended ({f'signal {-code}' if code < 0 else f'exit {code}'})", now_s)
+            self._died(f"ended ({exit_word(code)})", now_s)
         elif now_s >= self._due_s:
             self._begin(now_s)
 
@@ -72,7 +66,7 @@ class WatchKeeper:
         try:
             self._child = self._spawn()
         except OSError as error:
-            self._died(f"did not start ({error.strerror})", now_s)
+            self._died(f"did not start ({error.strerror or error})", now_s)
 
     def _died(self, how: str, now_s: float) -> None:
         if now_s - self._began_s >= _LONG_LIFE_S:

@@ -41,7 +41,7 @@ def with_cell(devices: OwnDevices, scene: Scene) -> list[str]:
         guardian = GuardianLine(theirs)
         cell = Cell(rig, rig.ports(), state, guardian, log)
         try:
-            await cell.start(["127.0.0.1", 0], record=False, restarted="")
+            await cell.start(["127.0.0.1", 0], record=False, restarted=None)
             async with asyncio.timeout(10):
                 await scene(cell, ours)
         finally:
