@@ -212,8 +212,9 @@ class Guardian:
             if self.last_beat_s is not None:  # before READY the start has its own, longer patience
                 self._heard(control)
         elif message.tag == link.BORN:
-            control.born(int(message.body["pid"]))
-            self.nursery.was_born()
+            with contextlib.suppress(OSError):  # it has died since: the end of its line is behind this message
+                control.born(int(message.body["pid"]))
+                self.nursery.was_born()
         elif message.tag == link.LINE:
             self._take_line(message)
         elif message.tag == link.NEED_RIG:
@@ -324,7 +325,7 @@ class Guardian:
         control, self.control = self.control, None
         if control is None:
             return EXIT_OK  # told to stop while there was none
-        is_gone = control.died < 0 or bool(wait_for([control.died], _DEATH_BOUND_S))
+        is_gone = control.died < 0 or bool(self.wait([control.died], _DEATH_BOUND_S))
         ending = self.said_cause or (cause if isinstance(cause, Ending) else cause())
         code = control.wait()
         control.close()
