@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -352,3 +354,13 @@ def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, mon
         one.run()
     one.guardian._close()
     assert port.wrote() == SAFE_FRAME
+
+
+def test_a_reader_that_has_gone_does_not_end_the_guardian():
+    """`run --json | head -1`, and a closed stderr: said to nobody, and exit 0."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    code = "from gateway.service.guardian_words import announce, complain; announce('READY'); announce({}); complain('A401')"
+    done = subprocess.run([sys.executable, "-c", code], stdout=writer, stderr=writer, check=False)
+    os.close(writer)
+    assert done.returncode == 0
