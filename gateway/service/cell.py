@@ -34,6 +34,7 @@ from gateway.service.tick import Tick
 from gateway.service.watch_desk import WatchDesk
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
+_WORDS_AGAIN_S = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
 _STOP_BOUND_S = 4.5  # the guardian waits 5 s
 
 
@@ -153,7 +154,7 @@ class Cell:
         await self._cell_port.open()
         self._tick.start()
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._spoke.wait(), _FIRST_WORDS_S)
+            await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
         notes = await self._notes(restarted)
         if record:
             notes += self._record_from_the_start()
@@ -187,13 +188,18 @@ class Cell:
         if restarted:
             notes.append(f"restarted in OFF after: {restarted.sentence}")
         if self._line.acknowledged_v is None:
-            notes.append(await self._why_silent(self._output_port, self._rig.output))
+            notes.append(await self._why_silent(self._output_port, self._rig.output, restarted))
         if self.gateway.sample is None:
-            notes.append(await self._why_silent(self._cell_port, self._rig.load_cell))
+            notes.append(await self._why_silent(self._cell_port, self._rig.load_cell, restarted))
         return tuple(notes)
 
-    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine) -> str:
-        """The port is ours alone: it is closed while the probe listens at other speeds, and opened again."""
+    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, restarted: Ending | None) -> str:
+        """The port is ours alone: it is closed while the probe listens at other speeds, and opened again.
+
+        Not after a restart: seconds of listening would tell what the start has told already.
+        """
+        if restarted:
+            return f"E111 {port.path}: nothing heard within {_WORDS_AGAIN_S:g} s of the restart; power, wires?"
         port.close()
         sentence = await why_no_words(line, port.path)
         await port.open()
