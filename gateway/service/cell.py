@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import time
 import traceback
 from pathlib import Path
@@ -30,6 +31,7 @@ from gateway.service.recordings import Recordings
 from gateway.service.rig_calibrations import RigCalibrations
 from gateway.service.rules import bank_rules, server_settings
 from gateway.service.run_flag import RunFlag
+from gateway.service.scheduling import TurnsOf
 from gateway.service.tick import Tick
 from gateway.service.watch_desk import WatchDesk
 
@@ -93,6 +95,7 @@ class Cell:
             on_open=self._on_cell_open,
         )
         self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
+        self._turns = TurnsOf(os.getpid())
         self._tick = Tick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
 
@@ -144,6 +147,7 @@ class Cell:
         self.gateway.recordings = self._recordings
         self.gateway.ring = self.ring
         self.gateway.restart_cause = cause
+        self.gateway.waited_s = self._turns.waited_s
         if self._tick.is_fallback:
             self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
 
@@ -239,6 +243,7 @@ class Cell:
         self._output_port.close()
         self._cell_port.close()
         self._upload.close()
+        self._turns.close()
         self._flag.lower()
 
     def _on_defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

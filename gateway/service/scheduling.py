@@ -54,6 +54,10 @@ class TurnsOf:
             return None
         return Turns(int(on_cpu_ns) * 1e-9, int(waited_ns) * 1e-9)
 
+    def waited_s(self) -> float | None:
+        turns = self.read()
+        return turns.waited_s if turns else None
+
     def state(self) -> str:
         """R, S, D, T, ...: the letter behind the name, which may hold brackets itself."""
         try:
