@@ -14,7 +14,7 @@ from gateway.service.children import Child, exit_word, spawn
 
 PAUSES_S: Final = (5.0, 30.0, 120.0)
 """Before the fork server is started again; it dies once more, and that is it."""
-_BIRTH_S: Final = 1.0  # from asking a server that is prepared; more than 50 times what it takes on a quiet machine
+_BIRTH_S: Final = 5.0  # from asking a prepared server: a busy machine is no reason to import everything again
 _FIRST_BIRTH_S: Final = 30.0  # imports on a slow machine
 _COMMAND_ROOM: Final = 1024
 WATCH: Final = "gateway.service.watch_process"

@@ -3,10 +3,13 @@
 import os
 import random
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 
 import psutil
+import pytest
 
 from tests.end_to_end.conftest import RunningGateway
 
@@ -67,6 +70,27 @@ def test_a_control_process_killed_at_any_moment_of_its_start_comes_up_in_the_end
 def test_whoever_else_dies_the_gateway_goes_on(running):
     a_simulated_rig_that_dies_comes_back_and_presses_again(running)
     without_its_prepared_process_a_restart_only_takes_longer(running)
+
+
+@pytest.mark.skipif(os.geteuid() != 0 or len(os.sched_getaffinity(0)) < 2, reason="needs SCHED_FIFO and a second core")
+def test_a_machine_that_does_not_let_the_loop_run_is_named_as_the_cause(running):
+    """One core for control, taken from it for longer than stall_s by a process that has every priority."""
+    core = min(os.sched_getaffinity(0))
+    control = running.ready["pids"]["control"]
+    os.sched_setaffinity(control, {core})
+    hog = (
+        f"import os, time; os.sched_setaffinity(0, {{{core}}}); "
+        "os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50)); end_s = time.monotonic() + 0.6\n"
+        "while time.monotonic() < end_s: pass"
+    )
+    subprocess.run([sys.executable, "-c", hog], check=True)
+    line = running.said("A401", within_s=5.0)
+    print(line)
+    assert "(A403)" in line
+    reconnect(running)
+    assert running.words(110, 1) == [16], "machine_busy"
+    assert running.words(111, 1)[0] & 1, "restarted"
+    assert any("A403" in note for note in running.ready["notes"])
 
 
 def without_its_prepared_process_a_restart_only_takes_longer(running: RunningGateway) -> None:
