@@ -22,47 +22,22 @@ from gateway.service import link, priority
 from gateway.service.children import Child, exit_word, reap_strangers, shared_memory
 from gateway.service.ending import EndCause, Ending
 from gateway.service.nursery import Nursery
+from gateway.service.pulse import Pulse
 from gateway.service.restarts import Restarts
 from gateway.service.rig_keeper import RigKeeper
+from gateway.service.run_options import RunOptions
 from gateway.service.safe_line import SafeLine
-from gateway.service.scheduling import Silence, Turns, judged, load_of_machine, since
 from gateway.service.waiting import Signals, wait_for
 from gateway.service.watch_keeper import WatchKeeper
 
 _START_GRACE_S: Final = 30.0  # imports on a slow machine; nothing but the safe voltage is written before READY
 _STOP_BOUND_S: Final = 5.0  # from the first signal; from the end of the line of a control process that never was ready
 _DEATH_BOUND_S: Final = 2.0  # of a killed process: milliseconds, unless a driver holds it
-_LATE_S: Final = 0.02
 _MOST_MESSAGES: Final = 1000  # of one wait: a child that floods its line does not keep us from the rest
 
 EXIT_OK, EXIT_FAILED, EXIT_DEVICE = 0, 1, 69
 _REFUSED: Final = frozenset({65, 77, 78})
 """Exit codes of a control process that has told the user why it can't work: another start would end the same way."""
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """What `force-gateway run` was asked for. state None: $XDG_STATE_HOME/force-gateway/RIG."""
-
-    rig: str = "demo"
-    simulate: bool = False
-    bind: tuple[str, int] | None = None
-    state: Path | None = None
-    json: bool = False
-    record: bool = False
-    realtime: bool = False
-
-    @property
-    def state_directory(self) -> Path:
-        if self.state is not None:
-            return self.state
-        return default_state_root() / Path(self.rig).stem
-
-
-def default_state_root() -> Path:
-    """Where the state directories of rigs are that were given none."""
-    home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
-    return Path(home) / "force-gateway"
 
 
 def run(options: RunOptions) -> int:
@@ -101,19 +76,15 @@ class Guardian:
     watch_keeper: WatchKeeper | None = None
     ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
     line: SafeLine | None = None
-    stall_s: float = 0.1
+    pulse: Pulse = field(default_factory=Pulse)
     bound: tuple[str, int] | None = None
     said_cause: Ending | None = None  # what control gave as its own first cause
     next_start: Ending | None = None  # why control is started again, once it is
-    last_beat_s: float | None = None  # None until READY; later than it was where we were late ourselves
-    heard_s: float = 0.0  # the last heartbeat
-    last_turns: Turns | None = None  # at the last heartbeat
     asked_s: float = 0.0  # when control was asked for, or is to be
     stop_deadline_s: float | None = None
     stops: int = 0
     announced: bool = False
     link_ended: bool = False
-    was_late: bool = False
     restarts: Restarts = field(default_factory=Restarts)
 
     def watch(self) -> int:
@@ -121,18 +92,17 @@ class Guardian:
         self.ring = shared_memory()
         try:
             self.nursery.open()
-            self._start_control()
-            while True:
+            code = self._start_control()
+            while code is None:
                 code = self._step()
-                if code is not None:
-                    return code
+            return code
         finally:
             self._close()
 
     def _step(self) -> int | None:
         readable = self.wait(self._sources(), self._patience_s())
-        if self.signals.descriptor in readable:
-            self._on_signal(self.signals.take())
+        if self.signals.descriptor in readable and (count := self.signals.take()):
+            self._on_signal(count)
         control = self.control
         if control and not self.link_ended and control.link.fileno() in readable:
             self._on_messages(control)
@@ -164,8 +134,8 @@ class Guardian:
         """When control is overdue: its heartbeat, READY, its birth; or when it is to be started."""
         if self.control is None:
             return self.asked_s
-        if self.last_beat_s is not None:
-            return self.last_beat_s + self.stall_s
+        if self.pulse.is_up:
+            return self.pulse.due_s
         return self.asked_s + (_START_GRACE_S if self.control.pid else self.nursery.birth_bound_s)
 
     def _follow_others(self, readable: set[int]) -> None:
@@ -181,7 +151,7 @@ class Guardian:
     def _on_signal(self, count: int) -> None:
         """The first one asks control to ramp down, where there is a line to ramp on; a second one waits for nothing."""
         self.stops += count
-        is_up = self.line is not None or self.last_beat_s is not None
+        is_up = self.line is not None or self.pulse.is_up
         self.stop_deadline_s = self.clock() + (_STOP_BOUND_S if self.stops == 1 and is_up else 0.0)
         if self.stops == 1:
             self._tell_control(link.STOP)
@@ -209,8 +179,8 @@ class Guardian:
 
     def _handle(self, control: Child, message: link.Message) -> None:
         if message.tag == link.HEARTBEAT:
-            if self.last_beat_s is not None:  # before READY the start has its own, longer patience
-                self._heard(control)
+            if self.pulse.is_up:  # before READY the start has its own, longer patience
+                self.pulse.heard(control, self.clock())
         elif message.tag == link.BORN:
             with contextlib.suppress(OSError):  # it has died since: the end of its line is behind this message
                 control.born(int(message.body["pid"]))
@@ -224,11 +194,6 @@ class Guardian:
         elif message.tag == link.READY:
             self._announce(control, message)
         message.drop_descriptors()
-
-    def _heard(self, control: Child) -> None:
-        self.last_beat_s = self.heard_s = self.clock()
-        self.was_late = False
-        self.last_turns = control.turns.read() if control.turns else None
 
     def _take_line(self, message: link.Message) -> None:
         if not message.descriptors:
@@ -254,10 +219,10 @@ class Guardian:
 
     def _announce(self, control: Child, message: link.Message) -> None:
         info, banner = message.body["info"], message.body["banner"]
-        self.stall_s = float(message.body["stall_s"])
+        self.pulse.stall_s = float(message.body["stall_s"])
         host, port = info["modbus"]
         self.bound = (host, port)  # a restart keeps the port that masters already know
-        self._heard(control)
+        self.pulse.heard(control, self.clock())
         self._provide_watch(message.body["watch"])
         if self.options.json:
             words.announce(info | {"pids": self._pids()})
@@ -287,18 +252,15 @@ class Guardian:
         now_s = self.clock()
         if self.stop_deadline_s is not None:
             return self._on_death(Ending(EndCause.DIED, "stopped")) if now_s >= self.stop_deadline_s else None
-        late_s = now_s - self._deadline_s()
-        if late_s < 0.0:
+        if now_s < self._deadline_s():
             return None
         if self.control is None:
             return self._start_control()
-        if self.last_beat_s is None:
+        if not self.pulse.is_up:
             return self._on_no_start(self.control, now_s)
-        if late_s > _LATE_S and not self.was_late:
-            self.was_late = True  # we woke late ourselves: the machine stood still, the child gets one more chance
-            self.last_beat_s = now_s - self.stall_s + _LATE_S
-            return None
-        return self._on_silence(self.control, now_s)
+        if self.pulse.is_overdue(now_s):
+            return self._on_death(self.pulse.why_silent(self.control, now_s))
+        return None
 
     def _on_no_start(self, control: Child, now_s: float) -> int | None:
         if not control.pid:  # nothing has been risked: the long way, at once, and it counts as no restart
@@ -307,17 +269,6 @@ class Guardian:
             self.nursery.drop_server("does not answer", now_s)
             return self._start_control()
         return self._on_death(Ending(EndCause.NOT_STARTED, f"control process not ready within {_START_GRACE_S:g} s"))
-
-    def _on_silence(self, control: Child, now_s: float) -> int | None:
-        """The kernel's counters are read behind the kill: they are complete then, and nothing waits for them."""
-        state, before, was_late = control.turns.state() if control.turns else "", self.last_turns, self.was_late
-        silent_s = now_s - self.heard_s
-
-        def why() -> Ending:
-            turns = since(before, control.turns.read() if control.turns else None)
-            return judged(Silence(silent_s, self.stall_s, turns, state, was_late), load_of_machine())
-
-        return self._on_death(why)
 
     def _on_death(self, cause: Ending | Callable[[], Ending]) -> int | None:
         """Safe voltage first, questions later. cause: or how to find it, once nothing is urgent any more."""
@@ -357,8 +308,8 @@ class Guardian:
         return self._start_control() if pause_s == 0.0 else None
 
     def _start_control(self) -> int | None:
-        self.last_beat_s, self.said_cause, self.link_ended, self.was_late = None, None, False, False
-        self.last_turns, self.asked_s = None, self.clock()
+        self.pulse.forget()
+        self.said_cause, self.link_ended, self.asked_s = None, False, self.clock()
         try:
             self.control = self.nursery.control(
                 {

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
-from gateway.service.children import Child, exit_word
+from gateway.service.children import LOST, Child, exit_word
 
 PAUSES_S: Final = (5.0, 30.0, 120.0)
 """Waiting times before it is started again; it dies once more, and that is it."""
@@ -52,7 +52,7 @@ class WatchKeeper:
             code = self._child.wait()
             self._child.close()
             self._child = None
-            self._died(f"ended ({exit_word(code)})", now_s)
+            self._died(f"ended ({f'signal {-code}' if LOST < code < 0 else exit_word(code)})", now_s)
         elif now_s >= self._due_s:
             self._begin(now_s)
 

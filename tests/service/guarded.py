@@ -14,7 +14,8 @@ import pytest
 
 from gateway.service import link
 from gateway.service.children import Child
-from gateway.service.guardian import Guardian, RunOptions
+from gateway.service.guardian import Guardian
+from gateway.service.run_options import RunOptions
 from gateway.service.scheduling import Turns
 from gateway.service.waiting import wait_for
 

@@ -85,7 +85,7 @@ def scene(tmp_path: Path) -> Iterator[Callable[..., Scene]]:
 
 
 def comes_up(one: Scene) -> None:
-    assert one.run(lambda: one.guardian.last_beat_s is not None) is None, one.said
+    assert one.run(lambda: one.guardian.pulse.is_up) is None, one.said
 
 
 @pytest.mark.parametrize("code", [-9, 1, 0, None])
@@ -147,7 +147,7 @@ def test_the_nth_call_on_any_line_may_fail_until_none_does(scene, port, error):
             rig_lives(child)
 
         one = scene(script, lives(port), rigs=(rig, rig_lives))
-        assert one.run(lambda one=one: one.now_s > 160.0 or one.guardian.last_beat_s is not None, 400) is None, n
+        assert one.run(lambda one=one: one.now_s > 160.0 or one.guardian.pulse.is_up, 400) is None, n
         comes_up(one)
         one.signals.send()
         one.signals.send()

@@ -98,8 +98,8 @@ FAULTS: Final = (
         "A319",
         "control loop stalled",
         "The loop came round later than the bound; commands that waited meanwhile were dropped.",
-        "The machine is overloaded, suspended, or swapping.",
-        "Look for other load (top); `run --realtime` gives the loop priority.",
+        "It was stopped or suspended, or a defect of ours; where the kernel does not count waiting, an overloaded machine.",
+        "The line says how long it waited for a processor, if the kernel counts that; look for other load (top).",
         "LOOP_STALLED",
     ),
     Entry(
