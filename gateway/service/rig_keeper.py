@@ -93,13 +93,15 @@ class RigKeeper:
             if message is not None and message.tag == link.BORN:
                 child.born(int(message.body["pid"]))
             elif message is not None and message.tag == link.PTYS:
-                self._due_s, self._answer = inf, {"ptys": message.body["ptys"]}
-                self._tell(self._answer)
-            elif message is None:
-                self._on_end_of_link(child, now_s)
-        except (OSError, ValueError, KeyError):
+                self._due_s, self._answer = inf, {"ptys": dict(message.body["ptys"])}
+        except (OSError, ValueError, KeyError, TypeError):
             child.kill()
             self._died("its first words made no sense", now_s)
+            return
+        if message is None:
+            self._on_end_of_link(child, now_s)
+        elif message.tag == link.PTYS and self._answer:
+            self._tell(self._answer)
 
     def _on_end_of_link(self, child: Child, now_s: float) -> None:
         """Its death follows, which has the exit code; without a birth there is nothing to wait for."""
