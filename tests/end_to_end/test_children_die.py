@@ -110,6 +110,8 @@ def a_simulated_rig_that_dies_comes_back_and_presses_again(running: RunningGatew
     os.kill(running.ready["pids"]["rig"], signal.SIGKILL)
     running.wait_until(lambda status: status["state"] == FAULT)
     assert "started again" in running.said("A408")
-    running.wait_until(lambda status: not running.write(0, 2, 0).isError() and status["state"] == OFF, within_s=8.0)
-    running.wait_until(lambda status: not running.write(0, 1, 1000).isError() and status["state"] == HOLDING)
+    until(lambda: not running.write(0, 2, 0).isError())
+    running.wait_until(lambda status: status["state"] == OFF)
+    until(lambda: not running.write(0, 1, 1000).isError())
+    running.wait_until(lambda status: status["state"] == HOLDING)
     assert running.process.poll() is None
