@@ -63,7 +63,7 @@ def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str,
         time.sleep(_POLL_S)
         answer = ask(directory, {"do": "calibration"})
     if answer["failed"]:
-        raise CliError(answer["said"], _exit_code(answer["said"]))
+        raise CliError(answer["said"], _exit_code(answer["reason"]))
     return answer
 
 
@@ -79,9 +79,9 @@ def _changed_here(directory: Path, rig_name: str, request: dict[str, Any]) -> di
         taken = activation.take_back() if "rollback" in request else activation.take(request["use"])
     except NotFit as error:
         sentence = error.fault.sentence(before.number if before else 0)
-        raise CliError(sentence, _exit_code(sentence)) from None
+        raise CliError(sentence, exit_codes.DATA) from None
     except StoreError as error:
-        raise CliError(str(error), _exit_code(str(error))) from None
+        raise CliError(str(error), exit_codes.FAILED if error.code == "E431" else exit_codes.DATA) from None
     calibration, active = taken.calibration, taken.pointer.active
     return {
         "active": calibration.number,
@@ -92,9 +92,11 @@ def _changed_here(directory: Path, rig_name: str, request: dict[str, Any]) -> di
     }
 
 
-def _exit_code(sentence: str) -> int:
-    """A disk that refuses is a failure, all else is a wrong calibration or number."""
-    return exit_codes.FAILED if sentence.startswith(("E431", "A499")) else exit_codes.DATA
+def _exit_code(reason: int) -> int:
+    """A disk that refuses, or a defect of ours, is a failure; all else is a wrong calibration or number."""
+    from gateway.registers.words import UploadReason
+
+    return exit_codes.FAILED if reason in (UploadReason.STORAGE, UploadReason.DEFECT) else exit_codes.DATA
 
 
 def _rig(name: str) -> "Rig | None":

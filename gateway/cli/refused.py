@@ -53,7 +53,7 @@ def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:
     """What the gateway itself has said to this refusal; empty where it is elsewhere, or nobody answers."""
     from gateway.cli.control_socket import ask
-    from gateway.service.guardian import default_state_root
+    from gateway.service.run_options import default_state_root
 
     states = [state] if state else _sockets_near(client, default_state_root())
     for directory in states:

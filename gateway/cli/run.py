@@ -31,6 +31,7 @@ def command(context: click.Context, /, **options: Any) -> None:
 
     RIG is a shipped name or a file. Ctrl-C ramps the force to 0 and stops; a second Ctrl-C skips the ramp.
     """
-    from gateway.service.guardian import RunOptions, run
+    from gateway.service.guardian import run
+    from gateway.service.run_options import RunOptions
 
     context.exit(run(RunOptions(**options)))  # the options are the dataclass's fields, by name

@@ -20,6 +20,7 @@ FAULT_CODES: Final[dict[FaultCode, str]] = {
     FaultCode.NOT_FINITE: "A320",
     FaultCode.MODEL_INVALID: "A321",
     FaultCode.INTERNAL: "A499",
+    FaultCode.MACHINE_BUSY: "A403",
 }
 """What `explain` knows each fault by."""
 

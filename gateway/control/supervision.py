@@ -39,6 +39,19 @@ def finding(fault: FaultCode, detail: str) -> Finding:
     return Finding(fault, fault_sentence(fault, detail))
 
 
+def _lateness(line: Line, allowed_s: float) -> Finding:
+    """Our defect, or the machine's load: the larger part of the lateness tells."""
+    seen = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
+    dropped = "what arrived meanwhile was dropped"
+    if line.waited_s is None:
+        return finding(FaultCode.LOOP_STALLED, f"{seen}: the machine is overloaded; {dropped}")
+    waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"
+    if line.waited_s < 0.5 * line.late_s:
+        return finding(FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or a defect of ours; {dropped}")
+    cure = "the machine is too busy: end other programs, or `run --realtime`"
+    return finding(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {cure}; {dropped}")
+
+
 class Supervisor:
     """Counts on every new sample; `first_cause` is asked once per step while enabled."""
 
@@ -95,10 +108,7 @@ class Supervisor:
 
     def _of_line(self, now_s: float, line: Line) -> Finding | None:
         if line.late_s > self._bounds.stall_s:
-            seen = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {self._bounds.stall_s * 1e3:.0f} ms"
-            return finding(
-                FaultCode.LOOP_STALLED, f"{seen}: the machine is overloaded; what arrived meanwhile was dropped"
-            )
+            return _lateness(line, self._bounds.stall_s)
         if line.fault:
             return finding(line.fault, _LINE_WORDS.get(line.fault, "reported by the output line"))
         if self._is_silent(now_s, line):

@@ -65,6 +65,13 @@ class SerialPort:
     async def open(self) -> None:
         self._open()
 
+    def move(self, path: str) -> None:
+        """The device is found elsewhere from now on. A lost port is opened there at once; an open one is still good."""
+        self._path = path
+        if self._reopening and self._descriptor < 0:
+            self._reopening.cancel()
+            self._reopen()
+
     def write(self, data: bytes) -> bool:
         if not self.is_open:
             return False

@@ -74,6 +74,7 @@ class FaultCode(IntEnum):
     NOT_FINITE = 13
     INTERNAL = 14
     MODEL_INVALID = 15
+    MACHINE_BUSY = 16  # A403: the loop was late because the machine did not let it run
 
 
 class WarningBit(IntFlag):

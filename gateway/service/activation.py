@@ -51,7 +51,7 @@ class Activation:
         """Select a calibration that is there, None: the built-in one."""
         calibration = self.store.built_in if number is None else self.store.load(number)
         if calibration is None:
-            raise StoreError("E433 the built-in calibration of this rig is not known here")
+            raise StoreError("E433", "the built-in calibration of this rig is not known here")
         if (fault := self._fault(calibration)) is not None:
             raise NotFit(fault)
         model = calibration.model()

@@ -31,7 +31,11 @@ UNKNOWN_N: Final = -1.0
 
 
 class StoreError(Exception):
-    """A calibration cannot be stored, read or used; what was in use stays. The sentence begins with its code."""
+    """A calibration cannot be stored, read or used; what was in use stays. str: the sentence, which begins with its code."""
+
+    def __init__(self, code: str, sentence: str) -> None:
+        super().__init__(f"{code} {sentence}")
+        self.code = code
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +99,9 @@ class CalibrationStore:
         except FileNotFoundError:
             return self._built_in(number)
         except OSError as error:
-            raise StoreError(f"E432 {path} cannot be read: {error.strerror}") from None
+            raise StoreError("E432", f"{path} cannot be read: {error.strerror}") from None
         if calibration.number != number:
-            raise StoreError(f"E432 {path} says that it is calibration {calibration.number}")
+            raise StoreError("E432", f"{path} says that it is calibration {calibration.number}")
         return calibration
 
     def standing(self, why_not: Callable[[Calibration], str] = lambda calibration: "") -> Standing:
@@ -123,7 +127,7 @@ class CalibrationStore:
         if number is not None and self.load(number) is self.built_in:
             number = None
         if slot is not None and not 0 <= slot < SLOTS:
-            raise StoreError(f"E433 slot {slot}: there are 0 .. {SLOTS - 1}")
+            raise StoreError("E433", f"slot {slot}: there are 0 .. {SLOTS - 1}")
         return self._change(Selection(number, slot))
 
     def rollback(self) -> Pointer:
@@ -135,7 +139,7 @@ class CalibrationStore:
         """What a rollback brings back. StoreError where nothing was ever changed."""
         pointer, _ = self._pointer()
         if pointer.generation == 0:
-            raise StoreError("E433 no calibration was in use before this one: there is nothing to go back to")
+            raise StoreError("E433", "no calibration was in use before this one: there is nothing to go back to")
         previous = pointer.previous
         kept = previous.slot is not None and pointer.in_slot(previous.slot) == previous
         return previous if kept else Selection(previous.number)
@@ -181,7 +185,7 @@ class CalibrationStore:
         if self.built_in is not None and self.built_in.number == number:
             return self.built_in
         known = ", ".join(map(str, self._numbers())) or "none yet"
-        raise StoreError(f"E433 there is no calibration {number} in {self.directory}; there are: {known}")
+        raise StoreError("E433", f"there is no calibration {number} in {self.directory}; there are: {known}")
 
     def _numbers(self) -> Numbers:
         names = [path.name for path in self.directory.iterdir()] if self.directory.is_dir() else []
@@ -191,7 +195,9 @@ class CalibrationStore:
         spoken_of, _ = read_pointer(self.directory)
         number = 1 + max(0, *self._numbers(), *spoken_of.numbers, self.built_in.number if self.built_in else 0)
         if number > _LAST:
-            raise StoreError(f"E431 {self.directory} holds calibration {_LAST}, the last number: start a new --state")
+            raise StoreError(
+                "E431", f"{self.directory} holds calibration {_LAST}, the last number: start a new --state"
+            )
         return number
 
 
@@ -213,7 +219,7 @@ def _readable(calibration: Calibration) -> bytes:
     """A calibration's file. StoreError for one that could not be read back as it is."""
     data = sealed(as_text(calibration))
     if _parsed(data, Path(calibration.name)) != calibration:
-        raise StoreError(f"E432 {calibration.name} holds a number that no file can")
+        raise StoreError("E432", f"{calibration.name} holds a number that no file can")
     return data
 
 
@@ -222,7 +228,7 @@ def _file_name(number: int) -> str:
 
 
 def _not_stored(error: OSError) -> StoreError:
-    return StoreError(f"E431 calibration not stored: {error.strerror or error}")
+    return StoreError("E431", f"calibration not stored: {error.strerror or error}")
 
 
 def _parsed(data: bytes, path: Path) -> Calibration:
@@ -231,9 +237,9 @@ def _parsed(data: bytes, path: Path) -> Calibration:
         unsealed(data)
         calibration, faults = read_calibration(parse(data, str(path)))
     except ValueError as error:
-        raise StoreError(f"E432 {path} {error}") from None
+        raise StoreError("E432", f"{path} {error}") from None
     except ProfileError as error:
         calibration, faults = None, list(error.faults)
     if calibration is None:
-        raise StoreError(f"E432 {faults[0]}")
+        raise StoreError("E432", str(faults[0]))
     return calibration

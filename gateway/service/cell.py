@@ -2,10 +2,11 @@
 
 import asyncio
 import contextlib
+import os
 import time
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.control import Controller
 from gateway.devices import cell_host, output_host
@@ -19,6 +20,7 @@ from gateway.registers.words import FaultCode, WarningBit
 from gateway.service import banner
 from gateway.service.activation import InUse
 from gateway.service.control_socket import Asked, ControlSocket
+from gateway.service.ending import EndCause, Ending
 from gateway.service.event_log import EventLog
 from gateway.service.gateway import Gateway
 from gateway.service.guardian_line import GuardianLine
@@ -29,10 +31,12 @@ from gateway.service.recordings import Recordings
 from gateway.service.rig_calibrations import RigCalibrations
 from gateway.service.rules import bank_rules, server_settings
 from gateway.service.run_flag import RunFlag
+from gateway.service.scheduling import TurnsOf
 from gateway.service.tick import Tick
 from gateway.service.watch_desk import WatchDesk
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
+_WORDS_AGAIN_S = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
 _STOP_BOUND_S = 4.5  # the guardian waits 5 s
 
 
@@ -44,11 +48,18 @@ class StartError(Exception):
         self.exit_code = exit_code
 
 
-def _cause_of_restart(restarted: str, *, was_unclean: bool) -> FaultCode:
-    """What the fault_code register says after an unclean end: the guardian's words, or a run that never ended."""
-    if not restarted and not was_unclean:
-        return FaultCode.NONE
-    return FaultCode.LOOP_STALLED if "stalled" in restarted else FaultCode.INTERNAL
+_FAULTS: Final = {
+    EndCause.MACHINE_BUSY: FaultCode.MACHINE_BUSY,
+    EndCause.STALLED: FaultCode.LOOP_STALLED,
+    EndCause.STOPPED: FaultCode.LOOP_STALLED,
+}
+
+
+def _cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCode:
+    """What the fault_code register says after an unclean end: the guardian's cause, or a run that never ended."""
+    if restarted:
+        return _FAULTS.get(restarted.cause, FaultCode.INTERNAL)
+    return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
 
 
 class Cell:
@@ -84,6 +95,7 @@ class Cell:
             on_open=self._on_cell_open,
         )
         self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
+        self._turns = TurnsOf(os.getpid())
         self._tick = Tick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
 
@@ -136,17 +148,18 @@ class Cell:
         self.gateway.recordings = self._recordings
         self.gateway.ring = self.ring
         self.gateway.restart_cause = cause
+        self.gateway.waited_s = self._turns.waited_s
         if self._tick.is_fallback:
             self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
 
-    async def start(self, bind: list[Any] | None, *, record: bool, restarted: str) -> banner.Ready:
+    async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
         self._wire(_cause_of_restart(restarted, was_unclean=self._flag.raise_flag()))
         await self._output_port.open()
         await self._cell_port.open()
         self._tick.start()
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._spoke.wait(), _FIRST_WORDS_S)
+            await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
         notes = await self._notes(restarted)
         if record:
             notes += self._record_from_the_start()
@@ -165,6 +178,11 @@ class Cell:
             notes=notes,
         )
 
+    def move_ports(self, ports: dict[str, str]) -> None:
+        """The simulated rig has been started again, elsewhere: what was lost is opened there."""
+        self._output_port.move(ports["output"])
+        self._cell_port.move(ports["load_cell"])
+
     def _record_from_the_start(self) -> tuple[str, ...]:
         """A disk that takes no recording is no reason not to control."""
         try:
@@ -173,18 +191,23 @@ class Cell:
             return (f"not recording: {error}",)
         return ()
 
-    async def _notes(self, restarted: str) -> tuple[str, ...]:
+    async def _notes(self, restarted: Ending | None) -> tuple[str, ...]:
         notes = [*self._rig.notes, *self._calibrations.notes]
         if restarted:
-            notes.append(f"restarted in OFF after: {restarted}")
+            notes.append(f"restarted in OFF after: {restarted.sentence}")
         if self._line.acknowledged_v is None:
-            notes.append(await self._why_silent(self._output_port, self._rig.output))
+            notes.append(await self._why_silent(self._output_port, self._rig.output, restarted))
         if self.gateway.sample is None:
-            notes.append(await self._why_silent(self._cell_port, self._rig.load_cell))
+            notes.append(await self._why_silent(self._cell_port, self._rig.load_cell, restarted))
         return tuple(notes)
 
-    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine) -> str:
-        """The port is ours alone: it is closed while the probe listens at other speeds, and opened again."""
+    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, restarted: Ending | None) -> str:
+        """The port is ours alone: it is closed while the probe listens at other speeds, and opened again.
+
+        Not after a restart: seconds of listening would tell what the start has told already.
+        """
+        if restarted:
+            return f"E111 {port.path}: nothing heard within {_WORDS_AGAIN_S:g} s of the restart; power, wires?"
         port.close()
         sentence = await why_no_words(line, port.path)
         await port.open()
@@ -224,6 +247,7 @@ class Cell:
         self._output_port.close()
         self._cell_port.close()
         self._upload.close()
+        self._turns.close()
         self._flag.lower()
 
     def _on_defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

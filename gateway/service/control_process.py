@@ -1,8 +1,8 @@
 """The control process: one lean asyncio loop with Modbus, both serial ports, the control step and the recorder.
 
 scipy, pandas, matplotlib and jinja2 are never imported here (a full garbage collection costs 2.6 ms lean and 21-36 ms
-with them; a test checks). It is started by the guardian, feeds its heartbeat from the tick, and ends with the safe
-voltage on the wire when the guardian says stop or is gone.
+with them; a test checks). It is started by the guardian, as a rule forked from a process that has imported everything,
+feeds its heartbeat from the tick, and ends with the safe voltage on the wire when the guardian says stop or is gone.
 """
 
 import asyncio
@@ -18,21 +18,23 @@ from typing import Any
 from gateway.ports import PortError
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
-from gateway.service import banner
+from gateway.service import banner, priority
 from gateway.service.cell import Cell, StartError
+from gateway.service.ending import Ending
 from gateway.service.event_file import EventFile
 from gateway.service.event_log import EventLog
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.realtime import use_realtime
 from gateway.service.run_recording import COLUMNS
 
-EXIT_DEFECT, EXIT_CONFIGURATION = 1, 78
+EXIT_DEFECT, EXIT_DEVICE, EXIT_CONFIGURATION = 1, 69, 78
 
 
 def main(arguments: list[str]) -> int:
     link = socket.socket(fileno=int(arguments[0]))
     link.setblocking(False)
     options = json.loads(arguments[1])
+    priority.take(priority.LOOP_NICE)
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
             rig = load(options)
@@ -51,6 +53,13 @@ def _not_started(log: EventLog, sentence: str, exit_code: int, event: str) -> in
     print(sentence, file=sys.stderr)
     log.note("start", event)
     return exit_code
+
+
+def prepare(options: dict[str, Any]) -> None:
+    """What takes long the first time: imports, and the types that the rig's files are checked against."""
+    _loop_factory()
+    with contextlib.suppress(ProfileError):  # told by the process that runs
+        load(options)
 
 
 def load(options: dict[str, Any]) -> Rig:
@@ -89,11 +98,14 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     guardian = GuardianLine(link)
     ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
     if ports is None:
-        return EXIT_CONFIGURATION
+        return EXIT_DEVICE
     cell = Cell(rig, ports, Path(options["state"]), guardian, log)
     cell.ring = sample_ring(options["ring"])
+    guardian.on_ports = cell.move_ports
     try:
-        ready = await cell.start(options["bind"], record=options["record"], restarted=options["restarted"])
+        ready = await cell.start(
+            options["bind"], record=options["record"], restarted=Ending.from_json(options["restarted"])
+        )
         ready = replace(ready, notes=ready.notes + notes)
         gc.collect()
         gc.freeze()

@@ -11,13 +11,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from gateway.service import priority
+
 
 def step_back() -> None:
     """Out of a parent's real-time class, and behind everybody else."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    with contextlib.suppress(OSError):
-        os.nice(10)
+    priority.take(priority.HELPER_NICE)
 
 
 def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]:

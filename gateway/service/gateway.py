@@ -64,7 +64,10 @@ class Gateway:
         self._cell = cell
         self._clock = clock
         self._log = log
+        self.waited_s: Callable[[], float | None] = lambda: None
+        """Seconds that this process has waited for a processor until now, where the machine counts that."""
         self._last_tick_s: float | None = None
+        self._last_waited_s: float | None = None
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
 
@@ -98,7 +101,7 @@ class Gateway:
         now_s = self._clock()
         self.output.tick(now_s)
         self._step(now_s)
-        self._last_tick_s = now_s
+        self._last_tick_s, self._last_waited_s = now_s, self.waited_s()
 
     def output_opened(self) -> None:
         self.output.opened()
@@ -122,6 +125,12 @@ class Gateway:
         """How long the loop has not come by: what arrived meanwhile is executed late (SAFETY: stall)."""
         return 0.0 if self._last_tick_s is None else now_s - self._last_tick_s
 
+    def _waited_s(self) -> float | None:
+        """Of the lateness: so much the machine is to blame for."""
+        if self._last_waited_s is None or (waited_s := self.waited_s()) is None:
+            return None
+        return waited_s - self._last_waited_s
+
     def _line(self, now_s: float) -> Line:
         return Line(
             acknowledged_v=self.output.acknowledged_v,
@@ -131,6 +140,7 @@ class Gateway:
             pressure_pa=self.output.pressure_pa,
             owner_connected=self.owner_connected,
             late_s=self._late_s(now_s),
+            waited_s=self._waited_s(),
             warnings=self.warnings,
         )
 

@@ -2,49 +2,82 @@
 
 import asyncio
 import contextlib
+import os
 import socket
+from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 from gateway.service import link as guardian_link
 
 
 class GuardianLine:
-    """Our end of the guardian's line."""
+    """Our end of the guardian's line. on_ports: the simulated rig has been started again, with these ptys.
+
+    A guardian that does not read for a while misses heartbeats, which is what its silence deserves, but nothing else:
+    what does not fit waits, in order, for the next heartbeat.
+    """
 
     def __init__(self, link: socket.socket) -> None:
+        self.on_ports: Callable[[dict[str, str]], None] = lambda ports: None
         self._link = link
+        self._waiting: deque[tuple[str, dict[str, Any], int | None]] = deque()
         self._rig: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self.told_to_stop = asyncio.Event()
         self.is_gone = False
         asyncio.get_running_loop().add_reader(link.fileno(), self._on_readable)
 
     async def simulated_ports(self, rig: str) -> dict[str, str] | None:
-        """Ask for the simulated rig: its ptys, or None when it could not start (it has said why)."""
-        self._send(guardian_link.NEED_RIG, {"rig": rig})
+        """Ask for the simulated rig: its ptys, or None when it could not start (the guardian has said why)."""
+        self._tell(guardian_link.NEED_RIG, {"rig": rig})
         answer = await self._rig
         ptys: dict[str, str] | None = answer.get("ptys")
         return ptys
 
     def heartbeat(self) -> None:
-        self._send(guardian_link.HEARTBEAT)
+        if self._waiting:
+            self._send_waiting()
+        with contextlib.suppress(OSError):  # a guardian that is gone shows as the end of the line
+            guardian_link.send(self._link, guardian_link.HEARTBEAT)
 
     def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes) -> None:
         """Before the first non-safe write, and after each reopen: the guardian can then speak the last word itself."""
-        self._send(guardian_link.LINE, {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex()}, descriptor)
+        self._tell(guardian_link.LINE, {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex()}, descriptor)
 
     def first_cause(self, cause: str) -> None:
-        self._send(guardian_link.FIRST_CAUSE, {"cause": cause})
+        """A defect of ours, in words: we are about to end."""
+        self._tell(guardian_link.FIRST_CAUSE, {"text": cause})
 
     def ready(self, announcement: dict[str, Any], stall_s: float) -> None:
-        self._send(guardian_link.READY, announcement | {"stall_s": stall_s})
+        self._tell(guardian_link.READY, announcement | {"stall_s": stall_s})
 
     def close(self) -> None:
+        self._send_waiting()
+        while self._waiting:
+            self._forget_first()
         asyncio.get_running_loop().remove_reader(self._link.fileno())
         self._link.close()
 
-    def _send(self, tag: str, body: dict[str, Any] | None = None, descriptor: int | None = None) -> None:
-        with contextlib.suppress(OSError):  # a guardian that is gone shows as the end of the line
-            guardian_link.send(self._link, tag, body, descriptor)
+    def _tell(self, tag: str, body: dict[str, Any], descriptor: int | None = None) -> None:
+        with contextlib.suppress(OSError):  # a port that is lost already is handed over after its next opening
+            self._waiting.append((tag, body, None if descriptor is None else os.dup(descriptor)))
+        self._send_waiting()
+
+    def _send_waiting(self) -> None:
+        while self._waiting:
+            tag, body, descriptor = self._waiting[0]
+            try:
+                guardian_link.send(self._link, tag, body, *(() if descriptor is None else (descriptor,)))
+            except BlockingIOError:
+                return
+            except OSError:
+                pass  # it is gone
+            self._forget_first()
+
+    def _forget_first(self) -> None:
+        _, _, descriptor = self._waiting.popleft()
+        if descriptor is not None:
+            os.close(descriptor)
 
     def _on_readable(self) -> None:
         try:
@@ -55,7 +88,13 @@ class GuardianLine:
             self.is_gone = True
             self.told_to_stop.set()
             asyncio.get_running_loop().remove_reader(self._link.fileno())
-        elif message.tag == guardian_link.RIG and not self._rig.done():
-            self._rig.set_result(message.body)
         elif message.tag == guardian_link.STOP:
             self.told_to_stop.set()
+        elif message.tag == guardian_link.RIG:
+            self._on_rig(message.body)
+
+    def _on_rig(self, answer: dict[str, Any]) -> None:
+        if not self._rig.done():
+            self._rig.set_result(answer)
+        elif "ptys" in answer:
+            self.on_ports(answer["ptys"])

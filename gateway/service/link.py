@@ -1,13 +1,16 @@
-"""The guardian's line to its control process: both ends of one SOCK_SEQPACKET pair, so that messages stay whole.
+"""The guardian's line to a child: both ends of one SOCK_SEQPACKET pair, so that messages stay whole.
 
-A message is one tag byte and a JSON object; HEARTBEAT is the bare tag. A LINE message carries the serial port's
-descriptor beside it (SCM_RIGHTS): an exclusive tty survives SIGKILL as EBUSY for a second open, a shared descriptor does not.
-Standard library only: the guardian imports this.
+A message is one tag byte and a JSON object; HEARTBEAT is the bare tag. Descriptors go beside it (SCM_RIGHTS): an exclusive
+tty survives SIGKILL as EBUSY for a second open, a shared descriptor does not. No call here waits, and the death of the
+other side, at whatever point, is an end or an OSError, never a half message. Standard library only: the guardian imports this.
 """
 
 import array
+import contextlib
 import json
+import os
 import socket
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -15,11 +18,22 @@ HEARTBEAT: Final = "h"  # control -> guardian, each tick of the loop
 LINE: Final = "l"  # control -> guardian: {"safe_frame": hex, "safe_reply": hex} + descriptor
 NEED_RIG: Final = "n"  # control -> guardian: {"rig": name or path}: start the simulated rig
 READY: Final = "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s}
-FIRST_CAUSE: Final = "f"  # control -> guardian: {"cause": text}, kept for the next start
-RIG: Final = "p"  # guardian -> control: {"ptys": {...}} or {"failed": exit code}
+FIRST_CAUSE: Final = "f"  # control -> guardian: {"text": ...}, kept for the next start
+BORN: Final = "b"  # a forked child -> guardian: {"pid": number}, before anything else
+PTYS: Final = "y"  # simulated rig -> guardian: {"ptys": {...}}
+RIG: Final = "p"  # guardian -> control: {"ptys": {...}} or {"failed": True}; again whenever the ports have moved
 STOP: Final = "q"  # guardian -> control: ramp to 0, safe voltage, exit
+FORK: Final = (
+    "k"  # guardian -> fork server: {"module": name, "arguments": {...}} + the child's end, then what it shares
+)
 
-_LARGEST = 65536
+_LARGEST: Final = 65536
+_MOST_DESCRIPTORS: Final = 4
+_FLAGS: Final = socket.MSG_DONTWAIT | getattr(socket, "MSG_CMSG_CLOEXEC", 0)  # a port's lock is no child's inheritance
+
+
+class NonsenseError(ValueError):
+    """What came is no message of this protocol: a defect of the sender, which cannot be relied on any more."""
 
 
 @dataclass
@@ -28,30 +42,64 @@ class Message:
     body: dict[str, Any] = field(default_factory=dict)
     descriptors: list[int] = field(default_factory=list)
 
+    def drop_descriptors(self) -> None:
+        """Close what nobody takes over."""
+        while self.descriptors:
+            with contextlib.suppress(OSError):
+                os.close(self.descriptors.pop())
+
 
 def pair() -> tuple[socket.socket, socket.socket]:
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
-def send(link: socket.socket, tag: str, body: dict[str, Any] | None = None, descriptor: int | None = None) -> None:
+def send(link: socket.socket, tag: str, body: dict[str, Any] | None = None, *descriptors: int) -> None:
     """Send one message; OSError when the other side is gone, BlockingIOError when it does not read."""
     data = tag.encode() + (json.dumps(body).encode() if body is not None else b"")
-    if descriptor is None:
-        link.send(data)
-    else:
-        link.sendmsg([data], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [descriptor]))])
+    beside = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
+    link.sendmsg([data], beside, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
 
 
 def receive(link: socket.socket) -> Message | None:
-    """The next message, None at the end of the line. A reset of a killed peer is an end too."""
+    """The next message, None at the end of the line; a reset of a killed peer is an end too.
+
+    BlockingIOError when there is none yet, NonsenseError for what is not of this protocol.
+    """
     try:
-        data, ancillary, _, _ = link.recvmsg(_LARGEST, socket.CMSG_SPACE(4 * 4))
-    except ConnectionResetError:
+        data, ancillary, flags, _ = link.recvmsg(_LARGEST, socket.CMSG_SPACE(4 * _MOST_DESCRIPTORS), _FLAGS)
+    except BlockingIOError:
+        raise
+    except OSError:
         return None
+    message = Message("", {}, _descriptors(ancillary))
     if not data:
+        message.drop_descriptors()
         return None
-    descriptors = array.array("i")
+    try:
+        message.tag, message.body = chr(data[0]), _body(data, flags)
+    except NonsenseError:
+        message.drop_descriptors()
+        raise
+    return message
+
+
+def _body(data: bytes, flags: int) -> dict[str, Any]:
+    if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
+        raise NonsenseError(f"a message of {chr(data[0])!r} lost its end")
+    if len(data) == 1:
+        return {}
+    try:
+        body = json.loads(data[1:])
+    except ValueError:
+        body = None
+    if not isinstance(body, dict):
+        raise NonsenseError(f"a message of {chr(data[0])!r} without its fields")
+    return body
+
+
+def _descriptors(ancillary: Iterable[tuple[int, int, bytes]]) -> list[int]:
+    found = array.array("i")
     for level, kind, payload in ancillary:
         if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
-            descriptors.frombytes(payload[: len(payload) // 4 * 4])
-    return Message(chr(data[0]), json.loads(data[1:]) if len(data) > 1 else {}, list(descriptors))
+            found.frombytes(payload[: len(payload) // 4 * 4])
+    return list(found)

@@ -32,6 +32,8 @@ from gateway.ports import PacedPty
 from gateway.profiles import Rig, load_rig
 from gateway.profiles.text import Document
 from gateway.profiles.typed import build
+from gateway.service import link as guardian_link
+from gateway.service import priority
 from gateway.service.event_file import EventFile
 from gateway.service.event_log import EventLog
 from gateway.service.json_lines import JsonLineServer
@@ -176,7 +178,7 @@ async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> No
         log("socket", f"E152 {unserved}")
     tick.start()
     loop.add_reader(link.fileno(), ended.set)
-    link.send(json.dumps({"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}}).encode())
+    guardian_link.send(link, guardian_link.PTYS, {"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}})
     await ended.wait()
     loop.remove_reader(link.fileno())
     tick.close()
@@ -189,6 +191,7 @@ def main(arguments: list[str]) -> int:
     link = socket.socket(fileno=int(arguments[0]))
     options = json.loads(arguments[1])
     state = Path(options["state"])
+    priority.take(priority.RIG_NICE)
     with EventLog(source="rig", file=EventFile(state)) as log:
         asyncio.run(serve(load_rig(options["rig"]).as_simulated(), link, state, log))
     return 0

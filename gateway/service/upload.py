@@ -31,6 +31,7 @@ from gateway.service.apart import Apart, Done, Work
 from gateway.service.calibration_store import Standing, StoreError
 
 _NO_COEFFICIENT: Final = -1
+_NO_ROOM: Final = "E431"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +75,7 @@ class Upload:
         self._shows = False  # whether commit_status tells of what is being done
         self._notice = NO_NOTICE
         self._jobs = 0
-        self._said, self._failed_last = "", False
+        self._said, self._failed_last, self._reason = "", False, 0
         staging.on_commit = self._on_commit
         staging.on_select = self._on_select
 
@@ -143,7 +144,7 @@ class Upload:
         return self._ask("calibration rollback", self._activation.take_back)
 
     def status(self) -> dict[str, Any]:
-        """What is in use, and how the last job went; job is its number, for whoever began it."""
+        """What is in use, and how the last job went; job is its number, for whoever began it; reason as failing_reason."""
         return {
             "active": self._calibration.number,
             "name": self._calibration.name,
@@ -153,6 +154,7 @@ class Upload:
             "busy": bool(self._doing),
             "said": self._said,
             "failed": self._failed_last,
+            "reason": self._reason,
         }
 
     def _ask(self, what: str, work: Work) -> dict[str, Any]:
@@ -189,14 +191,15 @@ class Upload:
             index, reason, sentence = error.fault.index, int(error.fault.reason), error.fault.sentence(active)
         elif isinstance(error, StoreError):
             sentence = f"{error}; active set {active} unchanged"
-            reason = int(UploadReason.STORAGE if sentence.startswith("E431") else UploadReason.NOT_STORED)
+            reason = int(UploadReason.STORAGE if error.code == _NO_ROOM else UploadReason.NOT_STORED)
         else:
             trace = "".join(traceback.format_exception(error))
             sentence = f"A499 a defect of ours, active set {active} unchanged:\n{trace}"
         self._end(CommitStatus.FAILED, sentence, index, reason)
 
     def _end(self, status: CommitStatus, sentence: str, index: int = 0, reason: int = 0) -> None:
-        self._doing, self._said, self._failed_last = "", sentence, status is CommitStatus.FAILED
+        self._doing, self._said, self._reason = "", sentence, reason
+        self._failed_last = status is CommitStatus.FAILED
         if self._shows:
             self._staging.show_commit(status, index, reason, self._notice)
         self._log("calibration", sentence)

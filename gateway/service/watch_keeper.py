@@ -9,7 +9,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
-from gateway.service.children import Child
+from gateway.service.children import LOST, Child, exit_word
 
 PAUSES_S: Final = (5.0, 30.0, 120.0)
 """Waiting times before it is started again; it dies once more, and that is it."""
@@ -46,13 +46,13 @@ class WatchKeeper:
         if self._child is None and self._deaths == 0:
             self._begin(now_s)
 
-    def follow(self, readable: list[object], now_s: float) -> None:
+    def follow(self, readable: set[int], now_s: float) -> None:
         """After each wait: has it died, is it time to start it again?"""
         if self._child is not None and self._child.died in readable:
             code = self._child.wait()
             self._child.close()
             self._child = None
-            self._died(f"ended ({f'signal {-code}' if code < 0 else f'exit {code}'})", now_s)
+            self._died(f"ended ({f'signal {-code}' if LOST < code < 0 else exit_word(code)})", now_s)
         elif now_s >= self._due_s:
             self._begin(now_s)
 
@@ -66,7 +66,7 @@ class WatchKeeper:
         try:
             self._child = self._spawn()
         except OSError as error:
-            self._died(f"did not start ({error.strerror})", now_s)
+            self._died(f"did not start ({error.strerror or error})", now_s)
 
     def _died(self, how: str, now_s: float) -> None:
         if now_s - self._began_s >= _LONG_LIFE_S:

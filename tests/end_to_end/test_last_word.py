@@ -179,8 +179,15 @@ def kill_every_control(gateway: RunningGateway) -> int:
     while gateway.process.poll() is None and len(killed) < 20:
         assert time.monotonic() < deadline_s
         for child in guardian.children() if guardian.is_running() else []:
-            if child.pid not in killed:
+            if child.pid not in killed and "gateway.service.control_process" in command_of(child):
                 killed.add(child.pid)
                 child.kill()
         time.sleep(0.002)
     return len(killed)
+
+
+def command_of(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []

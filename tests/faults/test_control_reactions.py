@@ -286,6 +286,18 @@ def test_a_stalled_loop_drops_what_arrived_in_it():
     assert (output.fault, output.voltage_v) == (FaultCode.LOOP_STALLED, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("waited_s", "fault"),
+    [(0.1, FaultCode.MACHINE_BUSY), (0.02, FaultCode.LOOP_STALLED), (None, FaultCode.LOOP_STALLED)],
+)
+def test_a_busy_machine_is_told_from_a_defect_of_ours(waited_s, fault):
+    bench = pressing()
+    bench.line = replace(bench.line, late_s=0.12, waited_s=waited_s)
+    output = bench.run(TICK_S)
+    assert (output.fault, output.voltage_v) == (fault, 0.0)
+    assert any("120 ms late, allowed 100 ms" in event for event in bench.events)
+
+
 def test_an_enable_that_waited_for_a_stalled_loop_is_not_obeyed():
     bench = Bench()
     bench.run(0.3)

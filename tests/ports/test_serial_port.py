@@ -183,6 +183,21 @@ def test_reopening_waits_longer_each_time_up_to_two_seconds(
     assert asyncio.run(scene()) == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 2.0])
 
 
+def test_a_lost_port_that_is_found_elsewhere_is_opened_there_at_once(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        port, other = ear.port(line.path), Pty()
+        await port.open()
+        port.move(line.path)  # nothing is lost: an open port is still good
+        line.close()
+        await ear.until(lambda: bool(ear.losses))
+        port.move(other.path)
+        assert (port.is_open, port.path, port.reopened, len(ear.losses)) == (True, other.path, 1, 1)
+        port.close()
+        other.close()
+
+    asyncio.run(scene())
+
+
 @pytest.mark.parametrize(
     "failure",
     [

@@ -14,6 +14,7 @@ from gateway.profiles import load_rig
 from gateway.registers.words import FaultCode
 from gateway.service import link
 from gateway.service.cell import Cell
+from gateway.service.ending import EndCause, Ending
 from gateway.service.event_log import EventLog
 from gateway.service.guardian_line import GuardianLine
 from tests.end_to_end.own_devices import OwnDevices
@@ -28,7 +29,7 @@ def devices(tmp_path: Path) -> Iterator[OwnDevices]:
         yield devices
 
 
-def with_cell(devices: OwnDevices, scene: Scene) -> list[str]:
+def with_cell(devices: OwnDevices, scene: Scene, restarted: Ending | None = None) -> list[str]:
     """Start a cell, play the scene, close it; what was logged."""
     lines: list[str] = []
     state = devices.directory / "state"
@@ -41,7 +42,7 @@ def with_cell(devices: OwnDevices, scene: Scene) -> list[str]:
         guardian = GuardianLine(theirs)
         cell = Cell(rig, rig.ports(), state, guardian, log)
         try:
-            await cell.start(["127.0.0.1", 0], record=False, restarted="")
+            await cell.start(["127.0.0.1", 0], record=False, restarted=restarted)
             async with asyncio.timeout(10):
                 await scene(cell, ours)
         finally:
@@ -66,6 +67,19 @@ async def pressing(cell: Cell, devices: OwnDevices, volts: float = 4.0) -> None:
     cell.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, round(1000 * volts)), MASTER)
     while devices.setting_v < volts - 0.1:
         await asyncio.sleep(0.005)
+
+
+def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices: OwnDevices) -> None:
+    """3 s for the first words and 3 s of other speeds are for somebody who sets a rig up, not for a running line."""
+    devices.is_silent = True
+
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        assert cell.gateway.restart_cause is FaultCode.MACHINE_BUSY
+
+    began_s = time.monotonic()
+    with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
+    assert time.monotonic() - began_s < 2.5
+    assert devices.heard
 
 
 def test_a_defect_anywhere_in_the_loop_ends_with_the_safe_voltage(devices: OwnDevices) -> None:

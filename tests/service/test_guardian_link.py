@@ -1,6 +1,7 @@
 """The line between guardian and control: messages stay whole, a descriptor arrives open, an end is an end."""
 
 import asyncio
+import contextlib
 import os
 import socket
 from collections.abc import Iterator
@@ -147,3 +148,84 @@ def test_a_guardian_that_does_not_read_does_not_stop_the_loop(ends: Pair) -> Non
     received = list(iter(lambda: link.receive(ends[0]), None))
     assert all(message == link.Message(link.HEARTBEAT) for message in received), "what arrives is whole"
     assert 0 < len(received) < 10_000, "the line was never full: this test shows nothing"
+
+
+@pytest.mark.parametrize("words", [b"r{", b"r[]", b"r3", b"r\xff", b"r" + b"x" * 70_000])
+def test_what_is_no_message_is_told_apart_from_an_end(ends: Pair, words: bytes) -> None:
+    ends[0].send(words)
+    with pytest.raises(link.NonsenseError):
+        link.receive(ends[1])
+    link.send(ends[0], link.HEARTBEAT)
+    assert link.receive(ends[1]) == link.Message(link.HEARTBEAT), "the next one is whole again"
+
+
+def test_more_descriptors_than_are_taken_are_closed_and_no_message(ends: Pair) -> None:
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    link.send(ends[0], link.LINE, {}, *[0] * 9)
+    with pytest.raises(link.NonsenseError):
+        link.receive(ends[1])
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+def test_no_call_waits(ends: Pair) -> None:
+    with pytest.raises(BlockingIOError):
+        link.receive(ends[0])
+    with pytest.raises(BlockingIOError):
+        for _ in range(10_000):
+            link.send(ends[0], link.HEARTBEAT)
+
+
+def test_a_port_that_was_handed_over_is_no_inheritance_of_other_children(ends: Pair) -> None:
+    link.send(ends[0], link.LINE, {}, ends[0].fileno())
+    message = link.receive(ends[1])
+    assert message
+    assert not os.get_inheritable(message.descriptors[0])
+    message.drop_descriptors()
+
+
+def test_what_a_full_line_does_not_take_comes_after_it_in_order(ends: Pair) -> None:
+    """A guardian that was stopped for seconds misses heartbeats, but neither the port nor READY."""
+    reader, writer = os.pipe()
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        for _ in range(10_000):
+            guardian.heartbeat()
+        guardian.hand_over(writer, b"SET 0", b"")
+        os.close(writer)
+        guardian.ready({}, 0.1)
+        while link.receive(ends[0]) != link.Message(link.HEARTBEAT):
+            pass
+        with contextlib.suppress(BlockingIOError):
+            while link.receive(ends[0]):
+                pass
+        guardian.heartbeat()
+        guardian.close()
+
+    asyncio.run(scene())
+    handed, ready, beat = (link.receive(ends[0]) for _ in range(3))
+    assert handed and ready and beat
+    assert [handed.tag, ready.tag, beat.tag] == [link.LINE, link.READY, link.HEARTBEAT]
+    os.write(handed.descriptors[0], b"SET 0")
+    handed.drop_descriptors()
+    assert os.read(reader, 16) == b"SET 0"
+    os.close(reader)
+
+
+def test_control_learns_that_its_simulated_ports_have_moved(ends: Pair) -> None:
+    async def scene() -> list[dict[str, str]]:
+        ends[1].setblocking(False)
+        guardian, moved = GuardianLine(ends[1]), []
+        guardian.on_ports = moved.append
+        asking = asyncio.ensure_future(guardian.simulated_ports("demo"))
+        for number in (1, 2):
+            link.send(ends[0], link.RIG, {"ptys": {"output": f"/dev/pts/{number}"}})
+        async with asyncio.timeout(2):
+            assert await asking == {"output": "/dev/pts/1"}
+            while not moved:
+                await asyncio.sleep(0)
+        guardian.close()
+        return moved
+
+    assert asyncio.run(scene()) == [{"output": "/dev/pts/2"}]

@@ -10,6 +10,7 @@ from gateway.control.settings import LeaseAction
 from gateway.registers.words import FaultCode
 from gateway.service.banner import Ready, banner, info
 from gateway.service.cell import _cause_of_restart
+from gateway.service.ending import EndCause, Ending
 from gateway.service.rules import bank_rules, server_settings
 from gateway.service.run_flag import RunFlag
 from tests.service.rigs import demo, with_supervision
@@ -84,15 +85,21 @@ def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("restarted", "was_unclean", "cause"),
     [
-        ("", False, FaultCode.NONE),
-        ("", True, FaultCode.INTERNAL),
-        ("control process stalled (SIGKILL)", True, FaultCode.LOOP_STALLED),
-        ("control process died (SIGKILL)", True, FaultCode.INTERNAL),
-        ("control process died (exit 1)", False, FaultCode.INTERNAL),
+        (None, False, FaultCode.NONE),
+        (None, True, FaultCode.INTERNAL),
+        (EndCause.STALLED, True, FaultCode.LOOP_STALLED),
+        (EndCause.STOPPED, True, FaultCode.LOOP_STALLED),
+        (EndCause.MACHINE_BUSY, True, FaultCode.MACHINE_BUSY),
+        (EndCause.DIED, True, FaultCode.INTERNAL),
+        (EndCause.DEFECT, False, FaultCode.INTERNAL),
     ],
 )
-def test_the_cause_of_an_unclean_end_is_readable(restarted: str, was_unclean: bool, cause: FaultCode) -> None:
-    assert _cause_of_restart(restarted, was_unclean=was_unclean) is cause
+@pytest.mark.parametrize("text", ["control process stalled (SIGKILL)", "mit anderen Worten"])
+def test_the_cause_of_an_unclean_end_is_readable_whatever_the_words_are(
+    restarted: EndCause | None, was_unclean: bool, cause: FaultCode, text: str
+) -> None:
+    ending = Ending.from_json(json.loads(json.dumps(Ending(restarted, text).to_json()))) if restarted else None
+    assert _cause_of_restart(ending, was_unclean=was_unclean) is cause
 
 
 def test_the_bank_holds_to_the_rigs_limits() -> None:

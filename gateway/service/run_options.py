@@ -1,0 +1,30 @@
+"""What `force-gateway run` was asked for. Standard library only."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """The options of the verb, by name. state None: $XDG_STATE_HOME/force-gateway/RIG."""
+
+    rig: str = "demo"
+    simulate: bool = False
+    bind: tuple[str, int] | None = None
+    state: Path | None = None
+    json: bool = False
+    record: bool = False
+    realtime: bool = False
+
+    @property
+    def state_directory(self) -> Path:
+        if self.state is not None:
+            return self.state
+        return default_state_root() / Path(self.rig).stem
+
+
+def default_state_root() -> Path:
+    """Where the state directories of rigs are that were given none."""
+    home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
+    return Path(home) / "force-gateway"

@@ -1,0 +1,59 @@
+"""How the guardian waits: for descriptors, and for signals as one of them. Standard library only."""
+
+import contextlib
+import select
+import signal
+import socket
+from math import isinf
+from types import TracebackType
+from typing import Final, Self
+
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_LONGEST_S: Final = 3600.0
+_MOST_SIGNALS: Final = 64
+
+
+def wait_for(descriptors: list[int], timeout_s: float) -> set[int]:
+    """Those that are readable, or at their end; none when the time is over. Any number of a descriptor (select: 1024)."""
+    poll = select.poll()
+    for descriptor in descriptors:
+        poll.register(descriptor, select.POLLIN)
+    longest_s = _LONGEST_S if isinf(timeout_s) else timeout_s
+    return {descriptor for descriptor, _ in poll.poll(max(0.0, longest_s) * 1e3)}
+
+
+class Signals:
+    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler."""
+
+    def __init__(self) -> None:
+        self._reader, self._writer = socket.socketpair()
+        for end in (self._reader, self._writer):
+            end.setblocking(False)
+
+    @property
+    def descriptor(self) -> int:
+        return self._reader.fileno()
+
+    def take(self) -> int:
+        """How many have come since the last call."""
+        with contextlib.suppress(OSError):
+            return len(self._reader.recv(_MOST_SIGNALS))
+        return 0
+
+    def __enter__(self) -> Self:
+        for number in _SIGNALS:
+            signal.signal(number, lambda *_: None)
+        signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        signal.set_wakeup_fd(-1)
+        for number in _SIGNALS:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+        self.close()
+
+    def close(self) -> None:
+        self._reader.close()
+        self._writer.close()
