@@ -42,6 +42,7 @@ CONTROL: list[dict[str, Any]] = [
     {"do": "calibrate", "plan": EXPERIMENT},
     {"do": "calibrate", "stop": True},
     {"do": "last-writer"},
+    {"do": "last-refusal"},
     {"do": "health"},
     {"do": "residual"},
     {"do": "residual", "cause": 12, "sentence": "friction", "counters": {"looks": 3, "rms_n": 0.2}},
