@@ -6,6 +6,7 @@ from typing import Final
 from gateway.devices import DeviceProfile, Role, cell_device, cell_host, output_host
 from gateway.devices.messages import ReadPressure
 from gateway.profiles.checks import Check, Found, Parts
+from gateway.profiles.edit_marks import PLACEHOLDER
 from gateway.profiles.models import CellFile, OutputFile
 from gateway.profiles.sentences import newton, number, second, volt
 
@@ -34,16 +35,23 @@ def devices_have_their_role(parts: Parts) -> Found:
             yield f"{key}.device", f"{device.name} is {_ARTICLE[device.role]}, {_ARTICLE[_ROLES[key]]} is needed here"
 
 
-def ports_are_given(parts: Parts) -> Found:
+def simulated_lines_have_no_port(parts: Parts) -> Found:
     for key, line, _ in _lines(parts):
         if parts.simulated and line.port is not None:
             yield f"{key}.port", "a simulated rig has no ports: delete this line, or write `simulated: false`"
-        elif not parts.simulated and line.port is None:
+
+
+def ports_are_given(parts: Parts) -> Found:
+    for key, line, _ in [] if parts.simulated else _lines(parts):
+        if line.port is None:
             yield (
                 f"{key}.port",
                 "is missing: `force-gateway ports` lists what is plugged in (no hardware: `simulated: true`)",
             )
-        elif line.port is not None and not line.port.startswith("/"):
+        elif PLACEHOLDER.search(line.port):
+            told = "is the placeholder that init wrote: put your adapter's path here, `force-gateway ports` lists them"
+            yield f"{key}.port", f"{line.port} {told}"
+        elif not line.port.startswith("/"):
             yield f"{key}.port", f'"{line.port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
 
 
@@ -156,10 +164,12 @@ def the_quantum_is_the_amplifiers(parts: Parts) -> Found:
         yield "supervision.sample_quantum_n", f"{newton(supervision.sample_quantum_n)} {told}"
 
 
+HARDWARE: Final[tuple[Check, ...]] = (ports_are_given, ports_differ)
+"""Faults that a run with simulated devices does not mind."""
+
 FAULTS: Final[tuple[Check, ...]] = (
     devices_have_their_role,
-    ports_are_given,
-    ports_differ,
+    simulated_lines_have_no_port,
     the_unit_is_known,
     the_output_reaches,
     silence_is_accepted,

@@ -50,8 +50,7 @@ def main(arguments: list[str]) -> int:
 
 
 def load(options: dict[str, Any]) -> Rig:
-    rig = load_rig(options["rig"])
-    return rig.as_simulated() if options["simulate"] else rig
+    return load_rig(options["rig"], simulated=options["simulate"])
 
 
 def sample_ring(descriptor: int | None) -> SampleRing | None:
