@@ -15,6 +15,7 @@ from gateway.devices.framing import LONGEST_LINE_BYTES
 from gateway.devices.messages import (
     Accepted,
     ForceSample,
+    Garbage,
     OutputReply,
     OutputRequest,
     Pressure,
@@ -43,13 +44,19 @@ def _output(profile: DeviceProfile) -> Found:
         if told := _talk(profile, SetVoltage(voltage_v), Accepted(voltage_v)):
             yield ("set_voltage",), f"{voltage_v:g} V: {told}"
             return
-    if profile.read_voltage and (told := _talk(profile, ReadVoltage(), Accepted(high_v))):
-        yield ("read_voltage",), told
-    if profile.read_pressure:
-        high_pa = profile.read_pressure.range.pressure_pa[1]
-        if told := _talk(profile, ReadPressure(), Pressure(high_pa)):
-            yield ("read_pressure",), told
+    for place, question, answers in _readings(profile):
+        told = next(filter(None, (_talk(profile, question, answer) for answer in answers)), "")
+        if told:
+            yield (place,), told
     yield from _refusals(profile)
+
+
+def _readings(profile: DeviceProfile) -> Iterator[tuple[str, OutputRequest, tuple[OutputReply, ...]]]:
+    """The questions that the device can be asked, and answers at both ends of their ranges."""
+    if profile.read_voltage:
+        yield "read_voltage", ReadVoltage(), tuple(map(Accepted, profile.read_voltage.range.voltage_v))
+    if profile.read_pressure:
+        yield "read_pressure", ReadPressure(), tuple(map(Pressure, profile.read_pressure.range.pressure_pa))
 
 
 def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -> str:
@@ -59,7 +66,8 @@ def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -
         asked = host.request(request)
         answered = b""
         for understood in device.receive(asked, _NOW_S):
-            if not isinstance(understood, type(request) | ReadVoltage):
+            is_read_back = isinstance(request, SetVoltage) and isinstance(understood, ReadVoltage)
+            if isinstance(understood, Garbage) or not (is_read_back or isinstance(understood, type(request))):
                 return f"the device reads {_line(asked)} as {_name(understood)}"
             answered += device.reply(answer, to=understood)
     except (ValueRefused, UnicodeEncodeError) as error:
@@ -68,7 +76,11 @@ def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -
     if len(heard) != 1 or not _means(heard[0], answer):
         seen = " and ".join(map(_name, heard)) or "nothing"
         return f"the answer {_line(answered)} to {_line(asked)} is read as {seen}{_too_long(asked, answered)}"
-    if isinstance(request, SetVoltage) and isinstance(heard[0], Accepted) and not host.confirms(request, heard[0]):
+    if (
+        isinstance(request, SetVoltage)
+        and isinstance(heard[0], Accepted)
+        and not host.confirms(request.voltage_v, heard[0], request)
+    ):
         return f"{_line(asked)} is confirmed as {heard[0].voltage_v:g} V by {_line(answered)}: the ranges do not fit"
     return ""
 

@@ -13,7 +13,6 @@ from gateway.devices.messages import (
     OutputRequest,
     Quality,
     Refused,
-    SetVoltage,
 )
 
 
@@ -28,8 +27,8 @@ class OutputHost(Protocol):
     def idle_question(self) -> OutputRequest | None:
         """What to ask a device that has nothing to do; None where it can only be told its setting again."""
 
-    def confirms(self, asked: SetVoltage, reply: Accepted) -> bool:
-        """Whether this answer says that the setting stands, up to the rounding of the numbers on the wire."""
+    def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
+        """Whether this answer to `question` says that the setting stands, up to the rounding of the numbers on the wire."""
 
     @property
     def expecting(self) -> int:

@@ -42,7 +42,9 @@ class TemplateOutputHost:
         self._is_read_back = self._confirmation is not self._grammar.set_voltage
         self.idle_question = _idle_question(profile)
         self.resolution_v = self._step_v(self._grammar.set_voltage, self._grammar.set_voltage.ask)
-        self._tolerance_v = _ROUNDING * self._tolerated_steps_v()
+        self._tolerance_v: dict[type, float] = {SetVoltage: _ROUNDING * self._steps_between(self._confirmation)}
+        if profile.read_voltage:
+            self._tolerance_v[ReadVoltage] = _ROUNDING * self._steps_between(profile.read_voltage)
 
     @property
     def expecting(self) -> int:
@@ -52,8 +54,8 @@ class TemplateOutputHost:
     def safe_reply(self) -> bytes:
         return self._grammar.answer_line(self._confirmation, self._safe_v)
 
-    def confirms(self, asked: SetVoltage, reply: Accepted) -> bool:
-        return abs(reply.voltage_v - asked.voltage_v) <= self._tolerance_v
+    def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
+        return abs(reply.voltage_v - voltage_v) <= self._tolerance_v[type(question)]
 
     def safe_frame(self, voltage_v: float) -> bytes:
         frame = self._encoded(SetVoltage(voltage_v))
@@ -86,11 +88,11 @@ class TemplateOutputHost:
             return 0.0
         return exchange.range.scale.physical_per_number * float(10.0 ** -self._grammar.profile.decimals_in(template))
 
-    def _tolerated_steps_v(self) -> float:
-        """A setting is rounded once on its way, and once more where its confirmation counts in other numbers."""
-        confirmed_v = self._step_v(self._confirmation, self._confirmation.answer)
-        same = isclose(confirmed_v, self.resolution_v) and self._confirmation.range == self._grammar.set_voltage.range
-        return self.resolution_v + (0.0 if same else confirmed_v)
+    def _steps_between(self, answered: VoltageExchange) -> float:
+        """V: a setting is rounded once on its way, and once more where the answer counts in other numbers."""
+        step_v = self._step_v(answered, answered.answer)
+        same = isclose(step_v, self.resolution_v) and answered.range == self._grammar.set_voltage.range
+        return self.resolution_v + (0.0 if same else step_v)
 
     def _reply(self, line: Line) -> OutputReply:
         reply = self._understood(self._grammar.body(line)) if self._expected else None

@@ -9,7 +9,7 @@ from typing import Final, TypeVar
 from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.settings import ControlSettings, Defaults, Limits, Supervision, Trim
 from gateway.devices import DeviceProfile
-from gateway.profiles import checks, line_checks, network_checks
+from gateway.profiles import checks, line_checks, network_checks, wire_checks
 from gateway.profiles.calibrations import read_calibration
 from gateway.profiles.checks import Check, Parts
 from gateway.profiles.compensating import compensation_of, compensation_words, in_simulation, without_compensable
@@ -31,8 +31,8 @@ T = TypeVar("T")
 STAND_IN_PLANT: Final = "paper-slide"
 """What `run --sim` simulates for a real rig that names no plant."""
 
-FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *network_checks.FAULTS)
-WARNINGS: Final = (*checks.WARNINGS, *line_checks.WARNINGS, *network_checks.WARNINGS)
+FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *wire_checks.FAULTS, *network_checks.FAULTS)
+WARNINGS: Final = (*checks.WARNINGS, *line_checks.WARNINGS, *wire_checks.WARNINGS, *network_checks.WARNINGS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,16 +124,20 @@ class OutputExchange:
             self.on_pressure(reply.pressure_pa)
         elif isinstance(reply, Refused):
             self._failed(type(asked), FaultCode.OUTPUT_REFUSED)
-        elif isinstance(reply, Accepted):
+        elif asked is not None and isinstance(reply, Accepted):
             self._check_setting(asked, reply)
 
     def _echoes(self, asked: OutputRequest | None, reply: OutputReply) -> bool:
-        return isinstance(asked, SetVoltage) and isinstance(reply, Accepted) and self._host.confirms(asked, reply)
+        return (
+            isinstance(asked, SetVoltage)
+            and isinstance(reply, Accepted)
+            and self._host.confirms(asked.voltage_v, reply, asked)
+        )
 
-    def _check_setting(self, asked: OutputRequest | None, reply: Accepted) -> None:
+    def _check_setting(self, asked: OutputRequest, reply: Accepted) -> None:
         """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted."""
         self.acknowledged_v = self._standing_v = reply.voltage_v
-        if not self._host.confirms(SetVoltage(self._asked_v), reply):
+        if not self._host.confirms(self._asked_v, reply, asked):
             self._failed(type(asked), FaultCode.OUTPUT_ALTERED)
             return
         if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:

@@ -153,7 +153,7 @@ class Wired:
             self.world.on_output_bytes(sent, self.now_s)
         if asked := self._asks.bytes_through(self.now_s):
             self.world.on_cell_bytes(asked, self.now_s)
-        if self._frame_steps and self._steps % self._frame_steps == 3 % self._frame_steps:
+        if self._frame_steps and self._steps % self._frame_steps == 3 % self._frame_steps and self._wire_has_time():
             self.world.stream(self.now_s)
         if (heard := self._down.bytes_through(self.now_s)) and self.is_plugged:
             self.gateway.on_output_bytes(heard, self.now_s)
@@ -161,6 +161,11 @@ class Wired:
             self.gateway.on_cell_bytes(frame, self.now_s)
         if self._steps % 10 == 0:
             self.gateway.on_tick(1, 0.0)
+
+    def _wire_has_time(self) -> bool:
+        """An amplifier leaves out the readings that its wire cannot carry."""
+        last_s = self._stream.last_through_s
+        return last_s is None or last_s - self.now_s < self._frame_steps * STEP_S
 
     def stall(self, duration_s: float, then: Callable[[], None] = lambda: None) -> None:
         """The loop does not come by; the world and the wires go on, and bytes wait for it. `then` is served first."""
