@@ -31,6 +31,7 @@ Found = Iterator[tuple[tuple[str, ...], str]]
 """(place in the profile, sentence)."""
 
 _NOW_S: Final = 0.0
+_LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
 
 def rehearsed(profile: DeviceProfile) -> Found:
@@ -68,7 +69,7 @@ def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -
         for understood in device.receive(asked, _NOW_S):
             is_read_back = isinstance(request, SetVoltage) and isinstance(understood, ReadVoltage)
             if isinstance(understood, Garbage) or not (is_read_back or isinstance(understood, type(request))):
-                return f"the device reads {_line(asked)} as {_name(understood)}"
+                return f"the device reads {_line(asked)} as {_name(understood)}{_too_long(asked)}"
             answered += device.reply(answer, to=understood)
     except (ValueRefused, UnicodeEncodeError) as error:
         return str(error)
@@ -133,7 +134,8 @@ def _cell(profile: DeviceProfile) -> Found:
 
 
 def _line(data: bytes) -> str:
-    return repr(data.decode("ascii", "replace"))
+    text = repr(data.decode("ascii", "replace"))
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}...'"
 
 
 def _too_long(*lines: bytes) -> str:

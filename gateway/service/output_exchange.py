@@ -90,6 +90,8 @@ class OutputExchange:
         if not self._stands(wanted_v):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             self._asked_v, self._standing_v = wanted_v, None
+            if self._host.idle_question is None:  # this is what a poll would say
+                self._next_poll_s = now_s + _POLL_PERIOD_S
             self._send(SetVoltage(wanted_v), now_s)
         elif now_s >= self._next_poll_s:
             self._next_poll_s = now_s + _POLL_PERIOD_S
