@@ -38,7 +38,7 @@ def told(folder: Path, **changes: Any) -> tuple[dict[str, str], dict[str, str]]:
     ("changes", "path", "words"),
     [
         ({"rig__output__baud": 1200}, "output.baud",
-         "1200: question and answer of set_voltage take 0.133 s on the wire, smc-itv-rc gives up after reply_timeout_s = 0.06 s"),
+         "1200: question and answer of set_voltage take 0.133 s on the wire, smc-itv-rc gives up after"),
         ({"rig__output__baud": 1200, "dac__reply_timeout_s": 0.5, "rig__supervision__output_timeout_s": 0.1},
          "supervision.output_timeout_s", "0.1 s is over before an answer can be there: 0.133 s on the wire"),
         ({"rig__output__baud": 300, "dac__reply_timeout_s": 2, "rig__supervision__output_timeout_s": 2}, "output.baud",
