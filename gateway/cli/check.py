@@ -1,4 +1,5 @@
-"""`check`: is this rig file, or plant file, right? Every fault at once, as file:line:column, before anything moves."""
+"""`check`: is this file right? Every fault at once, as file:line:column, before anything moves. Any kind of profile, told
+by its keys."""
 
 import json
 from typing import TYPE_CHECKING, Any
@@ -9,78 +10,65 @@ from gateway.cli import exit_codes
 from gateway.cli.options import count_of, json_option
 
 if TYPE_CHECKING:
-    from gateway.profiles import Fault, PlantProfile, Report, Rig
+    from gateway.profiles import Checked, Fault
 
 
 @click.command()
-@click.argument("rig", default="demo")
+@click.argument("file", metavar="RIG", default="demo")
 @json_option
 @click.pass_context
-def command(context: click.Context, *, rig: str, as_json: bool) -> None:
+def command(context: click.Context, *, file: str, as_json: bool) -> None:
     """Check a rig and every profile that it names.
 
-    RIG is a shipped name or a file (default: demo), or a plant file, such as diagnose --extend writes. Opens no port.
+    RIG is a shipped name or a file (default: demo). A device, plant, calibration, map or plan of its own is checked as what
+    it is. Opens no port.
     """
-    from gateway.profiles import PlantProfile, Report, check_plant, check_report
+    from gateway.profiles import check_file
 
-    plant = check_plant(rig)
-    if isinstance(plant, PlantProfile):
-        _tell_plant(plant, as_json=as_json)
-        return
-    report = check_report(rig) if plant is None else Report(plant, (), None)
+    checked = check_file(file)
     if as_json:
-        click.echo(json.dumps(_document(report), indent=2))
+        click.echo(json.dumps(_document(checked), indent=2))
     else:
-        _print(report, "rig does not start" if plant is None else "plant cannot be used")
-    context.exit(exit_codes.CONFIGURATION if report.faults else exit_codes.OK)
+        _print(file, checked)
+    context.exit(exit_codes.CONFIGURATION if checked.faults else exit_codes.OK)
 
 
-def _tell_plant(plant: "PlantProfile", *, as_json: bool) -> None:
-    facts = {"plant": f"{plant.name}: {plant.description}"}
-    if as_json:
-        click.echo(json.dumps({"ok": True, "faults": [], "warnings": [], "rig": None, **facts}, indent=2))
-        return
-    for name, value in [*facts.items(), ("ok", "no faults")]:
-        click.echo(f"{name:<12} {value}")
+def _print(file: str, checked: "Checked") -> None:
+    """Faults and warnings as compilers print theirs, on stderr; what was read, on stdout."""
+    from gateway.cli.profile_facts import facts
+    from gateway.profiles import CALLED
 
-
-def _print(report: "Report", outcome: str) -> None:
-    """Faults and warnings as compilers print theirs, on stderr; what was read, on stdout. outcome: of any fault."""
-    for fault in report.faults:
+    for fault in checked.faults:
         click.echo(str(fault), err=True)
-    for warning in report.warnings:
+    for warning in checked.warnings:
         click.echo(f"{warning} (warning)", err=True)
-    if report.rig is None:
-        click.echo(f"{count_of(report.faults, 'fault')}; this {outcome}", err=True)
+    is_rig = checked.kind == "rig"
+    if not is_rig:
+        click.echo(f"{file} is {CALLED[checked.kind]}; check takes it as one", err=bool(checked.faults))
+    if checked.faults:
+        outcome = "rig does not start" if is_rig else f"{CALLED[checked.kind].partition(' ')[2]} cannot be used"
+        click.echo(f"{count_of(checked.faults, 'fault')}; this {outcome}", err=True)
         return
-    for name, value in _facts(report.rig).items():
+    for name, value in facts(checked).items():
         click.echo(f"{name:<12} {value}")
-    for note in report.rig.notes:
+    for note in checked.value.notes if is_rig else ():
         click.echo(f"{'note':<12} {note}")
-    warnings = f", {count_of(report.warnings, 'warning')}" if report.warnings else ""
+    warnings = f", {count_of(checked.warnings, 'warning')}" if checked.warnings else ""
     click.echo(f"{'ok':<12} no faults{warnings}")
 
 
-def _facts(rig: "Rig") -> dict[str, str]:
-    limits = rig.control.limits
-    return {
-        "rig": f"{rig.name}: {rig.description}" + (" (simulated)" if rig.simulated else ""),
-        "output": f"{rig.output.device.name}, {rig.output.baud} baud, {rig.output.port or 'simulated'}",
-        "load_cell": f"{rig.load_cell.device.name}, {rig.load_cell.baud} baud, {rig.load_cell.port or 'simulated'}",
-        "calibration": f"{rig.calibration.name}, {rig.calibration.kind}",
-        "limits": f"0 .. {limits.force_max_n:g} N, {limits.voltage_min_v:g} .. {limits.voltage_max_v:g} V",
-        "modbus tcp": f"{rig.network.bind}:{rig.network.port}",
-        "fingerprint": rig.fingerprint[:16],
-    }
+def _document(checked: "Checked") -> dict[str, Any]:
+    """Of a rig: its facts under `rig`; of anything else: one sentence under its kind."""
+    from gateway.cli.profile_facts import facts
 
-
-def _document(report: "Report") -> dict[str, Any]:
-    facts = _facts(report.rig) | {"fingerprint": report.rig.fingerprint} if report.rig else None
+    told: dict[str, Any] = {"kind": checked.kind, "rig": None}
+    if not checked.faults:
+        told |= facts(checked) if checked.kind != "rig" else {"rig": facts(checked, whole=True)}
     return {
-        "ok": not report.faults,
-        "faults": [_fault(fault) for fault in report.faults],
-        "warnings": [_fault(warning) for warning in report.warnings],
-        "rig": facts,
+        "ok": not checked.faults,
+        "faults": [_fault(fault) for fault in checked.faults],
+        "warnings": [_fault(warning) for warning in checked.warnings],
+        **told,
     }
 
 

@@ -35,5 +35,7 @@ def command(*, name: str) -> None:
         (f"run {target} --sim", "tries it without hardware"),
         ("ports", "lists what to put into the lines marked EDIT"),
         (f"check {target}", "tells every fault with its line"),
+        (f"run {target}", "runs it"),
+        ("hold 12", "in another terminal: holds 12 N, with the heartbeat that the rig's lease wants"),
     ):
         click.echo(f"  force-gateway {line:<28} {why}")

@@ -16,6 +16,7 @@ VERBS: Final = (
     "monitor",
     "read",
     "write",
+    "hold",
     "calibrate",
     "fit",
     "registers",

@@ -4,7 +4,7 @@ from typing import Final
 
 _TEXT: Final = """\
 # Rig @NAME@. Try it without hardware: force-gateway run @NAME@.yaml --sim
-# Then go through the lines marked EDIT, and ask: force-gateway check @NAME@.yaml
+# Then go through the lines marked EDIT, take each mark away, and ask: force-gateway check @NAME@.yaml
 # Keys end with their unit: _n newton, _v volt, _s second, _hz hertz, _kg kilogram.
 name: @NAME@
 description: a constant-force cell # EDIT: one line that your colleagues understand
@@ -15,7 +15,7 @@ plant: paper-slide # what `run --sim` simulates; the real rig does not use it
 calibration: demo # EDIT: the simulated rig's. Enough to move, not to be exact: calibrate your own
 
 output: # the line to the DAC or pressure regulator
-  device: smc-itv-rc
+  device: smc-itv-rc # or your own: a YAML file beside this one, see profiles/devices
   port: /dev/serial/by-id/EDIT-output # EDIT: `force-gateway ports` lists yours
   baud: 9600 # EDIT: as set in the device
 
@@ -49,7 +49,7 @@ trim: # slow correction by the load cell on top of the model; gain 0 switches it
 #   second_lag_s: 0.05
 
 supervision:
-  lease_s: 0.2 # EDIT: the master changes the heartbeat register at least this often; null: a command lasts
+  lease_s: 0.2 # EDIT: the master changes the heartbeat at least this often (`force-gateway hold` does); null: a command lasts
   lease_action: fault # fault (safe voltage, latched), hold, ramp (to 0 N, then off)
   sample_timeout_s: 0.05
   saturation_n: 96 # EDIT: 98 % of range_n

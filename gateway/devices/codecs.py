@@ -10,7 +10,9 @@ from gateway.devices.template_output import TemplateOutputDevice, TemplateOutput
 
 Ends = TypeVar("Ends")
 OutputEnds = tuple[Callable[[DeviceProfile], OutputHost], Callable[[DeviceProfile], OutputDevice]]
-CellEnds = tuple[Callable[[DeviceProfile, int, str | None], CellHost], Callable[[DeviceProfile], CellDevice]]
+CellEnds = tuple[
+    Callable[[DeviceProfile, int, str | None], CellHost], Callable[[DeviceProfile, str | None], CellDevice]
+]
 
 OUTPUT_CODECS: Final[dict[str, OutputEnds]] = {"template": (TemplateOutputHost, TemplateOutputDevice)}
 CELL_CODECS: Final[dict[str, CellEnds]] = {"template": (TemplateCellHost, TemplateCellDevice)}
@@ -38,5 +40,6 @@ def cell_host(profile: DeviceProfile, sign: int = 1, unit: str | None = None) ->
     return _find(CELL_CODECS, profile, Role.LOAD_CELL)[0](profile, sign, unit)
 
 
-def cell_device(profile: DeviceProfile) -> CellDevice:
-    return _find(CELL_CODECS, profile, Role.LOAD_CELL)[1](profile)
+def cell_device(profile: DeviceProfile, unit: str | None = None) -> CellDevice:
+    """The amplifier's end; unit as for `cell_host`."""
+    return _find(CELL_CODECS, profile, Role.LOAD_CELL)[1](profile, unit)

@@ -5,6 +5,7 @@ Checked when built: a template that means nothing is told to its author, not to 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import ceil, floor
 from typing import Annotated, Final, Literal
 
 from annotated_types import Ge, Le, MinLen
@@ -16,6 +17,7 @@ from gateway.devices.template import Template, compile_template
 from gateway.units import NEWTON_PER_UNIT
 
 Span = tuple[float, float]
+_GRAIN: Final = 1e-6  # of a step: what binary fractions are off
 ForceUnit = Literal["N", "kg", "g", "lb"]
 
 FORCE: Final = "force"
@@ -40,8 +42,15 @@ class Scale:
     def to_number(self, value: float) -> float:
         return self.device[0] + (value - self.physical[0]) / self.physical_per_number
 
-    def carries(self, number: float) -> bool:
-        return self.device[0] <= number <= self.device[1]
+    def carries(self, number: float, slack: float = 0.0) -> bool:
+        """slack: in the device's numbers; half a step where the number was rounded before it was sent."""
+        return self.device[0] - slack <= number <= self.device[1] + slack
+
+    def on_grid(self, number: float, decimals: int) -> float:
+        """The nearest number with so many decimals that lies within the range, where one does."""
+        per_unit: int = 10**decimals
+        lowest, highest = ceil(self.device[0] * per_unit - _GRAIN), floor(self.device[1] * per_unit + _GRAIN)
+        return float(min(highest, max(lowest, round(number * per_unit)))) / per_unit
 
 
 def _scale(device: Span, physical: Span) -> Scale:
@@ -84,16 +93,21 @@ class PressureRange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VoltageExchange:
-    """Set or read the output voltage. ask, answer: templates; the one number in them is scaled by range."""
+    """Set or read the output voltage. ask, answer: templates; the one number in them is scaled by range.
+
+    The answer is how the gateway knows that the device has obeyed: an echo of the number, or a word. A device that says
+    nothing to a setting (no `answer`) is asked with `read_voltage` after each; one that has neither is refused.
+    """
 
     __pydantic_config__ = STRICT
     ask: Annotated[str, MinLen(1)]  # template of the question, without terminator
-    answer: Annotated[str, MinLen(1)]  # template of the answer, without terminator
+    answer: str = ""  # template of the answer, without terminator; empty in set_voltage: the device says nothing
     range: VoltageRange  # what the number means
 
     def __post_init__(self) -> None:
         compile_template(self.ask)
-        compile_template(self.answer)
+        if self.answer:
+            compile_template(self.answer)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,6 +157,11 @@ class Refusals:
     unknown: str = ""  # to what it does not understand; empty: silence
     out_of_range: OutOfRange | None = None  # to a setting that it understands and cannot do
 
+    def __post_init__(self) -> None:
+        for text in self.texts():
+            if not text.isascii():
+                raise ValueError(f"refusals are ASCII text, {text!r} is not")
+
     def texts(self) -> tuple[str, ...]:
         texts = (self.unknown, self.out_of_range.text if self.out_of_range else "")
         return tuple(text for text in texts if text)
@@ -159,12 +178,12 @@ class ForceReading:
     __pydantic_config__ = STRICT
     frame: Annotated[str, MinLen(1)]
     ask: str = ""  # empty for a stream
-    unit: ForceUnit | None = None
+    unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
     quality: Mapping[str, Quality] = field(
         default_factory=dict
     )  # word of {status:...} -> how far to believe the reading
     blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
-    rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second of a stream; 0: as often as it is asked
+    rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second; with ask: the most, 0: as the wire allows
 
     def __post_init__(self) -> None:
         if self.ask:
@@ -189,9 +208,20 @@ class ForceReading:
         """One count of the display, in the device's unit."""
         return float(10.0**-self.decimals)
 
+    @property
+    def largest_shown(self) -> float:
+        """The largest number that the display has digits for, with room for a sign, in the device's unit."""
+        number = self.template.field(FORCE)
+        width = number.width if isinstance(number, Decimals | WholeNumber) else 0
+        if not width:
+            return 999999.0
+        digits = width - 1 - (self.decimals + 1 if self.decimals else 0)
+        return max(0.0, float(10.0**digits) - self.step)
+
     def word(self, quality: Quality) -> str | None:
-        """The status word that means this, None where the frame has none."""
-        return next((word for word, meaning in self.quality.items() if meaning == quality), None)
+        """The status word that means this, None where the frame has none; a device may know unstable readings only."""
+        meant = (quality, Quality.UNSTABLE) if quality is Quality.OK else (quality,)
+        return next((word for one in meant for word, meaning in self.quality.items() if meaning == one), None)
 
 
 def _check_reading(template: Template, reading: ForceReading) -> None:
@@ -203,6 +233,10 @@ def _check_reading(template: Template, reading: ForceReading) -> None:
     unit = template.field(UNIT)
     if unit and not (isinstance(unit, Choice) and set(unit.words) <= set(NEWTON_PER_UNIT)):
         raise TemplateError(f"{template.text!r}: units are {', '.join(NEWTON_PER_UNIT)}")
+    if isinstance(unit, Choice) and reading.unit and reading.unit not in unit.words:
+        raise TemplateError(f"{template.text!r} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
     status = template.field(STATUS)
     if set(status.words if isinstance(status, Choice) else ()) != set(reading.quality):
         raise TemplateError(f"{template.text!r}: quality must name each word of {{status:...}}, and no other")
+    if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD}:
+        raise TemplateError(f"{template.text!r}: quality has no word for a good reading (ok, unstable)")

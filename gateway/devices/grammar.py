@@ -60,9 +60,16 @@ class Grammar:
             values[number_field.name] = round(number, decimals)
         return self.line(compile_template(template).encode(values))
 
+    def answer_line(self, exchange: Exchange, value: float) -> bytes:
+        """The answer with this physical value in it; a sensor or a setting stops at the ends of its range."""
+        number = exchange.range.scale.on_grid(
+            exchange.range.scale.to_number(value), self._number_in(exchange.answer)[1]
+        )
+        return self.number_line(exchange.answer, number)
+
     def read(self, template: str, body: bytes | None, may_be_blank: str = "") -> dict[str, Value] | None:
         """Field values, None unless body is this sentence with this profile's constants: another address is not ours."""
-        values = compile_template(template).decode(body, may_be_blank) if body is not None else None
+        values = compile_template(template).decode(body, may_be_blank) if body is not None and template else None
         if values is None or any(values.get(name, fixed) != fixed for name, fixed in self.profile.constants.items()):
             return None
         return values
@@ -75,10 +82,13 @@ class Grammar:
     def setting(self, voltage_v: float) -> float:
         """The device's number for a voltage, on its grid. ValueRefused for nan, inf, and outside its range."""
         exchange = self.set_voltage
-        number = exchange.range.scale.to_number(voltage_v)
-        if isfinite(number):
-            number = round(number, self._number_in(exchange.ask)[1])
-        if not exchange.range.scale.carries(number):  # nan is carried by no range
+        scale, number = exchange.range.scale, exchange.range.scale.to_number(voltage_v)
+        decimals = self._number_in(exchange.ask)[1]
+        if not isfinite(number) or not scale.carries(round(number, decimals), self.half_step(exchange.ask)):
             low_v, high_v = exchange.range.voltage_v
             raise ValueRefused(f"{voltage_v} V, {self.profile.name} takes {low_v:g} .. {high_v:g} V")
-        return number
+        return scale.on_grid(number, decimals)
+
+    def half_step(self, template: str) -> float:
+        """Half of what the template's number counts in: a reading beyond its range by less than that was only rounded."""
+        return 0.5 * float(10.0 ** -self._number_in(template)[1])

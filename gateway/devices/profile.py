@@ -58,9 +58,9 @@ class DeviceProfile:
     watchdog: Literal["none"] = "none"  # none: the device holds its last output when nobody talks to it
     identity: Literal["none"] = "none"  # none: the device cannot be asked what it is
     refusals: Refusals = field(default_factory=Refusals)  # the device's words for no
-    set_voltage: VoltageExchange | None = None  # output: drive this voltage
-    read_voltage: VoltageExchange | None = None  # output: what is the present setting?
-    read_pressure: PressureExchange | None = None  # output: what pressure is measured?
+    set_voltage: VoltageExchange | None = None  # output: drive this voltage; without an answer, read_voltage is needed
+    read_voltage: VoltageExchange | None = None  # output: what is the present setting? may be absent
+    read_pressure: PressureExchange | None = None  # output: what pressure is measured? may be absent
     steps: tuple[Step, ...] = ()  # output: commands that the gateway never sends but the device knows
     stream: ForceReading | None = None  # load cell that talks by itself
     read_force: ForceReading | None = None  # load cell that is asked
@@ -75,6 +75,14 @@ class DeviceProfile:
     def rate_hz(self) -> float:
         """Readings per second of a streaming load cell, 0 for anything else."""
         return self.stream.rate_hz if self.stream else 0.0
+
+    @property
+    def confirmation(self) -> VoltageExchange:
+        """The exchange whose answer tells that a setting stands: its own, or the reading after it. ValueError: a load cell."""
+        exchange = self.set_voltage if self.set_voltage and self.set_voltage.answer else self.read_voltage
+        if exchange is None:
+            raise ValueError(f"{self.name} is not an output")
+        return exchange
 
     @property
     def voltage_range_v(self) -> Span:
@@ -114,11 +122,17 @@ def _check_output(profile: DeviceProfile) -> None:
         raise ValueError("stream and read_force belong to a load cell")
     if profile.number_in(profile.set_voltage.ask) is None:
         raise TemplateError(f"{profile.set_voltage.ask!r} carries no number")
-    profile.number_in(profile.set_voltage.answer)
+    if profile.set_voltage.answer:
+        profile.number_in(profile.set_voltage.answer)
+    elif profile.read_voltage is None:
+        raise ValueError(
+            "set_voltage has no answer and there is no read_voltage: nothing would tell a device that is silent, refuses or "
+            "alters a setting; say its acknowledgement in answer, or how to read the setting back"
+        )
     for exchange in (profile.read_voltage, profile.read_pressure):
         if exchange and profile.number_in(exchange.ask) is not None:
             raise TemplateError(f"{exchange.ask!r} asks for a number and must not carry one")
-        if exchange and profile.number_in(exchange.answer) is None:
+        if exchange and (not exchange.answer or profile.number_in(exchange.answer) is None):
             raise TemplateError(f"{exchange.answer!r} carries no number")
 
 

@@ -5,7 +5,15 @@ Codecs (the template codec, or a Python one for a device that needs it) provide 
 
 from typing import Protocol
 
-from gateway.devices.messages import ForceSample, Garbage, OutputReply, OutputRequest, Quality, Refused
+from gateway.devices.messages import (
+    Accepted,
+    ForceSample,
+    Garbage,
+    OutputReply,
+    OutputRequest,
+    Quality,
+    Refused,
+)
 
 
 class OutputHost(Protocol):
@@ -13,7 +21,14 @@ class OutputHost(Protocol):
 
     @property
     def resolution_v(self) -> float:
-        """One step of the output, V: an echo may differ by half of it from what was asked."""
+        """One step of the output, V."""
+
+    @property
+    def idle_question(self) -> OutputRequest | None:
+        """What to ask a device that has nothing to do; None where it can only be told its setting again."""
+
+    def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
+        """Whether this answer to `question` says that the setting stands, up to the rounding of the numbers on the wire."""
 
     @property
     def expecting(self) -> int:
@@ -21,7 +36,7 @@ class OutputHost(Protocol):
 
     @property
     def safe_reply(self) -> bytes:
-        """What acknowledges the last `safe_frame` (0 V before the first): a whole line; empty if nothing does."""
+        """What acknowledges the last `safe_frame` (the least voltage before the first): a whole line."""
 
     def request(self, message: OutputRequest) -> bytes:
         """The bytes to write; their answer is expected from now on. ValueRefused when the device cannot be told that."""
@@ -73,4 +88,5 @@ class CellDevice(Protocol):
         """How many readings these bytes ask for; 0 for a stream."""
 
     def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
-        """One reading. A force that does not fit the display is an overload, as on the device."""
+        """One reading, in the rig's unit where the frame says none. What does not fit the display is an overload, as on
+        the device."""

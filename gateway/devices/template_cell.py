@@ -7,13 +7,26 @@ status word says: a display that shows nothing has no valid reading, and saturat
 from math import isfinite, isnan, nan
 
 from gateway.devices.exchange import FORCE, STATUS, UNIT, ForceReading
-from gateway.devices.fields import Decimals, Value, ValueRefused
+from gateway.devices.fields import Choice, Field, Text, Value, ValueRefused
 from gateway.devices.framing import Line, LineSplitter
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from gateway.devices.profile import DeviceProfile
 from gateway.devices.template import compile_template
 from gateway.units import NEWTON_PER_UNIT
+
+
+def _own_unit(reading: ForceReading) -> str | None:
+    """The unit that the device is set to: the profile's, else the first that its frames can say."""
+    said = reading.template.field(UNIT)
+    return reading.unit or (said.words[0] if isinstance(said, Choice) else None)
+
+
+def _nothing(field: Field) -> Value:
+    """What the simulated device says in a field that is not the force: a reader drops it."""
+    if isinstance(field, Choice):
+        return field.words[0]
+    return "-" if isinstance(field, Text) else 0
 
 
 def _question(grammar: Grammar, reading: ForceReading) -> bytes:
@@ -30,7 +43,7 @@ class TemplateCellHost:
         self._reading = profile.reading
         if unit and self._reading.template.field(UNIT):
             raise ValueError(f"{profile.name} says its unit in each frame: the rig's unit ({unit}) is one too many")
-        unit = unit or self._reading.unit
+        unit = unit or _own_unit(self._reading)
         if unit is None:
             raise ValueError(f"{profile.name} does not say its unit: the rig must")
         self._newton_per_unit = NEWTON_PER_UNIT[unit]
@@ -65,12 +78,13 @@ class TemplateCellHost:
 
 
 class TemplateCellDevice:
-    """See roles.CellDevice."""
+    """See roles.CellDevice. unit: the rig's, where neither frame nor profile says one."""
 
-    def __init__(self, profile: DeviceProfile) -> None:
+    def __init__(self, profile: DeviceProfile, unit: str | None = None) -> None:
         self._grammar = Grammar(profile)
         self._reading = profile.reading
-        self._unit = self._reading.unit or "N"
+        self._unit = unit or _own_unit(self._reading) or "N"
+        self._around = {field.name: _nothing(field) for field in self._reading.template.fields}
         self._lines = LineSplitter(profile.terminator_bytes)
 
     def receive(self, chunk: bytes, now_s: float) -> int:
@@ -88,13 +102,10 @@ class TemplateCellDevice:
 
     def _largest(self) -> float:
         """The largest number that the display can show: what a grammar without blanks says at overload."""
-        number = self._reading.template.field(FORCE)
-        if isinstance(number, Decimals) and number.width:
-            return float(10.0 ** (number.width - 2 - number.decimals)) - self._reading.step
-        return 999999.0
+        return self._reading.largest_shown
 
     def _encoded(self, raw: float, quality: Quality) -> bytes:
-        values: dict[str, Value] = {**self._grammar.profile.constants, UNIT: self._unit}
+        values: dict[str, Value] = {**self._around, **self._grammar.profile.constants, UNIT: self._unit}
         values[FORCE] = round(raw, self._reading.decimals) if isfinite(raw) else raw
         word = self._reading.word(quality)
         if word is not None:

@@ -1,13 +1,16 @@
 """Both ends of the line to an output device whose sentences are templates.
 
 Answers are matched to requests in order, because `512` alone does not say whether it echoes a setting or is a pressure.
+A device that says nothing to a setting is asked for it in the same breath: that answer is the setting's.
 A line that answers nothing we asked is garbage. A garbled line while several answers are awaited makes their order unsure:
 then none of them is believed, and the caller's timeout asks again. What is never done: guess.
 """
 
 from collections import deque
+from math import isclose
+from typing import Final
 
-from gateway.devices.exchange import Scale
+from gateway.devices.exchange import VoltageExchange
 from gateway.devices.framing import Line, LineSplitter
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
@@ -23,6 +26,8 @@ from gateway.devices.messages import (
 )
 from gateway.devices.profile import DeviceProfile
 
+_ROUNDING: Final = 0.6  # of a step: half of it is the device's rounding, the rest its arithmetic
+
 
 class TemplateOutputHost:
     """See roles.OutputHost."""
@@ -32,9 +37,14 @@ class TemplateOutputHost:
         self._lines = LineSplitter(profile.terminator_bytes)
         self._expected: deque[OutputRequest] = deque()
         self._refusals = {text.encode("ascii"): text for text in profile.refusals.texts()}
-        self._safe_v = 0.0
-        exchange = self._grammar.set_voltage
-        self.resolution_v = exchange.range.scale.physical_per_number * 10.0 ** -profile.decimals_in(exchange.ask)
+        self._safe_v = profile.voltage_range_v[0]
+        self._confirmation = profile.confirmation
+        self._is_read_back = self._confirmation is not self._grammar.set_voltage
+        self.idle_question = _idle_question(profile)
+        self.resolution_v = self._step_v(self._grammar.set_voltage, self._grammar.set_voltage.ask)
+        self._tolerance_v: dict[type, float] = {SetVoltage: _ROUNDING * self._steps_between(self._confirmation)}
+        if profile.read_voltage:
+            self._tolerance_v[ReadVoltage] = _ROUNDING * self._steps_between(profile.read_voltage)
 
     @property
     def expecting(self) -> int:
@@ -42,7 +52,10 @@ class TemplateOutputHost:
 
     @property
     def safe_reply(self) -> bytes:
-        return self._grammar.number_line(self._grammar.set_voltage.answer, self._grammar.setting(self._safe_v))
+        return self._grammar.answer_line(self._confirmation, self._safe_v)
+
+    def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
+        return abs(reply.voltage_v - voltage_v) <= self._tolerance_v[type(question)]
 
     def safe_frame(self, voltage_v: float) -> bytes:
         frame = self._encoded(SetVoltage(voltage_v))
@@ -64,9 +77,22 @@ class TemplateOutputHost:
         return [self._reply(line) for line in self._lines.feed(chunk)]
 
     def _encoded(self, message: OutputRequest) -> bytes:
-        exchange = self._grammar.exchange(message)
-        number = self._grammar.setting(message.voltage_v) if isinstance(message, SetVoltage) else 0.0
-        return self._grammar.number_line(exchange.ask, number)
+        if not isinstance(message, SetVoltage):
+            return self._grammar.number_line(self._grammar.exchange(message).ask, 0.0)
+        setting = self._grammar.number_line(self._grammar.set_voltage.ask, self._grammar.setting(message.voltage_v))
+        return setting + (self._grammar.number_line(self._confirmation.ask, 0.0) if self._is_read_back else b"")
+
+    def _step_v(self, exchange: VoltageExchange, template: str) -> float:
+        """What one count of the number in this template means, V; 0 where it carries none."""
+        if self._grammar.profile.number_in(template) is None:
+            return 0.0
+        return exchange.range.scale.physical_per_number * float(10.0 ** -self._grammar.profile.decimals_in(template))
+
+    def _steps_between(self, answered: VoltageExchange) -> float:
+        """V: a setting is rounded once on its way, and once more where the answer counts in other numbers."""
+        step_v = self._step_v(answered, answered.answer)
+        same = isclose(step_v, self.resolution_v) and answered.range == self._grammar.set_voltage.range
+        return self.resolution_v + (0.0 if same else step_v)
 
     def _reply(self, line: Line) -> OutputReply:
         reply = self._understood(self._grammar.body(line)) if self._expected else None
@@ -81,21 +107,23 @@ class TemplateOutputHost:
         if body is not None and body in self._refusals:
             return Refused(self._refusals[body])
         asked = self._expected[0]
-        exchange = self._grammar.exchange(asked)
+        exchange = self._confirmation if isinstance(asked, SetVoltage) else self._grammar.exchange(asked)
         values = self._grammar.read(exchange.answer, body)
         if values is None:
             return None
         number = self._grammar.number(exchange.answer, values)
         if number is None:  # the device says only that it obeyed
             return Accepted(asked.voltage_v) if isinstance(asked, SetVoltage) else None
-        return _answer(asked, exchange.range.scale, number)
+        if not exchange.range.scale.carries(number, self._grammar.half_step(exchange.answer)):
+            return None
+        value = exchange.range.scale.to_physical(number)
+        return Pressure(value) if isinstance(asked, ReadPressure) else Accepted(value)
 
 
-def _answer(asked: OutputRequest, scale: Scale, number: float) -> OutputReply | None:
-    if not scale.carries(number):
-        return None
-    value = scale.to_physical(number)
-    return Pressure(value) if isinstance(asked, ReadPressure) else Accepted(value)
+def _idle_question(profile: DeviceProfile) -> OutputRequest | None:
+    if profile.read_pressure:
+        return ReadPressure()
+    return ReadVoltage() if profile.read_voltage else None
 
 
 class TemplateOutputDevice:
@@ -131,11 +159,9 @@ class TemplateOutputDevice:
         return Refused(refusals.unknown)
 
     def _number(self, question: OutputRequest, value: float) -> bytes:
-        """The answer with this value in it; a sensor or a setting stops at the ends of its range."""
+        """The answer with this value in it; nothing where the device says nothing."""
         exchange = self._grammar.exchange(question)
-        low, high = exchange.range.scale.device
-        number = exchange.range.scale.to_number(value)
-        return self._grammar.number_line(exchange.answer, min(high, max(low, number)))
+        return self._grammar.answer_line(exchange, value) if exchange.answer else b""
 
     def _asked_number(self, garbage: Garbage) -> float | None:
         lines = LineSplitter(self._profile.terminator_bytes).feed(garbage.data)
@@ -151,7 +177,7 @@ class TemplateOutputDevice:
         number = self._set_number(body)
         if number is None:
             number = self._stepped(body)
-        if number is not None and self._scale.carries(number):
+        if number is not None and self._scale.carries(number, self._grammar.half_step(self._grammar.set_voltage.ask)):
             self._setting = number
             return SetVoltage(self._scale.to_physical(number))
         return self._question(body) or Garbage(line.data)

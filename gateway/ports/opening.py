@@ -1,5 +1,6 @@
 """Open and configure a serial port: pyserial knows every termios corner, so it opens; we keep only the descriptor."""
 
+import errno
 import os
 import termios
 from typing import Final
@@ -27,15 +28,14 @@ def open_descriptor(path: str, settings: SerialSettings) -> int:
 
 
 def _opened(path: str, settings: SerialSettings) -> int:
-    port = serial.Serial(
-        path,
-        settings.baud,
-        bytesize=settings.data_bits,
-        parity=_PARITY[settings.parity],
-        stopbits=settings.stop_bits,
-        timeout=0,
-        exclusive=True,
-    )
+    try:
+        port = _configured(path, settings)
+    except termios.error as error:
+        if error.args[0] != errno.EINVAL or not os.path.realpath(path).startswith("/dev/pts/"):
+            raise
+        port = _configured(
+            path, SerialSettings(baud=settings.baud)
+        )  # a pty has no frame, and refuses to be told of one
     try:
         descriptor = os.dup(port.fileno())  # the same open file: lock and settings stay, pyserial's four pipes go
     finally:
@@ -46,6 +46,18 @@ def _opened(path: str, settings: SerialSettings) -> int:
         os.close(descriptor)
         raise
     return descriptor
+
+
+def _configured(path: str, settings: SerialSettings) -> serial.Serial:
+    return serial.Serial(
+        path,
+        settings.baud,
+        bytesize=settings.data_bits,
+        parity=_PARITY[settings.parity],
+        stopbits=settings.stop_bits,
+        timeout=0,
+        exclusive=True,
+    )
 
 
 def _return_eagain_for_nothing(descriptor: int) -> None:

@@ -51,6 +51,12 @@ class PacedPty:
         """Put bytes on the wire to the client, behind those that are still on it."""
         self._outward.put(heard_at(data, self._baud, self._open_pty.client_baud()))
 
+    @property
+    def backlog_s(self) -> float:
+        """Time until everything sent is through the wire."""
+        last_s = self._outward.wire.last_through_s
+        return 0.0 if last_s is None else max(0.0, last_s - monotonic_s())
+
     def close(self) -> None:
         """Pull the plug; what is still on the wire is lost."""
         if self._pty is None:

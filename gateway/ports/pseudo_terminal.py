@@ -9,11 +9,12 @@ import fcntl
 import os
 import pty
 import struct
-import termios
 import tty
 from typing import Final
 
 _TCGETS2: Final = 0x802C542A  # linux/termbits.h: the only call that tells an unusual speed
+_TCSETS2: Final = 0x402C542B
+_CBAUD, _BOTHER = 0x100F, 0x1000  # the mask of the usual speeds in c_cflag, and the word for any other
 _TERMIOS2: Final = struct.Struct("4IB19s2I")
 
 
@@ -32,10 +33,10 @@ class Pty:
         return int(speed)
 
     def set_client_baud(self, baud: int) -> None:
-        """The speed that a client gets that sets none. Only the speeds of termios."""
-        attributes = termios.tcgetattr(self._slave)
-        attributes[4] = attributes[5] = getattr(termios, f"B{baud}")
-        termios.tcsetattr(self._slave, termios.TCSANOW, attributes)
+        """The speed that a client gets that sets none; any speed, for termios knows the usual ones only."""
+        *flags, line, control, _, _ = _TERMIOS2.unpack(fcntl.ioctl(self._slave, _TCGETS2, bytes(_TERMIOS2.size)))
+        flags[2] = flags[2] & ~_CBAUD | _BOTHER
+        fcntl.ioctl(self._slave, _TCSETS2, _TERMIOS2.pack(*flags, line, control, baud, baud))
 
     def close(self) -> None:
         """Pull the plug: a client reads a hang-up."""

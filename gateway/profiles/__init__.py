@@ -2,23 +2,27 @@
 
 A package instead of the one file that the plan of the house shows, for strict YAML, sentences, cross-checks and schemas are
 four trades. In the order of the way of a text: scalars, syntax, text (strict YAML), typed, sentences (pydantic's findings),
-models (form of a rig file), plants, calibrations, device_files, register_files, find, load, checks, line_checks,
-network_checks, rig, report; schema stands apart, for editors.
+models (form of a rig file), plants, calibrations, device_files, register_files, kinds, find, load, checks, line_checks,
+wire_checks, network_checks, edit_marks, rig, report, any_file; schema stands apart, for editors.
 
 Nothing here imports scipy: `check` answers at once.
 """
 
+from gateway.profiles.any_file import Checked, check_file
 from gateway.profiles.faults import Fault, ProfileError
 from gateway.profiles.find import root, shipped
+from gateway.profiles.kinds import CALLED
 from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
 from gateway.profiles.models import Network, ResidualWatch
 from gateway.profiles.plants import Origin, PlantProfile
-from gateway.profiles.report import Report, check_plant, check_report, load_rig
+from gateway.profiles.report import Report, check_report, load_rig
 from gateway.profiles.rig import CellLine, OutputLine, Rig
 from gateway.profiles.schema import schema
 
 __all__ = [
+    "CALLED",
     "CellLine",
+    "Checked",
     "Fault",
     "Network",
     "Origin",
@@ -28,7 +32,7 @@ __all__ = [
     "Report",
     "ResidualWatch",
     "Rig",
-    "check_plant",
+    "check_file",
     "check_report",
     "load_calibration",
     "load_device",

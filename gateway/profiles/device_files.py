@@ -1,9 +1,10 @@
-"""Device files: the profile's own rules, and the codec that it names."""
+"""Device files: the profile's own rules, the codec that it names, and whether both ends of its wire understand each other."""
 
 from collections.abc import Callable
 from typing import Final
 
 from gateway.devices import DeviceProfile, Role, cell_device, output_host
+from gateway.devices.rehearsal import rehearsed
 from gateway.profiles.faults import Fault
 from gateway.profiles.text import Document
 from gateway.profiles.typed import build
@@ -20,4 +21,5 @@ def read_device(document: Document) -> tuple[DeviceProfile | None, list[Fault]]:
         _MAKE[device.role](device)
     except ValueError as error:
         return None, [document.fault(("codec",) if "codec" in str(error) else (), str(error))]
-    return device, []
+    faults = [document.fault(place, told) for place, told in rehearsed(device)]
+    return (None, faults) if faults else (device, [])

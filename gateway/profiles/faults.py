@@ -53,6 +53,7 @@ class Findings:
     """Collects while files are read: faults stop a rig from starting, warnings do not. `texts`: all bytes read, by file."""
 
     faults: list[Fault] = field(default_factory=list)
+    hardware: list[Fault] = field(default_factory=list)  # what only a run on real devices needs
     warnings: list[Fault] = field(default_factory=list)
     texts: dict[str, bytes] = field(default_factory=dict)
 

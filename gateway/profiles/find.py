@@ -32,16 +32,19 @@ def shipped(kind: str) -> list[str]:
 
 
 def locate(kind: str, name: str, beside: Path | None = None) -> Path:
-    """The file of a profile: a shipped name, else a path (relative to the folder `beside`, or to the working directory).
+    """The file of a profile: a shipped name, else a path (relative to the folder `beside`, or to the working directory), else
+    the name of a file there or in its folder of that kind: `device: my-dac` is my-dac.yaml or devices/my-dac.yaml.
 
     FileNotFoundError with a sentence that follows the name: what is there, and what was probably meant.
     """
     known = shipped(kind)
     if name in known:
         return root() / FOLDERS[kind] / f"{name}.yaml"
-    path = (beside or Path()) / Path(name).expanduser()
-    if _is_file(path):
-        return path
+    folder = beside or Path()
+    path = folder / Path(name).expanduser()
+    for candidate in (path, folder / f"{name}.yaml", folder / FOLDERS[kind] / f"{name}.yaml"):
+        if _is_file(candidate):
+            return candidate
     if "/" in name or name.endswith(_SUFFIXES):
         raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(path)}")
     near = closest(name, known)

@@ -15,6 +15,7 @@ from gateway.profiles.calibrations import read_calibration
 from gateway.profiles.device_files import read_device
 from gateway.profiles.faults import Fault, Findings, ProfileError
 from gateway.profiles.find import display, locate
+from gateway.profiles.kinds import CALLED, kind_of
 from gateway.profiles.plants import PlantProfile, read_plant
 from gateway.profiles.register_files import read_registers
 from gateway.profiles.text import Document, parse
@@ -47,7 +48,18 @@ def written_at(document: Document, path: tuple[str, ...], folder: Path, default:
 
 
 def open_profile(kind: str, reference: Reference, findings: Findings) -> tuple[Document, Path] | None:
-    """Find, read and parse one file; None with the faults noted."""
+    """Find, read and parse one file of a kind; None with the faults noted."""
+    opened = open_file(kind, reference, findings)
+    found = kind_of(opened[0].value, kind) if opened else None
+    if opened and found and found != kind:
+        told = f"is {CALLED[found]}, {CALLED[kind]} is needed here: `force-gateway check {display(opened[1])}` takes it as one"
+        findings.faults.append(reference.place(told))
+        return None
+    return opened
+
+
+def open_file(kind: str, reference: Reference, findings: Findings) -> tuple[Document, Path] | None:
+    """The same, whatever the file turns out to be."""
     try:
         path = locate(kind, reference.name, reference.beside)
         data = path.read_bytes()

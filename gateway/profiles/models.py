@@ -11,8 +11,7 @@ from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import AfterValidator, Field, PlainValidator, WithJsonSchema
 
 from gateway.control.settings import STRICT, Defaults, LeadSettings, Limits, Supervision, Trim
-
-Baud = Literal[9600, 19200, 38400, 115200]
+from gateway.devices.line_settings import Baud
 
 
 def _address(text: str) -> str:

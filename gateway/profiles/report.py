@@ -1,71 +1,73 @@
 """From a rig's name to a `Rig`, or to everything that keeps it from being one: what `force-gateway check` prints."""
 
 import hashlib
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
 from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.settings import ControlSettings, Defaults, Limits, Supervision, Trim
 from gateway.devices import DeviceProfile
-from gateway.profiles import checks, line_checks, network_checks
+from gateway.profiles import checks, line_checks, network_checks, wire_checks
 from gateway.profiles.calibrations import read_calibration
 from gateway.profiles.checks import Check, Parts
 from gateway.profiles.compensating import compensation_of, compensation_words, in_simulation, without_compensable
 from gateway.profiles.device_files import read_device
+from gateway.profiles.edit_marks import marked
 from gateway.profiles.faults import Fault, Findings, ProfileError
+from gateway.profiles.find import display, root
 from gateway.profiles.load import asked_for, load_plant, open_profile, read_named, written_at
 from gateway.profiles.models import CellFile, Network, OutputFile, RigFile
-from gateway.profiles.plants import ABOUT, PlantProfile, read_plant
+from gateway.profiles.plants import PlantProfile, read_plant
 from gateway.profiles.register_files import read_registers
 from gateway.profiles.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
 from gateway.profiles.text import Document
-from gateway.profiles.typed import build, build_known, names
+from gateway.profiles.typed import build, build_known
 from gateway.registers.map import RegisterMap
-from gateway.twin import Plant
 
 T = TypeVar("T")
 
 STAND_IN_PLANT: Final = "paper-slide"
 """What `run --sim` simulates for a real rig that names no plant."""
 
-FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *network_checks.FAULTS)
-WARNINGS: Final = (*checks.WARNINGS, *line_checks.WARNINGS, *network_checks.WARNINGS)
+FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *wire_checks.FAULTS, *network_checks.FAULTS)
+WARNINGS: Final = (*checks.WARNINGS, *line_checks.WARNINGS, *wire_checks.WARNINGS, *network_checks.WARNINGS)
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """faults: what must be mended before the rig starts; warnings: what may be meant so; rig: None while there are faults."""
+    """faults: what must be mended before the rig starts; warnings: what may be meant so; rig: None while there are faults.
+    With `simulated` the faults are those that keep even a simulated run from starting."""
 
     faults: tuple[Fault, ...]
     warnings: tuple[Fault, ...]
     rig: Rig | None
 
 
-def check_report(name: str | Path) -> Report:
-    """Read and check a rig, by shipped name or path. Never raises for what is in a file."""
+def check_report(name: str | Path, *, simulated: bool = False) -> Report:
+    """Read and check a rig, by shipped name or path. Never raises for what is in a file.
+
+    simulated: its devices will be simulated, so no port is needed; rig is `as_simulated` then.
+    """
     findings = Findings()
     opened = open_profile("rig", asked_for(name), findings)
     rig = _rig(opened[0], opened[1], findings) if opened else None
-    return Report(_in_order(findings.faults), _in_order(findings.warnings), None if findings.faults else rig)
+    faults = findings.faults + ([] if simulated else findings.hardware)
+    if rig and simulated:
+        rig = replace(rig, notes=(*rig.notes, *_left_to_edit(findings))).as_simulated()
+    return Report(_in_order(faults), _in_order(findings.warnings), None if faults else rig)
 
 
-def check_plant(name: str | Path) -> PlantProfile | tuple[Fault, ...] | None:
-    """The plant, or its faults, where the file is one by its keys; None where it is anything else."""
-    opened = open_profile("rig", asked_for(name), Findings())
-    if opened is None or not isinstance(opened[0].value, dict):
-        return None
-    keys = frozenset(map(str, opened[0].value)) - frozenset(ABOUT)
-    if not keys or not keys <= frozenset(part.name for part in fields(Plant)) - frozenset(names(RigFile)):
-        return None
-    plant, faults = read_plant(opened[0])
-    return plant or tuple(faults)
+def _left_to_edit(findings: Findings) -> Iterator[str]:
+    """What a simulated run need not mind, and the real one will."""
+    for fault in _in_order(findings.hardware):
+        yield f"to be edited before it runs without --sim: {fault}"
 
 
-def load_rig(name: str | Path) -> Rig:
-    """A rig by shipped name or path; ProfileError with every fault."""
-    report = check_report(name)
+def load_rig(name: str | Path, *, simulated: bool = False) -> Rig:
+    """A rig by shipped name or path; ProfileError with every fault. simulated: as in `check_report`."""
+    report = check_report(name, simulated=simulated)
     if report.rig is None:
         raise ProfileError(report.faults)
     return report.rig
@@ -86,10 +88,29 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     )
     parts = _parts(document, path.parent, findings)
     findings.faults += _first_of_each_path(_told(document, FAULTS, parts))
+    findings.hardware += _first_of_each_path(_told(document, line_checks.HARDWARE, parts))
     findings.warnings += _told(document, WARNINGS, parts)
+    marks = _marks(document, path, findings)
+    findings.warnings += marks
     if file is None or register_map is None or findings.faults:
         return None
-    return _assembled(file, parts, register_map, path, findings)
+    rig = _assembled(file, parts, register_map, path, findings)
+    if not marks:
+        return rig
+    lines = ", ".join(str(fault.line) for fault in marks)
+    what = f"lines {lines} are" if len(marks) > 1 else f"line {lines} is"
+    return replace(
+        rig, notes=(*rig.notes, f"{what} still marked EDIT: force-gateway check {display(path)} says what each is")
+    )
+
+
+def _marks(document: Document, path: Path, findings: Findings) -> list[Fault]:
+    """Marks of a rig of the user's own; a placeholder is told already, and a shipped file is there to be copied."""
+    if path.is_relative_to(root()):
+        return []
+    told = {fault.path for fault in (*findings.faults, *findings.hardware)}
+    text = findings.texts[display(path)].decode("utf-8-sig", "replace")
+    return [fault for fault in marked(document, text) if fault.path not in told]
 
 
 def _told(document: Document, found_by: Iterable[Check], parts: Parts) -> list[Fault]:

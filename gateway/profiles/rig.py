@@ -108,7 +108,8 @@ class Rig:
         return {name: port for name, port in ports.items() if port is not None}
 
     def as_simulated(self) -> "Rig":
-        """The same rig with its devices simulated, on loopback. What was decided in the user's stead is in `notes`."""
+        """The same rig with its devices simulated, set as the rig says that the real ones are, on loopback. What was decided in
+        the user's stead is in `notes`."""
         if self.simulated:
             return self
         notes, network = self.notes, self.network
@@ -123,10 +124,14 @@ class Rig:
         return replace(
             self,
             simulated=True,
-            output=replace(self.output, port=None),
-            load_cell=replace(self.load_cell, port=None),
+            output=replace(self.output, port=None, device=_set_to(self.output.device, self.output.baud)),
+            load_cell=replace(self.load_cell, port=None, device=_set_to(self.load_cell.device, self.load_cell.baud)),
             plant_profile=self.plant_profile or self.stand_in,
             network=network,
             notes=notes,
             compensation=compensation,
         )
+
+
+def _set_to(device: DeviceProfile, baud: int) -> DeviceProfile:
+    return replace(device, serial=device.serial.at(baud))

@@ -156,10 +156,18 @@ def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     """`expected` is pydantic's list: `'fault', 'hold' or 'ramp'`."""
     choices = [word.strip(" '") for word in str(context["expected"]).replace(" or ", ",").split(",")]
     seen = value if isinstance(value, str) else shown(value)
-    near = closest(value, choices) if isinstance(value, str) else None
+    near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
     if len(choices) == 1:
         return f"{seen} is not {choices[0]}, the only choice"
     return f"{seen} is not one of {one_of(choices)}" + (f"; did you mean {near}?" if near else "")
+
+
+def _nearest(value: Any, choices: list[str]) -> str | None:
+    """The number among the choices that a slip of the finger makes this one of."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    near = [choice for choice in choices if choice.isdecimal() and abs(value - int(choice)) <= 0.1 * int(choice)]
+    return min(near, key=lambda choice: abs(value - int(choice)), default=None)
 
 
 _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {

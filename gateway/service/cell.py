@@ -19,6 +19,7 @@ from gateway.registers import RegisterBank
 from gateway.registers.words import FaultCode, WarningBit
 from gateway.service import banner
 from gateway.service.activation import InUse
+from gateway.service.cell_exchange import CellExchange
 from gateway.service.control_socket import Asked, ControlSocket
 from gateway.service.ending import EndCause, Ending
 from gateway.service.event_log import EventLog
@@ -96,6 +97,8 @@ class Cell:
         )
         self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
         self._turns = TurnsOf(os.getpid())
+        cell = rig.load_cell
+        self._cell_line = CellExchange(cell_host(cell.device, cell.sign, cell.unit), self._write_cell, cell.device)
         self._tick = Tick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
 
@@ -141,7 +144,7 @@ class Cell:
             self.bank,
             self.controller,
             self._line,
-            cell_host(rig.load_cell.device, sign=rig.load_cell.sign, unit=rig.load_cell.unit),
+            self._cell_line,
             clock=time.monotonic,
             log=self._log,
         )
@@ -281,6 +284,11 @@ class Cell:
         if not self._closing:
             self._output_port.flush_input()  # at most one question is out: whatever is there answers none of ours
             self._output_port.write(data)
+
+    def _write_cell(self, data: bytes) -> None:
+        if not self._closing:
+            self._cell_port.flush_input()
+            self._cell_port.write(data)
 
     def _on_output_bytes(self, chunk: bytes, now_s: float) -> None:
         self.gateway.on_output_bytes(chunk, now_s)

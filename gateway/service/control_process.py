@@ -63,8 +63,7 @@ def prepare(options: dict[str, Any]) -> None:
 
 
 def load(options: dict[str, Any]) -> Rig:
-    rig = load_rig(options["rig"])
-    return rig.as_simulated() if options["simulate"] else rig
+    return load_rig(options["rig"], simulated=options["simulate"])
 
 
 def sample_ring(descriptor: int | None) -> SampleRing | None:

@@ -13,7 +13,6 @@ from dataclasses import replace
 
 from gateway.control import Controller
 from gateway.control.inputs import Line, Output
-from gateway.devices import CellHost
 from gateway.devices.messages import ForceSample
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
@@ -21,6 +20,7 @@ from gateway.registers.command import Command
 from gateway.registers.edges import Asked, EdgeRefusal
 from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.words import FaultCode, WarningBit
+from gateway.service.cell_exchange import CellExchange
 from gateway.service.ladder_keeper import LadderKeeper
 from gateway.service.output_exchange import OutputExchange
 from gateway.service.publish import Known, LoopHealth, status_of
@@ -39,7 +39,7 @@ class Gateway:
         bank: RegisterBank,
         controller: Controller,
         output: OutputExchange,
-        cell: CellHost,
+        cell: CellExchange,
         *,
         clock: Callable[[], float],
         log: Log,
@@ -100,6 +100,7 @@ class Gateway:
         self.health.count(expirations, late_s)
         now_s = self._clock()
         self.output.tick(now_s)
+        self._cell.tick(now_s)
         self._step(now_s)
         self._last_tick_s, self._last_waited_s = now_s, self.waited_s()
 
@@ -118,7 +119,7 @@ class Gateway:
         self._step(self._clock())
 
     def cell_opened(self) -> None:
-        self._cell.forget()
+        self._cell.opened()
         self.cell_lost = False
 
     def _late_s(self, now_s: float) -> float:

@@ -1,8 +1,9 @@
 """The output device's line: at most one question on the wire, and of waiting setpoints only the last.
 
 A serial device at 9600 baud takes 15 ms for a setting and its echo, the loop decides every 4-10 ms: a queue would make
-the wire an ever older past. Setpoints go before pressure polls; polls fill the idle wire and keep a silent device from
-going unnoticed. Time comes in as an argument, so that tests run it in virtual time.
+the wire an ever older past. Setpoints go before polls; polls fill the idle wire and keep a silent device from going
+unnoticed: the pressure where the device measures it, else the setting that stands, else, of a device that cannot be asked
+anything, the same setting once more. Time comes in as an argument, so that tests run it in virtual time.
 
 An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
 it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
@@ -20,14 +21,13 @@ from gateway.devices.messages import (
     OutputReply,
     OutputRequest,
     Pressure,
-    ReadPressure,
     Refused,
     SetVoltage,
 )
 from gateway.registers.words import FaultCode
 
 _FAILURES_BEFORE_FAULT = 3  # SAFETY: T_dac is three writes or 100 ms; one bad echo is noise
-_PRESSURE_PERIOD_S = 0.1
+_POLL_PERIOD_S = 0.1
 
 
 class OutputExchange:
@@ -56,8 +56,8 @@ class OutputExchange:
         self._is_overdue = False  # a question was given up, its answer may still come
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
-        self._next_pressure_s = 0.0
-        self._failures = 0
+        self._next_poll_s = 0.0
+        self._failures: dict[object, int] = {}
         self.acknowledged_v: float | None = None
         self.unanswered_since_s: float | None = None
         self.fault = FaultCode.NONE
@@ -78,7 +78,7 @@ class OutputExchange:
         if self._in_flight is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
             self._in_flight, self._is_overdue = None, True
-            self._next_pressure_s = now_s  # ask again at once: three tries fit into the bound on silence
+            self._next_poll_s = now_s  # ask again at once: three tries fit into the bound on silence
         self._pump(now_s)
 
     def _pump(self, now_s: float) -> None:
@@ -90,10 +90,12 @@ class OutputExchange:
         if not self._stands(wanted_v):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             self._asked_v, self._standing_v = wanted_v, None
+            if self._host.idle_question is None:  # this is what a poll would say
+                self._next_poll_s = now_s + _POLL_PERIOD_S
             self._send(SetVoltage(wanted_v), now_s)
-        elif now_s >= self._next_pressure_s:
-            self._next_pressure_s = now_s + _PRESSURE_PERIOD_S
-            self._send(ReadPressure(), now_s)
+        elif now_s >= self._next_poll_s:
+            self._next_poll_s = now_s + _POLL_PERIOD_S
+            self._send(self._host.idle_question or SetVoltage(self._asked_v), now_s)
 
     def _stands(self, voltage_v: float) -> bool:
         """Within half a step of what surely stands there is nothing to send. After a question without an answer nothing
@@ -119,27 +121,35 @@ class OutputExchange:
             return
         self.round_trip_s = now_s - self._sent_s
         if isinstance(reply, Pressure):
+            self._failures[type(asked)] = 0
             self.pressure_pa = reply.pressure_pa
             self.on_pressure(reply.pressure_pa)
         elif isinstance(reply, Refused):
-            self._failed(FaultCode.OUTPUT_REFUSED)
-        elif isinstance(reply, Accepted) and isinstance(asked, SetVoltage):
-            self._check_echo(asked, reply)
+            self._failed(type(asked), FaultCode.OUTPUT_REFUSED)
+        elif asked is not None and isinstance(reply, Accepted):
+            self._check_setting(asked, reply)
 
     def _echoes(self, asked: OutputRequest | None, reply: OutputReply) -> bool:
-        """Half a step is the device's rounding."""
-        if not (isinstance(asked, SetVoltage) and isinstance(reply, Accepted)):
-            return False
-        return abs(reply.voltage_v - asked.voltage_v) <= 0.6 * self._host.resolution_v
+        return (
+            isinstance(asked, SetVoltage)
+            and isinstance(reply, Accepted)
+            and self._host.confirms(asked.voltage_v, reply, asked)
+        )
 
-    def _check_echo(self, asked: SetVoltage, reply: Accepted) -> None:
+    def _check_setting(self, asked: OutputRequest, reply: Accepted) -> None:
+        """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted."""
         self.acknowledged_v = self._standing_v = reply.voltage_v
-        if self._echoes(asked, reply):
-            self._failures, self.fault = 0, FaultCode.NONE
-        else:
-            self._failed(FaultCode.OUTPUT_ALTERED)
+        if not self._host.confirms(self._asked_v, reply, asked):
+            self._failed(type(asked), FaultCode.OUTPUT_ALTERED)
+            return
+        if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:
+            self._standing_v = self._asked_v  # the answer only counts in coarser steps
+        self._failures[type(asked)] = 0
+        if max(self._failures.values()) < _FAILURES_BEFORE_FAULT:
+            self.fault = FaultCode.NONE
 
-    def _failed(self, fault: FaultCode) -> None:
-        self._failures += 1
-        if self._failures >= _FAILURES_BEFORE_FAULT:
+    def _failed(self, question: type, fault: FaultCode) -> None:
+        """Counted by question: an echo that agrees makes no reading good that does not."""
+        self._failures[question] = self._failures.get(question, 0) + 1
+        if self._failures[question] >= _FAILURES_BEFORE_FAULT:
             self.fault = fault

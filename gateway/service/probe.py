@@ -10,13 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.devices import SerialSettings, cell_host, output_host
-from gateway.devices.messages import Accepted, ForceSample, Pressure, ReadVoltage, Refused
+from gateway.devices import DeviceProfile, SerialSettings, cell_host, output_host
+from gateway.devices.messages import Accepted, ForceSample, OutputRequest, Pressure, Refused, SetVoltage
 from gateway.ports import PortError, SerialPort
 from gateway.profiles import CellLine, OutputLine
 
-BAUDS: Final = (9600, 19200, 38400, 115200)
+BAUDS: Final = (9600, 19200, 38400, 57600, 115200)
 _LISTEN_S: Final = 0.4  # forty frames of a 100 Hz stream, or several questions and answers at 9600 baud
+_LONG_TALK: Final = 40  # characters of a question and its answer: on a slow wire they take longer than that
 _QUESTIONS: Final = 2
 _ENOUGH: Final = 3
 _VALID: Final = (Accepted, Pressure, Refused, ForceSample)  # a device that refuses in its own words is heard
@@ -79,17 +80,22 @@ async def _listen(line: OutputLine | CellLine, path: str, baud: int) -> Heard:
         for _ in range(_QUESTIONS):  # the first one may end half a line that somebody left in the device
             port.write(ask())
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(enough.wait(), _LISTEN_S / _QUESTIONS)
+                await asyncio.wait_for(enough.wait(), _LISTEN_S / _QUESTIONS + _LONG_TALK * settings.character_s)
     finally:
         port.close()
     return Heard(baud, total, valid)
 
 
+def _question(device: DeviceProfile) -> OutputRequest:
+    """What moves nothing: a reading, or, where a device cannot be asked, the least voltage that it can be set to."""
+    return output_host(device).idle_question or SetVoltage(device.voltage_range_v[0])
+
+
 def _ends(line: OutputLine | CellLine) -> tuple[Callable[[], bytes], Callable[[bytes, float], int]]:
     """How to ask this device for a word (a stream is not asked), and how many valid ones a chunk completes."""
     if isinstance(line, OutputLine):
-        output = output_host(line.device)
-        return lambda: output.request(ReadVoltage()), lambda chunk, now_s: _valid(output.receive(chunk, now_s))
+        output, question = output_host(line.device), _question(line.device)
+        return lambda: output.request(question), lambda chunk, now_s: _valid(output.receive(chunk, now_s))
     cell = cell_host(line.device, line.sign, line.unit)
     return cell.poll, lambda chunk, now_s: _valid(cell.receive(chunk, now_s))
 

@@ -51,7 +51,7 @@ class SafeLine:
             if not chunk:
                 return False
             seen += chunk
-            if self.reply.strip() in re.split(rb"[\r\n]+", seen)[:-1]:
+            if self.reply.strip(b"\r\n") in re.split(rb"[\r\n]+", seen)[:-1]:
                 return True
         return False
 

@@ -17,7 +17,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from gateway.devices import cell_device, output_device
+from gateway.devices import DeviceProfile, cell_device, output_device
 from gateway.devices.messages import (
     Accepted,
     Garbage,
@@ -57,7 +57,8 @@ class SimulatedRig:
         self.is_cell_cut = False
         self.is_output_cut = False
         self._output = output_device(rig.output.device)
-        self._cell = cell_device(rig.load_cell.device)
+        self._cell = cell_device(rig.load_cell.device, rig.load_cell.unit)
+        self._wiring = rig.load_cell.sign  # the simulated cell is wired as the rig says that the real one is
         self._send_output = send_output
         self._send_cell = send_cell
         self._setting_v = 0.0
@@ -78,11 +79,16 @@ class SimulatedRig:
             if not self.is_output_cut:
                 self._send_output(answer)
 
+    def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
+        """Questions to a load cell that answers when it is asked."""
+        for _ in range(self._cell.receive(chunk, now_s)):
+            self.stream(now_s)
+
     def stream(self, now_s: float) -> None:
         """One frame of the load-cell amplifier."""
         self.advance(now_s)
         if not self.is_cell_cut:
-            force_n = float(self.twin.measured_n)
+            force_n = self._wiring * float(self.twin.measured_n)
             overload = abs(force_n) >= self._range_n
             self._send_cell(self._cell.frame(force_n, Quality.OVERLOAD if overload else Quality.OK))
 
@@ -161,27 +167,40 @@ def _changed(plant: Plant, values: Mapping[str, float]) -> Plant:
     return plant
 
 
+def _pty(device: DeviceProfile, on_bytes: Callable[[bytes, float], None]) -> PacedPty:
+    serial = device.serial
+    return PacedPty(serial.baud, on_bytes=on_bytes, bits_per_character=serial.bits_per_character)
+
+
 async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> None:
     """Run until the guardian's end of the link closes."""
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
-    output_pty = PacedPty(
-        rig.output.device.serial.baud, on_bytes=lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s)
-    )
-    cell_pty = PacedPty(rig.load_cell.device.serial.baud, on_bytes=lambda chunk, now_s: None)
+    output_pty = _pty(rig.output.device, lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s))
+    cell_pty = _pty(rig.load_cell.device, lambda chunk, now_s: simulated.on_cell_bytes(chunk, now_s))
     simulated = SimulatedRig(rig, send_output=output_pty.send, send_cell=cell_pty.send, now_s=time.monotonic())
     faults = JsonLineServer(state / "rig.sock", {"fault": simulated.fault}, log)
-    tick = Tick(1.0 / rig.load_cell.device.rate_hz, lambda *_: simulated.stream(time.monotonic()))
+
+    rate_hz = rig.load_cell.device.rate_hz
+
+    def on_tick(expirations: int, late_s: float) -> None:
+        """A stream, whose amplifier leaves out what its wire has no time for."""
+        if cell_pty.backlog_s * rate_hz < 1.0:
+            simulated.stream(time.monotonic())
+
+    tick = Tick(1.0 / rate_hz, on_tick) if rate_hz else None
     output_pty.open()
     cell_pty.open()
     if unserved := await faults.start():
         log("socket", f"E152 {unserved}")
-    tick.start()
+    if tick:
+        tick.start()
     loop.add_reader(link.fileno(), ended.set)
     guardian_link.send(link, guardian_link.PTYS, {"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}})
     await ended.wait()
     loop.remove_reader(link.fileno())
-    tick.close()
+    if tick:
+        tick.close()
     await faults.close()
     output_pty.close()
     cell_pty.close()
@@ -193,7 +212,7 @@ def main(arguments: list[str]) -> int:
     state = Path(options["state"])
     priority.take(priority.RIG_NICE)
     with EventLog(source="rig", file=EventFile(state)) as log:
-        asyncio.run(serve(load_rig(options["rig"]).as_simulated(), link, state, log))
+        asyncio.run(serve(load_rig(options["rig"], simulated=True), link, state, log))
     return 0
 
 

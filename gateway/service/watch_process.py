@@ -70,8 +70,7 @@ def watch_of(ring: RingReader, options: dict[str, Any]) -> "Watch":
     from gateway.service.watch import Setup, Watch
     from gateway.service.watch_reference import Reference
 
-    rig = load_rig(options["rig"])
-    rig = rig.as_simulated() if options["simulated"] else rig
+    rig = load_rig(options["rig"], simulated=options["simulated"])
     assert rig.plant is not None  # or nobody had started us
     setup = Setup(options["window_s"], options["every_s"], rig.control.defaults.in_band_tolerance_n)
     return Watch(ring, Reference(rig.plant), setup, diagnosed, time.monotonic)

@@ -3,6 +3,8 @@
 import csv
 import io
 import json
+import re
+import shutil
 from pathlib import Path
 
 import jsonschema
@@ -10,7 +12,7 @@ import pytest
 
 from gateway.cli import exit_codes
 from gateway.ports import PortInfo
-from gateway.profiles import root
+from gateway.profiles import ProfileError, load_rig, root
 from gateway.registers import RegisterMap
 
 
@@ -20,13 +22,101 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_init_writes_a_rig_that_check_accepts(here: Path, call) -> None:
+def test_a_fresh_rig_is_refused_for_its_placeholders_alone_and_runs_once_they_are_edited(here: Path, call) -> None:
     assert call("init", "cell-7").exit_code == 0
     text = (here / "cell-7.yaml").read_text()
     assert text.count("EDIT") >= 8
+    document = json.loads(call("check", "cell-7.yaml", "--json").output)
+    assert [fault["path"] for fault in document["faults"]] == ["output.port", "load_cell.port"]
+    assert all(
+        "is the placeholder that init wrote: put your adapter's path here" in fault["message"]
+        for fault in document["faults"]
+    )
+    assert all(text.splitlines()[fault["line"] - 1].strip().startswith("port:") for fault in document["faults"])
+    (here / "cell-7.yaml").write_text(text.replace("EDIT-output", "usb-A").replace("EDIT-load-cell", "usb-B"))
     answer = call("check", "cell-7.yaml")
     assert answer.exit_code == 0, answer.output
-    assert "cell-7" in answer.output
+    assert "rig          cell-7: " in answer.output
+
+
+def test_a_line_that_is_still_marked_edit_is_a_warning_that_says_what_belongs_there(here: Path, call) -> None:
+    call("init", "cell")
+    text = (here / "cell.yaml").read_text()
+    warnings = json.loads(call("check", "cell.yaml", "--json").output)["warnings"]
+    marks = {warning["path"]: warning for warning in warnings if "still marked EDIT" in warning["message"]}
+    assert "rated force of your cell" in marks["load_cell.range_n"]["message"]
+    marked = {number for number, line in enumerate(text.splitlines(), 1) if "# EDIT" in line}
+    assert marked - {warning["line"] for warning in marks.values()} == {14, 19}, "the ports are refused instead"
+    (here / "cell.yaml").write_text(text.replace("# EDIT", "#"))
+    assert "still marked" not in call("check", "cell.yaml").output
+
+
+def test_a_fresh_rig_runs_simulated_and_says_what_is_left_to_edit(here: Path, call) -> None:
+    call("init", "cell")
+    rig = load_rig("cell.yaml", simulated=True)
+    assert rig.simulated and not rig.ports()
+    notes = " / ".join(rig.notes)
+    assert "to be edited before it runs without --sim: cell.yaml:14:9 output.port" in notes
+    assert "are still marked EDIT: force-gateway check cell.yaml says what each is" in notes
+    with pytest.raises(ProfileError, match="placeholder"):
+        load_rig("cell.yaml")
+    (here / "cell.yaml").write_text(
+        "\n".join(line for line in (here / "cell.yaml").read_text().splitlines() if "port: /dev" not in line)
+    )
+    assert load_rig("cell.yaml", simulated=True).simulated, "no ports at all will do, too"
+
+
+@pytest.mark.parametrize(
+    ("file", "is_one"),
+    [
+        ("devices/smc-itv-rc", "a device profile"),
+        ("devices/stream-st-gs", "a device profile"),
+        ("plants/paper-slide", "a plant"),
+        ("calibrations/demo", "a calibration"),
+        ("registers/force-v1", "a register map"),
+    ],
+)
+def test_check_says_what_a_file_is_and_checks_it_as_that(file: str, is_one: str, here: Path, call) -> None:
+    text = (root() / f"{file}.yaml").read_text(encoding="utf-8")
+    (here / "c2.yaml").write_text(text, encoding="utf-8")
+    answer = call("check", "c2.yaml")
+    assert answer.exit_code == 0, answer.output
+    assert answer.stdout.startswith(f"c2.yaml is {is_one}; check takes it as one\n")
+    (here / "c2.yaml").write_text(text + "no_such_key: 1\n", encoding="utf-8")
+    answer = call("check", "c2.yaml")
+    assert answer.exit_code == exit_codes.CONFIGURATION
+    assert re.search(r"^c2\.yaml:\d+:\d+ no_such_key: is not a known key", answer.stderr, re.MULTILINE), answer.stderr
+    assert answer.stderr.endswith(f"1 fault; this {is_one.split(' ', 1)[1]} cannot be used\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "facts"),
+    [
+        ("groups: 2\nstep_v: 0.5\n", "a ladder of 2 groups in steps of 0.5 V"),
+        ("name: next\nparts:\n  - name: rest\n    moves: [{do: force, to: 0, for_s: 1}]\n", ""),
+    ],
+)
+def test_check_takes_plans(text: str, facts: str, here: Path, call) -> None:
+    (here / "plan.yaml").write_text(text)
+    answer = call("check", "plan.yaml")
+    assert "plan.yaml is a plan; check takes it as one" in answer.output
+    assert facts in answer.output
+
+
+def test_a_file_of_another_kind_gets_one_sentence(here: Path, call) -> None:
+    shutil.copy(root() / "calibrations" / "demo.yaml", here / "c2.yaml")
+    with pytest.raises(ProfileError) as refused:
+        load_rig("c2.yaml")
+    assert str(refused.value) == (
+        "c2.yaml: is a calibration, a rig is needed here: `force-gateway check c2.yaml` takes it as one"
+    )
+    (here / "rig.yaml").write_text(
+        (root() / "rigs" / "demo.yaml").read_text().replace("plant: paper-slide", "plant: c2.yaml")
+    )
+    answer = call("check", "rig.yaml")
+    assert re.search(r"^rig\.yaml:\d+:8 plant: c2\.yaml is a calibration, a plant is needed here", answer.stderr), (
+        answer.stderr
+    )
 
 
 def test_init_overwrites_nothing(here: Path, call) -> None:
@@ -50,7 +140,8 @@ def test_check_tells_every_fault_with_its_place(here: Path, call) -> None:
     (here / "cell.yaml").write_text(text)
     answer = call("check", "cell.yaml")
     assert answer.exit_code == 78
-    assert "output.baud: 115300 is not one of 9600, 19200, 38400, 115200" in answer.stderr
+    assert "output.baud: 115300 is not one of 300, " in answer.stderr
+    assert "did you mean 115200?" in answer.stderr
     assert "did you mean force_max_n" in answer.stderr
     line = 1 + next(at for at, line in enumerate(text.splitlines()) if "115300" in line)
     assert f"cell.yaml:{line}:9 output.baud" in answer.stderr

@@ -1,12 +1,13 @@
 """README's generated part and its promises are those of the code."""
 
+import itertools
 import re
 from pathlib import Path
 
 import pytest
 
 from gateway.cli.main import command
-from gateway.profiles import load_register_map
+from gateway.profiles import load_device, load_register_map
 from gateway.registers import render_block
 
 ROOT = Path(__file__).parents[2]
@@ -16,6 +17,14 @@ README = (ROOT / "README.md").read_text()
 def test_the_command_block_is_the_map_s():
     table = README.split("<!-- command block", 1)[1].split("-->\n", 1)[1].split("<!-- end -->", 1)[0]
     assert table == render_block(load_register_map("force-v1"), "command"), "run tools/readme"
+
+
+def test_the_device_of_ones_own_is_one(tmp_path: Path):
+    lines = itertools.takewhile(
+        lambda line: line.startswith("    "), README.partition("    name: my-dac")[2].splitlines()[1:]
+    )
+    (tmp_path / "my-dac.yaml").write_text("\n".join(["name: my-dac", *(line[4:] for line in lines)]))
+    assert load_device(tmp_path / "my-dac.yaml").serial.baud == 57600
 
 
 @pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:bin/)?force-gateway ([a-z-]+)(?= |`|\n)", README))))

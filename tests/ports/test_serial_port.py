@@ -7,12 +7,14 @@ import os
 import sys
 import termios
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
 from gateway.devices import SerialSettings
+from gateway.devices.line_settings import Baud
 from gateway.ports import PortError, Pty
+from gateway.ports.opening import open_descriptor
 from gateway.ports.serial_port import MOST_UNSENT_BYTES
 
 
@@ -377,3 +379,17 @@ def test_closing_a_stuck_port_does_not_hang(ear: Any, line: Pty) -> None:
         assert asyncio.get_running_loop().time() - started_s < 1.0
 
     asyncio.run(scene())
+
+
+@pytest.mark.parametrize("parity", ["none", "even", "odd"])
+def test_every_speed_and_frame_that_a_profile_may_name_can_be_set(line: Pty, parity: Any) -> None:
+    for baud in get_args(Baud):
+        settings = SerialSettings(baud=baud, parity=parity, data_bits=7 if parity == "odd" else 8, stop_bits=2)
+        descriptor = open_descriptor(line.path, settings)
+        try:
+            assert line.client_baud() == baud
+        finally:
+            os.close(descriptor)
+        line.set_client_baud(9600)
+        line.set_client_baud(baud)
+        assert line.client_baud() == baud

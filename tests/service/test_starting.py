@@ -2,13 +2,14 @@
 
 import json
 from dataclasses import replace
+from ipaddress import ip_network
 from pathlib import Path
 
 import pytest
 
 from gateway.control.settings import LeaseAction
 from gateway.registers.words import FaultCode
-from gateway.service.banner import Ready, banner, info
+from gateway.service.banner import Ready, banner, info, try_lines
 from gateway.service.cell import _cause_of_restart
 from gateway.service.ending import EndCause, Ending
 from gateway.service.rules import bank_rules, server_settings
@@ -55,6 +56,36 @@ def test_the_command_to_try_names_another_gateway() -> None:
     assert "mbpoll -1 -p 502 -r 1 10.0.0.9 1 1200" in text
     assert "--gateway 10.0.0.9:502" in text
     assert "--gateway" not in banner(ready())
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, "force-gateway hold 12        (enable"),
+        ({"lease_s": 0.05}, "force-gateway hold 12 --rig "),
+    ],
+)
+def test_with_a_lease_the_line_to_try_keeps_a_heartbeat(changes: dict[str, float], expected: str) -> None:
+    (line,) = try_lines(with_supervision(demo(), **({"lease_s": 0.2} | changes)), "127.0.0.1", 5020)
+    assert line.startswith(expected)
+
+
+def test_the_lines_to_try_are_of_the_rig_at_hand() -> None:
+    rig = demo()
+    network = replace(rig.network, units=(7,), allow=(ip_network("127.0.0.0/8"),))
+    mbpoll, write, hold = try_lines(replace(rig, network=network), "0.0.0.0", 502)
+    assert mbpoll.startswith("mbpoll -1 -a 7 -p 502 -r 1 127.0.0.1 1 1200 ")
+    assert "--gateway 127.0.0.1:502 --unit 7" in write and "--gateway 127.0.0.1:502 --unit 7" in hold
+    closed = replace(rig, network=replace(rig.network, allow=(ip_network("10.0.0.0/8"),)))
+    assert "--gateway THIS-MACHINE:5020" in try_lines(closed, "0.0.0.0", 5020)[1], "loopback may not connect there"
+    owned = replace(rig, network=replace(rig.network, owner="192.168.1.5"))
+    assert try_lines(owned, "127.0.0.1", 5020) == ("force-gateway monitor        (192.168.1.5 alone may command)",)
+    proving = replace(rig, network=replace(rig.network, require_byte_order_echo=True))
+    assert try_lines(proving, "127.0.0.1", 5020)[0].startswith("force-gateway hold 12 ")
+    limits = replace(rig.control.limits, force_max_n=9.0)
+    weak = replace(rig, control=replace(rig.control, limits=limits))
+    assert "1 500 " in try_lines(weak, "127.0.0.1", 5020)[0]
+    assert "--gateway [::1]:5020" in try_lines(rig, "::1", 5020)[1]
 
 
 def test_a_lease_is_told_with_its_length_and_what_follows() -> None:

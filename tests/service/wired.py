@@ -15,9 +15,10 @@ from typing import Any
 from gateway.control import Controller
 from gateway.devices import PacedWire, cell_host, output_host
 from gateway.modbus import Peer
-from gateway.profiles import Rig
+from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers import RegisterBank
 from gateway.registers.words import FaultCode, State, WarningBit
+from gateway.service.cell_exchange import CellExchange
 from gateway.service.gateway import Gateway
 from gateway.service.output_exchange import OutputExchange
 from gateway.service.rules import bank_rules
@@ -74,6 +75,10 @@ class Observer:
         return any(half and line.startswith(half) and line[len(half) :] in (b"MON", b"SET 0") for half in self._halves)
 
 
+def wire_of(line: OutputLine | CellLine) -> PacedWire:
+    return PacedWire(line.baud, line.settings.bits_per_character)
+
+
 class Wired:
     """One simulated rig with its gateway. Times are virtual seconds since the start."""
 
@@ -85,8 +90,9 @@ class Wired:
         self.is_plugged = True
         self.is_cell_plugged = True
         self._steps = 0
-        self._down = PacedWire(rig.output.baud)
-        self._stream = PacedWire(rig.load_cell.baud)
+        self._down = wire_of(rig.output)
+        self._stream, self._asks = wire_of(rig.load_cell), wire_of(rig.load_cell)
+        self._frame_steps = round(1.0 / (STEP_S * rig.load_cell.device.rate_hz)) if rig.load_cell.device.rate_hz else 0
         self.world = SimulatedRig(
             rig,
             send_output=lambda data: self._down.put(data, self.now_s),
@@ -99,7 +105,7 @@ class Wired:
     def start(self, *, unclean: bool = False) -> None:
         """A fresh control process beside the same world; what the one before had not sent is gone."""
         self.observer.cut()
-        self._up = PacedWire(self.rig.output.baud)
+        self._up = wire_of(self.rig.output)
         rig, clock = self.rig, lambda: self.now_s
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=clock)
         self.exchange = OutputExchange(output_host(rig.output.device), self._write, rig.output.device.reply_timeout_s)
@@ -110,7 +116,11 @@ class Wired:
             self.bank,
             self.controller,
             self.exchange,
-            cell_host(rig.load_cell.device, sign=rig.load_cell.sign, unit=rig.load_cell.unit),
+            CellExchange(
+                cell_host(rig.load_cell.device, sign=rig.load_cell.sign, unit=rig.load_cell.unit),
+                self._ask_cell,
+                rig.load_cell.device,
+            ),
             clock=clock,
             log=lambda cause, sentence: self.log.append((self.now_s, sentence)),
         )
@@ -141,7 +151,9 @@ class Wired:
         if sent := self._up.bytes_through(self.now_s):
             self.observer.hear(sent, self.now_s)
             self.world.on_output_bytes(sent, self.now_s)
-        if self._steps % 10 == 3:
+        if asked := self._asks.bytes_through(self.now_s):
+            self.world.on_cell_bytes(asked, self.now_s)
+        if self._frame_steps and self._steps % self._frame_steps == 3 % self._frame_steps and self._wire_has_time():
             self.world.stream(self.now_s)
         if (heard := self._down.bytes_through(self.now_s)) and self.is_plugged:
             self.gateway.on_output_bytes(heard, self.now_s)
@@ -149,6 +161,11 @@ class Wired:
             self.gateway.on_cell_bytes(frame, self.now_s)
         if self._steps % 10 == 0:
             self.gateway.on_tick(1, 0.0)
+
+    def _wire_has_time(self) -> bool:
+        """An amplifier leaves out the readings that its wire cannot carry."""
+        last_s = self._stream.last_through_s
+        return last_s is None or last_s - self.now_s < self._frame_steps * STEP_S
 
     def stall(self, duration_s: float, then: Callable[[], None] = lambda: None) -> None:
         """The loop does not come by; the world and the wires go on, and bytes wait for it. `then` is served first."""
@@ -168,7 +185,7 @@ class Wired:
     def unplug(self) -> None:
         self.is_plugged = False
         self.observer.cut()
-        self._up, self._down = PacedWire(self.rig.output.baud), PacedWire(self.rig.output.baud)
+        self._up, self._down = wire_of(self.rig.output), wire_of(self.rig.output)
         self.gateway.output_closed()
 
     def replug(self) -> None:
@@ -178,6 +195,10 @@ class Wired:
     def _write(self, data: bytes) -> None:
         if self.is_plugged:
             self._up.put(data, self.now_s)
+
+    def _ask_cell(self, data: bytes) -> None:
+        if self.is_cell_plugged:
+            self._asks.put(data, self.now_s)
 
     # -- a master
 

@@ -132,6 +132,13 @@ ENTRIES: Final = (
         "Give a shorter --state DIR, on a local disk.",
     ),
     Entry(
+        "E180",
+        "the gateway was lost while a force was held",
+        "The connection to the gateway broke and could not be had again while a lease may run.",
+        "The gateway was stopped, its machine went down, or the network between is broken.",
+        "Look at the tool first: a rig with a lease has let go, one without may still press. Then read the gateway's log.",
+    ),
+    Entry(
         "E401",
         "coefficients refused",
         "An uploaded calibration failed a check; index and reason are in failing_index and failing_reason.",

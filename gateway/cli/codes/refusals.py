@@ -316,6 +316,13 @@ ENTRIES: Final = (
         "force-gateway calibration list shows which slots are filled; upload the set with --slot.",
         "EMPTY_SLOT",
     ),
+    Entry(
+        "W336",
+        "disabled by somebody else",
+        "While `hold` kept a force, enable was cleared by another client; any master may do that.",
+        "A robot program's stop, a colleague, or another terminal on this machine.",
+        "force-gateway monitor --state DIR shows the last writer of control_word; hold again when it is agreed.",
+    ),
 )
 
 REFUSAL_CODES: Final = {RefusalReason[entry.name]: entry.code for entry in ENTRIES if entry.name} | {

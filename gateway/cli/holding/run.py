@@ -1,0 +1,148 @@
+"""What a master writes to hold a force: enable, a heartbeat, and on the way out a ramp to 0 before it clears enable. Pure.
+
+Fed with the status registers, it says the next write. Where a fault is latched it is reset only on request; that needs a
+heartbeat that has changed since the fault, and the first value after one does not count, for the gateway itself zeroes the
+command block then: so one beat goes before the reset.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from math import isnan, nan
+from typing import Final
+
+from gateway.registers.words import ControlBit, FaultCode, LimitedBy, State, StatusBit, WarningBit
+
+_STUCK_S: Final = 3.0  # a ramp down that makes no way for so long is not waited for
+_ENABLE, _RESET = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT)
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The status registers, in their units; nan where the gateway has no value."""
+
+    state: State
+    fault: FaultCode = FaultCode.NONE
+    bits: StatusBit = StatusBit(0)  # noqa: RUF009 - a number
+    limited_by: LimitedBy = LimitedBy.NONE
+    warnings: WarningBit = WarningBit(0)  # noqa: RUF009 - a number
+    force_n: float = nan
+    setpoint_n: float = nan
+    applied_n: float = nan
+    voltage_v: float = nan
+
+
+def seen_of(values: Mapping[str, float]) -> Seen:
+    """From the status block's values by register name."""
+    return Seen(
+        state=State(int(values["state"])),
+        fault=FaultCode(int(values["fault_code"])),
+        bits=StatusBit(int(values["status_word"])),
+        limited_by=LimitedBy(int(values["limited_by"])),
+        warnings=WarningBit(int(values["warning_word"])),
+        force_n=values["force_measured"],
+        setpoint_n=values["force_requested"],
+        applied_n=values["force_applied"],
+        voltage_v=values["output_voltage"] / 1e3,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """The next write. None for control_word and setpoint: the heartbeat alone."""
+
+    heartbeat: int
+    control_word: int | None = None
+    setpoint_n: float = 0.0
+
+
+class End(Enum):
+    """How it ended."""
+
+    STOPPED = "stopped"  # as asked, at 0 N and disabled
+    FAULT = "fault"
+    DISABLED = "disabled"  # by somebody else
+
+
+class _Phase(Enum):
+    BEGINNING = 0
+    RESETTING = 1
+    ENABLING = 2
+    HOLDING = 3
+    LOWERING = 4
+
+
+class HoldRun:
+    """`next` is asked for each beat; `end` is set once there is nothing more to write."""
+
+    def __init__(self, force_n: float, *, heartbeat: int, resets: bool) -> None:
+        self.force_n = force_n
+        self.end: End | None = None
+        self._resets = resets
+        self._heartbeat = heartbeat
+        self._phase = _Phase.BEGINNING
+        self._applied_n, self._moved_s = nan, 0.0
+
+    @property
+    def is_pressing(self) -> bool:
+        """Whether the output has been enabled by us."""
+        return self._phase in (_Phase.HOLDING, _Phase.LOWERING)
+
+    def next(self, seen: Seen, now_s: float, *, stops: bool) -> Write | None:
+        """seen: read after the last write that was more than a beat. stops: whether to let go."""
+        if seen.state is State.FAULT and not (self._resets and self._phase.value <= _Phase.RESETTING.value):
+            self.end = End.FAULT
+            return None
+        match self._phase:
+            case _Phase.HOLDING:
+                return self._hold(seen, now_s, stops=stops)
+            case _Phase.LOWERING:
+                return self._lower(seen, now_s)
+        if stops:
+            self.end = End.STOPPED
+            return None
+        return self._begin(seen)
+
+    def at_once(self) -> Write:
+        """Clear enable without a ramp."""
+        self.end = End.STOPPED
+        return self._write(0)
+
+    def _begin(self, seen: Seen) -> Write:
+        if self._phase is _Phase.BEGINNING and seen.state is State.FAULT:
+            self._phase = _Phase.RESETTING
+            return self._write(0)
+        if self._phase is _Phase.RESETTING:
+            self._phase = _Phase.ENABLING
+            return self._write(_RESET)
+        self._phase = _Phase.HOLDING
+        return self._write(_ENABLE, self.force_n)
+
+    def _hold(self, seen: Seen, now_s: float, *, stops: bool) -> Write | None:
+        if seen.state is State.OFF:
+            self.end = End.STOPPED if stops else End.DISABLED
+            return None
+        if not stops:
+            return self._beat()
+        self._phase, self._moved_s = _Phase.LOWERING, now_s
+        return self._write(_ENABLE, 0.0)
+
+    def _lower(self, seen: Seen, now_s: float) -> Write | None:
+        if seen.state is State.OFF:
+            self.end = End.STOPPED
+            return None
+        if seen.applied_n != self._applied_n:
+            self._applied_n, self._moved_s = seen.applied_n, now_s
+        if isnan(seen.applied_n) or seen.applied_n <= 0.0 or now_s - self._moved_s > _STUCK_S:
+            return self.at_once()
+        return self._beat()
+
+    def _beat(self) -> Write:
+        return Write(self._changed())
+
+    def _write(self, control_word: int, setpoint_n: float = 0.0) -> Write:
+        return Write(self._changed(), control_word, setpoint_n)
+
+    def _changed(self) -> int:
+        self._heartbeat = (self._heartbeat + 1) & 0xFFFF
+        return self._heartbeat

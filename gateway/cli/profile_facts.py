@@ -1,0 +1,70 @@
+"""What `check` says of a profile without faults, in a few lines: enough to see that it is the one that was meant."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from gateway.bsfm import Calibration
+    from gateway.devices import DeviceProfile
+    from gateway.profiles import Checked, PlantProfile, Rig
+    from gateway.registers import RegisterMap
+
+
+def facts(checked: "Checked", *, whole: bool = False) -> dict[str, str]:
+    """Name -> words. whole: the fingerprint in full."""
+    if checked.kind == "rig":
+        return _rig(checked.value) | ({"fingerprint": checked.value.fingerprint} if whole else {})
+    return {checked.kind: _SAID[checked.kind](checked.value)}
+
+
+def _rig(rig: "Rig") -> dict[str, str]:
+    limits = rig.control.limits
+    return {
+        "rig": f"{rig.name}: {rig.description}" + (" (simulated)" if rig.simulated else ""),
+        "output": f"{rig.output.device.name}, {rig.output.baud} baud, {rig.output.port or 'simulated'}",
+        "load_cell": f"{rig.load_cell.device.name}, {rig.load_cell.baud} baud, {rig.load_cell.port or 'simulated'}",
+        "calibration": f"{rig.calibration.name}, {rig.calibration.kind}",
+        "limits": f"0 .. {limits.force_max_n:g} N, {limits.voltage_min_v:g} .. {limits.voltage_max_v:g} V",
+        "modbus tcp": f"{rig.network.bind}:{rig.network.port}",
+        "fingerprint": rig.fingerprint[:16],
+    }
+
+
+def _device(device: "DeviceProfile") -> str:
+    said = "asked" if device.read_force else f"{device.rate_hz:g} readings/s"
+    if device.set_voltage:
+        low_v, high_v = device.voltage_range_v
+        said = f"{low_v:g} .. {high_v:g} V"
+    return f"{device.name}: {device.role}, {device.serial}, {said}; {device.hardware}"
+
+
+def _plant(plant: "PlantProfile") -> str:
+    return f"{plant.name}: {plant.description}"
+
+
+def _calibration(calibration: "Calibration") -> str:
+    low_n, high_n = calibration.model().force_range_n
+    return (
+        f"{calibration.name}: {calibration.kind}, {low_n:.1f} .. {high_n:.1f} N, made on {calibration.rig or 'no rig'}"
+    )
+
+
+def _registers(register_map: "RegisterMap") -> str:
+    return f"{register_map.name}: version {register_map.version}, {len(register_map.registers)} registers"
+
+
+def _plan(plan: Any) -> str:
+    from gateway.control.experiment_plan import ExperimentPlan
+
+    if isinstance(plan, ExperimentPlan):
+        return f"{plan.name}: an experiment of {len(plan.parts)} parts"
+    return f"a ladder of {plan.groups} groups in steps of {plan.step_v:g} V"
+
+
+_SAID: Final[dict[str, Callable[[Any], str]]] = {
+    "device": _device,
+    "plant": _plant,
+    "calibration": _calibration,
+    "registers": _registers,
+    "plan": _plan,
+}

@@ -1,0 +1,157 @@
+"""Both ends of a profile's wire talk once: what could never work is told to its author, not to a running cell.
+
+The types of a profile say that each template means something. Whether the templates fit each other, nothing but a try can
+say: a number that outgrows its width at the end of its range, two questions that read alike, an answer that looks like a
+refusal, a display without room for a minus sign.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
+from gateway.devices.exchange import UNIT
+from gateway.devices.fields import ValueRefused
+from gateway.devices.framing import LONGEST_LINE_BYTES
+from gateway.devices.messages import (
+    Accepted,
+    ForceSample,
+    Garbage,
+    OutputReply,
+    OutputRequest,
+    Pressure,
+    Quality,
+    ReadPressure,
+    ReadVoltage,
+    Refused,
+    SetVoltage,
+)
+from gateway.devices.profile import DeviceProfile, Role
+
+Found = Iterator[tuple[tuple[str, ...], str]]
+"""(place in the profile, sentence)."""
+
+_NOW_S: Final = 0.0
+_LONGEST_SHOWN: Final = 60  # of a line, in a sentence
+
+
+def rehearsed(profile: DeviceProfile) -> Found:
+    """What keeps the two ends of this profile from understanding each other; nothing when they do."""
+    yield from _output(profile) if profile.role is Role.OUTPUT else _cell(profile)
+
+
+def _output(profile: DeviceProfile) -> Found:
+    low_v, high_v = profile.voltage_range_v
+    for voltage_v in (low_v, 0.5 * (low_v + high_v), high_v):
+        if told := _talk(profile, SetVoltage(voltage_v), Accepted(voltage_v)):
+            yield ("set_voltage",), f"{voltage_v:g} V: {told}"
+            return
+    for place, question, answers in _readings(profile):
+        told = next(filter(None, (_talk(profile, question, answer) for answer in answers)), "")
+        if told:
+            yield (place,), told
+    yield from _refusals(profile)
+
+
+def _readings(profile: DeviceProfile) -> Iterator[tuple[str, OutputRequest, tuple[OutputReply, ...]]]:
+    """The questions that the device can be asked, and answers at both ends of their ranges."""
+    if profile.read_voltage:
+        yield "read_voltage", ReadVoltage(), tuple(map(Accepted, profile.read_voltage.range.voltage_v))
+    if profile.read_pressure:
+        yield "read_pressure", ReadPressure(), tuple(map(Pressure, profile.read_pressure.range.pressure_pa))
+
+
+def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -> str:
+    """Ask, obey, answer, understand; why that fails, or nothing."""
+    host, device = output_host(profile), output_device(profile)
+    try:
+        asked = host.request(request)
+        answered = b""
+        for understood in device.receive(asked, _NOW_S):
+            is_read_back = isinstance(request, SetVoltage) and isinstance(understood, ReadVoltage)
+            if isinstance(understood, Garbage) or not (is_read_back or isinstance(understood, type(request))):
+                return f"the device reads {_line(asked)} as {_name(understood)}{_too_long(asked)}"
+            answered += device.reply(answer, to=understood)
+    except (ValueRefused, UnicodeEncodeError) as error:
+        return str(error)
+    heard = host.receive(answered, _NOW_S)
+    if len(heard) != 1 or not _means(heard[0], answer):
+        seen = " and ".join(map(_name, heard)) or "nothing"
+        return f"the answer {_line(answered)} to {_line(asked)} is read as {seen}{_too_long(asked, answered)}"
+    if (
+        isinstance(request, SetVoltage)
+        and isinstance(heard[0], Accepted)
+        and not host.confirms(request.voltage_v, heard[0], request)
+    ):
+        return f"{_line(asked)} is confirmed as {heard[0].voltage_v:g} V by {_line(answered)}: the ranges do not fit"
+    return ""
+
+
+def _means(heard: OutputReply, said: OutputReply) -> bool:
+    return type(heard) is type(said)
+
+
+def _refusals(profile: DeviceProfile) -> Found:
+    for text in profile.refusals.texts():
+        host = output_host(profile)
+        try:
+            host.request(SetVoltage(profile.voltage_range_v[0]))
+            heard = host.receive(output_device(profile).reply(Refused(text)), _NOW_S)
+        except (ValueRefused, UnicodeEncodeError) as error:
+            heard, text = [], str(error)
+        if heard != [Refused(text)]:
+            yield ("refusals",), f"{text!r} as an answer is read as {' and '.join(map(_name, heard)) or 'nothing'}"
+
+
+def _cell(profile: DeviceProfile) -> Found:
+    reading, place = profile.reading, ("stream" if profile.stream else "read_force",)
+    unit = None if reading.unit or reading.template.field(UNIT) else "N"
+    host, device = cell_host(profile, unit=unit), cell_device(profile, unit)
+    try:
+        question = host.poll()
+        if question and device.receive(question, _NOW_S) != 1:
+            yield place, f"the device does not know its own question {_line(question)}{_too_long(question)}"
+            return
+        for counts in (0, 1, -1):
+            force_n = counts * host.resolution_n
+            frame = device.frame(force_n)
+            heard = host.receive(frame, _NOW_S)
+            if [type(one) for one in heard] != [ForceSample]:
+                seen = " and ".join(map(_name, heard)) or "nothing"
+                yield place, f"{force_n:.3g} N, shown as {_line(frame)}, is read as {seen}{_too_long(frame)}"
+                return
+            sample = heard[0]
+            assert isinstance(sample, ForceSample)
+            if sample.quality is Quality.OVERLOAD or abs(sample.force_n - force_n) > 0.6 * host.resolution_n:
+                sign = (
+                    ": there is no room for a minus sign, and noise needs it"
+                    if counts < 0
+                    else ": it needs more digits"
+                )
+                yield place, f"{force_n:.3g} N cannot be shown by {reading.frame!r}{sign}"
+                return
+    except (ValueRefused, UnicodeEncodeError) as error:
+        yield place, str(error)
+
+
+def _line(data: bytes) -> str:
+    text = repr(data.decode("ascii", "replace"))
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}...'"
+
+
+def _too_long(*lines: bytes) -> str:
+    longest = max(map(len, lines))
+    return f": a line has at most {LONGEST_LINE_BYTES} characters" if longest > LONGEST_LINE_BYTES else ""
+
+
+def _name(message: object) -> str:
+    """`SetVoltage` as people say it."""
+    return {
+        "Garbage": "nothing that it knows",
+        "SetVoltage": "a setting",
+        "ReadVoltage": "the question of read_voltage",
+        "ReadPressure": "the question of read_pressure",
+        "Accepted": "a voltage",
+        "Pressure": "a pressure",
+        "Refused": "a refusal",
+        "ForceSample": "a force",
+    }[type(message).__name__]

@@ -1,0 +1,61 @@
+"""The load cell's line. A stream talks by itself; a cell that must be asked is asked here, at most one question on the wire.
+
+The next question follows the answer, so a slow wire is used whole; where the wire is faster than the device's own rate, or
+than anything the loop could use, it follows when that is over. An answer that does not come in its time is given up and
+asked for again. It may still come then, and a number does not say what it answers: it is a true reading of this moment all
+the same, but the line is left alone until the later answer is here or overdue too, for on a bus of two wires a third
+question would garble it. Time comes in as an argument, so that tests run it in virtual time.
+"""
+
+from collections.abc import Callable
+from math import inf
+from typing import Final
+
+from gateway.devices import CellHost, DeviceProfile
+from gateway.devices.messages import ForceSample, Garbage
+
+_FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only cost processor time
+
+
+class CellExchange:
+    """Asks through `write` what has to be asked, and tells what came. unanswered_since_s: None for a stream, or in time."""
+
+    def __init__(self, host: CellHost, write: Callable[[bytes], None], profile: DeviceProfile) -> None:
+        self._host = host
+        self._write = write
+        self._question = host.poll()
+        self._reply_timeout_s = profile.reply_timeout_s
+        self._period_s = 1.0 / min(profile.reading.rate_hz or inf, _FASTEST_HZ)
+        self.overdue = 0
+        self.opened()
+
+    def opened(self) -> None:
+        """The port is (again) open: nothing said before counts any more."""
+        self._host.forget()
+        self._sent_s: float | None = None
+        self._next_s = -inf
+        self._is_overdue = False
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
+        """What these bytes complete; the next question goes out at once where it is due."""
+        found = self._host.receive(chunk, now_s)
+        if any(isinstance(one, ForceSample) for one in found):
+            if self._is_overdue:
+                self._is_overdue = False  # of the question before, perhaps: the one that is out has its time
+            else:
+                self._sent_s = None
+        self._pump(now_s)
+        return found
+
+    def tick(self, now_s: float) -> None:
+        """Give up waiting for an overdue answer, and ask again."""
+        if self._sent_s is not None and now_s - self._sent_s > self._reply_timeout_s:
+            self._host.forget()
+            self.overdue += 1
+            self._sent_s, self._is_overdue, self._next_s = None, True, now_s
+        self._pump(now_s)
+
+    def _pump(self, now_s: float) -> None:
+        if self._question and self._sent_s is None and now_s >= self._next_s:
+            self._sent_s, self._next_s = now_s, now_s + self._period_s
+            self._write(self._question)

@@ -1,0 +1,82 @@
+"""A profile whose two ends could never understand each other is refused with a sentence, not met by a running cell."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.profiles import ProfileError, load_device, root
+from gateway.profiles.text import parse
+
+
+def loaded(folder: Path, name: str, **changes: Any) -> list[str]:
+    """Faults of a shipped profile with other words; a dotted key changes a group, None leaves it out."""
+    value = parse((root() / "devices" / f"{name}.yaml").read_bytes(), name).value
+    for key, new in changes.items():
+        *groups, last = key.split("__")
+        group = value
+        for step in groups:
+            group = group[step]
+        group.pop(last, None)
+        if new is not None:
+            group[last] = new
+    path = folder / "own.yaml"
+    path.write_text(json.dumps(value, indent=1))
+    try:
+        load_device(path)
+    except ProfileError as error:
+        return [str(fault) for fault in error.faults]
+    return []
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"set_voltage__answer": None, "read_voltage": None}, "set_voltage has no answer and there is no read_voltage"),
+        ({"set_voltage__ask": "SET {counts:03d}"}, "set_voltage: 10 V: counts = 1023: does not fit in 3 characters"),
+        ({"set_voltage__answer": "{counts:03d}"}, "set_voltage: 10 V: counts = 1023: does not fit in 3 characters"),
+        ({"read_pressure__ask": "REQ"}, "read_pressure: the device reads 'REQ\\r\\n' as the question of read_voltage"),
+        ({"read_voltage__ask": "SET 12"}, "read_voltage: the device reads 'SET 12\\r\\n' as a setting"),
+        ({"set_voltage__answer": "OK", "refusals__unknown": "OK"}, "is read as a refusal"),
+        ({"refusals__unknown": "512"}, "5 V: the answer '512\\r\\n' to 'SET 512\\r\\n' is read as a refusal"),
+        ({"refusals__unknown": "nö"}, "refusals are ASCII text, 'nö' is not"),
+        ({"refusals__unknown": "NO\r\nWAY"}, "refusals: 'NO\\r\\nWAY' as an answer is read as nothing that it knows"),
+        (
+            {"set_voltage__ask": "SET {a:02X}{counts:d}", "constants": {"a": 300}},
+            "set_voltage: 0 V: a = 12C: does not fit in 2 characters",
+        ),
+        ({"set_voltage__ask": "S" * 130 + "{counts:d}"}, "a line has at most 128 characters"),
+        ({"serial__baud": 57600}, None),
+        ({"serial__baud": 57601}, "serial.baud: 57601 is not one of 300, 600, "),
+        ({"read_voltage": None, "read_pressure": None, "steps": None}, None),
+        ({"set_voltage__answer": None}, None),
+    ],
+)
+def test_an_output_that_could_not_work_is_told(changes: dict[str, Any], told: str | None, tmp_path: Path) -> None:
+    faults = loaded(tmp_path, "smc-itv-rc", **changes)
+    if told is None:
+        assert faults == []
+    else:
+        assert any(told in fault for fault in faults), faults
+        assert all(":" in fault and fault.split(":")[1].isdecimal() for fault in faults), "file:line:column"
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"stream__frame": "{force:4.2f}", "stream__quality": None, "stream__blank_is_overload": None},
+         "stream: -0.0981 N cannot be shown by '{force:4.2f}': there is no room for a minus sign"),
+        ({"stream__frame": "{force:3.2f}", "stream__quality": None, "stream__blank_is_overload": None},
+         "stream: force = 0.09: does not fit in 3 characters"),
+        ({"stream__quality": {"ST": "overload", "US": "overload", "OL": "overload"}}, "no word for a good reading"),
+        ({"stream__quality": {"ST": "unstable", "US": "unstable", "OL": "overload"}}, None),
+        ({"stream__frame": "{status:ST|US|OL},{mode:GS|NT},{force:+08.2f}{unit:lb|N}"}, "never says kg: unit is one of lb, N"),
+        ({"stream__frame": "{status:ST|US|OL},{force:+08.2f}{unit:lb|N} {n:04X} {text:8s}", "stream__unit": None}, None),
+        ({"stream": None, "read_force": {"ask": "#{address:02X}", "frame": "{force:+08.2f}"}}, "address is not given"),
+        ({"stream": None, "read_force": {"ask": "W?", "frame": "{force:+08.2f}"}}, None),
+    ],
+)  # fmt: skip
+def test_a_load_cell_that_could_not_work_is_told(changes: dict[str, Any], told: str | None, tmp_path: Path) -> None:
+    faults = loaded(tmp_path, "stream-st-gs", **changes)
+    assert (faults == []) if told is None else any(told in fault for fault in faults), faults

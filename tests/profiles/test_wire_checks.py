@@ -1,0 +1,86 @@
+"""What a wire cannot carry and a number cannot show is told in numbers before anything moves."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.profiles import check_report, root
+from gateway.profiles.text import parse
+
+POLLED = {"ask": "W?", "frame": "W {force:+08.2f}", "unit": "N"}
+
+
+def told(folder: Path, **changes: Any) -> tuple[dict[str, str], dict[str, str]]:
+    """(faults, warnings) by path, of the demo as a real rig with devices of its own. changes: `rig__output__baud=9600`, and so
+    with `dac` and `cell`; None leaves a key out."""
+    shipped = {"rig": "rigs/demo", "dac": "devices/smc-itv-rc", "cell": "devices/stream-st-gs"}
+    files = {name: parse((root() / f"{file}.yaml").read_bytes(), name).value for name, file in shipped.items()}
+    files["rig"] |= {"simulated": False, "name": "own"}
+    files["rig"]["output"] |= {"device": "dac.yaml", "port": "/dev/serial/by-id/a"}
+    files["rig"]["load_cell"] |= {"device": "cell.yaml", "port": "/dev/serial/by-id/b"}
+    for key, value in changes.items():
+        name, *groups, last = key.split("__")
+        group = files[name]
+        for step in groups:
+            group = group[step]
+        group.pop(last, None)
+        if value is not None:
+            group[last] = value
+    for name, value in files.items():
+        (folder / f"{name}.yaml").write_text(json.dumps(value, indent=1))
+    report = check_report(folder / "rig.yaml")
+    return {one.path: one.message for one in report.faults}, {one.path: one.message for one in report.warnings}
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "words"),
+    [
+        ({"rig__output__baud": 1200}, "output.baud",
+         "1200: question and answer of set_voltage take 0.133 s on the wire, smc-itv-rc gives up after"),
+        ({"rig__output__baud": 1200, "dac__reply_timeout_s": 0.5, "rig__supervision__output_timeout_s": 0.1},
+         "supervision.output_timeout_s", "0.1 s is over before an answer can be there: 0.133 s on the wire"),
+        ({"rig__output__baud": 300, "dac__reply_timeout_s": 2, "rig__supervision__output_timeout_s": 2}, "output.baud",
+         "a setting and a reading take 0.90 s on the wire, longer than supervision.response_lag_s = 0.2 s"),
+        ({"rig__load_cell__baud": 9600, "cell__stream": None, "cell__read_force": POLLED,
+          "rig__supervision__sample_timeout_s": 0.03},
+         "supervision.sample_timeout_s", "0.03 s is too short: two readings of stream-st-gs take 0.0333 s (60 readings/s"),
+        ({"rig__load_cell__baud": 600, "cell__stream": None, "cell__read_force": POLLED}, "load_cell.baud",
+         "600: question and answer of read_force take 0.267 s on the wire, stream-st-gs gives up after"),
+        ({"cell__stream__frame": "{status:ST|US|OL},{force:+05.2f}{unit:kg|lb|g|N}", "rig__load_cell__range_n": 110,
+          "rig__limits__force_max_n": 60, "cell__stream__unit": "N"},
+         "limits.force_max_n", "60 N is beyond what stream-st-gs can show: 9.99 N"),
+        ({"cell__stream__frame": "{status:ST|US|OL},{force:+08.1f}{unit:kg|lb|g|N}"}, "supervision.sample_quantum_n",
+         "0.1 N is less than one count of stream-st-gs, 0.981 N: a held force would look like a frozen"),
+        ({"cell__stream__frame": "W {force:d}", "cell__stream__blank_is_overload": None, "cell__stream__quality": None,
+          "rig__supervision__sample_quantum_n": 9.8},
+         "defaults.in_band_tolerance_n", "1 N is less than one count of stream-st-gs, 9.81 N"),
+        ({"dac__set_voltage__ask": "V{volts:d}", "dac__set_voltage__answer": ">",
+          "dac__set_voltage__range": {"device": [0, 10], "voltage_v": [0, 10]}},
+         "output.device", "smc-itv-rc sets in steps of 1 V, about 8 N: defaults.in_band_tolerance_n = 1 N cannot be held"),
+    ],
+)  # fmt: skip
+def test_what_could_not_work_is_a_fault_in_numbers(
+    changes: dict[str, Any], path: str, words: str, tmp_path: Path
+) -> None:
+    faults, _ = told(tmp_path, **changes)
+    assert faults.get(path, f"nothing, but {faults}").startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "words"),
+    [
+        ({"cell__stream": None, "cell__read_force": POLLED, "rig__supervision__sample_timeout_s": 0.09},
+         "supervision.sample_timeout_s", "0.09 s: one lost answer leaves a gap of 0.101 s"),
+        ({"cell__stream__rate_hz": 10}, "load_cell.baud", "115200: stream-st-gs gives 10 readings/s; the pneumatics need 20"),
+        ({"rig__output__baud": 4800, "rig__supervision__output_timeout_s": 0.11}, "supervision.output_timeout_s",
+         "0.11 s is less than three settings with readings on the wire: 0.17 s"),
+    ],
+)  # fmt: skip
+def test_what_would_be_a_near_thing_is_a_warning(
+    changes: dict[str, Any], path: str, words: str, tmp_path: Path
+) -> None:
+    faults, warnings = told(tmp_path, **changes)
+    assert not faults
+    assert warnings.get(path, f"nothing, but {warnings}").startswith(words)

@@ -1,0 +1,120 @@
+"""Device profiles drawn from the schema: every key that the schema has, present or not, with values of every shape.
+
+Not all of them make sense, as not all that people write does: `check` must tell the ones that cannot work.
+"""
+
+from random import Random
+from typing import Any
+
+from gateway.profiles import schema
+
+SCHEMA = schema("device")
+Profile = dict[str, Any]
+
+
+def choices(owner: str, key: str) -> list[Any]:
+    """What the schema lists for a key of a group, `DeviceProfile` for the top."""
+    group = SCHEMA if owner == "DeviceProfile" else SCHEMA["$defs"][owner]
+    described = group["properties"][key]
+    if "$ref" in described:
+        described = SCHEMA["$defs"][described["$ref"].rpartition("/")[2]]
+    return list(described["enum"]) if "enum" in described else [described["const"]]
+
+
+def _about(rng: Random, role: str) -> Profile:
+    profile: Profile = {
+        "name": "drawn",
+        "description": "drawn from the schema",
+        "role": role,
+        "source": "a test",
+        "certainty": rng.choice(choices("DeviceProfile", "certainty")),
+        "hardware": "never run on hardware",
+        "serial": {
+            "baud": rng.choice(choices("SerialSettings", "baud")),
+            "data_bits": rng.choice(choices("SerialSettings", "data_bits")),
+            "parity": rng.choice(choices("SerialSettings", "parity")),
+            "stop_bits": rng.choice(choices("SerialSettings", "stop_bits")),
+        },
+        "terminator": rng.choice(choices("DeviceProfile", "terminator")),
+        "checksum": rng.choice(choices("DeviceProfile", "checksum")),
+    }
+    _maybe(rng, profile, "codec", "template")
+    _maybe(rng, profile, "watchdog", rng.choice(choices("DeviceProfile", "watchdog")))
+    _maybe(rng, profile, "identity", rng.choice(choices("DeviceProfile", "identity")))
+    _maybe(rng, profile, "reply_timeout_s", rng.choice([0.02, 0.1, 0.5, 2.0]), 0.7)
+    _maybe(rng, profile, "constants", {"address": rng.choice([1, 2, 255])}, 0.4)
+    return profile
+
+
+def _maybe(rng: Random, group: Profile, key: str, value: Any, share: float = 0.5) -> None:
+    if rng.random() < share:
+        group[key] = value
+
+
+_NUMBERS = ":d", ":04d", ":+05d", ":5d", ":.1f", ":.3f", ":07.3f", ":+07.3f", ":8.4f"
+_SPANS = {"d": [[0, 1023], [0, 4095.5], [0, 100], [-2047, 2048]], "f": [[0, 10], [0.0, 5.0], [-10.0, 10.0], [0, 99.9]]}
+
+
+def _number(rng: Random, name: str) -> tuple[str, list[float]]:
+    """A field, and what span its device counts in."""
+    shape = rng.choice(_NUMBERS)
+    return f"{{{name}{shape}}}", rng.choice(_SPANS[shape[-1]])
+
+
+def _sentence(rng: Random, profile: Profile, words: str, number: str = "") -> str:
+    """The words, perhaps with the address, perhaps with the number."""
+    head = "#{address:02X}" if "address" in profile.get("constants", {}) and rng.random() < 0.8 else ""
+    return f"{head}{words}{number}"
+
+
+def drawn_output(rng: Random) -> Profile:
+    profile = _about(rng, "output")
+    number, span = _number(rng, "level")
+    voltage_v = rng.choice([[0.0, 10.0], [0.0, 10.0], [0, 9], [0.0, 5.0]])
+    setting: Profile = {"ask": _sentence(rng, profile, rng.choice(["SET ", "V", "", "@"]), number)}
+    setting["range"] = {"device": span, "voltage_v": voltage_v}
+    answers = ["", ">", "OK", number, f"V={number}", f"{{flag:OK|WARN}} {number}", "{level:.1f}", "{level:d}"]
+    _maybe(rng, setting, "answer", rng.choice(answers), 0.9)
+    profile["set_voltage"] = setting
+    if rng.random() < 0.5:
+        read, read_span = rng.choice([(number, span), _number(rng, "present")])
+        answer = _sentence(rng, profile, rng.choice(["", "S "]), read)
+        ranges = {"device": read_span, "voltage_v": voltage_v}
+        profile["read_voltage"] = {"ask": rng.choice(["REQ", "?", "$8"]), "answer": answer, "range": ranges}
+    if rng.random() < 0.5:
+        read, read_span = _number(rng, "pressure")
+        ranges = {"device": read_span, "pressure_pa": [0.0, 0.9e6]}
+        profile["read_pressure"] = {"ask": rng.choice(["MON", "P", "?"]), "answer": f"{read}", "range": ranges}
+    _maybe(rng, profile, "steps", [{"ask": "INC", "by": 2}, {"ask": "DEC", "by": -2}], 0.3)
+    refusals: Profile = {"unknown": rng.choice(["", "UNKNOWN", "?", ">"])}
+    _maybe(rng, refusals, "out_of_range", {"text": "RANGE", "numbers": [1024, 9999]})
+    _maybe(rng, profile, "refusals", refusals)
+    return profile
+
+
+_FORCES = ":d", ":06d", ":+06d", ":.1f", ":.2f", ":.3f", ":+08.2f", ":08.3f", ":7.1f", ":5.1f", ":4.2f"
+
+
+def drawn_cell(rng: Random) -> Profile:
+    profile = _about(rng, "load cell")
+    number, reading = f"{{force{rng.choice(_FORCES)}}}", {}
+    frame = _sentence(rng, profile, rng.choice(["", "W ", "!"]), number)
+    if rng.random() < 0.4:
+        words, reading["quality"] = rng.choice(
+            [("ST|US|OL", {"ST": "ok", "US": "unstable", "OL": "overload"}), ("G|B", {"G": "ok", "B": "unstable"})]
+        )
+        frame = f"{{status:{words}}},{frame}"
+    if rng.random() < 0.4:
+        frame += "{unit:kg|lb|g|N}"
+    frame += rng.choice(["", "", " {serial:04X}", " {remark:6s}", ";{count:d}"])
+    reading["frame"] = frame
+    _maybe(rng, reading, "unit", rng.choice(["N", "N", "kg", "g", "lb"]), 0.7)
+    _maybe(rng, reading, "blank_is_overload", rng.choice([True, False]), 0.4)
+    is_asked = rng.random() < 0.6
+    if is_asked:
+        reading["ask"] = _sentence(rng, profile, rng.choice(["W?", "SYS?", "MSV?;"]))
+        _maybe(rng, reading, "rate_hz", rng.choice([0.0, 10.0, 80.0]), 0.5)
+    else:
+        _maybe(rng, reading, "rate_hz", rng.choice([1.0, 10.0, 40.0, 100.0, 400.0]), 0.95)
+    profile["read_force" if is_asked else "stream"] = reading
+    return profile
