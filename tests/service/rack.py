@@ -41,13 +41,16 @@ class Wire:
 
 
 class Samples:
-    """Stands for the load cell's codec: what is put here comes out at the next bytes."""
+    """Stands for the load cell's line: what is put here comes out at the next bytes."""
 
     def __init__(self) -> None:
         self.next: ForceSample | None = None
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | None]:
         return [self.next]
+
+    def tick(self, now_s: float) -> None:
+        """A stream is not asked."""
 
 
 class Rack:
