@@ -81,6 +81,11 @@ class Controller:
         """True once a `stop` has led to a disabled output."""
         return self._stopping and self.state not in ENABLED_STATES
 
+    @property
+    def zero_n(self) -> float:
+        """What the last tare has taken as zero, N of the cell."""
+        return self._reader.zero.zero_n
+
     def stop(self) -> None:
         """Ramp the force to 0 in the following steps, then OFF for good; no enable is accepted any more."""
         self._stopping = True

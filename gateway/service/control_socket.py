@@ -52,7 +52,8 @@ class ControlSocket(JsonLineServer):
         return self._asked.recordings.start() if is_on else self._asked.recordings.stop()
 
     def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
-        """{"use": number} or {"rollback": true} begin a change; neither tells what is in use and how the last one went."""
+        """{"use": number} (with "force": true a rejected one, too) or {"rollback": true} begin a change; neither tells what is
+        in use and how the last one went."""
         if request.get("rollback"):
             return self._asked.upload.rollback()
         number = request.get("use")
@@ -60,7 +61,7 @@ class ControlSocket(JsonLineServer):
             return self._asked.upload.status()
         if type(number) is not int:
             raise ValueError(f"use = {number}: the number of a calibration is expected")
-        return self._asked.upload.use(number)
+        return self._asked.upload.use(number, force=request.get("force") is True)
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
         bank = self._asked.bank
