@@ -61,8 +61,8 @@ def _sentence(error: Error, bounds: tuple[str, ...]) -> str:
     if not bounds:
         return ""
     return (
-        f"{error.rms_n:.3f} N RMS on all {error.points} measured points, {' and '.join(bounds)}; finer stairs, more groups or a "
-        "reversal part describe the rig better"
+        f"{error.rms_n:.3f} N RMS on all {error.points} measured points, {' and '.join(bounds)}; finer stairs, more groups or "
+        "a reversal part describe the rig better"
     )
 
 
