@@ -41,7 +41,7 @@ FAULTS: Final = (
     Entry(
         "A312",
         "force reading is frozen",
-        "Sample after sample is the same, bit for bit: the force must have changed, or the cell's own noise would have moved it.",
+        "Sample after sample is the same, bit for bit: the force, or the noise of the cell, must have changed it.",
         "The amplifier is in hold or menu mode, or repeats its last value without a cell.",
         "Leave the amplifier's menu and release `hold`; press the cell by hand and watch `force-gateway monitor`.",
         "SAMPLE_FROZEN",
@@ -133,7 +133,7 @@ WARNINGS: Final = (
         "A301",
         "target unreachable",
         "Voltage is out and much less force is measured than the model expects (2.31 V, 0.1 N instead of 17.9 N).",
-        "No air, a closed valve, or no contact with the workpiece; a tenth or ten times of the expected force is kgf read as N. "
+        "No air, a closed valve, or no contact with the workpiece; a tenth of the expected force is kgf read as N. "
         "The sentence names what the pressure, where it is measured, and the force can tell apart.",
         "Open the air supply and look at its gauge; then bring the tool into contact; then compare the units.",
         "TARGET_UNREACHABLE",
