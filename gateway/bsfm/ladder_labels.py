@@ -19,7 +19,7 @@ from gateway.bsfm.ladder_points import Points
 LABELS: Final = ("phase", "group", "stair")
 """Columns: CalibrationPhase, group from 0 (-1 outside the ladder), and stair from 0 of this run; the row after the last
 stair has the number of stairs."""
-CHECK, WALK = 2, 4  # of CalibrationPhase, which this room cannot import; a test compares
+CHECK, WALK, DONE = 2, 4, 5  # of CalibrationPhase, which this room cannot import; a test compares
 NO_GROUP: Final = -1
 
 Integers = NDArray[np.int64]
@@ -65,6 +65,11 @@ class Labels:
     def cut_groups(self) -> list[int]:
         whole = self.whole_groups
         return [int(group) for group in np.unique(self.group[self.group > NO_GROUP]) if group not in whole]
+
+    @property
+    def is_finished(self) -> bool:
+        """The run has come to its own end: its last stair was left, too."""
+        return bool((self.phase == DONE).any())
 
     @property
     def has_walk(self) -> bool:

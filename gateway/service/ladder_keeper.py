@@ -148,6 +148,7 @@ class LadderKeeper:
         if run is None or isinstance(run, ExperimentRun):
             return ()
         group = run.stairs[min(run.done, len(run.stairs) - 1)].group
+        self._stairs = len(run.stairs)  # some may have been left out by now
         return float(self._calibrating.phase), float(group), float(run.done)
 
     def flush(self, now_s: float) -> None:
@@ -178,7 +179,6 @@ class LadderKeeper:
             "zero_n": self._controller.zero_n,
         }
         columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LADDER)
-        self._stairs = 0 if isinstance(run, ExperimentRun) else len(run.stairs)
         try:
             recorder = Recorder(self._state / "recordings", header, columns)
         except OSError as error:

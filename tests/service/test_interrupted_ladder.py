@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.bsfm.ladder_labels import CHECK, LABELS, WALK, Labels
+from gateway.bsfm.ladder_labels import CHECK, DONE, LABELS, WALK, Labels
 from gateway.cli.calibrating.resume import resumed
 from gateway.cli.errors import CliError
 from gateway.profiles import load_rig
@@ -68,7 +68,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
             if first_group is None:
                 recordings.append(climbed(wired, keeper, {"plan": PLAN, "name": "left cell"}))
             else:
-                plan = PLAN | {"first_group": first_group, "v_max_v": 8.0}
+                plan = PLAN | {"first_group": first_group, "v_max_v": recordings[0].header["ladder"]["top_v"]}
                 recordings.append(climbed(wired, keeper, {"plan": plan, "continues": [1]}))
     return Runs(recordings[0], dict(zip((1, 2), recordings[1:], strict=True)))
 
@@ -89,13 +89,13 @@ def groups_left_behind(recording: Recording, rows: int) -> int:
 
 
 def test_the_labels_are_the_registers_words() -> None:
-    assert (CalibrationPhase.CHECK, CalibrationPhase.MINOR_LOOPS) == (CHECK, WALK)
+    assert (CalibrationPhase.CHECK, CalibrationPhase.MINOR_LOOPS, CalibrationPhase.FITTING) == (CHECK, WALK, DONE)
     assert LADDER == LABELS
 
 
 def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbed_again(runs, tmp_path: Path) -> None:
     path = written(tmp_path, runs.whole)
-    rows, seen = runs.whole.rows, set()
+    rows, seen, top_v = runs.whole.rows, set(), runs.whole.header["ladder"]["top_v"]
     for cut in [*range(1, rows, 61), *(np.flatnonzero(np.diff(runs.whole.columns["group"])) + 1).tolist(), rows - 1]:
         path.unlink()
         assert written(tmp_path, runs.whole, cut) == path
@@ -103,7 +103,7 @@ def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbe
         assert (rest.groups, rest.earlier) == (groups, [1] if groups else []), f"cut at row {cut}"
         assert not rest.is_whole(rest.plan)
         plan = rest.plan_with({})
-        assert (plan["first_group"], plan["v_max_v"], plan["step_v"]) == (groups, pytest.approx(8.0), 1.0)
+        assert (plan["first_group"], plan["v_max_v"], plan["step_v"]) == (groups, top_v, 1.0)
         seen.add(groups)
     assert seen == {0, 1, 2}
 

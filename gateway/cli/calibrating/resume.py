@@ -90,4 +90,4 @@ def _whole_groups(recording: Recording | None) -> int:
 def _is_finished(recording: Recording) -> bool:
     """Its last stair was left: the run has come to its own end."""
     labels = Labels.of(recording.columns)
-    return labels is not None and labels.last_stair >= int(recording.header["ladder"]["stairs"])
+    return labels is not None and labels.is_finished
