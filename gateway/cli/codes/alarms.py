@@ -133,8 +133,7 @@ WARNINGS: Final = (
         "A301",
         "target unreachable",
         "Voltage is out and much less force is measured than the model expects (2.31 V, 0.1 N instead of 17.9 N).",
-        "No air, a closed valve, or no contact with the workpiece; a tenth of the expected force is kgf read as N. "
-        "The sentence names what the pressure, where it is measured, and the force can tell apart.",
+        "No air, a closed valve, or no contact; a tenth of the expected force is kgf read as N. The sentence tells more.",
         "Open the air supply and look at its gauge; then bring the tool into contact; then compare the units.",
         "TARGET_UNREACHABLE",
     ),
