@@ -1,6 +1,6 @@
 """A ladder judged: every model and order fitted, held out, one chosen, its reversal identified.
 
-The choice is among fits that may drive a plant: the fewest coefficients within one standard error of the best held-out
+The choice is among fits that may drive a plant: the fewest coefficients not certainly worse than the best held-out
 error. Where no free optimum may, the best BSFM that may is looked for (fit_usable) and said to be that. One group alone
 cannot be left out; then every fifth stair is, which flatters, and is said too. Importing this costs scipy.
 """

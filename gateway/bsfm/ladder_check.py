@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gateway.bsfm.fit_problem import Floats
 from gateway.bsfm.ladder import FALLING, RISING, Ladder
 from gateway.bsfm.ladder_fault import Flaw, LadderError
+from gateway.bsfm.ladder_labels import Labels, Parted, parted
 from gateway.bsfm.ladder_points import Points, settled_points
 from gateway.bsfm.ladder_rows import Rows, usable_rows
 from gateway.bsfm.ladder_sweeps import Sweeps, sweeps
@@ -70,12 +71,14 @@ def checked_ladder(
     """The ladder in a table of the recording contract. LadderError with one sentence if it must not be fitted."""
     said = _check_rig(facts, expected)
     rows = usable_rows(columns, facts, expected.force_unit)
-    points = _points(rows)
+    labels = Labels.of(columns)
+    labels = labels.part(rows.row) if labels else None
+    points = _points(rows, labels)
     slope_n_per_v = _slope(points)
     said += [*rows.notes, *points.notes]
     _check_moves(points)
     _check_sign(points, slope_n_per_v)
-    walk = sweeps(points)
+    walk = parted(points, labels, by_check=_is_only_walk(facts)) if labels else sweeps(points)
     ladder = _whole_groups(walk)
     said += [*walk.left_out, *_check_scale(rows, slope_n_per_v, expected)]
     ladder, clipped = _without_saturated(ladder, expected.saturation_n)
@@ -130,9 +133,9 @@ def _is_only_walk(facts: Mapping[str, object]) -> bool:
     return isinstance(plan, Mapping) and plan.get("first_group", 0) >= plan.get("groups", 1)
 
 
-def _points(rows: Rows) -> Points:
+def _points(rows: Rows, labels: Labels | None) -> Points:
     try:
-        return settled_points(rows.time_s, rows.command_v, rows.force_n)
+        return settled_points(rows.time_s, rows.command_v, rows.force_n, labels.stair if labels else None)
     except ValueError as error:
         raise LadderError(Flaw.NO_STAIRS, str(error)) from error
 
@@ -163,10 +166,10 @@ def _check_sign(points: Points, slope_n_per_v: float) -> None:
         )
 
 
-def _whole_groups(walk: Sweeps) -> Ladder:
+def _whole_groups(walk: Sweeps | Parted) -> Ladder:
     if walk.ladder is not None:
         return walk.ladder
-    if min(walk.rising, walk.falling) < 3:
+    if isinstance(walk, Sweeps) and min(walk.rising, walk.falling) < 3:
         raise LadderError(
             Flaw.ONE_DIRECTION,
             f"one direction only: {walk.rising} rising and {walk.falling} falling stairs; friction makes two branches, so a "

@@ -42,11 +42,12 @@ class Points:
         return Points(voltage_v, force_n, row, self.drift_n[keep], self.noise_n, self.notes)
 
 
-def settled_points(time_s: Floats, command_v: Floats, force_n: Floats) -> Points:
-    """Points of finite columns whose time does not fall. ValueError when the command never rests."""
-    starts = _starts(command_v)
+def settled_points(time_s: Floats, command_v: Floats, force_n: Floats, stair: Integers | None = None) -> Points:
+    """Points of finite columns whose time does not fall. stair: of each row, where it is known: two stairs of one voltage
+    are two points then. ValueError when the command never rests."""
+    starts = _starts(command_v) if stair is None else _starts_of_stairs(command_v, stair)
     lengths = np.diff(np.append(starts, len(command_v)))
-    if np.median(lengths) < 3:
+    if stair is None and np.median(lengths) < 3:
         return _one_row_each(time_s, command_v, force_n)
     return _dwells(time_s, command_v, force_n, starts)
 
@@ -58,6 +59,10 @@ def _starts(command_v: Floats) -> Integers:
         if abs(command_v[row] - command_v[starts[-1]]) > SAME_V:
             starts.append(row)
     return np.array(starts, dtype=np.int64)
+
+
+def _starts_of_stairs(command_v: Floats, stair: Integers) -> Integers:
+    return np.union1d(_starts(command_v), np.flatnonzero(np.diff(stair)) + 1)
 
 
 def _dwells(time_s: Floats, command_v: Floats, force_n: Floats, starts: Integers) -> Points:

@@ -118,7 +118,8 @@ class Calibration:
 
     slip_radii_v, slip_shares: empty for the linear blend over blend_span_n. force_limits_n: lowest and highest force that
     the set may be used for, as uploaded; empty where nothing but the branches' reach and the rig bounds it. response: None
-    where it was not measured.
+    where it was not measured. rms_n, max_n: on all measured points, partial reversals included. rejected: why it is not offered
+    for use, empty where it is.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles
@@ -142,6 +143,7 @@ class Calibration:
     slip_shares: tuple[float, ...] = ()
     force_limits_n: tuple[float, ...] = ()
     response: Response | None = None
+    rejected: str = ""
 
     @property
     def reversal(self) -> Reversal:

@@ -18,7 +18,7 @@ from gateway.bsfm.reversal import LinearBlend
 from gateway.bsfm.slip_fit import SlipFit, fit_joint, walk_of
 from gateway.bsfm.slip_problem import Walk
 
-FEWEST_POINTS: Final = 40  # of the walk: each half must turn round a few times
+FEWEST_POINTS: Final = 12  # of the walk: each half must turn round a few times, as a plan's fourteen turns do
 BETTER_SHARE: Final = 0.9  # held-out error of the stops, of the blend's
 
 

@@ -4,6 +4,7 @@ With an experiment as its plan (`diagnose --plan` writes them) it records what t
 """
 
 import json
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,7 +12,7 @@ import click
 
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
-from gateway.cli.options import endpoint, json_option, state_directory, state_options
+from gateway.cli.options import endpoint, json_option, name_option, state_directory, state_options
 
 _QUESTIONS: Final = (
     "Does the tool press on the workpiece, or on a stop, that takes {force:.0f} N?",
@@ -19,6 +20,7 @@ _QUESTIONS: Final = (
     "Is the air on, with supply enough for {top:g} V?",
 )
 _GO_ON: Final = "; force-gateway calibrate --resume goes on"
+_STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 
 
 @click.command()
@@ -37,6 +39,7 @@ _GO_ON: Final = "; force-gateway calibrate --resume goes on"
     help="Plan as YAML: a ladder's, or an experiment of diagnose --plan.",
 )
 @click.option("--resume", is_flag=True, help="Go on with the groups that the last stopped run did not climb.")
+@name_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.option(
     "--gateway", callback=endpoint, metavar="HOST:PORT", help="By Modbus (the rig's own plan), not on this machine."
@@ -62,29 +65,85 @@ def command(
         run: LocalRun | RemoteRun = RemoteRun(gateway)
     else:
         directory = state_directory(state, rig)
-        fields, earlier = _plan(directory, wanted)
-        run, resumes = LocalRun(directory, fields, earlier), not is_experiment(fields)
-    _ask(run.preview(), yes)
+        asked = _asked(directory, wanted)
+        if asked.whole:
+            _tell(_fitted(asked.whole, rig, directory), as_json, resumes=False)
+            return
+        run = LocalRun(directory, asked.plan, asked.earlier, asked.name)
+        resumes = not is_experiment(asked.plan)
+    preview = run.preview()
+    if gateway is None:
+        _warn_of_another_rig(asked, preview)
+    _ask(preview, yes)
     _tell(follow(run), as_json, resumes=resumes)
 
 
-def _plan(directory: Path, wanted: dict[str, Any]) -> tuple[dict[str, Any], list[int]]:
-    """The plan's fields, and the recordings that it goes on from."""
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What to climb: the plan's fields, and the recordings that it goes on from. whole: the recording of a run that has
+    everything, so that only the fit is left; fingerprint: of the rig that the earlier ones were made on."""
+
+    plan: dict[str, Any]
+    earlier: list[int] = field(default_factory=list)
+    name: str = ""
+    whole: Path | None = None
+    fingerprint: str = ""
+
+
+def _asked(directory: Path, wanted: dict[str, Any]) -> _Asked:
     from gateway.control.ladder_stairs import QUICK
 
     fields: dict[str, Any] = {}
-    earlier: list[int] = []
-    if wanted["resume"]:
-        from gateway.cli.calibrating.resume import resumed
-
-        fields, earlier = resumed(directory)
     if wanted["quick"]:
         fields |= {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
     if wanted["plan_file"]:
         fields |= _from_file(wanted["plan_file"], wanted)
     names = ("groups", "step_v", "v_max_v", "minor_points")
     fields |= {name: wanted[name] for name in names if wanted[name] is not None}
-    return fields | ({"tare": True} if wanted["tare"] else {}), earlier
+    if wanted["tare"]:
+        fields["tare"] = True
+    if wanted["resume"]:
+        return _resumed(directory, fields, wanted["name"] or "")
+    return _Asked(fields, name=wanted["name"] or "")
+
+
+def _resumed(directory: Path, fields: dict[str, Any], name: str) -> _Asked:
+    """The rest of the last run; fields: what is asked for otherwise now, which may be more groups, but no other stairs."""
+    from gateway.cli.calibrating.resume import resumed
+
+    rest = resumed(directory)
+    changed = [f"{key} {value:g}" for key, value in fields.items() if key in _STAIRS and value != rest.plan[key]]
+    if changed:
+        stairs = ", ".join(f"{key} {rest.plan[key]:g}" for key in _STAIRS)
+        raise CliError(
+            f"E437 --resume goes on with the ladder of {rest.last} ({stairs}), not with {', '.join(changed)}: leave that out, "
+            "or leave --resume out to begin anew",
+            exit_codes.USAGE,
+        )
+    plan = rest.plan_with(fields)
+    whole = rest.last if rest.is_whole(plan) else None
+    return _Asked(plan, rest.earlier, name or rest.name, whole, rest.fingerprint)
+
+
+def _fitted(recording: Path, rig: str, directory: Path) -> dict[str, Any]:
+    """The end of a run that has everything but its fit: as `follow` answers."""
+    from gateway.cli.calibrating.resume import rig_of
+    from gateway.service.fit_process import fit_and_store
+
+    result = fit_and_store(recording, rig_of(recording, rig), directory)
+    phase = "stored" if "stored" in result else "refused"
+    sentence = result.pop("refused", "") or "info the run is whole: nothing was climbed again"
+    click.echo(f"{recording} has every stair of its plan: nothing is climbed again", err=True)
+    return {"phase": phase, "recording": str(recording), "sentence": sentence} | result
+
+
+def _warn_of_another_rig(asked: _Asked, preview: dict[str, Any]) -> None:
+    if asked.fingerprint and asked.fingerprint != preview["rig_fingerprint"]:
+        click.echo(
+            f"the files of rig {preview['rig']} have changed since the first part was recorded: if cell, cylinder or regulator "
+            "are others now, begin anew without --resume",
+            err=True,
+        )
 
 
 def _from_file(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
@@ -92,10 +151,10 @@ def _from_file(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
     from gateway.cli.calibrating.plans import fields_of, is_experiment
 
     fields = fields_of(path)
-    options = ("groups", "step_v", "v_max_v", "minor_points", "quick", "resume")
+    options = ("groups", "step_v", "v_max_v", "minor_points", "quick", "resume", "name")
     if is_experiment(fields) and any(wanted[name] for name in options):
         raise click.UsageError(
-            f"{path} is an experiment: --groups, --step, --v-max, --minor, --quick, --resume are a ladder's"
+            f"{path} is an experiment: --groups, --step, --v-max, --minor, --quick, --resume, --name are a ladder's"
         )
     return fields
 
@@ -141,7 +200,7 @@ def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
     if end["phase"] in ("stored", "recorded"):
         return
     kept = f"\nthe data are kept in {end['recording']}{_GO_ON if resumes else ''}" if end.get("recording") else ""
-    if end["phase"] == "refused":
+    if end["phase"] == "refused":  # by the data, or by the verdict on a fit that is kept
         raise CliError(str(end.get("sentence") or "the fit was refused: see the gateway's log"), exit_codes.DATA)
     raise CliError(f"{str(end.get('sentence') or 'calibration stopped').removeprefix('info ')}{kept}")
 

@@ -29,7 +29,7 @@ def command() -> None:
 @state_options
 @json_option
 def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
-    """List the calibrations of a state directory; * is in use."""
+    """List the calibrations of a state directory; * is in use, x was rejected."""
     from gateway.cli.calibrations import opened
     from gateway.service.selection import OWN
 
@@ -51,7 +51,8 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
         mark = "*" if standing.selection.number is None else " "
         click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, _slots(standing, OWN))} (the rig's own)")
     for entry in entries:
-        mark = "*" if standing.selection.number == entry.number else " "
+        is_rejected = entry.calibration is not None and bool(entry.calibration.rejected)
+        mark = "*" if standing.selection.number == entry.number else "x" if is_rejected else " "
         told = (
             _line(entry.calibration, _slots(standing, entry.number))
             if entry.calibration
@@ -76,16 +77,17 @@ def show_command(*, which: str | None, state: Path | None, rig: str, as_json: bo
 
 @command.command(name="use")
 @click.argument("number", metavar="N", type=click.IntRange(min=1))
+@click.option("--force", is_flag=True, help="Also one whose fit was rejected.")
 @state_options
 @json_option
-def use_command(*, number: int, state: Path | None, rig: str, as_json: bool) -> None:
+def use_command(*, number: int, force: bool, state: Path | None, rig: str, as_json: bool) -> None:
     """Use calibration N from now on.
 
     A running gateway swaps it without a bump. `calibration rollback` goes back.
     """
     from gateway.cli.calibrations import change
 
-    _tell_change(change(state_directory(state, rig), rig, {"use": number}), as_json=as_json)
+    _tell_change(change(state_directory(state, rig), rig, {"use": number, "force": force}), as_json=as_json)
 
 
 @command.command(name="rollback")
@@ -206,8 +208,12 @@ def _line(calibration: "Calibration", slots: list[int]) -> str:
     rms, worst = (f"{error_n:.3f}" if error_n >= 0.0 else "-" for error_n in (calibration.rms_n, calibration.max_n))
     return (
         f"{calibration.date_utc:<12}{calibration.kind:<10}{calibration.reversal_kind:<16}{forces:<18}{rms:>7} {worst:>7}"
-        f"  {','.join(map(str, slots)):<5}  {calibration.name} · {calibration.source}"
+        f"  {','.join(map(str, slots)):<5}  {calibration.name} · {calibration.source}{_rejected(calibration)}"
     )
+
+
+def _rejected(calibration: "Calibration") -> str:
+    return f" · rejected, not offered: {calibration.rejected}" if calibration.rejected else ""
 
 
 def _tell_change(answer: dict[str, Any], *, as_json: bool) -> None:

@@ -51,7 +51,7 @@ def in_use(store: "CalibrationStore") -> "Calibration":
 
 
 def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
-    """{"use": N} or {"rollback": True}: the gateway's answer when it is through, or our own where none runs."""
+    """{"use": N, "force": bool} or {"rollback": True}: the gateway's answer when it is through, or our own where none runs."""
     with _not_running(directory) as is_free:
         if is_free:
             return _changed_here(directory, rig_name, request)
@@ -76,7 +76,10 @@ def _changed_here(directory: Path, rig_name: str, request: dict[str, Any]) -> di
     activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n if rig else _ANY_CELL_N))
     before = store.standing().calibration
     try:
-        taken = activation.take_back() if "rollback" in request else activation.take(request["use"])
+        force = bool(request.get("force"))
+        taken = (
+            activation.take_back() if "rollback" in request else activation.take_offered(request["use"], force=force)
+        )
     except NotFit as error:
         sentence = error.fault.sentence(before.number if before else 0)
         raise CliError(sentence, exit_codes.DATA) from None

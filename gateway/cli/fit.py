@@ -8,7 +8,7 @@ import click
 
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
-from gateway.cli.options import json_option, state_directory
+from gateway.cli.options import json_option, name_option, state_directory
 
 if TYPE_CHECKING:
     from gateway.service.ladder_fit import LadderFit
@@ -58,6 +58,7 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
 )
 @click.option("--no-report", is_flag=True, help="Write no report.")
 @click.option("--store", is_flag=True, help="Store the chosen fit as a numbered calibration (it is not activated).")
+@name_option
 @click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway.")
 @click.option("--rig", help="The rig it must be from; default the recording's own.")
 @json_option
@@ -82,6 +83,10 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
         click.echo(json.dumps(fit.document, indent=2))
     else:
         show(fit.document)
+    if store and fit.verdict.rejected:
+        from gateway.service.fit_process import rejected_sentence
+
+        raise CliError(rejected_sentence(fit.document["calibration"], fit.verdict.rejected), exit_codes.DATA)
 
 
 def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
@@ -105,7 +110,7 @@ def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
     )
     background = Background(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
     try:
-        return fit_recording(read_source(path, mapping), question, background)
+        return fit_recording(read_source(path, mapping), question, background, options["name"] or "")
     except LadderError as error:
         raise CliError(f"E421 {path}: {error}", exit_codes.DATA) from None
 

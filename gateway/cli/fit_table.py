@@ -57,7 +57,8 @@ def summary(document: dict[str, Any]) -> list[Text]:
     rig = document["rig"] or "not named"
     lines = [
         Text(
-            "* the paper's normalised figure, no force; dips: a branch is not increasing; flat: below 0.5 N/V somewhere",
+            "RMS and max: of the stairs, each by its own branch; * the paper's normalised figure, no force; dips: a branch is "
+            "not increasing; flat: below 0.5 N/V somewhere",
             style="dim",
         ),
         Text(),
@@ -65,29 +66,46 @@ def summary(document: dict[str, Any]) -> list[Text]:
             f"ladder    {ladder['points']} stairs in {_groups(ladder['groups'])}, {low_v:g} .. {high_v:g} V, rig {rig}"
         ),
         Text(
-            f"chosen    {chosen['model'].upper()} of order {chosen['order']}: {chosen['rms_n']:.3f} N RMS, "
-            f"{chosen['max_n']:.2f} N max, {low_n:.1f} .. {high_n:.1f} N",
+            f"chosen    {chosen['model'].upper()} of order {chosen['order']}, {low_n:.1f} .. {high_n:.1f} N",
             style="bold",
         ),
+        Text(f"error     {_measured(document['measured'])}", style="bold"),
         Text(f"          {_reason(chosen)}"),
         Text(f"reversal  {_reversal(reversal)}"),
     ]
     lines += [Text(f"note      {note}", style="yellow") for note in document["notes"]]
     if document.get("calibration"):
-        lines.append(
-            Text(
-                f"stored    calibration {document['calibration']}; force-gateway calibration use {document['calibration']}"
-            )
-        )
+        lines.append(_stored(document))
     if document.get("report"):
         lines.append(Text(f"report    {document['report']}"))
     return lines
 
 
+def _measured(measured: dict[str, Any]) -> str:
+    """The error on all that was measured, and what it is to be compared with."""
+    said = (
+        f"{measured['rms_n']:.3f} N RMS, {measured['max_n']:.2f} N max on all {measured['points']} measured points, "
+        f"{'reversals included' if measured['reversals'] else 'no reversals measured'}"
+    )
+    if measured["allowed_rms_n"] is not None:
+        said += f"; allowed {measured['allowed_rms_n']:.3f} N"
+    if measured["in_use_rms_n"] is not None:
+        said += f"; calibration {measured['in_use']} in use has {measured['in_use_rms_n']:.3f} N on them"
+    return said
+
+
+def _stored(document: dict[str, Any]) -> Text:
+    number, rejected = document["calibration"], document["measured"]["rejected"]
+    named = f"calibration {number} ({document['name']})"
+    if rejected:
+        return Text(f"stored    {named} as rejected, not offered: {rejected}", style="red")
+    return Text(f"stored    {named}; force-gateway calibration use {number}")
+
+
 def _reason(chosen: dict[str, Any]) -> str:
     if chosen["constrained"]:
         return "the best that increases everywhere and does not cross; better free optima do not"
-    return "fewest coefficients within one standard error of the best held-out error that may drive a plant"
+    return "fewest coefficients that are not certainly worse than the best held-out error that may drive a plant"
 
 
 def _reversal(reversal: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ import click
 Function = TypeVar("Function", bound=Callable[..., Any])
 Endpoint = tuple[str, int]
 _DEFAULT_PORT: Final = 5020
+_LONGEST_NAME: Final = 60
 DEFAULT_ENDPOINT: Final = f"127.0.0.1:{_DEFAULT_PORT}"
 
 
@@ -65,6 +66,21 @@ def state_options(function: Function) -> Function:
     ):
         function = option(function)
     return function
+
+
+def calibration_name(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    """A name that stands on one line and is no number, for an option's callback."""
+    if value is None:
+        return None
+    name = " ".join(value.split())
+    if not name or not name.isprintable() or name.isdecimal() or len(name) > _LONGEST_NAME:
+        raise click.BadParameter(f"{value!r} is no name: 1 to {_LONGEST_NAME} printable characters, not a number alone")
+    return name
+
+
+def name_option(function: Function) -> Function:
+    """--name: what the user calls the calibration."""
+    return click.option("--name", callback=calibration_name, help="What the calibration is called.")(function)
 
 
 def json_option(function: Function) -> Function:

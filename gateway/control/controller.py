@@ -81,6 +81,11 @@ class Controller:
         """True once a `stop` has led to a disabled output."""
         return self._stopping and self.state not in ENABLED_STATES
 
+    @property
+    def zero_n(self) -> float:
+        """What the last tare has taken as zero, N of the cell."""
+        return self._reader.zero.zero_n
+
     def stop(self) -> None:
         """Ramp the force to 0 in the following steps, then OFF for good; no enable is accepted any more."""
         self._stopping = True
@@ -144,6 +149,7 @@ class Controller:
 
     def _sense(self, now_s: float, sample: ForceSample | None, line: Line) -> None:
         around = (line.temperature_c, self._pursuit.stage.voltage_v)
+        self._telling.hear(line)
         self._reading = reading = self._reader.read(now_s, sample, self._follower.demand.gravity_n, around)
         if not reading.is_new:
             return
@@ -233,6 +239,7 @@ class Controller:
     def _started(self, now_s: float, sentence: str) -> None:
         self._restarted = False
         self._supervisor.start()
+        self._telling.start()
         self._follower.lease.start(now_s)
         self._outcome.events.append(sentence)
 
@@ -311,7 +318,7 @@ class Controller:
         moment = self._moment(now_s, dt_s)
         self._follow(now_s, self._motion.pursue(self._target(), moment, ramps_down=self._ramping_down))
         measured_n = self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
-        self._telling.unreachable(self._pursuit, measured_n, moment.expected_n, self._outcome.events)
+        self._telling.unreachable(self._pursuit, measured_n, moment, self._outcome.events)
 
     def _climb(self, now_s: float) -> bool:
         """One step of the run; True when it has just ended, and the ramp down begins."""

@@ -1,16 +1,16 @@
-"""Is the load cell still alive behind its readings? A cell that repeats one value while the plant must have moved is
-frozen.
+"""Is the load cell still alive behind its readings? A cell that repeats one value, bit for bit, while its frames go on.
 
-"Must have moved" is judged friction-proof: since the value last changed, the rising branch (the least force a voltage
-can leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five
-quanta. A single number would trip on every small reversal, where friction really holds the force. Only in contact: in
-free air a quiet cell rightly repeats itself. A cell whose noise shows in every reading can be judged sooner, by n equal
-samples (frozen_equal_samples).
+Two ways to tell. While the force changes: since the value last changed, the rising branch (the least force a voltage can
+leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five quanta. That is
+friction-proof; a single number would trip on every small reversal, where friction really holds the force. Only in contact: in
+free air a quiet cell rightly repeats itself. While the force stands still: more equal samples than the cell's own noise allows
+(cell_noise), or than the rig says (frozen_equal_samples).
 """
 
 from math import inf
 from typing import Final
 
+from gateway.control.cell_noise import CellNoise
 from gateway.control.reading import Reading
 from gateway.control.response import ModelResponse
 from gateway.control.settings import Supervision
@@ -25,7 +25,8 @@ class FrozenWatch:
     def __init__(self, supervision: Supervision) -> None:
         self._frozen_s = supervision.frozen_s
         self._least_change_n = _QUANTA * supervision.sample_quantum_n
-        self._equal_limit = supervision.frozen_equal_samples or inf
+        self._told_limit = supervision.frozen_equal_samples
+        self._noise = CellNoise()
         self._value_n = inf
         self._slack_n = 0.0
         self.start()
@@ -33,6 +34,7 @@ class FrozenWatch:
     def start(self) -> None:
         """At enable: what happened before does not count."""
         self._equal = 1
+        self._equal_s = 0.0
         self._watch_model()
 
     def _watch_model(self) -> None:
@@ -41,11 +43,14 @@ class FrozenWatch:
 
     def observe(self, reading: Reading, response: ModelResponse, touching: bool) -> None:
         """One more new reading."""
-        if reading.cell_n != self._value_n:
-            self._value_n = reading.cell_n
+        if reading.is_usable:
+            self._noise.observe(reading.raw_n, reading.interval_s, touching)
+        if reading.raw_n != self._value_n:
+            self._value_n = reading.raw_n
             self.start()
         else:
             self._equal += 1
+            self._equal_s += reading.interval_s
             self._same_s += reading.interval_s
         if not touching:
             self._watch_model()
@@ -55,9 +60,23 @@ class FrozenWatch:
 
     @property
     def is_frozen(self) -> bool:
-        must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
-        return (self._same_s >= self._frozen_s and must_have_moved) or self._equal > self._equal_limit
+        return bool(self.words)
 
     @property
-    def same_s(self) -> float:
-        return self._same_s
+    def words(self) -> str:
+        """What was seen and why it cannot be, empty for a cell that may be alive."""
+        must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
+        if self._same_s >= self._frozen_s and must_have_moved:
+            return f"repeated for {self._same_s:.2f} s while the force must have changed"
+        seen = f"repeated for {self._equal_s:.2f} s, {self._equal} samples bit for bit"
+        if self._told_limit is not None:
+            return (
+                f"{seen}, allowed {self._told_limit} (frozen_equal_samples)" if self._equal > self._told_limit else ""
+            )
+        if self._equal >= self._noise.limit and self._equal_s >= self._frozen_s:
+            return f"{seen}, while its noise has left at most {self._noise.longest} equal so far"
+        return ""
+
+    def tripped(self) -> None:
+        """The fault is told: these equal samples are not learned from."""
+        self._noise.forget_run()

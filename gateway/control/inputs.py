@@ -17,9 +17,10 @@ class Line:
 
     acknowledged_v: voltage that the device confirmed last, None before the first; unanswered_since_s: monotonic time of the
     oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered, lost);
-    owner_connected: False once the owning master's last connection has closed; late_s: how late this step runs;
-    waited_s: so much of it the process could have run and was not let, None where the machine does not count that;
-    temperature_c, feed_mm_s: of the load cell and under the tool, for compensation; nan: nobody knows.
+    pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning master's last
+    connection has closed; late_s: how late this step runs; waited_s: so much of it the process could have run and was not
+    let, None where the machine does not count that; temperature_c, feed_mm_s: of the load cell and under the tool, for
+    compensation; nan: nobody knows.
     """
 
     acknowledged_v: float | None = None
@@ -27,6 +28,7 @@ class Line:
     fault: FaultCode = FaultCode.NONE
     cell_lost: bool = False
     pressure_pa: float = nan
+    pressure_pa_per_v: float = nan
     owner_connected: bool = True
     late_s: float = 0.0
     waited_s: float | None = None

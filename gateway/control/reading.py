@@ -15,7 +15,7 @@ from gateway.devices.messages import ForceSample, Quality
 class Reading:
     """cell_n: zeroed cell force, nan unless usable; contact_n: with the payload's weight; interval_s: since the sample
     before, 0 unless this one is new; overload: saturated or said so by the device; age_s: nan before the first
-    sample."""
+    sample; raw_n: as the cell said it, in N."""
 
     cell_n: float = nan
     contact_n: float = nan
@@ -25,6 +25,7 @@ class Reading:
     is_fresh: bool = False
     is_usable: bool = False
     overload: bool = False
+    raw_n: float = nan
 
 
 NO_READING: Final = Reading()
@@ -64,7 +65,9 @@ class Reader:
         age_s = max(0.0, now_s - sample.time_s)
         cell_n = force_n - self.zero.zero_n if usable else nan
         fresh = age_s <= self._timeout_s
-        return Reading(cell_n, cell_n + gravity_n, age_s, interval_s, interval_s > 0.0, fresh, usable, overload)
+        return Reading(
+            cell_n, cell_n + gravity_n, age_s, interval_s, interval_s > 0.0, fresh, usable, overload, sample.force_n
+        )
 
     def _interval_s(self, time_s: float) -> float:
         """Time since the sample before, at most the time-out; 0 for the same one, or one from the past."""

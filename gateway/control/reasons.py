@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from gateway.control.unreachable import Evidence, unreachable_words
 from gateway.registers.words import FaultCode
 
 FAULT_CODES: Final[dict[FaultCode, str]] = {
@@ -29,14 +30,12 @@ def fault_sentence(fault: FaultCode, detail: str) -> str:
     return f"{FAULT_CODES[fault]} {detail}"
 
 
-def unreachable_sentence(voltage_v: float, measured_n: float, expected_n: float) -> str:
-    """A301 in numbers. A tenth of the expected force is what kgf read as N looks like."""
-    seen = f"A301 {voltage_v:.2f} V out, {measured_n:.1f} N measured, {expected_n:.1f} expected: "
-    if expected_n > 0.0 and 0.09 < measured_n / expected_n < 0.115:
-        return seen + "no air, valve closed or no contact; or kgf read as N (factor 9.81, unit in the rig file)"
-    if measured_n < 0.5 * expected_n:
-        return seen + "no air, valve closed or no contact"
-    return seen + "target not reached: supply pressure too low, trim at its limit or calibration off"
+def unreachable_sentence(seen: Evidence) -> str:
+    """A301 in numbers, and what it probably is."""
+    return (
+        f"A301 {seen.voltage_v:.2f} V out, {seen.measured_n:.1f} N measured, {seen.expected_n:.1f} expected: "
+        f"{unreachable_words(seen)}"
+    )
 
 
 def sign_sentence(rise_n: float, expected_n: float) -> str:

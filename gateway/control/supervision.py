@@ -131,11 +131,10 @@ class Supervisor:
     def _of_force(self, reading: Reading, expected_n: float) -> Finding | None:
         if self._over >= self._limits.over_force_samples:
             return finding(FaultCode.OVER_FORCE, self._over_words(reading, expected_n))
-        if self._frozen.is_frozen:
-            seen = f"{reading.cell_n:.2f} N repeated for {self._frozen.same_s:.2f} s"
-            return finding(
-                FaultCode.SAMPLE_FROZEN, f"{seen} while the force must have changed: amplifier or cell is dead"
-            )
+        if words := self._frozen.words:
+            self._frozen.tripped()
+            said = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
+            return finding(FaultCode.SAMPLE_FROZEN, said)
         if self._response_fault is FaultCode.SIGN_INVERTED:
             return Finding(FaultCode.SIGN_INVERTED, sign_sentence(self.rise.measured_rise_n, expected_n))
         if self._response_fault is FaultCode.GAIN_WRONG:

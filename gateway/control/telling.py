@@ -1,8 +1,16 @@
 """Sentences that are told once, when something begins to be so: target unreachable, force stuck at rest."""
 
-from gateway.control.pursuit import Pursuit
+from math import isfinite, nan
+from typing import Final
+
+from gateway.control.inputs import Line
+from gateway.control.pursuit import Moment, Pursuit
 from gateway.control.reading import Reading
 from gateway.control.reasons import stuck_sentence, unreachable_sentence
+from gateway.control.unreachable import Evidence
+
+_LEARNING: Final = 0.02  # of each new ratio of pressure to voltage
+_LEAST_V: Final = 0.2
 
 
 class Telling:
@@ -12,11 +20,43 @@ class Telling:
         self.said_unreachable = False
         self._said_stuck = False
         self._stuck_n = stuck_n
+        self._was_right = False
+        self._pressure_pa = self._profile_pa_per_v = self._learned_pa_per_v = nan
 
-    def unreachable(self, pursuit: Pursuit, measured_n: float, expected_n: float, events: list[str]) -> None:
+    def start(self) -> None:
+        """At enable."""
+        self._was_right = False
+
+    def hear(self, line: Line) -> None:
+        """What the output device measures."""
+        self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
+
+    def unreachable(self, pursuit: Pursuit, measured_n: float, moment: Moment, events: list[str]) -> None:
+        """After each step in force or voltage mode."""
         if pursuit.unreachable and not self.said_unreachable:
-            events.append(unreachable_sentence(pursuit.stage.voltage_v, measured_n, expected_n))
+            events.append(unreachable_sentence(self._evidence(pursuit.stage.voltage_v, measured_n, moment.expected_n)))
         self.said_unreachable = pursuit.unreachable
+        if pursuit.in_band and moment.touching:
+            self._learn(pursuit.stage.voltage_v)
+
+    def _learn(self, voltage_v: float) -> None:
+        """The force is right, so the pressure at this voltage is, too."""
+        self._was_right = True
+        if isfinite(self._pressure_pa) and voltage_v >= _LEAST_V:
+            ratio, known = self._pressure_pa / voltage_v, self._learned_pa_per_v
+            self._learned_pa_per_v = known + _LEARNING * (ratio - known) if isfinite(known) else ratio
+
+    def _evidence(self, voltage_v: float, measured_n: float, expected_n: float) -> Evidence:
+        learned = isfinite(self._learned_pa_per_v)
+        return Evidence(
+            voltage_v=voltage_v,
+            measured_n=measured_n,
+            expected_n=expected_n,
+            pressure_pa=self._pressure_pa,
+            expected_pa=voltage_v * (self._learned_pa_per_v if learned else self._profile_pa_per_v),
+            learned=learned,
+            was_right=self._was_right,
+        )
 
     def stuck(self, is_stuck: bool, reading: Reading, events: list[str]) -> None:
         if is_stuck and not self._said_stuck:

@@ -7,6 +7,7 @@ templates cannot say is done by a Python codec, named by `codec`.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import nan
 from typing import Annotated, Literal
 
 from annotated_types import Gt, MinLen
@@ -88,6 +89,12 @@ class DeviceProfile:
     def voltage_range_v(self) -> Span:
         """What the output can be set to, V; (0, 0) for a load cell."""
         return self.set_voltage.range.voltage_v if self.set_voltage else (0.0, 0.0)
+
+    @property
+    def pressure_pa_per_v(self) -> float:
+        """Of a regulator whose ranges of pressure and voltage have one end, as its profile says; nan without a pressure."""
+        top_v = self.voltage_range_v[1]
+        return self.read_pressure.range.pressure_pa[1] / top_v if self.read_pressure and top_v else nan
 
     @property
     def terminator_bytes(self) -> bytes:

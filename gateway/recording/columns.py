@@ -33,3 +33,6 @@ DERIVED: Final = (
     "model_residual_n",
 )
 """What our recorder writes beside the contract. The trim and the residual hold the measured force."""
+
+LADDER: Final = ("phase", "group", "stair")
+"""What it adds to a calibration ladder: where the run is, by its plan (gateway.bsfm.ladder_labels)."""

@@ -47,6 +47,13 @@ class Activation:
         fault = self._fault(calibration)
         return f"E401 calibration {calibration.number}: {fault.text}" if fault else ""
 
+    def take_offered(self, number: int, *, force: bool = False) -> InUse:
+        """Select a calibration that a person asks for. force: one that its fit's verdict has rejected, too."""
+        rejected = self.store.load(number).rejected
+        if rejected and not force:
+            raise StoreError("E436", f"calibration {number} was rejected: {rejected}; --force uses it all the same")
+        return self.take(number)
+
     def take(self, number: int | None, slot: int | None = None) -> InUse:
         """Select a calibration that is there, None: the built-in one."""
         calibration = self.store.built_in if number is None else self.store.load(number)

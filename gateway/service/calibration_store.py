@@ -104,6 +104,10 @@ class CalibrationStore:
             raise StoreError("E432", f"{path} says that it is calibration {calibration.number}")
         return calibration
 
+    def number_of(self, data_sha256: str) -> int | None:
+        """The calibration that was made of these very data, None where there is none."""
+        return next((e.number for e in self.list() if e.calibration and e.calibration.data_sha256 == data_sha256), None)
+
     def standing(self, why_not: Callable[[Calibration], str] = lambda calibration: "") -> Standing:
         """What is in use: the active one, else the previous, else the built-in. why_not: a sentence for one that is not
         fit for this rig, empty for one that is."""

@@ -148,6 +148,7 @@ class Cell:
             clock=time.monotonic,
             log=self._log,
         )
+        self.gateway.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
         self.gateway.recordings = self._recordings
         self.gateway.ring = self.ring
         self.gateway.restart_cause = cause

@@ -54,11 +54,14 @@ class ControlSocket(JsonLineServer):
         return self._asked.recordings.start() if is_on else self._asked.recordings.stop()
 
     def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
-        """{"use": number} or {"rollback": true} begin a change; neither tells what is in use and how the last one went."""
+        """{"use": number} (with "force": true a rejected one, too) or {"rollback": true} begin a change; neither tells what is
+        in use and how the last one went."""
         asked = read(CalibrationRequest, request)
         if asked.rollback:
             return self._asked.upload.rollback()
-        return self._asked.upload.status() if asked.use is None else self._asked.upload.use(asked.use)
+        return (
+            self._asked.upload.status() if asked.use is None else self._asked.upload.use(asked.use, force=asked.force)
+        )
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
         read(Ask, request)

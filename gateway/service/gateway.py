@@ -10,6 +10,7 @@ standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
 import traceback
 from collections.abc import Callable
 from dataclasses import replace
+from math import nan
 
 from gateway.control import Controller
 from gateway.control.inputs import Line, Output
@@ -55,6 +56,7 @@ class Gateway:
         self.sample: ForceSample | None = None
         self.samples = 0
         self.cell_garbage_bytes = 0
+        self.pressure_pa_per_v = nan  # of the output device, by its profile
         self.output_lost = FaultCode.NONE
         self.cell_lost = False
         self.owner_connected = True
@@ -139,6 +141,7 @@ class Gateway:
             fault=self.output_lost or self.output.fault,
             cell_lost=self.cell_lost,
             pressure_pa=self.output.pressure_pa,
+            pressure_pa_per_v=self.pressure_pa_per_v,
             owner_connected=self.owner_connected,
             late_s=self._late_s(now_s),
             waited_s=self._waited_s(),

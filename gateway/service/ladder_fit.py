@@ -11,18 +11,14 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-
 from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, validate_coefficients
 from gateway.bsfm.evaluation import Evaluation, Question, evaluate
-from gateway.bsfm.fit_problem import Floats
 from gateway.bsfm.ladder_check import CheckedLadder
 from gateway.bsfm.ladder_fault import Flaw, LadderError
-from gateway.bsfm.slip_fit import residuals_n
-from gateway.bsfm.slip_problem import Walk
 from gateway.recording import Recording
-from gateway.service.ladder_source import Background, checked_source
-from gateway.service.reporting.document import Document, document_of, residual_of
+from gateway.service.fit_verdict import Verdict, verdict_on
+from gateway.service.ladder_source import Background, bounds_on, checked_source
+from gateway.service.reporting.document import Document, document_of
 from gateway.service.reporting.fit_page import fit_page
 
 
@@ -33,27 +29,36 @@ class LadderFit:
     recording: Recording
     evaluation: Evaluation
     document: Document
+    verdict: Verdict
 
 
-def fit_recording(recording: Recording, question: Question, background: Background) -> LadderFit:
-    """Check, fit, hold out, choose. LadderError with a sentence where the data must not be fitted."""
+def fit_recording(recording: Recording, question: Question, background: Background, name: str = "") -> LadderFit:
+    """Check, fit, hold out, choose, judge. name: the user's, empty for the one given when it was recorded. LadderError with a
+    sentence where the data must not be fitted."""
     evaluation = evaluate(checked_source(recording, background), question)
+    verdict = verdict_on(evaluation, *bounds_on(recording, background))
     document = document_of(evaluation, recording.path, recording.header)
     document["data_sha256"] = data_sha256(evaluation.checked)
-    return LadderFit(recording, evaluation, document)
+    document["name"] = name or str(recording.header.get("name") or "") or default_name(document)
+    document["measured"] = verdict.facts()
+    return LadderFit(recording, evaluation, document, verdict)
+
+
+def default_name(document: Document) -> str:
+    """Of a calibration that nobody has named: model and order."""
+    return f"{document['chosen']['model']}-{document['chosen']['order']}"
 
 
 def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
     """The chosen model as a calibration without a number. LadderError where its coefficients may not drive the rig."""
-    chosen, model = fit.document["chosen"], fit.document["model"]
+    model = fit.document["model"]
     coefficients = Coefficients.of(fit.evaluation.model.branches, fit.evaluation.span_n)
-    away_n = model_error_n(fit.evaluation)
     faults = validate_coefficients(coefficients, CoefficientLimits(cell_range_n=cell_range_n))
     if faults:
         raise LadderError(Flaw.NO_FIT, f"E401 the chosen model may not drive the rig: {faults[0].text}")
     return Calibration(
         number=0,
-        name=f"{chosen['model']}-{chosen['order']}",
+        name=fit.document["name"],
         order=len(coefficients.rising_weights) - 1,
         x0_v=coefficients.x0_v,
         x1_v=coefficients.x1_v,
@@ -62,23 +67,16 @@ def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
         falling_handles_n=_plain(coefficients.falling_handles_n),
         falling_weights=_plain(coefficients.falling_weights),
         blend_span_n=float(fit.evaluation.span_n),
-        rms_n=float(np.sqrt(np.mean(away_n * away_n))),
-        max_n=float(np.abs(away_n).max()),
+        rms_n=fit.verdict.error.rms_n,
+        max_n=fit.verdict.error.max_n,
         date_utc=datetime.now(UTC).strftime("%Y-%m-%d"),
         source=_source(fit),
         rig=str(fit.document["rig"] or ""),
         data_sha256=fit.document["data_sha256"],
         slip_radii_v=_plain(model["slip_radii_v"]),
         slip_shares=_plain(model["slip_shares"]),
+        rejected=fit.verdict.rejected,
     )
-
-
-def model_error_n(evaluation: Evaluation) -> Floats:
-    """Model minus measured on the ladder, N: of what is to be activated, with the memory of its stops where it has any."""
-    ladder = evaluation.checked.ladder
-    if evaluation.reversal and evaluation.reversal.slip:
-        return residuals_n(evaluation.model, Walk(ladder.voltage_v, ladder.force_n))
-    return -residual_of(evaluation)
 
 
 def _plain(values: Iterable[float]) -> tuple[float, ...]:

@@ -1,8 +1,9 @@
 """Keeps a calibration run or experiment: starts it for this machine, records it, and has a ladder fitted when it is done.
 
-The recording is one of its own, beside whatever else is recorded, with the plan in its header; it stays whatever becomes
-of the run. A run that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S:
-a closed terminal must not leave a tool climbing stairs.
+The recording is one of its own, beside whatever else is recorded, with the plan in its header and, of a ladder, the stair in
+each row; it stays whatever becomes of the run. One more row after the last stair says that this one was finished, too. A run
+that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S: a closed terminal
+must not leave a tool climbing stairs.
 """
 
 from collections.abc import Callable
@@ -19,12 +20,14 @@ from gateway.devices.messages import ForceSample
 from gateway.profiles import Rig
 from gateway.profiles.plan_files import plain, plan_of
 from gateway.recording import Recorder
+from gateway.recording.columns import LADDER
 from gateway.registers.words import CalibrationPhase
 from gateway.service.fit_child import FitChild, Result
 from gateway.service.requests import CalibrateRequest, read
 from gateway.service.run_recording import COLUMNS, RunRecording
 
 FOLLOWED_S: Final = 3.0
+_CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
 Answer = dict[str, Any]
 
 
@@ -42,6 +45,10 @@ class LadderKeeper:
         self._clock = clock
         self._log = log
         self._continues: tuple[int, ...] = ()
+        self._name = ""
+        self._stairs = 0
+        self._closing_s: float | None = None
+        self._payload_n = 0.0
         self._recording: RunRecording | None = None
         self._path: Path | None = None
         self._child: FitChild | None = None
@@ -53,8 +60,8 @@ class LadderKeeper:
     # -- asked by this machine
 
     def answer(self, request: Answer) -> Answer:
-        """{"plan": {...}, "continues": [numbers]} starts, with "dry_run": true it is only tried; {"stop": true} stops; neither
-        tells how it is. ValueError refuses."""
+        """{"plan": {...}, "continues": [numbers], "name": text} starts, with "dry_run": true it is only tried; {"stop": true}
+        stops; neither tells how it is. ValueError refuses."""
         asked = read(CalibrateRequest, request)
         self._followed_s = self._clock()
         if asked.dry_run:
@@ -63,6 +70,7 @@ class LadderKeeper:
             self._calibrating.ask_stop("info calibration stopped at this machine")
         elif asked.plan is not None:
             self._start(asked.plan, asked.continues)
+            self._name = asked.name
         if refused := self._calibrating.take_refused():
             raise ValueError(refused)
         return self.status()
@@ -79,6 +87,7 @@ class LadderKeeper:
             "force_max_n": top_n,
             "simulated": self._rig.simulated,
             "rig": self._rig.name,
+            "rig_fingerprint": self._rig.fingerprint,
             **_asks(plan),
         }
 
@@ -116,6 +125,9 @@ class LadderKeeper:
         calibrating = self._calibrating
         if calibrating.running and self._recording is None:
             self._begin()
+        elif self._closing_s is not None:
+            if self._clock() - self._closing_s > _CLOSING_S:
+                self._close_ladder()
         elif self._recording is not None and not calibrating.running:
             self._end(decision)
         elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
@@ -124,7 +136,22 @@ class LadderKeeper:
     def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
         """The cell's own force, without the payload's weight: that is what the model speaks."""
         if self._recording and self._calibrating.running:
-            self._recording.append(sample, replace(decision, force_measured_n=self._calibrating.cell_n), pressure_pa)
+            self._payload_n = decision.force_measured_n - self._calibrating.cell_n
+            row = replace(decision, force_measured_n=self._calibrating.cell_n)
+            self._recording.append(sample, row, pressure_pa, *self._labels())
+        elif self._recording and self._closing_s is not None:
+            row = replace(decision, force_measured_n=decision.force_measured_n - self._payload_n)
+            self._recording.append(sample, row, pressure_pa, float(self._calibrating.phase), -1.0, float(self._stairs))
+            self._close_ladder()
+
+    def _labels(self) -> tuple[float, ...]:
+        """Where a ladder is, in the columns LADDER."""
+        run = self._calibrating.run
+        if run is None or isinstance(run, ExperimentRun):
+            return ()
+        group = run.stairs[min(run.done, len(run.stairs) - 1)].group
+        self._stairs = len(run.stairs)  # some may have been left out by now
+        return float(self._calibrating.phase), float(group), float(run.done)
 
     def flush(self, now_s: float) -> None:
         if self._recording:
@@ -150,17 +177,24 @@ class LadderKeeper:
             "seed": rig.seed,
             **_planned(run),
             "continues": list(self._continues),
+            "name": self._name,
+            "zero_n": self._controller.zero_n,
         }
+        columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LADDER)
         try:
-            recorder = Recorder(self._state / "recordings", header, COLUMNS)
+            recorder = Recorder(self._state / "recordings", header, columns)
         except OSError as error:
             self._calibrating.ask_stop(f"A330 calibration stopped: the recording cannot be written: {error.strerror}")
             return
         self._recording, self._path = RunRecording(recorder), recorder.path
-        self._continues = ()
+        self._continues, self._name = (), ""
 
     def _end(self, decision: Output) -> None:
         assert self._recording
+        if self._calibrating.phase is CalibrationPhase.FITTING:
+            self._closing_s = self._clock()
+            self._ended = decision.events[0] if decision.events else ""
+            return
         recorder, self._recording = self._recording.recorder, None
         recorder.close()
         self._ended = decision.events[0] if decision.events else ""
@@ -169,7 +203,16 @@ class LadderKeeper:
             self._calibrating.phase = CalibrationPhase.STOPPED
         elif self._calibrating.phase is CalibrationPhase.RECORDED:
             self._log("calibration", f"info experiment recorded in {recorder.path}; force-gateway diagnose takes it")
-        elif self._calibrating.phase is CalibrationPhase.FITTING:
+
+    def _close_ladder(self) -> None:
+        """A finished ladder is fitted, if the disk took all of it."""
+        assert self._recording
+        recorder, self._recording, self._closing_s = self._recording.recorder, None, None
+        recorder.close()
+        if recorder.failure:
+            self._ended = recorder.failure
+            self._calibrating.phase = CalibrationPhase.STOPPED
+        else:
             self._child = FitChild(recorder.path, self._rig.file, self._state, self._on_result)
 
     def _on_result(self, result: Result) -> None:
@@ -180,7 +223,8 @@ class LadderKeeper:
             self._log("calibration", f"info calibration {self.stored} stored, not active; report {result['report']}")
         else:
             self._calibrating.phase = CalibrationPhase.REFUSED
-            self._log("calibration", str(result.get("refused")))
+            told = f"; report {result['report']}" if "report" in result else ""
+            self._log("calibration", f"{result.get('refused')}{told}")
 
 
 def _asks(plan: AnyPlan) -> Answer:
@@ -214,7 +258,8 @@ def _planned(run: AnyRun) -> Answer:
     """For the recording's header: a ladder is what `fit` and --resume look for."""
     if isinstance(run, ExperimentRun):
         return {"experiment": plain(run.plan)}
-    return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs)}}
+    top_v = max(stair.voltage_v for stair in run.stairs)
+    return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
 
 
 def _plan_of(fields: Any) -> AnyPlan:

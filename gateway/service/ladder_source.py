@@ -46,15 +46,27 @@ def with_earlier(recording: Recording) -> list[Recording]:
     numbers = recording.header.get("continues", ()) if recording.path.suffix == SUFFIX else ()
     earlier = numbers if isinstance(numbers, list) else ()
     beside = recording.path.parent
-    return [*(read_recording(beside / f"{int(number):04d}{recording.path.suffix}") for number in earlier), recording]
+    parts = [*(read_recording(beside / f"{int(number):04d}{recording.path.suffix}") for number in earlier), recording]
+    return [_from_zero(part, float(parts[0].header.get("zero_n", 0.0))) for part in parts]
+
+
+def _from_zero(part: Recording, zero_n: float) -> Recording:
+    """Its forces from this zero of the cell: a restart of the gateway has lost the tare that the first part was made with."""
+    moved_n = float(part.header.get("zero_n", zero_n)) - zero_n
+    if moved_n == 0.0 or "force_n" not in part.columns:
+        return part
+    said = f"{part.path.name} was recorded from another zero, {moved_n:+.2f} N: its forces were moved to that of the first part"
+    columns = part.columns | {"force_n": part.columns["force_n"] + moved_n}
+    return replace(part, columns=columns, notes=(*part.notes, said))
 
 
 def checked_source(recording: Recording, background: Background) -> CheckedLadder:
     """The ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
     expected, said = expectation(recording, background)
-    parts = [checked_ladder(part.columns, part.header, expected) for part in with_earlier(recording)]
-    checked = joined(parts)
-    return replace(checked, notes=(*recording.notes, *said, *checked.notes))
+    recordings = with_earlier(recording)
+    checked = joined([checked_ladder(part.columns, part.header, expected) for part in recordings])
+    told = dict.fromkeys(note for part in recordings for note in part.notes)
+    return replace(checked, notes=(*told, *said, *checked.notes))
 
 
 def expectation(recording: Recording, background: Background) -> tuple[Expectation, list[str]]:
@@ -77,6 +89,14 @@ def expectation(recording: Recording, background: Background) -> tuple[Expectati
         force_unit=background.force_unit,
     )
     return expected, said
+
+
+def bounds_on(recording: Recording, background: Background) -> tuple[float | None, Calibration | None]:
+    """What a fit of it must not miss: the rig's in-band tolerance, N, and the calibration in use. None: not known."""
+    asked = background.rig or rig_of_state(background.state)
+    rig, _ = known_rig(asked or str(recording.header.get("rig", "")), str(recording.header.get("rig_file", "")))
+    tolerance_n = rig.control.defaults.in_band_tolerance_n if rig else None
+    return tolerance_n, _reference(rig, background.state)
 
 
 def rig_of_state(state: Path | None) -> str | None:

@@ -39,20 +39,23 @@ class RecordRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrationRequest:
-    """Neither: what is in use."""
+    """Neither: what is in use. force: a rejected one, too."""
 
     __pydantic_config__ = _STRICT
     use: Number | None = None
+    force: bool = False
     rollback: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrateRequest:
-    """plan: as a plan file has it; its own reader judges it. continues: recordings of the run that is resumed."""
+    """plan: as a plan file has it; its own reader judges it. continues: recordings of the run that is resumed. name: of the
+    calibration that comes of it; empty for one made up."""
 
     __pydantic_config__ = _STRICT
     plan: dict[str, Any] | None = None
     continues: Annotated[tuple[Number, ...], MaxLen(1000)] = ()
+    name: Annotated[str, MaxLen(200)] = ""
     dry_run: bool = False
     stop: bool = False
 

@@ -45,8 +45,9 @@ class RunRecording:
     def recorder(self) -> Recorder:
         return self._recorder
 
-    def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
+    def append(self, sample: ForceSample, decision: Output, pressure_pa: float, *labels: float) -> None:
+        """labels: of the columns that a run adds."""
         if self._start_s is None:
             self._start_s = sample.time_s
         self.rows += 1
-        self._recorder.append(row_of(sample.time_s - self._start_s, sample, decision, pressure_pa))
+        self._recorder.append(row_of(sample.time_s - self._start_s, sample, decision, pressure_pa) + labels)

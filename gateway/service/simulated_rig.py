@@ -2,8 +2,8 @@
 
 It is a child of the guardian in its own session, so it outlives a kill of control as a real rig does, and ends when the
 guardian does (its link closes). The wires take the time that their baud rates take. A socket in the state directory
-(`rig.sock`) takes faults for tests and demonstrations: no air, no contact, a cut wire, an inverted sign, or a plant that
-is no longer the one in the rig's file.
+(`rig.sock`) takes faults for tests and demonstrations: no air, no contact, a cut wire, an inverted sign, an amplifier that
+repeats its last value, or a plant that is no longer the one in the rig's file.
 """
 
 import asyncio
@@ -67,6 +67,7 @@ class SimulatedRig:
         self._plant = rig.plant
         self._seed = rig.seed
         self._twin_faults: dict[str, bool] = {}
+        self.is_cell_frozen, self._shown_n = False, 0.0
 
     def advance(self, now_s: float) -> None:
         self.twin.advance(min(max(0.0, now_s - self._now_s), _LONGEST_LEAP_S))
@@ -88,7 +89,8 @@ class SimulatedRig:
         """One frame of the load-cell amplifier."""
         self.advance(now_s)
         if not self.is_cell_cut:
-            force_n = self._wiring * float(self.twin.measured_n)
+            measured_n = self._wiring * float(self.twin.measured_n)
+            force_n = self._shown_n = self._shown_n if self.is_cell_frozen else measured_n
             overload = abs(force_n) >= self._range_n
             self._send_cell(self._cell.frame(force_n, Quality.OVERLOAD if overload else Quality.OK))
 
@@ -118,13 +120,16 @@ class SimulatedRig:
                 self._set_twin_faults()
             case "cell-cut":
                 self.is_cell_cut = is_on
+            case "cell-frozen":
+                self.is_cell_frozen = is_on
             case "output-cut":
                 self.is_output_cut = is_on
             case "plant":
                 self._change_plant(_changed(self._plant, asked.values) if is_on else self._plant)
             case _:
                 raise ValueError(
-                    f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, output-cut, plant"
+                    f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, cell-frozen, "
+                    "output-cut, plant"
                 )
         return {"fault": name, "on": is_on}
 

@@ -135,9 +135,10 @@ class Upload:
 
     # -- asked by a tool of this machine
 
-    def use(self, number: int) -> dict[str, Any]:
-        """Begin to take a calibration by its number; `status` tells how it goes. ValueError while another is under way."""
-        return self._ask(f"calibration use {number}", lambda: self._activation.take(number))
+    def use(self, number: int, *, force: bool = False) -> dict[str, Any]:
+        """Begin to take a calibration by its number; `status` tells how it goes. force: a rejected one, too. ValueError while
+        another is under way."""
+        return self._ask(f"calibration use {number}", lambda: self._activation.take_offered(number, force=force))
 
     def rollback(self) -> dict[str, Any]:
         """Begin to go back to what was in use before."""

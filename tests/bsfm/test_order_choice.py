@@ -1,12 +1,14 @@
 """Choosing an order: what is held out decides, and the simpler model wins a tie."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gateway.bsfm import RationalBezier
 from gateway.bsfm.fit_solver import Effort
 from gateway.bsfm.ladder import Ladder
-from gateway.bsfm.order_choice import FitSettings, choose, score_orders
+from gateway.bsfm.order_choice import FitSettings, Score, choose, score_orders
 
 QUICK = FitSettings(effort=Effort(screened=64, descending=8))
 
@@ -41,6 +43,22 @@ def test_what_cannot_drive_a_plant_is_chosen_only_if_nothing_else_is_there(loops
     chosen = choose(score_orders(inverted, ["psfm"], range(1, 4)))
     assert not chosen.result.verdicts.usable
     assert chosen.result.verdicts.sentences[0] == "the rising branch is not increasing"
+
+
+def scored(score: Score, *groups_n2: float) -> Score:
+    squares = np.array(groups_n2)
+    error_n2 = float(squares.std(ddof=1) / np.sqrt(len(squares)))
+    return replace(score, heldout_n2=float(squares.mean()), error_n2=error_n2, groups_n2=groups_n2)
+
+
+def test_a_shaken_group_does_not_make_a_straight_line_as_good_as_the_best(loops):
+    """Of two groups one was shaken: the errors of all orders differ by group, their differences do not."""
+    straight, bent = score_orders(loops["smooth"](6), ["bsfm"], (1, 2), "tied", QUICK)
+    straight, bent = scored(straight, 0.28, 1.30), scored(bent, 0.01, 1.00)
+    assert straight.heldout_n2 < bent.heldout_n2 + bent.error_n2, "within the error of the best one by itself"
+    assert choose([straight, bent]) is bent
+    doubtful = scored(straight, 0.28, 0.80)
+    assert choose([doubtful, bent]) is doubtful
 
 
 def test_one_group_cannot_be_left_out(loops):

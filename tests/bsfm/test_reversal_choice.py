@@ -47,6 +47,7 @@ def test_a_walk_of_slip_stops_is_recognised_as_one() -> None:
 
 def test_a_short_walk_identifies_the_blend_alone_and_none_nothing() -> None:
     volts, forces = walk(TURNS_N, 1)
+    volts, forces = volts[:10], forces[:10]
     choice = chosen_reversal(BRANCHES, ladder(), volts, forces)
     assert choice is not None
     assert choice.slip is None

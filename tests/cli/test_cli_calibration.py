@@ -165,3 +165,26 @@ def test_export_as_c_writes_a_header_and_a_source(state, call, tmp_path):
 def test_a_state_of_a_rig_that_cannot_be_read_works_without_its_own_calibration(state, call):
     done = call("calibration", "list", "--state", state, "--rig", "no-such-rig")
     assert [line[:10].split() for line in done.output.splitlines()[1:]] == [["2"], ["*", "3"]]
+
+
+def test_a_rejected_one_is_listed_as_such_and_used_only_by_force(state, call):
+    store = CalibrationStore(state, load_calibration("demo"))
+    number = store.add(calibration(32, rejected="0.600 N RMS on all 59 measured points"))
+    listed = call("calibration", "list", "--state", state).output.splitlines()[-1]
+    assert listed.startswith(f"x {number} ")
+    assert listed.endswith("rejected, not offered: 0.600 N RMS on all 59 measured points")
+    refused = call("calibration", "use", number, "--state", state)
+    assert refused.exit_code == 65
+    assert refused.stderr.startswith(f"E436 calibration {number} was rejected: 0.600 N RMS on all 59")
+    assert active(state) == 3
+    assert call("calibration", "use", number, "--force", "--state", state).exit_code == 0
+    assert active(state) == number
+
+
+def test_the_users_name_stands_in_the_list_and_in_the_comparison(state, call):
+    number = CalibrationStore(state, load_calibration("demo")).add(calibration(40, name="left cell, new seals"))
+    assert "  left cell, new seals · " in call("calibration", "list", "--state", state).output
+    assert (
+        f"B  calibration {number} (left cell, new seals, "
+        in call("calibration", "compare", "1", str(number), "--state", state).output
+    )

@@ -6,9 +6,11 @@ from random import Random
 import pytest
 
 from gateway.control.inputs import Output
+from gateway.devices.messages import ForceSample, Garbage
 from gateway.profiles import Rig
 from gateway.registers import Refusal
 from gateway.registers.words import FaultCode, LimitedBy, State, WarningBit
+from gateway.service.cell_exchange import CellExchange
 from tests.service.rigs import demo, strict, with_supervision
 from tests.service.wired import ENABLE, RESET, STEP_S, Wired
 
@@ -88,6 +90,47 @@ def test_no_air_is_a_warning_in_numbers_and_not_a_fault() -> None:
     wired.fault("no-air", on=False)
     wired.until(lambda: abs(wired.force_n - 12.0) <= 1.0, 3.0)
     wired.until(lambda: not wired.warnings & WarningBit.TARGET_UNREACHABLE, 1.0)
+
+
+def test_a_cell_that_freezes_while_the_force_is_held_is_found_within_two_seconds() -> None:
+    wired = Wired().pressing(12.0)
+    wired.run(3.0)
+    wired.fault("cell-frozen")
+    assert wired.until(lambda: wired.state is State.FAULT, 2.0) >= 0.4
+    assert wired.fault_code is FaultCode.SAMPLE_FROZEN
+    assert "bit for bit" in wired.said("A312")[0]
+
+
+class InKilograms:
+    """The same line to the cell, its kilograms taken for newtons from now on."""
+
+    def __init__(self, line: CellExchange) -> None:
+        self._line = line
+        self.tick = line.tick
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
+        heard = self._line.receive(chunk, now_s)
+        return [replace(one, force_n=one.raw) if isinstance(one, ForceSample) else one for one in heard]
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("no-air", "no air, or a closed valve"),
+        ("no-contact", "air is there, so no contact"),
+        ("cell-in-kgf", "is what kgf read as N looks like (A303)"),
+    ],
+)
+def test_what_takes_the_force_while_holding_is_told_by_pressure_and_factor(fault: str, words: str) -> None:
+    wired = Wired().pressing(12.0)
+    wired.run(1.0)
+    if fault == "cell-in-kgf":
+        wired.gateway._cell = InKilograms(wired.gateway._cell)  # type: ignore[assignment]
+    else:
+        wired.fault(fault)
+    wired.until(lambda: bool(wired.said("A301")), 6.0)
+    assert words in wired.said("A301")[0]
+    assert "kPa measured" in wired.said("A301")[0]
 
 
 def test_without_contact_the_tool_waits_and_does_not_press_harder() -> None:

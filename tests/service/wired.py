@@ -124,6 +124,7 @@ class Wired:
             clock=clock,
             log=lambda cause, sentence: self.log.append((self.now_s, sentence)),
         )
+        self.gateway.pressure_pa_per_v = rig.output.device.pressure_pa_per_v
 
     # -- time
 

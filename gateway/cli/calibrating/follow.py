@@ -1,6 +1,10 @@
-"""Follows a run to its end with a progress bar; Ctrl-C takes the force to 0, a second one leaves at once."""
+"""Follows a run to its end with a progress bar; Ctrl-C, SIGTERM and a closed terminal take the force to 0, a second one leaves
+at once."""
 
+import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import isnan
 from typing import Any, Final
 
@@ -37,7 +41,7 @@ class NotBegunError(CliError):
 def follow(run: LocalRun | RemoteRun) -> dict[str, Any]:
     """Begin the run and wait for its end; how it ended."""
     run.begin()
-    with _progress() as progress:
+    with _signals_as_ctrl_c(), _progress() as progress:
         task = progress.add_task("starting", total=1.0, force="", eta="")
         try:
             _wait(run, progress, task)
@@ -49,6 +53,20 @@ def follow(run: LocalRun | RemoteRun) -> dict[str, Any]:
         except CliError as error:
             raise CliError(f"{error.format_message()}\n{_LOST}", error.exit_code) from None
     return run.end()
+
+
+@contextmanager
+def _signals_as_ctrl_c() -> Iterator[None]:
+    """An end from outside stops the run at once, instead of when nobody has followed it for a while."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    before = {number: handler for number, handler in handlers.items() if handler is not signal.SIG_IGN}  # nohup
+    for number in before:
+        signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _progress() -> Progress:

@@ -33,19 +33,21 @@ class Look:
 
 
 class LocalRun:
-    """plan: fields of RunPlan or ExperimentPlan; earlier: recordings that it goes on from."""
+    """plan: fields of RunPlan or ExperimentPlan; earlier: recordings that it goes on from; name: of the calibration."""
 
-    def __init__(self, state: Path, plan: dict[str, Any], earlier: list[int]) -> None:
+    def __init__(self, state: Path, plan: dict[str, Any], earlier: list[int], name: str = "") -> None:
         self._state = state
         self._plan = plan
         self._earlier = earlier
+        self._name = name
         self._last: dict[str, Any] = {}
 
     def preview(self) -> dict[str, Any]:
         return ask(self._state, {"do": "calibrate", "plan": self._plan, "dry_run": True})
 
     def begin(self) -> None:
-        self._last = ask(self._state, {"do": "calibrate", "plan": self._plan, "continues": self._earlier})
+        request = {"do": "calibrate", "plan": self._plan, "continues": self._earlier, "name": self._name}
+        self._last = ask(self._state, request)
 
     def look(self) -> Look:
         self._last = last = ask(self._state, {"do": "calibrate"})

@@ -41,7 +41,7 @@ FAULTS: Final = (
     Entry(
         "A312",
         "force reading is frozen",
-        "Sample after sample is the same, though the force must have changed.",
+        "Sample after sample is the same, bit for bit: the force, or the noise of the cell, must have changed it.",
         "The amplifier is in hold or menu mode, or repeats its last value without a cell.",
         "Leave the amplifier's menu and release `hold`; press the cell by hand and watch `force-gateway monitor`.",
         "SAMPLE_FROZEN",
@@ -141,8 +141,8 @@ WARNINGS: Final = (
         "A301",
         "target unreachable",
         "Voltage is out and much less force is measured than the model expects (2.31 V, 0.1 N instead of 17.9 N).",
-        "No air, a closed valve, or no contact with the workpiece.",
-        "Open the air supply and look at its gauge; then bring the tool into contact.",
+        "No air, a closed valve, or no contact; a tenth of the expected force is kgf read as N. The sentence tells more.",
+        "Open the air supply and look at its gauge; then bring the tool into contact; then compare the units.",
         "TARGET_UNREACHABLE",
     ),
     Entry(

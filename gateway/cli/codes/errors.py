@@ -223,6 +223,28 @@ ENTRIES: Final = (
         "force-gateway read active_slot calibration_id shows what is in use; agree on one master for uploads.",
     ),
     Entry(
+        "E435",
+        "calibration stored as rejected",
+        "The fit's RMS error on all measured points is more than half of in_band_tolerance_n, or clearly more than that of the "
+        "calibration in use on the same data.",
+        "Too few or too coarse stairs, no reversal part, a tool that slipped, or a zero that moved during the run.",
+        "Look at its report, then run a finer ladder: force-gateway calibrate. `calibration use N --force` takes it anyway.",
+    ),
+    Entry(
+        "E436",
+        "a rejected calibration is not used",
+        "`calibration use` names a calibration whose fit was rejected when it was made; the message has the figures.",
+        "It was made of data that do not describe the rig well enough; see E435.",
+        "Use another of `force-gateway calibration list`, or give --force if you know better.",
+    ),
+    Entry(
+        "E437",
+        "another ladder than the one that was stopped",
+        "calibrate --resume was given other stairs than those of the run that it is to go on with.",
+        "Groups of different stairs describe different ladders and are not fitted together.",
+        "Leave --step and --v-max out to go on, or leave --resume out to begin anew.",
+    ),
+    Entry(
         "E500",
         "a defect of force-gateway",
         "A verb ended in a way that we did not foresee.",

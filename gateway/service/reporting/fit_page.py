@@ -46,13 +46,20 @@ def fit_page(evaluation: Evaluation, document: Document) -> str:
         _provenance(document),
     ]
     body = "\n".join(part for part in parts if part)
-    return _FRAME.format(title=escape(f"Fit of {Path(document['recording']).name}"), style=STYLE, body=body)
+    return _FRAME.format(title=escape(_title(document)), style=STYLE, body=body)
+
+
+def _title(document: Document) -> str:
+    """The name that the user gave, and where to find it."""
+    number = f"calibration {document['calibration']}" if document.get("calibration") else ""
+    return f"{document['name']} · {number or 'fit of ' + Path(document['recording']).name}"
 
 
 def _heading(document: Document) -> str:
     ladder = document["ladder"]
     low_v, high_v = ladder["voltage_v"]
     facts = [
+        _model(document["chosen"]),
         str(document["rig"] or "unnamed rig"),
         Path(document["recording"]).name,
         f"{ladder['points']} stairs in {ladder['groups']} groups, {low_v:g} to {high_v:g} V",
@@ -62,8 +69,13 @@ def _heading(document: Document) -> str:
     number = f"Calibration {document['calibration']} · " if document.get("calibration") else ""
     return (
         f"<header><p class='kicker'>{escape(number)}force-gateway {VERSION}</p>"
-        f"<h1>{escape(_model(document['chosen']))}</h1><p>{escape(' · '.join(facts))}</p></header>"
+        f"<h1>{escape(document['name'])}</h1><p>{escape(' · '.join(facts))}</p>{_rejected(document)}</header>"
     )
+
+
+def _rejected(document: Document) -> str:
+    why = document["measured"]["rejected"]
+    return f"<p><strong>Rejected, not offered for use:</strong> {escape(why)}</p>" if why else ""
 
 
 def _model(fit: Document) -> str:
@@ -71,13 +83,14 @@ def _model(fit: Document) -> str:
 
 
 def _figures(document: Document) -> str:
-    chosen, reversal = document["chosen"], document["reversal"]
+    chosen, reversal, measured = document["chosen"], document["reversal"], document["measured"]
     low_n, high_n = chosen["force_range_n"]
     heldout = f"{chosen['heldout_rms_n']:.3f}" if chosen["heldout_rms_n"] else "not tried"
+    reversals = "reversals included" if measured["reversals"] else "no reversals measured"
     tiles = (
-        ("RMS", f"{chosen['rms_n']:.3f}", "N, on its own ladder"),
-        ("Held out", heldout, "N, on a group not seen"),
-        ("Largest", f"{chosen['max_n']:.2f}", "N at one stair"),
+        ("RMS error", f"{measured['rms_n']:.3f}", f"N on all {measured['points']} points, {reversals}"),
+        ("Largest", f"{measured['max_n']:.2f}", "N at one of them"),
+        ("Held out", heldout, "N by branch, on a group not seen"),
         ("Range", f"{low_n:.1f} – {high_n:.1f}", "N on both branches"),
         ("Reversal", *_reversal_tile(reversal)),
     )
@@ -117,7 +130,7 @@ def _why(document: Document) -> str:
         )
     else:
         words = (
-            "It has the fewest coefficients of all fits whose held-out error is within one standard error of the best, among "
+            "It has the fewest coefficients of all fits whose held-out error is not certainly larger than the best, among "
             "those that may drive a plant: increasing on both branches, no crossing, at least 0.5 N per volt."
         )
     branches = f"Rising branch {chosen['rising_rms_n']:.3f} N RMS, falling {chosen['falling_rms_n']:.3f} N."
@@ -152,7 +165,8 @@ def _table(document: Document) -> str:
     rows = "".join(_row(fit) for fit in document["fits"])
     return (
         f"<div class='wide'><table class='fits'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
-        "<p class='small'>* the paper's normalised figure (2-norm of the group means' residuals over the number of points), "
+        "<p class='small'>RMS and max: of the stairs, each by its own branch. "
+        "* the paper's normalised figure (2-norm of the group means' residuals over the number of points), "
         "for comparison with its tables; it is no force.</p>"
     )
 

@@ -1,0 +1,107 @@
+"""Why a force is not reached, told apart as far as the witnesses go: no air, another unit of force, no contact.
+
+The pressure that the output device measures decides, where it measures one: too little for the voltage is no air; enough,
+and no force, is no contact. What is enough has been seen while the force was right; before that it is read from the ranges of
+the device's profile, which is less certain, so that only very little and plenty count. Without a pressure there is the force
+itself: a tenth or ten times of what the model expects is kilograms read as newtons, and a force that was right before in the
+same enable rules out what was never right. What cannot be told apart is named together.
+"""
+
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Final
+
+KGF: Final = 9.80665
+_UNIT_SLACK: Final = 1.15  # trim and calibration move the ratio by so much
+_FRICTION_N: Final = 2.0  # what friction may hold beside it, where the true force is small
+_TIMES: Final = 3.0
+_LEAST_N: Final = 0.3  # less is noise and zero
+_SILENT_SHARE: Final = 0.25
+_LITTLE, _ENOUGH = 0.5, 0.7  # of the pressure that was seen at this voltage while the force was right
+_VERY_LITTLE, _PLENTY = 0.2, 0.5  # of what the ranges of the device say
+_LEAST_EXPECTED_PA: Final = 5.0e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """What is seen. pressure_pa: measured, expected_pa: at this voltage; nan: nobody knows. learned: expected_pa was seen while
+    the force was right; was_right: it has been so since the last enable."""
+
+    voltage_v: float
+    measured_n: float
+    expected_n: float
+    pressure_pa: float = nan
+    expected_pa: float = nan
+    learned: bool = False
+    was_right: bool = False
+
+    @property
+    def _pressure_share(self) -> float:
+        """Of the expected pressure; nan where it cannot be told."""
+        known = isfinite(self.pressure_pa) and self.expected_pa >= _LEAST_EXPECTED_PA
+        return self.pressure_pa / self.expected_pa if known else nan
+
+    @property
+    def no_air(self) -> bool:
+        return self._pressure_share < (_LITTLE if self.learned else _VERY_LITTLE)
+
+    @property
+    def has_air(self) -> bool:
+        return self._pressure_share >= (_ENOUGH if self.learned else _PLENTY)
+
+    @property
+    def is_silent(self) -> bool:
+        return self.measured_n < _SILENT_SHARE * self.expected_n
+
+    @property
+    def factor(self) -> float:
+        return self.measured_n / self.expected_n if self.expected_n > 0.0 else nan
+
+    @property
+    def looks_like_another_unit(self) -> bool:
+        if self.factor < 1.0:
+            return self.measured_n > _LEAST_N and 1.0 / _UNIT_SLACK < self.factor * KGF < _UNIT_SLACK
+        off_n = abs(self.measured_n / KGF - self.expected_n)
+        return self.factor > _TIMES and off_n < (_UNIT_SLACK - 1.0) * self.expected_n + _FRICTION_N
+
+
+def unreachable_words(seen: Evidence) -> str:
+    """What it probably is, and one thing to do."""
+    pressure = _pressure(seen)
+    if seen.no_air:
+        return f"{pressure}: no air, or a closed valve; open the air supply and look at its gauge"
+    if seen.looks_like_another_unit:
+        return _unit_words(seen, pressure)
+    if seen.is_silent:
+        return _silent_words(seen, pressure)
+    said = f"{pressure}; " if pressure else ""
+    if seen.factor < 0.5 and not pressure:
+        return "no air, valve closed or no contact"
+    return f"{said}target not reached: supply pressure too low, trim at its limit or calibration off"
+
+
+def _pressure(seen: Evidence) -> str:
+    """The pressure in numbers, where it is one to compare."""
+    if not isfinite(seen.pressure_pa):
+        return ""
+    expected = f", {seen.expected_pa / 1e3:.0f} kPa expected" if seen.expected_pa >= _LEAST_EXPECTED_PA else ""
+    return f"{seen.pressure_pa / 1e3:.0f} kPa measured{expected}"
+
+
+def _unit_words(seen: Evidence, pressure: str) -> str:
+    unit = "kgf read as N" if seen.factor < 1.0 else "N read as kgf"
+    told = f"factor {seen.factor:.3g} is what {unit} looks like (A303)"
+    if seen.has_air:
+        return f"{pressure}: air is there, and {told}: check the unit on the amplifier against the rig file"
+    since = ", though the force was right before in this enable" if seen.was_right else ""
+    other = "; else no air, valve closed or no contact" if seen.factor < 1.0 else ""
+    return f"{f'{pressure}: ' if pressure else ''}{told}{since}: check the unit on the amplifier against the rig file{other}"
+
+
+def _silent_words(seen: Evidence, pressure: str) -> str:
+    if seen.has_air:
+        return f"{pressure}: air is there, so no contact with the workpiece"
+    said = f"{pressure}; " if pressure else ""
+    if seen.was_right:
+        return f"{said}the force was right before in this enable: contact lost or air gone; look at the gauge and at the tool"
+    return f"{said}no air, valve closed or no contact"
