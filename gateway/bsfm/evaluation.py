@@ -15,7 +15,7 @@ import numpy as np
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.fit import FitSettings
 from gateway.bsfm.fit_result import ModelName, Ties
-from gateway.bsfm.fit_usable import fit_usable
+from gateway.bsfm.fit_usable import fit_usable, is_moderate
 from gateway.bsfm.ladder import Ladder
 from gateway.bsfm.ladder_check import CheckedLadder
 from gateway.bsfm.ladder_fault import Flaw, LadderError
@@ -109,7 +109,11 @@ def _settings(ladder: Ladder, question: Question) -> FitSettings:
 def _is_poor(chosen: Score, scores: Sequence[Score]) -> bool:
     """Nothing usable, or something that may not drive a plant describes the data much better."""
     best = min(scores, key=lambda score: score.heldout_n2)
-    return not chosen.result.verdicts.usable or best.heldout_rms_n < POOR_SHARE * chosen.heldout_rms_n
+    return not _may_drive(chosen) or best.heldout_rms_n < POOR_SHARE * chosen.heldout_rms_n
+
+
+def _may_drive(score: Score) -> bool:
+    return score.result.verdicts.usable and is_moderate(score.result.branches)
 
 
 def _constrained(
@@ -124,9 +128,9 @@ def _constrained(
             continue
     smallest_n = min((result.rms_n for result in found), default=0.0)
     best = next((result for result in found if result.rms_n <= NEAR * smallest_n), None)
-    if best is None and not free.result.verdicts.usable:
+    if best is None and not _may_drive(free):
         raise LadderError(Flaw.NO_FIT, "no fit of any model and order may drive a plant: see the verdicts in the table")
-    if best is None or (free.result.verdicts.usable and best.rms_n >= POOR_SHARE * free.heldout_rms_n):
+    if best is None or (_may_drive(free) and best.rms_n >= POOR_SHARE * free.heldout_rms_n):
         return free
     said.append(
         f"the better free optima may not drive a plant (see the verdicts); chosen is the best BSFM of order {best.order} that "

@@ -20,6 +20,7 @@ from gateway.bsfm.outliers import huber_weight, kept
 
 MARGINS = (0.01, 0.1, 0.5)  # of the slope floor; of 0.1 N for the gap
 GAP_N = 0.1
+HANDLES_SHARE = 1.5  # of the largest force: no rig takes coefficients far beyond its cell
 PLACES = np.concatenate([[0.0, 1.0e-4], np.arange(1, 64) / 64, [1.0 - 1.0e-4, 1.0]])
 
 
@@ -71,7 +72,7 @@ def fit_usable(
     """
     chosen = settings or FitSettings()
     free = fit(ladder, model, order, ties, chosen)
-    if free.verdicts.usable:
+    if free.verdicts.usable and is_moderate(free.branches):
         return free
     used = ladder.part(kept(ladder)) if chosen.outliers == "reject" else ladder
     weight = own_weight(used)
@@ -80,10 +81,25 @@ def fit_usable(
     problem = Problem(split_samples(used, weight, free.form, chosen), order, free.form.tied)
     for margin in MARGINS:
         results = [_constrained(problem, start, margin, used, free, chosen) for start in _starts(problem, free)]
-        usable = [result for result in results if result.verdicts.usable]
+        usable = [result for result in results if result.verdicts.usable and is_moderate(result.branches)]
         if usable:
             return min(usable, key=lambda result: result.rms_n)
     raise ValueError(f"no usable {free.form.model} of order {order}: " + "; ".join(free.verdicts.sentences))
+
+
+def is_moderate(branches: Branches) -> bool:
+    """No handle far beyond the forces of the ends: a handle of 1500 N with a weight of 0.002 describes a curve of 50 N as
+    well as any, but no cell's range allows it."""
+    most_n = HANDLES_SHARE * _most_n(branches)
+    return all(
+        abs(handle) <= most_n + 1.0e-9 for curve in (branches.rising, branches.falling) for handle in curve.handles
+    )
+
+
+def _most_n(branches: Branches) -> float:
+    return max(
+        abs(handle) for curve in (branches.rising, branches.falling) for handle in (curve.handles[0], curve.handles[-1])
+    )
 
 
 def _starts(problem: Problem, free: FitResult) -> list[Floats]:
@@ -105,12 +121,14 @@ def _constrained(
     floor_n = settings.slope_floor_n_per_v * (1.0 + margin) * (x1_v - x0_v)
     search = _Search(problem, floor_n, GAP_N * margin)
     reach = settings.effort.log_weight_max if free.model.rational else 0.0
+    most_n = 0.98 * HANDLES_SHARE * float(np.abs(ladder.force_n).max())
+    start = np.concatenate([start[: problem.unknowns], np.clip(start[problem.unknowns :], -most_n, most_n)])
     found = minimize(
         search.cost,
         start,
         jac=True,
         method="SLSQP",
-        bounds=[(-reach, reach)] * problem.unknowns + [(None, None)] * problem.handle_count,
+        bounds=[(-reach, reach)] * problem.unknowns + [(-most_n, most_n)] * problem.handle_count,
         constraints={"type": "ineq", "fun": search.margins, "jac": search.margin_slopes},
         options={"maxiter": 100, "ftol": 1e-9},
     )

@@ -22,6 +22,7 @@ from gateway.bsfm.blend_span import chosen_span, command_error_n
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.fit_problem import Floats
 from gateway.bsfm.fit_result import verdicts_of
+from gateway.bsfm.fit_usable import is_moderate
 from gateway.bsfm.ladder import Ladder
 from gateway.bsfm.model import Bsfm
 from gateway.bsfm.reversal import LinearBlend
@@ -91,7 +92,7 @@ def fit_joint(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
     for _ in range(2):
         moved = SlipSearch(problem, moved).best()
         problem.weight = trust * _huber(problem, problem.errors_n(moved))
-    if not verdicts_of(moved, SLOPE_FLOOR_N_PER_V).usable:
+    if not (verdicts_of(moved, SLOPE_FLOOR_N_PER_V).usable and is_moderate(moved)):
         return stops_only
     joint = _result(problem, moved, joint=True)
     return joint if joint.rms_n < stops_only.rms_n else stops_only

@@ -30,7 +30,15 @@ _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 @click.option(
     "--minor", "minor_points", type=click.IntRange(0, 2000), help="Points of the reversal part  [default: 150]"
 )
-@click.option("--quick", is_flag=True, help="1 V stairs, 2 groups, short reversal part: under a minute.")
+@click.option(
+    "--response",
+    "response_steps",
+    type=click.IntRange(0, 200),
+    help="Large steps for dead time and lags  [default: 12]",
+)
+@click.option(
+    "--quick", is_flag=True, help="0.5 V stairs, one group, short reversal part, a few steps: about a minute."
+)
 @click.option("--tare", is_flag=True, help="Take the force at rest as zero first (only with the tool unloaded).")
 @click.option(
     "--plan",
@@ -95,10 +103,10 @@ def _asked(directory: Path, wanted: dict[str, Any]) -> _Asked:
 
     fields: dict[str, Any] = {}
     if wanted["quick"]:
-        fields |= {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
+        fields |= {name: getattr(QUICK, name) for name in ("step_v", "groups", "minor_points", "response_steps")}
     if wanted["plan_file"]:
         fields |= _from_file(wanted["plan_file"], wanted)
-    names = ("groups", "step_v", "v_max_v", "minor_points")
+    names = ("groups", "step_v", "v_max_v", "minor_points", "response_steps")
     fields |= {name: wanted[name] for name in names if wanted[name] is not None}
     if wanted["tare"]:
         fields["tare"] = True
@@ -151,10 +159,10 @@ def _from_file(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
     from gateway.cli.calibrating.plans import fields_of, is_experiment
 
     fields = fields_of(path)
-    options = ("groups", "step_v", "v_max_v", "minor_points", "quick", "resume", "name")
+    options = ("groups", "step_v", "v_max_v", "minor_points", "response_steps", "quick", "resume", "name")
     if is_experiment(fields) and any(wanted[name] for name in options):
         raise click.UsageError(
-            f"{path} is an experiment: --groups, --step, --v-max, --minor, --quick, --resume, --name are a ladder's"
+            f"{path} is an experiment: --groups, --step, --v-max, --minor, --response, --quick, --resume, --name are a ladder's"
         )
     return fields
 

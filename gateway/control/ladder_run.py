@@ -1,8 +1,9 @@
 """One calibration run, stair by stair: what to put out now, how far it is, and when a stair has settled.
 
 A stair is left when the data say that it has settled: the means of the two halves of a window differ by no more than the
-noise, measured before the first stair, explains. The window begins late enough that no transport delay can look like
-rest. A stair that never settles is left after MOST_DWELL_S and counted.
+noise, measured before the first stair, explains. The window begins when, by the pace of the check's stairs (ladder_pace),
+the transient of a step of this size is over: no transport delay can look like rest, nor the slow end of a lag. A stair that
+never settles is left after MOST_DWELL_S and counted. The voltage changes with a reading only: the recording's rows say when.
 Supervision is not here: the controller watches as always. Only what a ladder alone can see is judged: each settled stair
 of the check against the model, for sign and scale.
 """
@@ -12,6 +13,7 @@ from math import sqrt
 from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
+from gateway.control.ladder_pace import LadderPace, Trace
 from gateway.control.ladder_stairs import RunPlan, Stair, stairs_of
 from gateway.control.reading import Reading
 from gateway.control.reasons import gain_sentence, ladder_silent_sentence, sign_sentence
@@ -20,11 +22,10 @@ from gateway.control.supervision import Finding
 from gateway.registers.words import CalibrationPhase, FaultCode
 
 ZERO_S: Final = 0.6
-BLIND_S: Final = 0.12  # after a step: longer than a regulator's transport delay
 WINDOW_S: Final = 0.2
 FEWEST_READINGS: Final = 6
-MOST_DWELL_S: Final = 2.5
-GUESSED_DWELL_S: Final = 0.55
+MOST_DWELL_S: Final = 3.5
+GUESSED_DWELL_S: Final = 0.65
 SETTLED_SIGMA: Final = 2.0
 SMALLEST_DRIFT_N: Final = 0.03
 LEAST_EXPECTED_N: Final = 3.0
@@ -70,6 +71,8 @@ class LadderRun:
         self._stair_s: float | None = None
         self._window: deque[tuple[float, float]] = deque()
         self._dwelt_s = 0.0
+        self._pace, self._trace = LadderPace(), Trace()
+        self._last_n = 0.0
 
     @property
     def is_done(self) -> bool:
@@ -112,6 +115,7 @@ class LadderRun:
         self.stairs = (*self.stairs[: self.done], *left)
         self._stair_s = now_s
         self._window.clear()
+        self._trace.clear()
         return bool(left)
 
     @property
@@ -122,16 +126,24 @@ class LadderRun:
         """reading: of this moment; only new usable ones count."""
         if self._began_s is None:
             self._began_s = now_s
-        if reading.is_new and reading.is_usable:
-            self._window.append((now_s, reading.cell_n))
+        if not (reading.is_new and reading.is_usable):
+            return self._answer(None)
+        self._window.append((now_s, reading.cell_n))
         if self._stair_s is None:
             return self._zero(now_s)
+        self._trace.append((now_s - self._stair_s, reading.cell_n))
         row = self._finished(now_s, self._stair_s)
         if row:
             self._judge(row)
-            self._stair_s = now_s
-            self._window.clear()
+            self._begin_next(now_s, row.force_n)
         return self._answer(row)
+
+    def _begin_next(self, now_s: float, settled_n: float) -> None:
+        if not self._pace.is_known:
+            self._pace.observe(self._trace, self._last_n, settled_n, self.noise_n)
+        self._stair_s, self._last_n = now_s, settled_n
+        self._window.clear()
+        self._trace.clear()
 
     def _zero(self, now_s: float) -> LadderStep:
         assert self._began_s is not None
@@ -139,21 +151,30 @@ class LadderRun:
             forces = [force_n for _, force_n in self._window]
             self.rest_n = sum(forces) / len(forces)
             self.noise_n = sqrt(sum((force - self.rest_n) ** 2 for force in forces) / (len(forces) - 1))
-            self._window.clear()
-            self._stair_s = now_s
+            self._begin_next(now_s, self.rest_n)
         return self._answer(None)
 
     def _finished(self, now_s: float, since_s: float) -> LadderRow | None:
         """The row of this stair once it has settled, or has had its time."""
-        dwell_s = now_s - since_s
+        dwell_s, blind_s = now_s - since_s, self._blind_s()
         window = self._window
-        while window and (window[0][0] < since_s + BLIND_S or self._is_spare(now_s)):
+        while window and (window[0][0] < since_s + blind_s or self._is_spare(now_s)):
             window.popleft()
-        if dwell_s < BLIND_S + WINDOW_S or len(window) < FEWEST_READINGS:
+        if dwell_s < blind_s + WINDOW_S or len(window) < FEWEST_READINGS:
             return None if dwell_s < MOST_DWELL_S or not window else self._row(dwell_s, settled=False)
         if self._drift_n() <= self._allowed_n():
             return self._row(dwell_s, settled=True)
         return self._row(dwell_s, settled=False) if dwell_s >= MOST_DWELL_S else None
+
+    def _blind_s(self) -> float:
+        """After a step, until its window may begin: half of that lies behind the transient's end."""
+        return self._pace.blind_s(self._step_n(), self.noise_n) - (0.5 * WINDOW_S if self._pace.is_known else 0.0)
+
+    def _step_n(self) -> float:
+        """Size of this stair's step by the model."""
+        stair, way = self._stair, float(self._stair.direction)
+        before_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
+        return self.model.force_n(stair.voltage_v, way) - self.model.force_n(before_v, way)
 
     def _is_spare(self, now_s: float) -> bool:
         return self._window[0][0] < now_s - WINDOW_S and len(self._window) > FEWEST_READINGS

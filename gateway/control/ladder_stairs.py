@@ -17,6 +17,7 @@ from gateway.registers.words import CalibrationPhase
 
 TURNS: Final = (0.0, 0.875, 0.25, 0.625, 0.375, 0.5625, 0.125, 0.75, 0.4375, 0.6875, 0.0625, 0.3125, 0.1875, 0.375)
 CHECK_SHARES: Final = (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0)
+RESPONSE_SHARES: Final = (0.25, 0.5, 0.8, 0.25, 0.8, 0.5)  # every way between three levels, again and again
 FIRST_STAIR_N: Final = 4.0  # of the check: enough to see the sign, little enough if the scale is ten times off
 OVER_FORCE_SHARE: Final = 0.93  # the largest planned force, of the one that trips: friction and noise need the rest
 FORCE_MAX_SHARE: Final = 0.985  # and of the largest that the rig allows: what is measured must not pass that one
@@ -26,18 +27,20 @@ MOST_STAIRS: Final = 20_000
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunPlan:
     """v_max_v None: as high as model and limits allow. first_group: a resumed run goes on from there; as large as groups where
-    only the reversal part is missing. tare: take the rest force as zero first. minor_points: 0 leaves the reversal part out."""
+    only the reversal part is missing. tare: take the rest force as zero first. minor_points: 0 leaves the reversal part out.
+    response_steps: large steps behind it, for dead time and lags; 0 leaves them out."""
 
     __pydantic_config__ = STRICT
     v_max_v: float | None = None
     step_v: float = 0.2
     groups: int = 5
     minor_points: int = 150
+    response_steps: int = 12
     first_group: int = 0
     tare: bool = False
 
 
-QUICK: Final = RunPlan(step_v=1.0, groups=2, minor_points=24)
+QUICK: Final = RunPlan(step_v=0.5, groups=1, minor_points=32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,7 @@ def stairs_of(plan: RunPlan, limits: Limits, model: Bsfm) -> tuple[Stair, ...]:
             if group >= plan.first_group
         ),
         *_minor_stairs(top_v, plan.minor_points),
+        *_response_stairs(top_v, plan),
     )
 
 
@@ -109,6 +113,8 @@ def _check(plan: RunPlan, top_v: float) -> None:
         raise ValueError(f"groups = {plan.groups} from {plan.first_group}, allowed 1 .. 100")
     if not 0 <= plan.minor_points <= 2000:
         raise ValueError(f"minor_points = {plan.minor_points}, allowed 0 .. 2000")
+    if not 0 <= plan.response_steps <= 200:
+        raise ValueError(f"response_steps = {plan.response_steps}, allowed 0 .. 200")
     if 2.0 * top_v / plan.step_v * plan.groups > MOST_STAIRS:
         raise ValueError(f"{2.0 * top_v / plan.step_v * plan.groups:.0f} stairs: at most {MOST_STAIRS}")
 
@@ -131,3 +137,14 @@ def _minor_stairs(top_v: float, points: int) -> tuple[Stair, ...]:
         count = max(1, round(points * abs(b - a) / travel))
         stairs += [(a + (b - a) * (k + 1) / count, RISING if b > a else FALLING) for k in range(count)]
     return tuple(Stair(share * top_v, way, -1, CalibrationPhase.MINOR_LOOPS) for share, way in stairs)
+
+
+def _response_stairs(top_v: float, plan: RunPlan) -> tuple[Stair, ...]:
+    """Part of the walk of partial reversals, and only behind it: their settled ends are points of it like any other."""
+    if plan.minor_points == 0:
+        return ()
+    shares = [TURNS[-1], *(RESPONSE_SHARES[k % len(RESPONSE_SHARES)] for k in range(plan.response_steps))]
+    return tuple(
+        Stair(share * top_v, RISING if share > before else FALLING, -1, CalibrationPhase.MINOR_LOOPS)
+        for before, share in pairwise(shares)
+    )

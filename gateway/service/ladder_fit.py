@@ -6,7 +6,7 @@ as the store does it. So a refused ladder, a full disk or a kill leaves no half 
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
@@ -15,8 +15,10 @@ from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, validate_
 from gateway.bsfm.evaluation import Evaluation, Question, evaluate
 from gateway.bsfm.ladder_check import CheckedLadder
 from gateway.bsfm.ladder_fault import Flaw, LadderError
+from gateway.bsfm.response_fit import Measured
 from gateway.recording import Recording
 from gateway.service.fit_verdict import Verdict, verdict_on
+from gateway.service.ladder_response import response_of
 from gateway.service.ladder_source import Background, bounds_on, checked_source
 from gateway.service.reporting.document import Document, document_of
 from gateway.service.reporting.fit_page import fit_page
@@ -24,12 +26,13 @@ from gateway.service.reporting.fit_page import fit_page
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LadderFit:
-    """A fit that may be reported and stored."""
+    """A fit that may be reported and stored. measured: how the plant follows, or why that is not known."""
 
     recording: Recording
     evaluation: Evaluation
     document: Document
     verdict: Verdict
+    measured: Measured
 
 
 def fit_recording(recording: Recording, question: Question, background: Background, name: str = "") -> LadderFit:
@@ -39,9 +42,12 @@ def fit_recording(recording: Recording, question: Question, background: Backgrou
     verdict = verdict_on(evaluation, *bounds_on(recording, background))
     document = document_of(evaluation, recording.path, recording.header)
     document["data_sha256"] = data_sha256(evaluation.checked)
+    response = response_of(recording, evaluation)
+    document["response"] = asdict(response.response) if response.response else None
+    document["notes"].append(response.told)
     document["name"] = name or str(recording.header.get("name") or "") or default_name(document)
     document["measured"] = verdict.facts()
-    return LadderFit(recording, evaluation, document, verdict)
+    return LadderFit(recording, evaluation, document, verdict, response)
 
 
 def default_name(document: Document) -> str:
@@ -75,6 +81,7 @@ def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
         data_sha256=fit.document["data_sha256"],
         slip_radii_v=_plain(model["slip_radii_v"]),
         slip_shares=_plain(model["slip_shares"]),
+        response=fit.measured.response,
         rejected=fit.verdict.rejected,
     )
 

@@ -52,9 +52,11 @@ def volts_along(model: Bsfm, forces_n: list[float]) -> list[float]:
 
 def test_a_quick_ladder_gives_a_numbered_calibration_that_agrees_with_the_shipped_one(patient) -> None:
     before = patient.words(122, 1)
-    done = calibrated(patient.state, "--step", "1", "--groups", "2", "--minor", "13", "--json")
+    done = calibrated(patient.state, "--step", "1", "--groups", "2", "--minor", "13", "--response", "2", "--json")
     assert done.returncode == 0, done.stderr
     end = json.loads(done.stdout)
+    patient.client.close()  # which has asked nothing for most of a minute, and may have been hung up on
+    assert patient.client.connect()
     assert patient.words(PHASE, 3) == [6, 1000, end["stored"]]
     assert patient.words(122, 1) == before  # stored, not active
     assert patient.status()["state"] == OFF
@@ -64,6 +66,8 @@ def test_a_quick_ladder_gives_a_numbered_calibration_that_agrees_with_the_shippe
     asked = [5.0, 15.0, 30.0, 45.0, 60.0, 45.0, 30.0, 15.0, 5.0]
     assert volts_along(stored.model(), asked) == pytest.approx(volts_along(shipped, asked), abs=0.15)
     assert stored.rms_n < 0.4
+    assert stored.response is not None
+    assert stored.response.lag_s == pytest.approx(0.072, abs=0.015)
     assert stored.data_sha256 == end["fit"]["data_sha256"]
     assert Path(end["report"]).read_text(encoding="utf-8").startswith("<!doctype html>")
     header = read_recording(Path(end["recording"])).header
