@@ -40,11 +40,11 @@ defaults: # what 0 in a command register means
   in_band_time_s: 0.2
   payload_kg: 0 # EDIT: what hangs on the cell; needed for tilt compensation
 
-trim: # slow correction by the load cell on top of the model; gain 0 switches it off
+trim: # slow correction by the load cell on top of the model; gain 0 switches it off; `calibrate` measures its pace
   gain_v_per_n_s: 0.3
   limit_v: 0.4
 
-# lead: # the regulator's own lags: setpoints arrive sooner. Rather too short than too long: too long overshoots
+# lead: # the regulator's own lags, until a calibration has measured them. Rather too short than too long: too long overshoots
 #   lag_s: 0.05
 #   second_lag_s: 0.05
 

@@ -10,6 +10,7 @@ taken and comes all the same is a defect of ours, with what belongs to one: the 
 from math import inf
 
 from gateway.bsfm import Bsfm
+from gateway.bsfm.model import Response
 from gateway.control.calibrating import AnyPlan, Calibrating
 from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.contact import ContactSense
@@ -28,6 +29,7 @@ from gateway.control.settings import ControlSettings, LeaseAction
 from gateway.control.state_table import ENABLED_STATES, Event, next_state
 from gateway.control.supervision import Finding, Supervisor, finding
 from gateway.control.telling import Telling
+from gateway.control.timing import timing_of
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
 from gateway.registers.edges import Asked, EdgeRefusal
@@ -48,9 +50,11 @@ class Controller:
         calibration_id: int,
         unclean_restart: bool = False,
         compensation: Compensation = NO_COMPENSATION,
+        response: Response | None = None,
     ) -> None:
-        """model: as volts are sent (compensation_command.sent), here as in `use`."""
-        settings = compensation.settings(settings)
+        """model: as volts are sent (compensation_command.sent), here as in `use`; response: as the calibration measured it."""
+        self._rig_settings = compensation.settings(settings)
+        settings = timing_of(response, self._rig_settings)
         self._compensation, self._outside_n = compensation, 0.0
         self.calibration_id = calibration_id
         self.state = State.OFF
@@ -59,8 +63,8 @@ class Controller:
         self._follower.use(model)
         self.calibrating = Calibrating(settings, model)
         self._pursuit = Pursuit(settings, model, compensation.timing)
-        response = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
-        self._motion = Motion(self._pursuit, response, self.calibrating)
+        expected = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
+        self._motion = Motion(self._pursuit, expected, self.calibrating)
         self._supervisor = Supervisor(settings)
         self._reader = Reader(settings.supervision, compensation.cell)
         self._judge = EdgeJudge(self._follower, self._reader.zero, self.calibrating)
@@ -90,10 +94,10 @@ class Controller:
         """Ramp the force to 0 in the following steps, then OFF for good; no enable is accepted any more."""
         self._stopping = True
 
-    def use(self, model: Bsfm, calibration_id: int) -> None:
+    def use(self, model: Bsfm, calibration_id: int, response: Response | None = None) -> None:
         """Swap the calibration; while enabled the voltage difference fades instead of jumping, and a force above the new
-        set's limits is left by the ramp."""
-        self._motion.use(model, self._given_n)
+        set's limits is left by the ramp. What was measured with it sets the pace from now on."""
+        self._motion.use(model, self._given_n, timing_of(response, self._rig_settings))
         self._follower.use(model)
         self.calibration_id = calibration_id
 
@@ -131,7 +135,7 @@ class Controller:
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
         self._last_s, self._line = now_s, line
         self._outcome = Outcome()
-        self._motion.elapse(dt_s)
+        self._motion.elapse(dt_s, line)
         edges = self._follower.take(now_s, command)
         self._outside_n = self._compensation.outside_n(command.tilt_angle_rad, line.feed_mm_s)
         self._sense(now_s, sample, line)
@@ -319,6 +323,7 @@ class Controller:
         self._follow(now_s, self._motion.pursue(self._target(), moment, ramps_down=self._ramping_down))
         measured_n = self._supervisor.rise.smooth_n + self._follower.demand.gravity_n
         self._telling.unreachable(self._pursuit, measured_n, moment, self._outcome.events)
+        self._telling.hunting(self._pursuit, self._outcome.events)
 
     def _climb(self, now_s: float) -> bool:
         """One step of the run; True when it has just ended, and the ramp down begins."""

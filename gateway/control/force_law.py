@@ -18,6 +18,7 @@ from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
 _CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
+LEAST_SLOPE_N_PER_V: Final = 1.0  # a flatter model is a model's end, not a plant's
 _OK: Final = Status.OK
 
 
@@ -48,18 +49,28 @@ class Approach:
 class ForceLaw:
     """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers."""
 
-    def __init__(self, model: Bsfm, limits: Limits, response_lag_s: float, delay_s: float = 0.0) -> None:
-        """delay_s: before the force begins to follow at all, not part of response_lag_s."""
+    def __init__(
+        self, model: Bsfm, limits: Limits, response_lag_s: float, delay_s: float = 0.0, ahead_s: float = 0.0
+    ) -> None:
+        """delay_s: before the force begins to follow at all, not part of response_lag_s; ahead_s: how far the aim runs ahead of
+        the applied target on a ramp, because the plant arrives so much later."""
         self.model = model
         self._rig_limits = limits
         self._limits = narrowed(limits, model.limits_n)
         self._lag_s = response_lag_s
         self._delayed = Delayed(delay_s)
+        self._ahead_s = ahead_s
         self.reset()
+
+    def retime(self, response_lag_s: float, delay_s: float, ahead_s: float) -> None:
+        """Another response from now on."""
+        self._lag_s, self._ahead_s = response_lag_s, ahead_s
+        self._delayed = Delayed(delay_s)
+        self._delayed.restart(self.applied_n)
 
     def reset(self) -> None:
         """Vented: nothing applied, nothing remembered."""
-        self.applied_n = self.reference_n = 0.0
+        self.applied_n = self.aimed_n = self.reference_n = 0.0
         self._delayed.restart(0.0)
         self._memory = self.model.reversal.start()
         self._pace = Pace()
@@ -89,7 +100,8 @@ class ForceLaw:
         self.applied_n = ramped(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
         self._pace.spend(moved_n, rate_n_per_s)
-        self._turn(last_n - gravity_n, self.applied_n - gravity_n)
+        aimed_n, self.aimed_n = self.aimed_n, ramped(goal_n, self.applied_n, rate_n_per_s, self._ahead_s)
+        self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
         heard_n = self._delayed.advance(self.applied_n, dt_s)
         self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
@@ -104,12 +116,19 @@ class ForceLaw:
 
     def fall_back(self, goal_n: float) -> None:
         """Contact lost: at once down to the goal, and on the rising branch for the next contact."""
-        self.applied_n = min(self.applied_n, goal_n)
+        self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
         self._memory = self.model.reversal.at(RISING)
+
+    def slope_n_per_v(self, gravity_n: float) -> float:
+        """How much force a volt makes at the working point, N/V, by the branches as they are shared there."""
+        rising, falling = self.model.branches.rising, self.model.branches.falling
+        force_n, share = self.aimed_n - gravity_n, 0.5 + 0.5 * self.blend
+        slopes = [max(LEAST_SLOPE_N_PER_V, curve.slope(curve.inverse(force_n)[0])) for curve in (rising, falling)]
+        return 1.0 / (share / slopes[0] + (1.0 - share) / slopes[1])
 
     def take_over(self, force_n: float, blend: float = RISING) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
-        self.applied_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
+        self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
         self._memory = self.model.reversal.at(blend)
 
@@ -120,9 +139,9 @@ class ForceLaw:
         if is_below_usable(self.applied_n, self._limits):
             return 0.0, LimitedBy.SMALLEST_FORCE
         try:
-            voltage_v, status = self.model.voltage_v(self.applied_n - gravity_n, self.blend)
+            voltage_v, status = self.model.voltage_v(self.aimed_n - gravity_n, self.blend)
         except ValueError as error:
             raise ModelError(f"model: {error}") from error
         if not isfinite(voltage_v):
-            raise ModelError(f"model: {voltage_v} V for {self.applied_n:.2f} N")
+            raise ModelError(f"model: {voltage_v} V for {self.aimed_n:.2f} N")
         return voltage_v + self._carry_over_v, LimitedBy.NONE if status is _OK else LimitedBy.CALIBRATION_RANGE

@@ -15,7 +15,9 @@ _NO_STATUS: Final = StatusBit(0)
 class Line:
     """What the output line and the process know, at the time of a step.
 
-    acknowledged_v: voltage that the device confirmed last, None before the first; unanswered_since_s: monotonic time of the
+    acknowledged_v: voltage that the device confirmed last, None before the first; sent_v: voltage that went out last on the
+    wire, which carries one at a time, None where nobody knows; wire_s: how long one setting keeps it, nan if not known;
+    unanswered_since_s: monotonic time of the
     oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered, lost);
     pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning master's last
     connection has closed; late_s: how late this step runs; waited_s: so much of it the process could have run and was not
@@ -35,6 +37,8 @@ class Line:
     warnings: WarningBit = _NO_WARNING
     temperature_c: float = nan
     feed_mm_s: float = nan
+    sent_v: float | None = None
+    wire_s: float = nan
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,7 @@ class Lead:
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
         if self._lag_s <= 0.0:
+            self.first_v = self.second_v = voltage_v
             return
         first_v, second_v = self.first_v - voltage_v, self.second_v - voltage_v
         decay = exp(-dt_s / self._lag_s)

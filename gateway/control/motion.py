@@ -11,10 +11,12 @@ from gateway.bsfm import Bsfm
 from gateway.control.calibrating import Calibrating
 from gateway.control.demand import Demand
 from gateway.control.force_law import ModelError
+from gateway.control.inputs import Line
 from gateway.control.limits import NotFiniteError
 from gateway.control.pursuit import Moment, Pursuit
 from gateway.control.reading import Reading
 from gateway.control.response import ModelResponse
+from gateway.control.settings import ControlSettings
 from gateway.control.state_table import Event
 from gateway.control.supervision import Finding, finding
 from gateway.registers.words import FaultCode
@@ -32,15 +34,17 @@ class Motion:
         self.response = response
         self._calibrating = calibrating
 
-    def use(self, model: Bsfm, given_n: float) -> None:
-        """Swap the calibration. given_n: contact force that the slide need not give."""
+    def use(self, model: Bsfm, given_n: float, settings: ControlSettings) -> None:
+        """Swap the calibration and the timing that goes with it. given_n: contact force that the slide need not give."""
         self.pursuit.law.use(model, given_n)
+        self.pursuit.retime(settings)
+        self.response.retime(settings.supervision.response_lag_s)
         self.response.use(model)
         self._calibrating.use(model)
 
-    def elapse(self, dt_s: float) -> None:
+    def elapse(self, dt_s: float, line: Line) -> None:
         """dt_s has passed with the present voltage on the output, whoever drives it."""
-        self.pursuit.elapse(dt_s)
+        self.pursuit.elapse(dt_s, line)
         self.response.advance(self.pursuit.stage.voltage_v, dt_s)
 
     def rest(self) -> None:

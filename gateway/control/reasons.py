@@ -38,6 +38,14 @@ def unreachable_sentence(seen: Evidence) -> str:
     )
 
 
+def hunting_sentence(force_n: float, turns: int) -> str:
+    """W360: the trim has backed off."""
+    return (
+        f"W360 at {force_n:.1f} N the trim has turned round {turns} times: the force sticks and slips, or the "
+        "workpiece moves; the trim stands still until there is another setpoint"
+    )
+
+
 def sign_sentence(rise_n: float, expected_n: float) -> str:
     return fault_sentence(
         FaultCode.SIGN_INVERTED,

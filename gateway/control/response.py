@@ -33,6 +33,10 @@ class ModelResponse:
         self._lagged_v = rest_v
         self.use(model)
 
+    def retime(self, lag_s: float) -> None:
+        """Another lag from now on."""
+        self._lag_s = lag_s
+
     def use(self, model: Bsfm) -> None:
         self._model = model
         self._rest_n = model.force_n(self._rest_v, 1.0)

@@ -59,6 +59,24 @@ class LeadSettings:
     second_lag_s: Annotated[float, Ge(0), Le(2)] = 0.0  # behind the first; 0: there is one lag only
 
 
+class ResponseSource(StrEnum):
+    MEASURED = "measured"  # by the calibration in use, where it has measured it; else the numbers of this file
+    RIG = "rig"  # the numbers of this file: trim.gain_v_per_n_s, lead, supervision.response_lag_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """What control derives from a measured response (gateway.control.timing). Seconds, N; integral_per_s: of the trim, N/s of
+    correction by N of error; zone_n: errors within it are stiction's and noise's."""
+
+    dead_time_s: float
+    lag_s: float
+    second_lag_s: float
+    landing_s: float  # how much later than dead time the force arrives with the lags inverted
+    integral_per_s: float
+    patience_s: float  # after the transient should be over: what an error of the measured lags leaves must have gone
+
+
 class LeaseAction(StrEnum):
     FAULT = "fault"  # safe voltage at once, latched
     HOLD = "hold"  # keep the last setpoint, raise a warning
@@ -91,3 +109,5 @@ class ControlSettings:
     trim: Trim = Trim()
     supervision: Supervision = Supervision()
     lead: LeadSettings = LeadSettings()
+    response: ResponseSource = ResponseSource.MEASURED
+    timing: Timing | None = None  # of the calibration in use, None where nothing was measured or the rig file rules

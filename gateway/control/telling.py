@@ -1,4 +1,4 @@
-"""Sentences that are told once, when something begins to be so: target unreachable, force stuck at rest."""
+"""Sentences that are told once, when something begins to be so: target unreachable, trim hunting, force stuck at rest."""
 
 from math import isfinite, nan
 from typing import Final
@@ -6,7 +6,8 @@ from typing import Final
 from gateway.control.inputs import Line
 from gateway.control.pursuit import Moment, Pursuit
 from gateway.control.reading import Reading
-from gateway.control.reasons import stuck_sentence, unreachable_sentence
+from gateway.control.reasons import hunting_sentence, stuck_sentence, unreachable_sentence
+from gateway.control.trim_measured import MOST_TURNS, MeasuredTrim
 from gateway.control.unreachable import Evidence
 
 _LEARNING: Final = 0.02  # of each new ratio of pressure to voltage
@@ -18,7 +19,7 @@ class Telling:
 
     def __init__(self, stuck_n: float) -> None:
         self.said_unreachable = False
-        self._said_stuck = False
+        self._said_stuck = self._said_hunting = False
         self._stuck_n = stuck_n
         self._was_right = False
         self._pressure_pa = self._profile_pa_per_v = self._learned_pa_per_v = nan
@@ -57,6 +58,13 @@ class Telling:
             learned=learned,
             was_right=self._was_right,
         )
+
+    def hunting(self, pursuit: Pursuit, events: list[str]) -> None:
+        trim = pursuit.trim
+        hunted = isinstance(trim, MeasuredTrim) and trim.hunted
+        if hunted and not self._said_hunting:
+            events.append(hunting_sentence(pursuit.law.applied_n, MOST_TURNS))
+        self._said_hunting = hunted
 
     def stuck(self, is_stuck: bool, reading: Reading, events: list[str]) -> None:
         if is_stuck and not self._said_stuck:

@@ -25,6 +25,10 @@ class TrimIntegral:
     def reset(self) -> None:
         self.value_v, self.limited_by = 0.0, LimitedBy.NONE
 
+    def resume(self, value_v: float) -> None:
+        """Go on from a correction that another trim has learned."""
+        self.value_v, self.limited_by = trim_ranged(value_v, self._settings.limit_v)
+
     def travel(self, moved_n: float) -> None:
         """The applied target moved by so much, N."""
         if moved_n and self.value_v:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import AfterValidator, Field, PlainValidator, WithJsonSchema
 
-from gateway.control.settings import STRICT, Defaults, LeadSettings, Limits, Supervision, Trim
+from gateway.control.settings import STRICT, Defaults, LeadSettings, Limits, ResponseSource, Supervision, Trim
 from gateway.devices.line_settings import Baud
 
 
@@ -119,6 +119,9 @@ class RigFile:
     defaults: Defaults = field(default_factory=Defaults)
     trim: Trim = field(default_factory=Trim)
     lead: LeadSettings = field(default_factory=LeadSettings)
+    response: ResponseSource = (
+        ResponseSource.MEASURED
+    )  # measured: trim's pace, lead and lag by the calibration, once it has measured them; rig: by this file
     supervision: Supervision = field(default_factory=Supervision)
     network: Network = field(default_factory=Network)
     residual_watch: ResidualWatch = field(default_factory=ResidualWatch)

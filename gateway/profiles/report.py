@@ -197,6 +197,7 @@ def _assembled(file: RigFile, parts: Parts, register_map: RegisterMap, path: Pat
             defaults=file.defaults,
             trim=file.trim,
             lead=file.lead,
+            response=file.response,
             supervision=file.supervision,
         ),
         network=file.network,

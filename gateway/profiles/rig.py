@@ -6,7 +6,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
-from gateway.bsfm.model import Bsfm, Calibration
+from gateway.bsfm.model import Bsfm, Calibration, Response
 from gateway.control.compensation import NO_COMPENSATION, Compensation
 from gateway.control.compensation_command import sent
 from gateway.control.settings import ControlSettings
@@ -101,6 +101,14 @@ class Rig:
         """The calibration's model as control uses it here: a bent command map is straightened, but for a calibration that was
         made on this very rig, for that has measured it."""
         return model if calibration.rig == self.name else sent(model, self.compensation.command)
+
+    def response_of(self, calibration: Calibration) -> Response | None:
+        """How this rig follows, as the calibration measured it; None for one that another rig was measured with."""
+        here = [
+            self.name,
+            *([f"twin of plant {self.plant_profile.name}"] if self.simulated and self.plant_profile else []),
+        ]
+        return calibration.response if calibration.rig in here else None
 
     def ports(self) -> dict[str, str]:
         """The serial ports of a real rig, by line; empty for a simulated one."""

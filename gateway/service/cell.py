@@ -139,6 +139,7 @@ class Cell:
             calibration_id=rig.calibration.number,
             unclean_restart=bool(cause),
             compensation=rig.compensation,
+            response=rig.response_of(rig.calibration),
         )
         self.gateway = Gateway(
             self.bank,
@@ -274,7 +275,9 @@ class Cell:
 
     def _on_calibration(self, taken: InUse) -> None:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
-        self.controller.use(self._rig.model_of(taken.calibration, taken.model), taken.calibration.number)
+        rig, calibration = self._rig, taken.calibration
+        model, response = rig.model_of(calibration, taken.model), rig.response_of(calibration)
+        self.controller.use(model, calibration.number, response)
         self._recordings.calibration_number = taken.calibration.number
         lowered = self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
         if lowered:

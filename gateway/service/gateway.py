@@ -146,6 +146,8 @@ class Gateway:
             late_s=self._late_s(now_s),
             waited_s=self._waited_s(),
             warnings=self.warnings,
+            sent_v=self.output.sent_v,
+            wire_s=self.output.round_trip_s,
         )
 
     def _decide(self, now_s: float) -> Output:

@@ -63,6 +63,11 @@ class OutputExchange:
         self.fault = FaultCode.NONE
         self.pressure_pa = nan
 
+    @property
+    def sent_v(self) -> float | None:
+        """The setting that went out last, None before the first."""
+        return self._asked_v if self._asked_v < inf else None
+
     def want(self, voltage_v: float, now_s: float) -> None:
         """This voltage shall stand on the device, V; sent at once if the wire is free, else as soon as it is."""
         self._wanted_v = voltage_v

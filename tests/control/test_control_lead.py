@@ -8,6 +8,7 @@ import pytest
 
 from gateway.control import ControlSettings, LeadSettings, Limits, Trim
 from gateway.control.lead import Lead
+from gateway.control.settings import ResponseSource
 from gateway.control.voltage_stage import VoltageStage
 from gateway.registers.words import LimitedBy
 from tests.control.bench import Bench, settings
@@ -170,7 +171,8 @@ TARGETS_N = (10.0, 20.0, 30.0, 40.0, 25.0, 12.0, 5.0, 20.0, 12.0, 15.0, 13.0, 26
 def course(lead: LeadSettings, seed: int) -> tuple[list[float], float]:
     """(settling times, largest trim) over TARGETS_N; asserts the last 0.3 s of each within 1 N, and no fault."""
     rig = demo()
-    wired = Wired(replace(rig, control=replace(rig.control, lead=lead)), seed=seed).pressing(5.0)
+    by_file = replace(rig.control, lead=lead, response=ResponseSource.RIG)
+    wired = Wired(replace(rig, control=by_file), seed=seed).pressing(5.0)
     times_s, trim_v = [], 0.0
     for target_n in TARGETS_N:
         began_s = settled_s = wired.now_s

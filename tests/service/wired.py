@@ -110,7 +110,11 @@ class Wired:
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=clock)
         self.exchange = OutputExchange(output_host(rig.output.device), self._write, rig.output.device.reply_timeout_s)
         self.controller = Controller(
-            rig.control, rig.calibration.model(), calibration_id=rig.calibration.number, unclean_restart=unclean
+            rig.control,
+            rig.calibration.model(),
+            calibration_id=rig.calibration.number,
+            unclean_restart=unclean,
+            response=rig.response_of(rig.calibration),
         )
         self.gateway = Gateway(
             self.bank,

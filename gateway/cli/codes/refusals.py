@@ -323,6 +323,13 @@ ENTRIES: Final = (
         "A robot program's stop, a colleague, or another terminal on this machine.",
         "force-gateway monitor --state DIR shows the last writer of control_word; hold again when it is agreed.",
     ),
+    Entry(
+        "W360",
+        "trim stands still",
+        "The trim's corrections at one setpoint changed their sign again and again, so it stopped correcting there.",
+        "The slide sticks and slips (dirt, dry seals, side load), or the workpiece moves under the tool.",
+        "Nothing if the force is good enough: the next setpoint starts afresh. Else free and clean the slide, and calibrate.",
+    ),
 )
 
 REFUSAL_CODES: Final = {RefusalReason[entry.name]: entry.code for entry in ENTRIES if entry.name} | {
