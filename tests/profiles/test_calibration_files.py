@@ -39,7 +39,7 @@ def test_the_shipped_calibration_makes_a_model() -> None:
         ("slip_radii_v", "[.001, .2, .3, .4, .5, .6, .7]", "15 slip_radii_v: slip stops give way over"),
         ("slip_radii_v", "[.2, .3, .3, .4, .5, .6, .7]", "24 slip_radii_v[2]: slip radius 2 = 0.3 V, the one before it 0.3 V"),
         ("slip_shares", "[.1, .1, .1, .1, .1, .1, .5]", "15 slip_shares[0]: slip shares add up to 1.1: 1 is needed"),
-        ("blend_span_n", "14\nresponse: {dead_time_s: 2, lag_s: 0.1}", "25 response.dead_time_s: dead time = 2: 0 .. 1 s"),
+        ("response", "{dead_time_s: 2, lag_s: 0.1}", "25 response.dead_time_s: dead time = 2: 0 .. 1 s"),
         ("blend_span_n", "14\nforce_limits_n: [9, 3]", "17 force_limits_n: force limits 9 .. 3 N"),
         ("order", "two", '8 order: "two" is not a whole number'),
     ],

@@ -1,0 +1,121 @@
+# ruff: noqa: E402  the tests must be found before they are imported
+"""What a measured response is worth on machines that nobody here has built: hold, steps and tracking, with and without trim.
+
+    .venv/bin/python tools/bench/response.py                # 8 machines, virtual time, some minutes
+    .venv/bin/python tools/bench/response.py --seeds 20
+    .venv/bin/python tools/bench/response.py --write        # calibrate anew, and keep that for the tests
+
+Machines are drawn from a seed (tests/control/foreign.py: dead time 20-150 ms, lags 30-300 ms, one or two, LuGre friction of
+0.5-4 N, noise). Each is calibrated by the product's quick ladder, in virtual time, starting with the demo's calibration; then
+the same course with the numbers of the demo rig's file (`fixed`) and with what was measured, trim on and off. "settled" is the
+median time until the force stays within 0.5 N; "of bound" the median of that over what the plant's physics allows
+(tests/control/foreign_course.py says which bound). Never run on hardware.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+from gateway.bsfm import Bsfm
+from gateway.control.settings import ControlSettings, LeadSettings, Trim
+from gateway.profiles import load_rig
+from tests.control.foreign import drawn
+from tests.control.foreign_course import Course, allowed_s, course
+from tests.control.foreign_kept import KEPT, kept, stored
+from tests.control.foreign_stand import Calibrated, calibrated, settings
+
+FIXED: Final = LeadSettings(lag_s=0.072, second_lag_s=0.072)
+
+
+def ways() -> dict[str, tuple[ControlSettings, bool]]:
+    """Name -> settings, and whether the measured response is used."""
+    off = Trim()
+    return {
+        "fixed, no trim": (settings(off, lead=FIXED), False),
+        "fixed, trim": (settings(lead=FIXED), False),
+        "measured, no trim": (settings(off), True),
+        "measured, trim": (settings(), True),
+    }
+
+
+def described(one: Calibrated) -> str:
+    machine, response = one.machine, one.response
+    late_s = machine.dead_time_s + machine.wire_s + machine.cell_lag_s
+    true = f"{late_s * 1e3:.0f} + {machine.lag_s * 1e3:.0f} + {machine.second_lag_s * 1e3:.0f} ms"
+    found = "not measured"
+    if response:
+        found = f"{response.dead_time_s * 1e3:.0f} + {response.lag_s * 1e3:.0f} + {response.second_lag_s * 1e3:.0f} ms"
+    return (
+        f"{machine.name}: {true}, measured {found}; friction {machine.coulomb_n:.1f} N, noise {machine.noise_n:.2f} N"
+    )
+
+
+def row(name: str, one: Calibrated, done: Course) -> dict[str, object]:
+    ratios = [step.settled_s / allowed_s(one.machine, step) for step in done.steps]
+    return {
+        "machine": one.machine.name,
+        "way": name,
+        "hold_n": done.hold_n,
+        "after_1_s_n": done.after_1_s_n,
+        "still_n": done.still_n,
+        "swing_n": done.swing_n,
+        "settled_s": done.settled_s(),
+        "of_bound": float(np.median(ratios)),
+        "within_1_5": float(np.mean(np.array(ratios) <= 1.5)),
+        "never": sum(not step.is_settled for step in done.steps),
+        "sine_0_5_n": done.sines_n[0],
+        "sine_0_2_n": done.sines_n[1],
+        "ramp_n": done.ramp_n,
+        "warnings": list(done.warnings[:2]),
+    }
+
+
+def shown(found: dict[str, object]) -> str:
+    numbers = "hold_n after_1_s_n still_n settled_s of_bound within_1_5 sine_0_5_n sine_0_2_n ramp_n".split()
+    cells = "".join(f"{float(str(found[name])):>9.2f}" for name in numbers)
+    return f"  {found['way']!s:<18}{cells}{found['never']!s:>7}"
+
+
+def write(seeds: Iterable[int], demo: Bsfm) -> None:
+    """Calibrate these machines anew; the others stay as they were."""
+    for seed in seeds:
+        one = calibrated(drawn(seed), demo)
+        KEPT.write_text(stored(dict(sorted((kept() | {seed: one}).items()))), encoding="utf-8")
+        print(described(one), flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--write", action="store_true", help=f"calibrate anew and write {KEPT.name}")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    seeds = range(options.first, options.first + options.seeds)
+    demo = load_rig("demo").calibration.model()
+    if options.write:
+        write(seeds, demo)
+        return
+    known, rows = kept(), []
+    if not options.json:
+        print(" " * 22 + "hold    1 s   still  settled of bound <=1.5   0.5 Hz   0.2 Hz     ramp  never")
+    for seed in seeds:
+        one = known.get(seed) or calibrated(drawn(seed), demo)
+        if not options.json:
+            print(described(one), flush=True)
+        for name, (control, measured) in ways().items():
+            rows.append(row(name, one, course(one.machine, one.calibration, control, measured=measured)))
+            if not options.json:
+                print(shown(rows[-1]), flush=True)
+    if options.json:
+        print(json.dumps(rows))
+
+
+if __name__ == "__main__":
+    main()
