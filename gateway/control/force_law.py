@@ -18,6 +18,7 @@ from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
 _CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
+APPROACH_N: Final = 1.0  # above what friction keeps: a vented tool moves
 LEAST_SLOPE_N_PER_V: Final = 1.0  # a flatter model is a model's end, not a plant's
 _OK: Final = Status.OK
 
@@ -32,11 +33,12 @@ class Approach:
     def __init__(self) -> None:
         self._touched_s: float | None = None
 
-    def goal(self, now_s: float, demand: Demand, touching: bool, applied_n: float) -> tuple[float, float]:
+    def goal(self, now_s: float, demand: Demand, touching: bool, law: "ForceLaw") -> tuple[float, float]:
         """(goal N, rate N/s) for this step."""
+        applied_n = law.applied_n
         if not touching:
             self._touched_s = None
-            return min(demand.force_n, demand.precontact_n), demand.ramp_n_per_s
+            return min(demand.force_n, law.approaching_n(demand.precontact_n)), demand.ramp_n_per_s
         if self._touched_s is None:
             self._touched_s = now_s
         left_s = demand.contact_ramp_s - (now_s - self._touched_s)
@@ -80,6 +82,11 @@ class ForceLaw:
     def blend(self) -> float:
         """Where between the branches the plant is, -1 .. 1."""
         return self.model.reversal.share(self._memory)
+
+    def approaching_n(self, precontact_n: float) -> float:
+        """The pre-contact force, but never one that cannot move a vented tool: what friction keeps pressed at the ladder's
+        lowest stair is the friction itself, and where the ladder begins to press it has been overcome twice."""
+        return max(precontact_n, 2.0 * self.model.force_range_n[0] + APPROACH_N)
 
     def use(self, model: Bsfm, gravity_n: float) -> None:
         """Swap the model without a bump: the voltage difference is carried over and fades. An equal one changes nothing,

@@ -136,9 +136,9 @@ class Pursuit:
 
     def _force(self, demand: Demand, moment: Moment) -> Event:
         law = self.law
-        goal_n, rate_n_per_s = self._approach.goal(moment.now_s, demand, moment.touching, law.applied_n)
+        goal_n, rate_n_per_s = self._approach.goal(moment.now_s, demand, moment.touching, law)
         if moment.held_back:
-            goal_n = min(goal_n, demand.precontact_n)
+            goal_n = min(goal_n, law.approaching_n(demand.precontact_n))
         if self._was_touching and not moment.touching:
             law.fall_back(goal_n)
         given_n = demand.gravity_n + moment.outside_n

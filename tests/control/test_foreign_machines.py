@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gateway.control import Trim
+from gateway.control import Controller, Trim
 from gateway.profiles import load_rig
+from gateway.registers.words import State
 from tests.control.foreign import drawn
 from tests.control.foreign_course import SHORT_N, Course, allowed_s, course
 from tests.control.foreign_kept import kept
-from tests.control.foreign_stand import Calibrated, calibrated, settings
+from tests.control.foreign_stand import Calibrated, Stand, calibrated, settings
 
 SEEDS = (0, 1, 2, 3, 4, 6, 7, 8, 9)
 BENT = {6: 1.6, 7: 2.1, 9: 1.7}  # whose command map bends: the push is reckoned in volts, and ends some way off
@@ -88,3 +89,15 @@ def test_the_kept_calibrations_are_what_a_run_gives(seed):
             assert again.calibration.model().force_n(volts, way) == pytest.approx(
                 before.calibration.model().force_n(volts, way), abs=0.2
             )
+
+
+@pytest.mark.parametrize("seed", [5, 7, 9])
+def test_a_vented_tool_reaches_the_work_although_friction_kept_more_at_the_ladders_lowest_stair(seed):
+    one = machine(seed)
+    controller = Controller(settings(), one.calibration.model(), calibration_id=1, response=one.response)
+    stand = Stand(one.machine, controller)
+    stand.run(0.5)
+    stand.force(12.0)
+    output = stand.run(3.0)
+    assert output.state is State.HOLDING
+    assert output.force_measured_n == pytest.approx(12.0, abs=0.5)
