@@ -24,8 +24,10 @@ from gateway.diagnosis.remarks import blind, nothing_to_switch_off, strange_area
 from gateway.diagnosis.result import Diagnosis
 from gateway.diagnosis.screen import screen
 from gateway.diagnosis.search import search
+from gateway.diagnosis.start import felt
 from gateway.twin.plant import Plant, with_value
 
+_LEAST_CHANCE_S: Final = 1.0e-3
 _CHANCE_SHARE: Final = 0.25  # of the time that readings may be late is chance: a process that was not woken at once
 
 
@@ -64,7 +66,9 @@ def diagnose(
     bench, base, found_direct = _direct(bench, base, whiten, max(options.quantum_n, given.cell.quantum_n))
     if options.late_s > 0.0:
         simulated_n = bench.simulate([base.point])[0]
-        bench.doubt_times(simulated_n, _CHANCE_SHARE * options.late_s, fast_noise_n(base.residual_n[bench.judged]))
+        bench.doubt_times(
+            simulated_n, _chance_s(measurements, options.late_s), fast_noise_n(base.residual_n[bench.judged])
+        )
         base = refit(bench, base, whiten)
     effects = _competitors(base.free, hidden, options.late_s)
     found = search(bench, base, effects, whiten, account)
@@ -82,6 +86,13 @@ def diagnose(
         plant=_with_readings_of(given, result.plant),
         spent_s=account.spent_s,
     )
+
+
+def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
+    """How late readings are by chance: what their own times show, else a share of all that they may be late."""
+    if all(each.even_s for each in measurements):
+        return min(max(_LEAST_CHANCE_S, *(each.jitter_s for each in measurements)), _CHANCE_SHARE * late_s)
+    return _CHANCE_SHARE * late_s
 
 
 class _Account:
@@ -137,9 +148,9 @@ def _based(
         tries.append((fit_base(bench, start, free, whiten), motion, bench, whiten))
     fitted, motion, bench, whiten = min(tries, key=lambda each: each[0].chi2)
     free = base_parameters(bench, hidden, late_s)
-    if free != fitted.free:
+    if free != fitted.free[: len(free)] or hidden - {"coulomb-friction"} != hidden:
         fitted = fit_base(bench, start, free, whiten)
-    return bench, fitted, whiten
+    return bench, felt(bench, fitted, whiten), whiten
 
 
 def _direct(

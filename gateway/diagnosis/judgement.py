@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 from numpy.random import default_rng
+from numpy.typing import NDArray
 
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
@@ -22,6 +23,7 @@ from gateway.diagnosis.floor import replicate_floor_n
 from gateway.diagnosis.gram import HeldOut, covariance, held_out
 from gateway.diagnosis.identifiability import invisible
 from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.point import STARTS
 from gateway.diagnosis.refine import Fitted, Problem, refine
 from gateway.diagnosis.remarks import remarks, too_high_a_floor
 from gateway.diagnosis.result import (
@@ -45,6 +47,10 @@ _BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain 
 _LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
 _DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
 _SAME_AREA: Final = 0.2
+_LEAST_SAVED: Final = 0.02  # of the held-out squared error
+_LEFT_AS_LARGE: Final = 0.995  # of the base model's error: what is left of it is all of it
+_LEAST_SURE: Final = 0.5  # share of resampled recordings that an effect and its like must win
+_PARTS: Final = 100
 _LEAST_REJECTED: Final = 5.0e-3  # of the RMS
 _SEED: Final = 43
 
@@ -60,6 +66,19 @@ class Reported:
     held_out: HeldOut
 
 
+@dataclass(frozen=True, slots=True)
+class Dropped:
+    """What the search had accepted and the judgement did not; gain_n: of the held-out RMS; why: as a sentence."""
+
+    name: str
+    gain_n: float
+    why: str
+
+    @property
+    def note(self) -> str:
+        return f"{self.name} is no finding: {self.why}"
+
+
 def judged(
     bench: Bench,
     found: Found,
@@ -69,11 +88,11 @@ def judged(
     given_floor_n: float | None,
 ) -> Diagnosis:
     """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
-    found, reported = _worthy(bench, found)
+    found, reported, dropped = _worthy(bench, found)
     rms_n = bench.rms_n(reported.base.residual_n)
     too_high = given_floor_n is not None and given_floor_n > rms_n
     known_n = _replicates(bench) if given_floor_n is None or too_high else given_floor_n
-    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n)
+    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n, reported.held_out.rms_n)
     reaches = reported.held_out.rms_n <= _REACHED * floor_n
     causes = _causes(bench, found, reported, floor_n) + _direct_causes(bench, reported, direct, floor_n)
     causes.sort(key=lambda cause: -cause.gain.share_of_excess)
@@ -87,32 +106,57 @@ def judged(
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
-        rejected=_rejected(bench, found, rms_n, {*names, *_grouped(causes), *(each.name for each in unseen)}),
+        rejected=_rejected(bench, found, rms_n, {*names, *_grouped(causes), *(each.name for each in unseen)}, dropped),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant(reported.base),
         plant=_extended(reported, causes),
-        base_parameters=_estimates(bench, reported.base, reported.base.free, reported.whiten),
+        base_parameters=_estimates(
+            bench, reported.base, [each for each in reported.base.free if each.section != STARTS], reported.whiten
+        ),
         traces=_traces(bench, reported),
         experiments=_experiments(causes),
         notes=(
             *remarks(bench.measurements, reported.fitted.point.offsets_n, floor_n),
+            *(each.note for each in dropped),
             *((too_high_a_floor(given_floor_n, rms_n),) if too_high and given_floor_n is not None else ()),
         ),
     )
 
 
-def _worthy(bench: Bench, found: Found) -> tuple[Found, Reported]:
-    """What is reported, without effects that make the unseen blocks worse once everything counts again."""
-    reported = _reported(bench, found)
-    gains = [
-        held_out(bench, without_it, reported.whiten).rms_n - reported.held_out.rms_n for without_it in reported.without
-    ]
-    if not gains or min(gains) > 0.0:
-        return found, reported
-    worst = int(np.argmin(gains))
-    kept = found.accepted[:worst] + found.accepted[worst + 1 :]
-    fitted = without(bench, found.fitted, found.base, found.accepted[worst], kept, found.whiten) if kept else found.base
-    return _worthy(bench, replace(found, fitted=fitted, accepted=kept))
+def _worthy(bench: Bench, found: Found) -> tuple[Found, Reported, tuple[Dropped, ...]]:
+    """What is reported once everything counts again, without effects that are no finding then, the worst of them first."""
+    reported, dropped = _reported(bench, found), list[Dropped]()
+    while found.accepted:
+        gains = [
+            _gain(held_out(bench, without_it, reported.whiten), reported.held_out, 0.0)
+            for without_it in reported.without
+        ]
+        doubts = [_doubt(each, gain) for each, gain in zip(found.accepted, gains, strict=True)]
+        rms_n = bench.rms_n(reported.base.residual_n)
+        if not any(doubts) and reported.held_out.rms_n > _LEFT_AS_LARGE * rms_n:
+            doubts = [f"with it the error is as large on unseen blocks as without: {rms_n:.3g} N"] * len(gains)
+        if not any(doubts):
+            break
+        worst = min((k for k, doubt in enumerate(doubts) if doubt), key=lambda k: gains[k].ci95[0])
+        taken, kept = found.accepted[worst], found.accepted[:worst] + found.accepted[worst + 1 :]
+        won_n = gains[worst].held_out_rms_before_n - gains[worst].held_out_rms_after_n
+        dropped.append(Dropped(taken.effect.name, won_n, doubts[worst]))
+        fitted = without(bench, found.fitted, found.base, taken, kept, found.whiten) if kept else found.base
+        found = replace(found, fitted=fitted, accepted=kept)
+        reported = _reported(bench, found)
+    return found, reported, tuple(dropped)
+
+
+def _doubt(accepted: Accepted, gain: Gain) -> str:
+    """Why this is no finding, as a sentence; empty where it is one."""
+    name, contest = accepted.effect.name, accepted.contest
+    before_n, after_n = gain.held_out_rms_before_n, gain.held_out_rms_after_n
+    if gain.ci95[0] <= 0.0:
+        return f"what it gains on unseen blocks may be nothing: {gain.ci95[0]:.2g} .. {gain.ci95[1]:.2g} N"
+    if after_n**2 > (1.0 - _LEAST_SAVED) * before_n**2:
+        return f"it leaves the error as large: {before_n:.3g} N before, {after_n:.3g} N after"
+    wins = sum(contest.shares.get(each, 0.0) for each in {name, *BY_NAME[name].group})
+    return f"it wins in {100.0 * wins:.0f} % of the ways to resample the recording only" if wins < _LEAST_SURE else ""
 
 
 def _reported(bench: Bench, found: Found) -> Reported:
@@ -172,12 +216,23 @@ def _causes(bench: Bench, found: Found, reported: Reported, floor_n: float) -> l
 
 
 def _gain(before: HeldOut, after: HeldOut, floor_n: float) -> Gain:
-    blocks = before.errors.size
+    errors_before, errors_after, counts = (
+        np.add.reduceat(values, _edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
+    )
+    blocks = counts.size
     weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=400)
-    rms_before = np.sqrt((weights @ before.errors) / (weights @ before.counts))
-    rms_after = np.sqrt((weights @ after.errors) / (weights @ after.counts))
+    rms_before = np.sqrt((weights @ errors_before) / (weights @ counts))
+    rms_after = np.sqrt((weights @ errors_after) / (weights @ counts))
     low, high = np.quantile(rms_before - rms_after, (0.025, 0.975))
     return Gain(before.rms_n, after.rms_n, (float(low), float(high)), _share(before.rms_n, after.rms_n, floor_n))
+
+
+def _edges(held: HeldOut) -> NDArray[np.intp]:
+    """Where parts begin that are drawn anew for an interval: finer than the blocks that are left out, for an effect may show
+    in one of these only, and then a fifth of all ways to draw blocks would not have it."""
+    counted = np.cumsum(held.squares > 0.0)
+    parts = min(_PARTS, int(counted[-1]) // 2)
+    return np.asarray(np.searchsorted(counted, np.arange(parts) * counted[-1] // parts, side="right"))
 
 
 def _share(before_n: float, after_n: float, floor_n: float) -> float:
@@ -245,17 +300,20 @@ def _grouped(causes: Sequence[Cause]) -> set[str]:
     return {name for cause in causes for name in cause.group}
 
 
-def _rejected(bench: Bench, found: Found, rms_n: float, told: set[str]) -> tuple[Rejected, ...]:
+def _rejected(
+    bench: Bench, found: Found, rms_n: float, told: set[str], dropped: Sequence[Dropped]
+) -> tuple[Rejected, ...]:
     """Losers of the first contest and of the last, by the part of the RMS that they would save of unseen blocks, N."""
-    gains: dict[str, float] = {}
+    gains = {each.name: each.gain_n for each in dropped}
     for contest in (found.first, found.last):
         before_n = held_out(bench, contest.beside, found.whiten).rms_n
         for finalist in contest.finalists:
-            if finalist.effect.name not in told:
+            if finalist.effect.name not in {*told, *(each.name for each in dropped)}:
                 share = 1.0 - held_out(bench, finalist.fitted, found.whiten).rms_n / before_n
                 gains[finalist.effect.name] = rms_n * share
     best = sorted(gains.items(), key=lambda item: -item[1])
-    return tuple(Rejected(name, gain_n) for name, gain_n in best if gain_n > _LEAST_REJECTED * rms_n)
+    known = {each.name for each in dropped}
+    return tuple(Rejected(name, gain_n) for name, gain_n in best if name in known or gain_n > _LEAST_REJECTED * rms_n)
 
 
 def _traces(bench: Bench, reported: Reported) -> tuple[Trace, ...]:

@@ -16,11 +16,10 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis import Diagnosis
-from gateway.diagnosis.bench import drive_of
+from gateway.diagnosis.bench import replay_of
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.service.watch_window import Window
 from gateway.twin.plant import Plant, with_value
-from gateway.twin.replay import Replay
 
 LINES: Final = {
     "regulator.delay_s": 0.035,
@@ -73,7 +72,7 @@ class Reference:
 
 def residuals(measurement: Measurement, plants: list[Plant]) -> Floats:
     """Measured minus replayed at the judged rows; shape (plants, judged rows)."""
-    readings_n = Replay(drive_of(measurement, "inferred")).run(plants).reading_n
+    readings_n = replay_of(measurement, "inferred").run(plants).reading_n
     return np.asarray((measurement.force_n - readings_n)[:, measurement.usable])
 
 

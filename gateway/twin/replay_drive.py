@@ -10,6 +10,8 @@ from gateway.twin.surroundings import COLUMNS, UNKNOWN, Surroundings
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
+Strains: TypeAlias = tuple[float, float, float]
+"""Of the three friction elements, -1..1, the stiffest first: what friction remembers."""
 Motion: TypeAlias = Literal["inferred", "measured", "measured-reversed"]
 
 
@@ -23,6 +25,7 @@ class Drive:
     position_noise_m: standard deviation; friction elements are made so wide that it does not move them.
     repeated: rows known to repeat the reading before. outliers: spike of each row, in units of the cell's outlier_n.
     before_v: command for a long time before the first row; None: that of the first row.
+    settled_s: until then the pressure is that of this moment for the slide: what went in before the first row has gone.
     """
 
     time_s: Floats
@@ -35,6 +38,7 @@ class Drive:
     repeated: Flags | None = None
     outliers: Floats | None = None
     before_v: float | None = 0.0
+    settled_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.time_s.ndim != 1 or self.time_s.size < 2 or self.time_s[0] != 0.0:
