@@ -45,6 +45,8 @@ def title(diagnosis: Diagnosis) -> str:
 
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, and for `partial` what it lacks."""
+    if any(suspect.is_sure for suspect in diagnosis.suspects):
+        return "The columns are not what their names say: no cause was looked for. First mend this, then ask again."
     if why := blind(diagnosis):
         return f"{why}."
     told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_lack(diagnosis)]
@@ -53,7 +55,9 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def blind(diagnosis: Diagnosis) -> str:
     """Why the recordings say nothing, where they do not and nothing else was found."""
-    found = diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
+    found = (
+        diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
+    )
     return "" if found else remarks.blind([trace.measurement for trace in diagnosis.traces])
 
 
@@ -170,7 +174,8 @@ def noticed(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
         for measurement in measurements
         for note in measurement.notes
     ]
-    return list(dict.fromkeys([*before, *(note for note in diagnosis.notes if note not in read), *named]))
+    suspected = [suspect.sentence for suspect in diagnosis.suspects]
+    return list(dict.fromkeys([*suspected, *before, *(note for note in diagnosis.notes if note not in read), *named]))
 
 
 def listed(words: Iterable[str]) -> str:
