@@ -31,7 +31,7 @@ from gateway.diagnosis.start import felt
 from gateway.diagnosis.suspects import Suspect, suspects
 from gateway.twin.plant import Plant, with_value
 
-_LEAST_CHANCE_S: Final = 1.0e-3
+_LEAST_CHANCE_S, _MOST_CHANCE_S = 1.0e-3, 9.0e-3
 _CHANCE_SHARE: Final = 0.25  # of the time that readings may be late is chance: a process that was not woken at once
 
 
@@ -72,7 +72,7 @@ def diagnose(
     bench, base, whiten = _based(measurements, _prepared(given, hidden), hidden, options.late_s)
     account("base fit")
     bench, base, found_direct = _direct(bench, base, whiten, max(options.quantum_n, given.cell.quantum_n))
-    if options.late_s > 0.0:
+    if options.late_s > 0.0 or any(each.even_s for each in measurements):
         simulated_n = bench.simulate([base.point])[0]
         bench.doubt_times(
             simulated_n, _chance_s(measurements, options.late_s), fast_noise_n(base.residual_n[bench.judged])
@@ -100,7 +100,7 @@ def diagnose(
 def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
     """How late readings are by chance: what their own times show, else a share of all that they may be late."""
     if all(each.even_s for each in measurements):
-        return min(max(_LEAST_CHANCE_S, *(each.jitter_s for each in measurements)), _CHANCE_SHARE * late_s)
+        return min(max(_LEAST_CHANCE_S, *(each.jitter_s for each in measurements)), _MOST_CHANCE_S)
     return _CHANCE_SHARE * late_s
 
 

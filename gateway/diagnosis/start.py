@@ -16,9 +16,9 @@ import numpy as np
 from gateway.diagnosis.bench import Bench, begins_at_rest
 from gateway.diagnosis.effect import Parameter
 from gateway.diagnosis.measurement import Flags, Floats
-from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.noise import Whitener, white
 from gateway.diagnosis.point import Point, StrainOf
-from gateway.diagnosis.refine import Fitted
+from gateway.diagnosis.refine import Fitted, Problem, refine
 from gateway.twin.plant import Plant
 from gateway.twin.replay_drive import Strains
 
@@ -32,6 +32,7 @@ _TRIED: Final[tuple[Strains, ...]] = (
     (1.0, 0.0, -1.0),
 )
 """Both branches, the middle, and what a reversal within the loop leaves: the stiffest element turns first."""
+_WAVES: Final = 4
 _FELT: Final = 2.0  # chi-square that the whole way of a strain must make for it to be fitted
 _FAINT: Final = 0.1  # of the noise: what is less of the start is forgotten
 _YOUNGEST: Final = 0.25  # of a recording may count as its beginning
@@ -55,6 +56,13 @@ def begun(bench: Bench, point: Point, whiten: Whitener) -> Point:
     costs = [_costs(bench, residual) for residual in whiten(_centred(bench, bench.residuals(bench.simulate(points))))]
     best = np.argmin(np.array(costs), axis=0)
     return replace(point, starts=tuple(_TRIED[int(index)] for index in best))
+
+
+def at_its_best(bench: Bench, plant: Plant) -> Fitted:
+    """This very plant with the offset and the start that fit each recording best: what of its error is not the start's."""
+    whiten = white(bench, bench.measured_n)
+    point = begun(bench, Point(plant, tuple(0.0 for _ in bench.measurements)), whiten)
+    return refine(bench, [Problem(point, start_parameters(bench, plant))], whiten, waves=_WAVES)[0]
 
 
 def _centred(bench: Bench, residuals: Floats) -> Floats:

@@ -125,7 +125,8 @@ def _suspect(measurement: Measurement, plant: Plant, is_own: bool) -> Suspect | 
     if not _moves(measurement, plant):
         return None
     as_is = _fit(measurement, plant)
-    too_large = _beyond(measurement, plant)
+    too_large = set(_beyond(measurement, plant))
+    too_large -= {"pressure_kpa"} if measurement.command_v is not None else set()
     if as_is.alike > _ALIKE and as_is.off() < _USUAL[is_own] and not too_large:
         return _beside(measurement, plant)
     best = min(_explanations(measurement, plant, as_is, is_own), key=lambda each: each[0], default=None)

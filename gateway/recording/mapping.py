@@ -1,8 +1,8 @@
 """Which column of a foreign table is which column of the contract, and in which unit: `--columns time_s=1:ms,force_n=7:n`.
 
 NAME=SOURCE[:UNIT]: NAME as in the contract, or that of a covariate; SOURCE a column's number from 1 or its header;
-UNIT what the numbers are in, by default what NAME ends with, with a minus where their sign is turned. Columns that are not mentioned keep their header's name;
-one without a header's name is left out, for nobody could ask for it.
+UNIT what the numbers are in, by default what NAME ends with, with a minus where their sign is turned (`:-n`). Columns
+that are not mentioned keep their header's name; one without a header's name is left out, for nobody could ask for it.
 """
 
 from collections.abc import Mapping, Sequence

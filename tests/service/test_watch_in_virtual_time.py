@@ -125,9 +125,8 @@ def test_what_the_wire_adds_is_taken_into_the_reference_and_nothing_more(scene):
 
 
 def test_a_hose_that_is_longer_than_a_wire_can_be_is_a_finding_from_the_start(scene):
-    far = with_value(scene.plant, "regulator", "delay_s", 0.2)
     delay = Estimate("regulator", 0.2, "s", (0.19, 0.21))
-    scene.search.plant = far
+    scene.change(regulator__delay_s=0.2)
     scene.search.causes = (
         Cause("transport-delay", ("transport-delay", "clock-offset"), 0.9, {"delay_s": delay}, GAIN),
     )

@@ -11,7 +11,10 @@ Document = dict[str, Any]
 
 
 def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
-    """suspects and notes stand beside the contract. Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1. A number that is not finite is null."""
+    """Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1. A number that is not finite is null.
+
+    suspects (columns that are not what they say) and notes stand beside the contract's fields.
+    """
     return {
         "format": FORMAT,
         "verdict": str(diagnosis.verdict),
