@@ -61,8 +61,9 @@ def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Wh
     """The refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
     start = Point(plant, tuple(0.0 for _ in bench.measurements))
     coarse, strains = _coarse(bench, start, free, whiten), start_parameters(bench, plant)
-    coarse = begun(bench, coarse, whiten) if strains else coarse
-    return refine(bench, [Problem(coarse, (*free, *strains))], whiten, waves=10 if strains else 8)[0]
+    coarse_ones = begun(bench, coarse, whiten) if strains else [coarse]
+    problems = [Problem(point, (*free, *strains)) for point in coarse_ones]
+    return min(refine(bench, problems, whiten, waves=16 if strains else 8), key=lambda each: each.chi2)
 
 
 def refit(bench: Bench, fitted: Fitted, whiten: Whitener, waves: int = 3) -> Fitted:

@@ -23,15 +23,10 @@ from gateway.twin.plant import Plant
 from gateway.twin.replay_drive import Strains
 
 _TRIED: Final[tuple[Strains, ...]] = (
-    (1.0, 1.0, 1.0),
-    (-1.0, -1.0, -1.0),
     (0.0, 0.0, 0.0),
-    (-1.0, -0.5, 0.5),
-    (1.0, 0.5, -0.5),
-    (-1.0, 0.0, 1.0),
-    (1.0, 0.0, -1.0),
+    *((one, two, three) for one in (1.0, -1.0) for two in (1.0, -1.0) for three in (1.0, -1.0)),
 )
-"""Both branches, the middle, and what a reversal within the loop leaves: the stiffest element turns first."""
+"""The middle, both branches, and what reversals of different sizes within the loop leave."""
 _WAVES: Final = 4
 _FELT: Final = 2.0  # chi-square that the whole way of a strain must make for it to be fitted
 _FAINT: Final = 0.1  # of the noise: what is less of the start is forgotten
@@ -50,18 +45,18 @@ def start_parameters(bench: Bench, plant: Plant) -> tuple[Parameter, ...]:
     )
 
 
-def begun(bench: Bench, point: Point, whiten: Whitener) -> Point:
-    """The point with the best of a few starts for each recording."""
+def begun(bench: Bench, point: Point, whiten: Whitener, most: int = 3) -> list[Point]:
+    """The point with the best few starts for each recording, the best first: a fit may end in the wrong one."""
     points = [replace(point, starts=(strains,) * len(bench.measurements)) for strains in _TRIED]
     costs = [_costs(bench, residual) for residual in whiten(_centred(bench, bench.residuals(bench.simulate(points))))]
-    best = np.argmin(np.array(costs), axis=0)
-    return replace(point, starts=tuple(_TRIED[int(index)] for index in best))
+    ranked = np.argsort(np.array(costs), axis=0)[:most]
+    return [replace(point, starts=tuple(_TRIED[int(index)] for index in best)) for best in ranked]
 
 
 def at_its_best(bench: Bench, plant: Plant) -> Fitted:
     """This very plant with the offset and the start that fit each recording best: what of its error is not the start's."""
     whiten = white(bench, bench.measured_n)
-    point = begun(bench, Point(plant, tuple(0.0 for _ in bench.measurements)), whiten)
+    (point,) = begun(bench, Point(plant, tuple(0.0 for _ in bench.measurements)), whiten, most=1)
     return refine(bench, [Problem(point, start_parameters(bench, plant))], whiten, waves=_WAVES)[0]
 
 

@@ -18,6 +18,7 @@ from gateway.diagnosis.measurement import Floats, Measurement
 _CLOSEST_S: Final = 8.0e-3  # readings that come faster are taken together: a regulator's lag is tens of milliseconds
 _FEWEST: Final = 3
 _SMOOTH: Final = 5  # readings over which the slope is taken that brings one to its tick
+_SURE_ROWS: Final = 200
 _KERNEL: Final = np.full(_SMOOTH, 1.0 / _SMOOTH)
 
 
@@ -65,12 +66,16 @@ class _Clock:
     """The even clock behind times that scatter, and means of columns about its ticks."""
 
     def __init__(self, time_s: Floats) -> None:
-        usual_s = float(np.median(np.diff(time_s)))
-        period_s = usual_s
-        ticks = np.concatenate([[0.0], np.cumsum(np.round(np.diff(time_s) / usual_s))])
-        if ticks[-1] > 0.0 and float(np.max(np.diff(time_s))) < 100.0 * usual_s:  # a gap hides how often it ticked
-            period_s = float(np.polyfit(ticks, time_s, 1)[0])
-            period_s = period_s if abs(period_s / usual_s - 1.0) < 0.01 else usual_s
+        usual_s = period_s = float(np.median(np.diff(time_s)))
+        for rows in (
+            _SURE_ROWS,
+            _SURE_ROWS**2 // 20,
+            time_s.size,
+        ):  # a period that is a little off miscounts far away only
+            part = time_s[:rows]
+            ticks = np.round((part - part[0]) / period_s)
+            fitted_s = float(np.polyfit(ticks, part, 1)[0]) if ticks[-1] > 0.0 else usual_s
+            period_s = fitted_s if abs(fitted_s / usual_s - 1.0) < 0.01 else usual_s
         self.row_s = period_s * max(1, round(_CLOSEST_S / period_s))
         phase = np.exp(2.0j * np.pi * time_s / self.row_s)
         first_s = float(np.angle(np.mean(phase))) / (2.0 * np.pi) * self.row_s

@@ -84,7 +84,7 @@ class Replay:
     def run(self, plants: Sequence[Plant], starts: Sequence[Strains | None] | None = None) -> Response:
         """Replay the recording with each plant. ValueError when there is none, or one is stacked.
 
-        starts: strains of each plant's friction when the slide begins (`Drive.settled_s`); None: after rest without pressure.
+        starts: what each plant's friction remembers when the slide begins (`Drive.settled_s`); None: rest without pressure.
         """
         if not plants:
             raise ValueError("a replay needs at least one plant")

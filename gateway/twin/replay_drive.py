@@ -11,7 +11,11 @@ from gateway.twin.surroundings import COLUMNS, UNKNOWN, Surroundings
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 Strains: TypeAlias = tuple[float, float, float]
-"""Of the three friction elements, -1..1, the stiffest first: what friction remembers."""
+"""What friction remembers, -1..1 for each of its three elements, the stiffest first.
+
+The first is the stiffest element's strain; each further one how an element stands beyond the one before it, as a share of
+what it may: d z = d' z' + (d - d') u. So any three numbers are a state that some history leaves, all 1 is the rising branch,
+and a reversal turns the first number first."""
 Motion: TypeAlias = Literal["inferred", "measured", "measured-reversed"]
 
 

@@ -17,7 +17,7 @@ from gateway.twin.surroundings import Moment
 class Load:
     """What presses on one slide: drive_n and limit_n on the grid, weight and the friction's centre included.
 
-    start: strains of the friction elements at the first point, the stiffest first; None: come to rest from no pressure.
+    start: what friction remembers at the first point; None: it came to rest from no pressure.
     """
 
     plant: Plant
@@ -28,13 +28,15 @@ class Load:
     start: Strains | None = None
 
     @property
-    def strains(self) -> Strains:
-        """At the first point, as far as the thrust can strain them: a pad that is left does not pull."""
+    def strains(self) -> tuple[float, float, float]:
+        """Of the elements at the first point, the stiffest first; no more than the thrust strains: a pad does not pull."""
         assert self.start is not None
         limit_n = float(self.limit_n[0])
         most = float(self.drive_n[0]) / limit_n if limit_n > 0.0 else 1.0
-        first, second, third = (min(strain, most) for strain in self.start)
-        return first, second, third
+        one, two, three = self.start
+        two = 0.5 * (one + two)
+        three = (2.0 * two + three) / 3.0
+        return min(one, most), min(two, most), min(three, most)
 
     @property
     def begins_n(self) -> float:

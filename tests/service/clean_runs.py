@@ -20,6 +20,7 @@ from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.registers.words import State
 from gateway.service.run_recording import COLUMNS
+from tests.service.rigs import demo
 from tests.service.wired import ENABLE, STEP_S, Wired, _Absent
 
 LASTS_S: Final = 70.0
@@ -62,9 +63,10 @@ class Busy(Wired):
 
 
 class Run:
-    """One run of a kind; `record` marks where the recording begins, which is cut off LASTS_S later."""
+    """One run of a kind; `record` marks where the recording begins, which is cut off `lasts_s` later."""
 
-    def __init__(self, seed: int, rig: Rig | None = None) -> None:
+    def __init__(self, seed: int, lasts_s: float = LASTS_S, rig: Rig | None = None) -> None:
+        self.lasts_s = lasts_s
         self.wired = Busy(rig, seed=seed)
         self.draw = np.random.default_rng([seed, 9])
         self.wired.ready()
@@ -75,7 +77,7 @@ class Run:
 
     @property
     def goes_on(self) -> bool:
-        return self.wired.now_s < self._begin_s + LASTS_S
+        return self.wired.now_s < self._begin_s + self.lasts_s
 
     def rest(self, duration_s: float) -> None:
         self.wired.run(duration_s)
@@ -99,7 +101,7 @@ class Run:
 
     def rows(self) -> list[tuple[float, ...]]:
         """From the beginning of the recording, times from 0."""
-        kept = [row for row in self.wired.rows if self._begin_s <= row[0] <= self._begin_s + LASTS_S]
+        kept = [row for row in self.wired.rows if self._begin_s <= row[0] <= self._begin_s + self.lasts_s]
         return [(row[0] - kept[0][0], *row[1:]) for row in kept]
 
 
@@ -133,13 +135,13 @@ def _sine(run: Run) -> None:
 
 def _at_rest(run: Run) -> None:
     run.record()
-    run.rest(LASTS_S)
+    run.rest(run.lasts_s)
 
 
 def _one_force(run: Run) -> None:
     run.hold(15.0, 3.0)
     run.record()
-    run.rest(LASTS_S)
+    run.rest(run.lasts_s)
 
 
 def _random(run: Run) -> None:
@@ -225,20 +227,20 @@ KINDS: Final[dict[str, Callable[[Run], None]]] = {
 }
 
 
-def rows_of(kind: str, seed: int, rig: Rig | None = None) -> list[tuple[float, ...]]:
+def rows_of(kind: str, seed: int, lasts_s: float = LASTS_S) -> list[tuple[float, ...]]:
     """Rows in the order of COLUMNS."""
-    run = Run(seed, rig)
+    run = Run(seed, lasts_s)
     KINDS[kind](run)
     assert run.wired.state is not State.FAULT, run.wired.log[-5:]
     return run.rows()
 
 
-def recorded(kind: str, seed: int, directory: Path) -> Path:
+def recorded(kind: str, seed: int, directory: Path, lasts_s: float = LASTS_S) -> Path:
     """The run as a file of the gateway's own, with its rig's texts."""
-    rig = Run(seed).wired.rig
+    rig = demo()
     header = {"rig": rig.name, "rig_fingerprint": rig.fingerprint, "rig_texts": dict(rig.texts), "simulated": True}
     recorder = Recorder(directory, header, COLUMNS)
-    for row in rows_of(kind, seed):
+    for row in rows_of(kind, seed, lasts_s):
         recorder.append(row)
     recorder.close()
     return recorder.path
