@@ -96,14 +96,9 @@ def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list
     return stood, watch
 
 
-def test_the_watch_says_nothing_of_a_clean_job() -> None:
-    stood, watch = watched("job", 4, 34.0, 15.0)
-    assert watch.counters["judged"] >= 1
-    assert set(stood) == {ResidualCause.NONE}, watch.standing
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_watch_says_nothing_of_any_kind_of_clean_work(kind: str) -> None:
+    """tests/service/test_watch_in_virtual_time.py asks the same, with a stub for the search, in the push gate."""
     stood, watch = watched(kind, 5, 190.0, 60.0)
     assert set(stood) <= {ResidualCause.NONE}, watch.standing

@@ -167,6 +167,19 @@ def test_a_change_that_hardly_moves_the_force_disturbs_nobody(scene):
     assert scene.looks(3) == [ResidualCause.NONE] * 3
 
 
+def test_a_name_for_a_force_that_is_where_it_should_be_disturbs_nobody(scene):
+    """The demo, clean, raised A345 for a refit that changed two numbers against each other and the force not at all."""
+    scene.work(25)
+    scene.looks(1)
+    scene.watch._reference.floors_n.clear()
+    worn = with_value(with_value(scene.plant, "friction", "coulomb_n", 2.0), "cylinder", "area_m2", 9.8e-5)
+    scene.search.plant = with_value(worn, "cell", "warm_up_n", 3.0)
+    size = Estimate("cell", 3.0, "N", (2.0, 4.0))
+    scene.search.causes = (Cause("warm-up", ("warm-up",), 0.9, {"warm_up_n": size}, GAIN),)
+    assert scene.looks(3) == [ResidualCause.NONE] * 3
+    assert scene.search.asked >= 2
+
+
 def test_what_no_effect_explains_is_an_unknown_cause(scene):
     scene.work(25)
     scene.looks(1)
