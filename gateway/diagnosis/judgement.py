@@ -251,7 +251,8 @@ def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], f
             before_n, now_n = after_n, float(np.sqrt(max(after_n**2 - each.values[0][1] ** 2 / 12.0, 0.0)))
         else:
             now_n = after_n
-        if before_n**2 - now_n**2 > _LEAST_DIRECT * before_n**2 or each.name == "repeated-samples":
+        least = 0.0 if each.name == "repeated-samples" else _LEAST_DIRECT  # few copies are no chance either
+        if before_n**2 - now_n**2 > least * before_n**2:
             gain = Gain(before_n, now_n, (before_n - now_n, before_n - now_n), _share(before_n, now_n, floor_n))
             causes.append(Cause(each.name, (each.name,), 0.99, _direct_estimates(each), gain))
     return causes

@@ -145,11 +145,17 @@ def gained(cause: Cause) -> str:
 
 
 def explained(diagnosis: Diagnosis) -> float:
-    """Share of the squared error above the noise floor that the extended model takes away, 0..1; nan where there is none."""
+    """Share of the squared error above the noise floor that the causes take away, 0..1; nan where there is none.
+
+    The model's share, or that of the strongest cause: spikes are taken out of the readings before any model is fitted.
+    """
     floor_n2 = diagnosis.baseline.noise_floor_n**2
     excess_n2 = diagnosis.baseline.rms_n**2 - floor_n2
     left_n2 = diagnosis.extended.held_out_rms_n**2 - floor_n2
-    return min(1.0, max(0.0, 1.0 - left_n2 / excess_n2)) if excess_n2 > 0.0 else float("nan")
+    strongest = max((cause.gain.share_of_excess for cause in diagnosis.causes), default=0.0)
+    if excess_n2 <= 0.0:
+        return strongest if diagnosis.causes else float("nan")
+    return min(1.0, max(strongest, 1.0 - left_n2 / excess_n2))
 
 
 def excess_n(diagnosis: Diagnosis) -> float:
