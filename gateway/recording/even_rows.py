@@ -17,6 +17,7 @@ from gateway.diagnosis.measurement import Floats, Measurement
 
 _CLOSEST_S: Final = 8.0e-3  # readings that come faster are taken together: a regulator's lag is tens of milliseconds
 _FEWEST: Final = 3
+_SAME_V: Final = 0.3  # by which what is wanted may differ from what was sent, usually
 _SMOOTH: Final = 5  # readings over which the slope is taken that brings one to its tick
 _SURE_ROWS: Final = 200
 _KERNEL: Final = np.full(_SMOOTH, 1.0 / _SMOOTH)
@@ -28,6 +29,8 @@ def evened(measurement: Measurement, sent_v: Floats, sent_age_s: Floats) -> Meas
     times_s, volts = _settings(measurement.time_s - sent_age_s, sent_v)
     if measurement.command_v is None or not volts.size or measurement.rows < _FEWEST:
         return measurement
+    if not float(np.nanmedian(np.abs(sent_v - measurement.command_v))) < _SAME_V:
+        return measurement  # columns of an exported table were renamed: which of them is the command is not ours to say
     clock = _Clock(measurement.time_s)
     command_v = _means(times_s, volts, np.append(clock.rows_s, clock.rows_s[-1] + clock.row_s))
     position_m, pressure_pa = measurement.position_m, measurement.pressure_pa

@@ -27,10 +27,10 @@ MEASUREMENT = Measurement(
     force_n=force(TIME_S),
     usable=np.ones(TIME_S.size, dtype=bool),
     repeated=np.zeros(TIME_S.size, dtype=bool),
-    command_v=np.zeros(TIME_S.size),
+    command_v=np.full(TIME_S.size, 2.5),
 )
 SETTINGS_S = np.sort(RNG.uniform(0.5, 29.0, 400))
-VOLTS = RNG.uniform(0.0, 5.0, SETTINGS_S.size)
+VOLTS = RNG.uniform(2.3, 2.7, SETTINGS_S.size)
 
 
 def sent(time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,6 +68,12 @@ def test_noise_is_not_shared_between_neighbours() -> None:
     found = evened(replace(MEASUREMENT, force_n=noise), *sent(TIME_S)).force_n
     assert np.std(found) == pytest.approx(0.1, rel=0.05)
     assert abs(np.corrcoef(found[1:], found[:-1])[0, 1]) < 0.1
+
+
+def test_a_command_that_was_never_sent_is_another_column() -> None:
+    volts, age_s = sent(TIME_S)
+    swapped = replace(MEASUREMENT, command_v=MEASUREMENT.force_n, force_n=volts)
+    assert evened(swapped, volts, age_s) is swapped
 
 
 def test_without_anything_sent_it_stays_as_it_is() -> None:
