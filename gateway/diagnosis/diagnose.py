@@ -85,7 +85,11 @@ def diagnose(
     result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
     account("judgement")
     told = [nothing_to_switch_off(options.without)] if options.without and not _has(given, options.without) else []
-    if not blind(measurements) and (why := strange_area(result.base.cylinder.area_m2, given.cylinder.area_m2)):
+    if (
+        not suspected
+        and not blind(measurements)
+        and (why := strange_area(result.base.cylinder.area_m2, given.cylinder.area_m2))
+    ):
         told.append(why)
     return replace(
         result,

@@ -68,6 +68,8 @@ def excess_of(window: Window, reference: Reference) -> float:
 
 def _described(found: Diagnosis) -> str:
     """What no effect explains, in the words of the screen."""
+    if found.suspects:
+        return found.suspects[0].sentence
     if not found.leftover:
         return "no cause of the catalogue explains it"
     left = max(found.leftover, key=lambda each: each.share)

@@ -6,7 +6,7 @@ that the test put behind the wires.
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -17,6 +17,8 @@ from gateway.recording.ring import RingReader, SampleRing
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.run_recording import COLUMNS
 from gateway.service.watch import Setup, Watch
+from gateway.service.watch_judge import finding_of
+from gateway.service.watch_process import diagnosed
 from gateway.service.watch_reference import Reference
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
@@ -212,3 +214,15 @@ def test_a_gain_has_no_name_in_the_catalogue_but_is_told(scene):
     scene.change(cylinder__area_m2=1.15 * area_m2)
     assert scene.looks(6)[-1] is ResidualCause.UNKNOWN
     assert "gain, area_m2 9.5e-05 -> 0.0001092 m2" in scene.watch.standing.sentence
+
+
+def test_a_cell_whose_sign_turned_is_told_as_such(scene):
+    """By the engine itself: it looks for no cause in such a window, so that this is fast."""
+    scene.work(25)
+    scene.looks(1)
+    window = scene.watch._window(20.0)
+    turned = replace(window.measurement, force_n=-window.measurement.force_n)
+    found = diagnosed([turned], scene.plant)
+    sentence = finding_of(replace(window, measurement=turned), found, scene.watch._reference, 0.25).sentence
+    assert "E522" in sentence
+    assert "falls where it should rise" in sentence
