@@ -1,30 +1,24 @@
 """From what the search found to the answer: gains on unseen blocks, intervals, the verdict.
 
-The search whitens, for a test needs to know what noise can do. The reported model is the one of the two fits, whitened or
-plain, that predicts the held-out blocks better: where a cause is missing from the catalogue, a whitened fit would
-sacrifice the slow part of the force to details. Standard errors are the larger of the whitened fit's own and the
+What is a finding is decided in worth.py. Standard errors are the larger of the whitened fit's own and the
 jackknife's over blocks, which believes in no noise model.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.random import default_rng
-from numpy.typing import NDArray
 
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
-from gateway.diagnosis.catalogue_cylinder import AREA
 from gateway.diagnosis.direct import Direct
 from gateway.diagnosis.effect import Effect, Parameter
 from gateway.diagnosis.floor import replicate_floor_n
-from gateway.diagnosis.gram import HeldOut, covariance, held_out
+from gateway.diagnosis.gram import covariance, held_out
 from gateway.diagnosis.identifiability import invisible
-from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.point import STARTS
-from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.refine import Fitted
 from gateway.diagnosis.remarks import remarks, too_high_a_floor
 from gateway.diagnosis.result import (
     Baseline,
@@ -38,45 +32,15 @@ from gateway.diagnosis.result import (
     Trace,
     Verdict,
 )
-from gateway.diagnosis.search import Accepted, Found, without
+from gateway.diagnosis.search import Found
+from gateway.diagnosis.worth import Dropped, Reported, gain_of, share_of_excess, worthy
 from gateway.twin.plant import Plant, with_value
 
 _REACHED: Final = 1.05  # residual over floor that counts as reached
 _ABOVE: Final = 1.1  # residual over a known floor that asks for a cause
-_BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
 _LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
 _DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
-_SAME_AREA: Final = 0.2
-_LEAST_SAVED: Final = 0.02  # of the held-out squared error
-_LEFT_AS_LARGE: Final = 0.995  # of the base model's error: what is left of it is all of it
-_LEAST_SURE: Final = 0.5  # share of resampled recordings that an effect and its like must win
-_PARTS: Final = 100
 _LEAST_REJECTED: Final = 5.0e-3  # of the RMS
-_SEED: Final = 43
-
-
-@dataclass(frozen=True, slots=True)
-class Reported:
-    """The models that are reported: base, extended, and the extended one without each accepted effect."""
-
-    base: Fitted
-    fitted: Fitted
-    without: tuple[Fitted, ...]
-    whiten: Whitener
-    held_out: HeldOut
-
-
-@dataclass(frozen=True, slots=True)
-class Dropped:
-    """What the search had accepted and the judgement did not; gain_n: of the held-out RMS; why: as a sentence."""
-
-    name: str
-    gain_n: float
-    why: str
-
-    @property
-    def note(self) -> str:
-        return f"{self.name} is no finding: {self.why}"
 
 
 def judged(
@@ -88,7 +52,7 @@ def judged(
     given_floor_n: float | None,
 ) -> Diagnosis:
     """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
-    found, reported, dropped = _worthy(bench, found)
+    found, reported, dropped = worthy(bench, found)
     rms_n = bench.rms_n(reported.base.residual_n)
     too_high = given_floor_n is not None and given_floor_n > rms_n
     known_n = _replicates(bench) if given_floor_n is None or too_high else given_floor_n
@@ -123,74 +87,6 @@ def judged(
     )
 
 
-def _worthy(bench: Bench, found: Found) -> tuple[Found, Reported, tuple[Dropped, ...]]:
-    """What is reported once everything counts again, without effects that are no finding then, the worst of them first."""
-    reported, dropped = _reported(bench, found), list[Dropped]()
-    while found.accepted:
-        gains = [
-            _gain(held_out(bench, without_it, reported.whiten), reported.held_out, 0.0)
-            for without_it in reported.without
-        ]
-        doubts = [_doubt(each, gain) for each, gain in zip(found.accepted, gains, strict=True)]
-        rms_n = bench.rms_n(reported.base.residual_n)
-        if not any(doubts) and reported.held_out.rms_n > _LEFT_AS_LARGE * rms_n:
-            doubts = [f"with it the error is as large on unseen blocks as without: {rms_n:.3g} N"] * len(gains)
-        if not any(doubts):
-            break
-        worst = min((k for k, doubt in enumerate(doubts) if doubt), key=lambda k: gains[k].ci95[0])
-        taken, kept = found.accepted[worst], found.accepted[:worst] + found.accepted[worst + 1 :]
-        won_n = gains[worst].held_out_rms_before_n - gains[worst].held_out_rms_after_n
-        dropped.append(Dropped(taken.effect.name, won_n, doubts[worst]))
-        fitted = without(bench, found.fitted, found.base, taken, kept, found.whiten) if kept else found.base
-        found = replace(found, fitted=fitted, accepted=kept)
-        reported = _reported(bench, found)
-    return found, reported, tuple(dropped)
-
-
-def _doubt(accepted: Accepted, gain: Gain) -> str:
-    """Why this is no finding, as a sentence; empty where it is one."""
-    name, contest = accepted.effect.name, accepted.contest
-    before_n, after_n = gain.held_out_rms_before_n, gain.held_out_rms_after_n
-    if gain.ci95[0] <= 0.0:
-        return f"what it gains on unseen blocks may be nothing: {gain.ci95[0]:.2g} .. {gain.ci95[1]:.2g} N"
-    if after_n**2 > (1.0 - _LEAST_SAVED) * before_n**2:
-        return f"it leaves the error as large: {before_n:.3g} N before, {after_n:.3g} N after"
-    wins = sum(contest.shares.get(each, 0.0) for each in {name, *BY_NAME[name].group})
-    return f"it wins in {100.0 * wins:.0f} % of the ways to resample the recording only" if wins < _LEAST_SURE else ""
-
-
-def _reported(bench: Bench, found: Found) -> Reported:
-    """Every model twice, whitened and plain; the kind whose extended model predicts better.
-
-    Dependences without a name count again: the reported errors are those of the simulation, and of nothing beside it.
-    """
-    bench.put_back()
-    plain = white(bench, found.fitted.residual_n)
-    models = [found.base, found.fitted, *(_without(each, found) for each in found.accepted)]
-    problems = [Problem(each.point, each.free) for each in models]
-    kinds = [(found.whiten, refine(bench, problems, found.whiten, waves=3)), (plain, _plainly(bench, problems, plain))]
-    errors = [held_out(bench, fits[1], whiten) for whiten, fits in kinds]
-    best = 1 if errors[1].rms_n < _BETTER * errors[0].rms_n else 0
-    whiten, fits = kinds[best]
-    return Reported(fits[0], fits[1], tuple(fits[2:]), whiten, errors[best])
-
-
-def _plainly(bench: Bench, problems: Sequence[Problem], plain: Whitener) -> list[Fitted]:
-    """Each model at its plain optimum. The whitened one may be far from it in the area, which slow changes tell best:
-    then it is looked for from the base model's plain area, too."""
-    fits = refine(bench, problems, plain, waves=3)
-    area_m2 = fits[0].point.value(AREA)
-    if all(abs(each.point.value(AREA) / area_m2 - 1.0) < _SAME_AREA for each in fits):
-        return fits
-    again = [Problem(each.point.moved(AREA, area_m2), each.free) for each in fits]
-    others = refine(bench, again, plain, waves=12)
-    return [min(pair, key=lambda each: each.chi2) for pair in zip(fits, others, strict=True)]
-
-
-def _without(accepted: Accepted, found: Found) -> Fitted:
-    return found.base if len(found.accepted) == 1 else accepted.contest.beside
-
-
 def _verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
     if not causes:
         return Verdict.UNKNOWN if left or unexplained else Verdict.NOTHING_FOUND
@@ -209,35 +105,10 @@ def _causes(bench: Bench, found: Found, reported: Reported, floor_n: float) -> l
             accepted.contest.group(accepted.effect.name),
             accepted.contest.shares.get(accepted.effect.name, 0.0),
             _estimates(bench, reported.fitted, accepted.form.parameters, reported.whiten),
-            _gain(held_out(bench, without, reported.whiten), reported.held_out, floor_n),
+            gain_of(held_out(bench, without, reported.whiten), reported.held_out, floor_n),
         )
         for accepted, without in zip(found.accepted, reported.without, strict=True)
     ]
-
-
-def _gain(before: HeldOut, after: HeldOut, floor_n: float) -> Gain:
-    errors_before, errors_after, counts = (
-        np.add.reduceat(values, _edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
-    )
-    blocks = counts.size
-    weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=400)
-    rms_before = np.sqrt((weights @ errors_before) / (weights @ counts))
-    rms_after = np.sqrt((weights @ errors_after) / (weights @ counts))
-    low, high = np.quantile(rms_before - rms_after, (0.025, 0.975))
-    return Gain(before.rms_n, after.rms_n, (float(low), float(high)), _share(before.rms_n, after.rms_n, floor_n))
-
-
-def _edges(held: HeldOut) -> NDArray[np.intp]:
-    """Where parts begin that are drawn anew for an interval: finer than the blocks that are left out, for an effect may show
-    in one of these only, and then a fifth of all ways to draw blocks would not have it."""
-    counted = np.cumsum(held.squares > 0.0)
-    parts = min(_PARTS, int(counted[-1]) // 2)
-    return np.asarray(np.searchsorted(counted, np.arange(parts) * counted[-1] // parts, side="right"))
-
-
-def _share(before_n: float, after_n: float, floor_n: float) -> float:
-    excess = before_n**2 - min(floor_n, after_n) ** 2
-    return float(min(max((before_n**2 - after_n**2) / excess, 0.0), 1.0)) if excess > 0.0 else 0.0
 
 
 def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], floor_n: float) -> list[Cause]:
@@ -253,7 +124,9 @@ def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], f
             now_n = after_n
         least = 0.0 if each.name == "repeated-samples" else _LEAST_DIRECT  # few copies are no chance either
         if before_n**2 - now_n**2 > least * before_n**2:
-            gain = Gain(before_n, now_n, (before_n - now_n, before_n - now_n), _share(before_n, now_n, floor_n))
+            gain = Gain(
+                before_n, now_n, (before_n - now_n, before_n - now_n), share_of_excess(before_n, now_n, floor_n)
+            )
             causes.append(Cause(each.name, (each.name,), 0.99, _direct_estimates(each), gain))
     return causes
 

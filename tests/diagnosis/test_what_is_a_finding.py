@@ -10,9 +10,9 @@ from gateway.diagnosis import Options, Verdict, diagnose
 from gateway.diagnosis.catalogue import BY_NAME
 from gateway.diagnosis.contest import Contest
 from gateway.diagnosis.gram import HeldOut
-from gateway.diagnosis.judgement import _doubt, _gain
 from gateway.diagnosis.result import Gain
 from gateway.diagnosis.search import Accepted
+from gateway.diagnosis.worth import doubt, gain_of
 from gateway.service.reporting import diagnosis_words as words
 from tests.diagnosis.machine import MACHINE, recorded, times_s
 
@@ -38,9 +38,9 @@ SURE = accepted("creep", {"creep": 0.97})
     ],
 )
 def test_what_is_no_finding_is_told_why(taken: Accepted, gain: Gain, why: str) -> None:
-    doubt = _doubt(taken, gain)
-    assert why in doubt
-    assert bool(doubt) == bool(why)
+    told = doubt(taken, gain)
+    assert why in told
+    assert bool(told) == bool(why)
 
 
 def held(squares: np.ndarray) -> HeldOut:
@@ -51,7 +51,7 @@ def held(squares: np.ndarray) -> HeldOut:
 def test_a_gain_s_interval_holds_0_where_noise_alone_gained() -> None:
     rng = np.random.default_rng(3)
     before, after = (rng.normal(0.0, 0.1, 4000) ** 2 + 1.0e-9 for _ in range(2))
-    low, high = _gain(held(before), held(after), 0.0).ci95
+    low, high = gain_of(held(before), held(after), 0.0).ci95
     assert low < 0.0 < high
 
 
@@ -60,7 +60,7 @@ def test_an_effect_that_shows_in_one_block_of_twenty_has_a_gain_all_the_same() -
     after = np.random.default_rng(4).normal(0.0, 0.1, 4000) ** 2 + 1.0e-9
     before = after.copy()
     before[1000:1200] += 0.09
-    assert _gain(held(before), held(after), 0.0).ci95[0] > 0.0
+    assert gain_of(held(before), held(after), 0.0).ci95[0] > 0.0
 
 
 def test_a_named_cause_never_stands_beside_nothing_explained() -> None:
