@@ -38,7 +38,7 @@ LINEAR: Final[dict[str, dict[str, tuple[float, float]]]] = {
         "gf": (STANDARD_GRAVITY_M_PER_S2 * 1.0e-3, 0.0),
         "lbf": (NEWTON_PER_POUND_FORCE, 0.0),
     },
-    "voltage": {"v": (1.0, 0.0), "mv": (1.0e-3, 0.0)},
+    "voltage": {"v": (1.0, 0.0), "mv": (1.0e-3, 0.0), "percent": (0.1, 0.0)},  # of the usual 0 .. 10 V
     "pressure": {
         "pa": (1.0, 0.0),
         "kpa": (PASCAL_PER_KILOPASCAL, 0.0),

@@ -121,17 +121,20 @@ def _diagnosed(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis,
     from rich.console import Console
 
     from gateway.diagnosis import Options, diagnose
+    from gateway.diagnosis.suspects import mended
 
     asked = Options(
         without=options["without"],
         noise_floor_n=options["noise_floor_n"],
         late_s=sources.late_s,
         quantum_n=sources.quantum_n,
+        is_own=sources.is_own,
         clock=time.perf_counter,
     )
     began_s = time.perf_counter()
     with Console(stderr=True).status("diagnosing"):
         diagnosis = diagnose(sources.measurements, sources.plant.plant, asked)
+    diagnosis = replace(diagnosis, suspects=mended(diagnosis.suspects, options["columns"] or ""))
     return diagnosis, time.perf_counter() - began_s
 
 
@@ -163,10 +166,11 @@ def _texts(answer: Answer, options: dict[str, Any]) -> dict[Path, str]:
 
 
 def _extends(answer: Answer, file: Path) -> bool:
-    """Is there a plant to write? Where the force says nothing, what was refitted means nothing."""
+    """Is there a plant to write? Where the force says nothing, or columns are wrong, what was refitted means nothing."""
     from gateway.service.reporting.diagnosis_words import blind
 
-    why = blind(answer.diagnosis)
+    sure = [each.sentence for each in answer.diagnosis.suspects if each.is_sure]
+    why = "; ".join(sure) or blind(answer.diagnosis)
     if why:
         click.echo(f"{file} is not written: {why}", err=True)
     return not why

@@ -21,6 +21,7 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.point import Point
 from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.start import begun, start_parameters
 from gateway.twin.plant import UNLIMITED, Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
 DEFAULT_PLANT: Final = Plant(
@@ -57,9 +58,12 @@ def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -
 
 
 def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Whitener) -> Fitted:
-    """The refitted base model."""
+    """The refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
     start = Point(plant, tuple(0.0 for _ in bench.measurements))
-    return refine(bench, [Problem(_coarse(bench, start, free, whiten), free)], whiten, waves=8)[0]
+    coarse, strains = _coarse(bench, start, free, whiten), start_parameters(bench, plant)
+    coarse_ones = begun(bench, coarse, whiten) if strains else [coarse]
+    problems = [Problem(point, (*free, *strains)) for point in coarse_ones]
+    return min(refine(bench, problems, whiten, waves=16 if strains else 8), key=lambda each: each.chi2)
 
 
 def refit(bench: Bench, fitted: Fitted, whiten: Whitener, waves: int = 3) -> Fitted:

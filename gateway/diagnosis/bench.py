@@ -45,7 +45,8 @@ class Bench:
 
     def __init__(self, measurements: Sequence[Measurement], motion: Motion = "inferred") -> None:
         self.measurements = tuple(measurements)
-        self._replays = [Replay(drive_of(each, motion)) for each in measurements]
+        self.motion = motion
+        self._replays = [replay_of(each, motion) for each in measurements]
         self.segments = tuple(_segments(measurements))
         self.measured_n = np.concatenate([self._channel(segment) for segment in self.segments])
         self.usable = np.concatenate([measurements[segment.recording].usable for segment in self.segments])
@@ -56,6 +57,7 @@ class Bench:
             [np.full(segment.rows.stop - segment.rows.start, segment.is_force) for segment in self.segments]
         )
         self.weights: Floats = np.ones(self.measured_n.size)  # of the rows, for who whitens
+        self.young: Flags = np.zeros(self.measured_n.size, dtype=bool)  # rows that still feel how it began
         self.block_of_row = np.concatenate([_blocks(segment, self.usable) for segment in self.segments])
         self._taken_out: list[Floats] = []
         self._nuisance = _nuisance(self, self._taken_out)
@@ -74,7 +76,7 @@ class Bench:
         result = np.empty((len(points), self.rows))
         for recording, replay in enumerate(self._replays):
             plants = [with_value(point.plant, "cell", "zero_n", point.offsets_n[recording]) for point in points]
-            response = replay.run(plants)
+            response = replay.run(plants, [point.start(recording) for point in points])
             for segment in self.segments:
                 if segment.recording == recording:
                     result[:, segment.rows] = (
@@ -161,7 +163,7 @@ class Bench:
         parts = []
         for segment in self.segments:
             measurement = self.measurements[segment.recording]
-            parts.append(measurement.time_s < (0.0 if _begins_at_rest(measurement) else _settled_s(measurement)))
+            parts.append(measurement.time_s < (0.0 if begins_at_rest(measurement) else _settled_s(measurement)))
         return np.concatenate(parts)
 
     def _channel(self, segment: Segment) -> Floats:
@@ -183,7 +185,7 @@ def _settled_s(measurement: Measurement) -> float:
     return min(settled_s + forgotten_s, max(settled_s, _LATEST * measurement.duration_s))
 
 
-def _begins_at_rest(measurement: Measurement) -> bool:
+def begins_at_rest(measurement: Measurement) -> bool:
     """Do command and force stand still at first, and the command at its lowest, so that the state before the first row is
     known? Rest further up may have been reached from either side."""
     rows = measurement.time_s < REST_S
@@ -197,6 +199,11 @@ def _begins_at_rest(measurement: Measurement) -> bool:
     error_n = float(np.sqrt(np.var(first) / first.size + np.var(second) / second.size))
     slack_n = _SLACK * float(np.ptp(measurement.force_n[measurement.usable]))  # slow noise wanders, too
     return abs(float(np.mean(first) - np.mean(second))) < max(4.0 * error_n, slack_n) + 1.0e-9
+
+
+def replay_of(measurement: Measurement, motion: Motion) -> Replay:
+    """The twin over a recording; in steps as long as the rows where the reader has made them even."""
+    return Replay(drive_of(measurement, motion), measurement.even_s or None)
 
 
 def drive_of(measurement: Measurement, motion: Motion) -> Drive:
@@ -217,6 +224,7 @@ def drive_of(measurement: Measurement, motion: Motion) -> Drive:
         surroundings=Surroundings(**{name: columns[name] for name in SURROUNDINGS if name in columns}),
         repeated=measurement.repeated,
         before_v=None,
+        settled_s=0.0 if begins_at_rest(measurement) else min(SETTLING_S, 0.1 * measurement.duration_s),
     )
 
 

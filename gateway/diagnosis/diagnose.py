@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+
 from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
 from gateway.diagnosis.bench import MOTIONS, Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
@@ -19,13 +21,17 @@ from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
 from gateway.diagnosis.judgement import judged
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import Whitener, fast_noise_n, white
+from gateway.diagnosis.point import Point
 from gateway.diagnosis.refine import Fitted
 from gateway.diagnosis.remarks import blind, nothing_to_switch_off, strange_area
-from gateway.diagnosis.result import Diagnosis
+from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdict
 from gateway.diagnosis.screen import screen
 from gateway.diagnosis.search import search
+from gateway.diagnosis.start import felt
+from gateway.diagnosis.suspects import Suspect, suspects
 from gateway.twin.plant import Plant, with_value
 
+_LEAST_CHANCE_S, _MOST_CHANCE_S = 1.0e-3, 9.0e-3
 _CHANCE_SHARE: Final = 0.25  # of the time that readings may be late is chance: a process that was not woken at once
 
 
@@ -34,7 +40,7 @@ class Options:
     """without: an effect of the base model to switch off, to see it found again. noise_floor_n: known floor, N.
 
     late_s: readings may come up to so much late without being a finding (the wires of a gateway's own recording).
-    quantum_n: step of the readings that is known and no finding either.
+    quantum_n: step of the readings that is known and no finding either. is_own: the plant is that of the recording's rig.
     clock: seconds from anywhere, for the account of where the time went; None: no account.
     """
 
@@ -42,6 +48,7 @@ class Options:
     noise_floor_n: float | None = None
     late_s: float = 0.0
     quantum_n: float = 0.0
+    is_own: bool = False
     clock: Callable[[], float] | None = None
 
 
@@ -59,12 +66,17 @@ def diagnose(
     hidden = frozenset({options.without} if options.without else ())
     account = _Account(options.clock)
     given = plant or DEFAULT_PLANT
+    suspected = suspects(measurements, given, is_own=options.is_own)
+    if any(each.is_sure for each in suspected):
+        return _unjudged(measurements, given, suspected)
     bench, base, whiten = _based(measurements, _prepared(given, hidden), hidden, options.late_s)
     account("base fit")
     bench, base, found_direct = _direct(bench, base, whiten, max(options.quantum_n, given.cell.quantum_n))
-    if options.late_s > 0.0:
+    if options.late_s > 0.0 or any(each.even_s for each in measurements):
         simulated_n = bench.simulate([base.point])[0]
-        bench.doubt_times(simulated_n, _CHANCE_SHARE * options.late_s, fast_noise_n(base.residual_n[bench.judged]))
+        bench.doubt_times(
+            simulated_n, _chance_s(measurements, options.late_s), fast_noise_n(base.residual_n[bench.judged])
+        )
         base = refit(bench, base, whiten)
     effects = _competitors(base.free, hidden, options.late_s)
     found = search(bench, base, effects, whiten, account)
@@ -73,14 +85,52 @@ def diagnose(
     result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
     account("judgement")
     told = [nothing_to_switch_off(options.without)] if options.without and not _has(given, options.without) else []
-    if not blind(measurements) and (why := strange_area(result.base.cylinder.area_m2, given.cylinder.area_m2)):
+    if (
+        not suspected
+        and not blind(measurements)
+        and (why := strange_area(result.base.cylinder.area_m2, given.cylinder.area_m2))
+    ):
         told.append(why)
     return replace(
         result,
         notes=(*result.notes, *told),
+        suspects=suspected,
         base=_with_readings_of(given, result.base),
         plant=_with_readings_of(given, result.plant),
         spent_s=account.spent_s,
+    )
+
+
+def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
+    """How late readings are by chance: what their own times show, else a share of all that they may be late."""
+    if all(each.even_s for each in measurements):
+        return min(max(_LEAST_CHANCE_S, *(each.jitter_s for each in measurements)), _MOST_CHANCE_S)
+    return _CHANCE_SHARE * late_s
+
+
+def _unjudged(measurements: Sequence[Measurement], given: Plant, suspected: tuple[Suspect, ...]) -> Diagnosis:
+    """The answer where columns are wrong: what stands in them, and no cause."""
+    bench = Bench(measurements)
+    simulated_n = bench.simulate([Point(_prepared(given, frozenset()), tuple(0.0 for _ in measurements))])[0]
+    rms_n = float(np.std((bench.measured_n - simulated_n)[bench.judged]))
+    floor_n = min(fast_noise_n(bench.measured_n[bench.judged]), rms_n)
+    return Diagnosis(
+        verdict=Verdict.UNKNOWN,
+        baseline=Baseline(rms_n, floor_n, int(bench.judged.sum()), sum(each.duration_s for each in measurements)),
+        causes=(),
+        leftover=(),
+        not_identifiable=(),
+        rejected=(),
+        extended=Extended(rms_n, False),
+        base=given,
+        plant=given,
+        traces=tuple(
+            Trace(bench.measurements[segment.recording], simulated_n[segment.rows], simulated_n[segment.rows])
+            for segment in bench.segments
+            if segment.is_force
+        ),
+        notes=tuple(note for each in measurements for note in each.notes),
+        suspects=suspected,
     )
 
 
@@ -137,9 +187,9 @@ def _based(
         tries.append((fit_base(bench, start, free, whiten), motion, bench, whiten))
     fitted, motion, bench, whiten = min(tries, key=lambda each: each[0].chi2)
     free = base_parameters(bench, hidden, late_s)
-    if free != fitted.free:
+    if free != fitted.free[: len(free)] or hidden - {"coulomb-friction"} != hidden:
         fitted = fit_base(bench, start, free, whiten)
-    return bench, fitted, whiten
+    return bench, felt(bench, fitted, whiten), whiten
 
 
 def _direct(

@@ -70,7 +70,8 @@ def block_sums(bench: Bench, values: Floats, rows: Floats | None = None) -> Floa
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """Each block judged by the model fitted without it. errors: squared error of the judged force rows; counts: rows.
+    """Each block judged by the model fitted without it. errors: squared error of the judged force rows; counts: rows;
+    squares: squared error of each row, 0 where it is not judged.
 
     steps: how far offsets and free parameters move when a block is left out, (blocks, size).
     """
@@ -78,6 +79,7 @@ class HeldOut:
     errors: Floats
     counts: Floats
     steps: Floats
+    squares: Floats
 
     @property
     def rms_n(self) -> float:
@@ -102,6 +104,7 @@ def held_out(bench: Bench, fitted: Fitted, whiten: Whiten) -> HeldOut:
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
     columns = columns / scale[:, None]
     gram, slope = columns @ columns.T + _RIDGE * np.eye(columns.shape[0]), columns @ residual
+    squares = np.zeros(bench.rows)
     errors, counts, steps = np.zeros(blocks), np.zeros(blocks), np.zeros((blocks, columns.shape[0]))
     for block in range(blocks):
         rows = bench.block_of_row == block
@@ -110,8 +113,9 @@ def held_out(bench: Bench, fitted: Fitted, whiten: Whiten) -> HeldOut:
         steps[block] = np.linalg.lstsq(left, slope - inside @ residual[rows], rcond=1.0e-10)[0] / scale
         judged = rows & bench.judged
         error = fitted.residual_n[judged] - steps[block] @ fitted.jacobian[:, judged]
+        squares[judged] = error**2
         errors[block], counts[block] = float(error @ error), float(judged.sum())
-    return HeldOut(errors, counts, steps)
+    return HeldOut(errors, counts, steps, squares)
 
 
 def covariance(fitted: Fitted, whiten: Whiten) -> Floats:

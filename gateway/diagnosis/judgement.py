@@ -1,28 +1,24 @@
 """From what the search found to the answer: gains on unseen blocks, intervals, the verdict.
 
-The search whitens, for a test needs to know what noise can do. The reported model is the one of the two fits, whitened or
-plain, that predicts the held-out blocks better: where a cause is missing from the catalogue, a whitened fit would
-sacrifice the slow part of the force to details. Standard errors are the larger of the whitened fit's own and the
+What is a finding is decided in worth.py. Standard errors are the larger of the whitened fit's own and the
 jackknife's over blocks, which believes in no noise model.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.random import default_rng
 
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
-from gateway.diagnosis.catalogue_cylinder import AREA
 from gateway.diagnosis.direct import Direct
 from gateway.diagnosis.effect import Effect, Parameter
 from gateway.diagnosis.floor import replicate_floor_n
-from gateway.diagnosis.gram import HeldOut, covariance, held_out
+from gateway.diagnosis.gram import covariance, held_out
 from gateway.diagnosis.identifiability import invisible
-from gateway.diagnosis.noise import Whitener, white
-from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.point import STARTS
+from gateway.diagnosis.refine import Fitted
 from gateway.diagnosis.remarks import remarks, too_high_a_floor
 from gateway.diagnosis.result import (
     Baseline,
@@ -36,28 +32,15 @@ from gateway.diagnosis.result import (
     Trace,
     Verdict,
 )
-from gateway.diagnosis.search import Accepted, Found, without
+from gateway.diagnosis.search import Found
+from gateway.diagnosis.worth import Dropped, Reported, gain_of, share_of_excess, worthy
 from gateway.twin.plant import Plant, with_value
 
 _REACHED: Final = 1.05  # residual over floor that counts as reached
 _ABOVE: Final = 1.1  # residual over a known floor that asks for a cause
-_BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
 _LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
 _DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
-_SAME_AREA: Final = 0.2
 _LEAST_REJECTED: Final = 5.0e-3  # of the RMS
-_SEED: Final = 43
-
-
-@dataclass(frozen=True, slots=True)
-class Reported:
-    """The models that are reported: base, extended, and the extended one without each accepted effect."""
-
-    base: Fitted
-    fitted: Fitted
-    without: tuple[Fitted, ...]
-    whiten: Whitener
-    held_out: HeldOut
 
 
 def judged(
@@ -69,11 +52,11 @@ def judged(
     given_floor_n: float | None,
 ) -> Diagnosis:
     """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
-    found, reported = _worthy(bench, found)
+    found, reported, dropped = worthy(bench, found)
     rms_n = bench.rms_n(reported.base.residual_n)
     too_high = given_floor_n is not None and given_floor_n > rms_n
     known_n = _replicates(bench) if given_floor_n is None or too_high else given_floor_n
-    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n)
+    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n, reported.held_out.rms_n)
     reaches = reported.held_out.rms_n <= _REACHED * floor_n
     causes = _causes(bench, found, reported, floor_n) + _direct_causes(bench, reported, direct, floor_n)
     causes.sort(key=lambda cause: -cause.gain.share_of_excess)
@@ -87,64 +70,21 @@ def judged(
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
-        rejected=_rejected(bench, found, rms_n, {*names, *_grouped(causes), *(each.name for each in unseen)}),
+        rejected=_rejected(bench, found, rms_n, {*names, *_grouped(causes), *(each.name for each in unseen)}, dropped),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant(reported.base),
         plant=_extended(reported, causes),
-        base_parameters=_estimates(bench, reported.base, reported.base.free, reported.whiten),
+        base_parameters=_estimates(
+            bench, reported.base, [each for each in reported.base.free if each.section != STARTS], reported.whiten
+        ),
         traces=_traces(bench, reported),
         experiments=_experiments(causes),
         notes=(
             *remarks(bench.measurements, reported.fitted.point.offsets_n, floor_n),
+            *(each.note for each in dropped),
             *((too_high_a_floor(given_floor_n, rms_n),) if too_high and given_floor_n is not None else ()),
         ),
     )
-
-
-def _worthy(bench: Bench, found: Found) -> tuple[Found, Reported]:
-    """What is reported, without effects that make the unseen blocks worse once everything counts again."""
-    reported = _reported(bench, found)
-    gains = [
-        held_out(bench, without_it, reported.whiten).rms_n - reported.held_out.rms_n for without_it in reported.without
-    ]
-    if not gains or min(gains) > 0.0:
-        return found, reported
-    worst = int(np.argmin(gains))
-    kept = found.accepted[:worst] + found.accepted[worst + 1 :]
-    fitted = without(bench, found.fitted, found.base, found.accepted[worst], kept, found.whiten) if kept else found.base
-    return _worthy(bench, replace(found, fitted=fitted, accepted=kept))
-
-
-def _reported(bench: Bench, found: Found) -> Reported:
-    """Every model twice, whitened and plain; the kind whose extended model predicts better.
-
-    Dependences without a name count again: the reported errors are those of the simulation, and of nothing beside it.
-    """
-    bench.put_back()
-    plain = white(bench, found.fitted.residual_n)
-    models = [found.base, found.fitted, *(_without(each, found) for each in found.accepted)]
-    problems = [Problem(each.point, each.free) for each in models]
-    kinds = [(found.whiten, refine(bench, problems, found.whiten, waves=3)), (plain, _plainly(bench, problems, plain))]
-    errors = [held_out(bench, fits[1], whiten) for whiten, fits in kinds]
-    best = 1 if errors[1].rms_n < _BETTER * errors[0].rms_n else 0
-    whiten, fits = kinds[best]
-    return Reported(fits[0], fits[1], tuple(fits[2:]), whiten, errors[best])
-
-
-def _plainly(bench: Bench, problems: Sequence[Problem], plain: Whitener) -> list[Fitted]:
-    """Each model at its plain optimum. The whitened one may be far from it in the area, which slow changes tell best:
-    then it is looked for from the base model's plain area, too."""
-    fits = refine(bench, problems, plain, waves=3)
-    area_m2 = fits[0].point.value(AREA)
-    if all(abs(each.point.value(AREA) / area_m2 - 1.0) < _SAME_AREA for each in fits):
-        return fits
-    again = [Problem(each.point.moved(AREA, area_m2), each.free) for each in fits]
-    others = refine(bench, again, plain, waves=12)
-    return [min(pair, key=lambda each: each.chi2) for pair in zip(fits, others, strict=True)]
-
-
-def _without(accepted: Accepted, found: Found) -> Fitted:
-    return found.base if len(found.accepted) == 1 else accepted.contest.beside
 
 
 def _verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
@@ -165,24 +105,10 @@ def _causes(bench: Bench, found: Found, reported: Reported, floor_n: float) -> l
             accepted.contest.group(accepted.effect.name),
             accepted.contest.shares.get(accepted.effect.name, 0.0),
             _estimates(bench, reported.fitted, accepted.form.parameters, reported.whiten),
-            _gain(held_out(bench, without, reported.whiten), reported.held_out, floor_n),
+            gain_of(held_out(bench, without, reported.whiten), reported.held_out, floor_n),
         )
         for accepted, without in zip(found.accepted, reported.without, strict=True)
     ]
-
-
-def _gain(before: HeldOut, after: HeldOut, floor_n: float) -> Gain:
-    blocks = before.errors.size
-    weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=400)
-    rms_before = np.sqrt((weights @ before.errors) / (weights @ before.counts))
-    rms_after = np.sqrt((weights @ after.errors) / (weights @ after.counts))
-    low, high = np.quantile(rms_before - rms_after, (0.025, 0.975))
-    return Gain(before.rms_n, after.rms_n, (float(low), float(high)), _share(before.rms_n, after.rms_n, floor_n))
-
-
-def _share(before_n: float, after_n: float, floor_n: float) -> float:
-    excess = before_n**2 - min(floor_n, after_n) ** 2
-    return float(min(max((before_n**2 - after_n**2) / excess, 0.0), 1.0)) if excess > 0.0 else 0.0
 
 
 def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], floor_n: float) -> list[Cause]:
@@ -196,8 +122,11 @@ def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], f
             before_n, now_n = after_n, float(np.sqrt(max(after_n**2 - each.values[0][1] ** 2 / 12.0, 0.0)))
         else:
             now_n = after_n
-        if before_n**2 - now_n**2 > _LEAST_DIRECT * before_n**2 or each.name == "repeated-samples":
-            gain = Gain(before_n, now_n, (before_n - now_n, before_n - now_n), _share(before_n, now_n, floor_n))
+        least = 0.0 if each.name == "repeated-samples" else _LEAST_DIRECT  # few copies are no chance either
+        if before_n**2 - now_n**2 > least * before_n**2:
+            gain = Gain(
+                before_n, now_n, (before_n - now_n, before_n - now_n), share_of_excess(before_n, now_n, floor_n)
+            )
             causes.append(Cause(each.name, (each.name,), 0.99, _direct_estimates(each), gain))
     return causes
 
@@ -245,17 +174,20 @@ def _grouped(causes: Sequence[Cause]) -> set[str]:
     return {name for cause in causes for name in cause.group}
 
 
-def _rejected(bench: Bench, found: Found, rms_n: float, told: set[str]) -> tuple[Rejected, ...]:
+def _rejected(
+    bench: Bench, found: Found, rms_n: float, told: set[str], dropped: Sequence[Dropped]
+) -> tuple[Rejected, ...]:
     """Losers of the first contest and of the last, by the part of the RMS that they would save of unseen blocks, N."""
-    gains: dict[str, float] = {}
+    gains = {each.name: each.gain_n for each in dropped}
     for contest in (found.first, found.last):
         before_n = held_out(bench, contest.beside, found.whiten).rms_n
         for finalist in contest.finalists:
-            if finalist.effect.name not in told:
+            if finalist.effect.name not in {*told, *(each.name for each in dropped)}:
                 share = 1.0 - held_out(bench, finalist.fitted, found.whiten).rms_n / before_n
                 gains[finalist.effect.name] = rms_n * share
     best = sorted(gains.items(), key=lambda item: -item[1])
-    return tuple(Rejected(name, gain_n) for name, gain_n in best if gain_n > _LEAST_REJECTED * rms_n)
+    known = {each.name for each in dropped}
+    return tuple(Rejected(name, gain_n) for name, gain_n in best if name in known or gain_n > _LEAST_REJECTED * rms_n)
 
 
 def _traces(bench: Bench, reported: Reported) -> tuple[Trace, ...]:

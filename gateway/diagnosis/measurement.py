@@ -22,6 +22,8 @@ class Measurement:
 
     usable: rows whose force may be judged (a finite, valid reading, and a drive that is known at that time).
     repeated: rows whose reading is exactly the one before, where that is no chance (see the reader).
+    even_s: distance of rows that the reader has made even, s, 0 where they are as recorded; jitter_s: how far the readings'
+    own times were scattered about such rows (standard deviation).
     """
 
     name: str
@@ -34,6 +36,8 @@ class Measurement:
     position_m: Floats | None = None
     covariates: Mapping[str, Floats] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    even_s: float = 0.0
+    jitter_s: float = 0.0
 
     @property
     def rows(self) -> int:

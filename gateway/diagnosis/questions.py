@@ -15,6 +15,7 @@ import numpy as np
 
 from gateway.diagnosis.bench import BLOCKS, SURROUNDINGS, Bench
 from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import fast_noise_n
 from gateway.diagnosis.scene import lines_hz
 
 _STEPS: Final = 40  # places where a jump in time is looked for
@@ -40,7 +41,8 @@ def questions(bench: Bench, residual_n: Floats, white: Floats) -> Iterator[Quest
     yield from _of_columns(bench, force)
     yield from _of_time(bench, force)
     yield from _of_lines(bench, white)
-    yield from _of_motion(bench, simulated, force)
+    if float(np.std(simulated[bench.judged])) > fast_noise_n(residual_n[bench.judged]):  # else a trim follows the noise
+        yield from _of_motion(bench, simulated, force)
 
 
 def standard(column: Floats, bench: Bench) -> Floats:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.diagnosis.suspects import Suspect
 from gateway.twin.plant import Plant
 
 Interval = tuple[float, float]
@@ -108,7 +109,10 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """The whole answer. base and plant: the refitted base model and the extended one (its intervals in `causes`)."""
+    """The whole answer. base and plant: the refitted base model and the extended one (its intervals in `causes`).
+
+    suspects: columns that are probably not what their names say: before anything else is believed.
+    """
 
     verdict: Verdict
     baseline: Baseline
@@ -123,4 +127,5 @@ class Diagnosis:
     traces: tuple[Trace, ...] = ()
     experiments: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    suspects: tuple[Suspect, ...] = ()
     spent_s: Mapping[str, float] = field(default_factory=dict)

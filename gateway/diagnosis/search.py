@@ -1,10 +1,10 @@
 """The search: add the winner of a contest while it pays, then let every accepted effect compete for its place again.
 
 Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
-not see, in nearly all ways to resample them; at least 4 % of the held-out squared error, or 2 % where chi-square
-overwhelms; and, for every effect after the first, a few percent of what the others explain, or much of the error that is
-left: no form is exact, and what a cause's wrong form leaves must not be named. What oscillates does not count there: the
-rest of a sine is no bent line.
+not see, in nearly all ways to resample them, and without the blocks that still feel how the recording began; at least
+4 % of the held-out squared error, or 2 % where chi-square overwhelms; and, for every effect after the first, a few
+percent of what the others explain, or much of the error that is left: no form is exact, and what a cause's wrong form
+leaves must not be named. What oscillates does not count there: the rest of a sine is no bent line.
     - Two causes together may look like a third one: where resampling does not decide, the winner's rivals are judged
       with the best companion that each finds.
     - A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
@@ -18,13 +18,14 @@ from typing import Final
 
 import numpy as np
 from numpy.random import default_rng
+from numpy.typing import NDArray
 
 from gateway.diagnosis.base_fit import refit
 from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.candidates import remainder, wave
 from gateway.diagnosis.contest import Contest, Finalist, finalist, hold, joined, significant
 from gateway.diagnosis.effect import Effect, Form, Parameter, Scene
-from gateway.diagnosis.gram import held_out, orthonormal
+from gateway.diagnosis.gram import block_sums, held_out, orthonormal
 from gateway.diagnosis.noise import Whitener, coloured
 from gateway.diagnosis.point import back_at
 from gateway.diagnosis.refine import Fitted, Problem, Whiten, refine
@@ -219,8 +220,9 @@ def _saved(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, exp
     an overwhelming chi-square stands for it, also beside what the effects before it have `explained`. Not so for a saw
     tooth: it is there all the time, and among so many teeth some meet the few moments that another form got wrong.
     """
-    error_before = held_out(bench, before, whiten).errors
-    saved = error_before - held_out(bench, winner.fitted, whiten).errors
+    old = _old_blocks(bench)
+    error_before = held_out(bench, before, whiten).errors[old]
+    saved = error_before - held_out(bench, winner.fitted, whiten).errors[old]
     weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
     if winner.form.everywhere:
         sure = float(np.sum(np.sort(saved)[_MOMENTS:-_MOMENTS])) > _ELSEWHERE * float(np.sum(saved))
@@ -228,6 +230,13 @@ def _saved(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, exp
         overwhelming = winner.gain > max(_OVERWHELMING, 0.5 * explained)
         sure = overwhelming or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
     return max(float(np.sum(saved)), 0.0) / float(np.sum(error_before)) if sure else 0.0
+
+
+def _old_blocks(bench: Bench) -> NDArray[np.intp]:
+    """Blocks that do not feel any more how their recording began: a cause must show without the first seconds, too."""
+    counted = block_sums(bench, bench.judged.astype(np.float64))
+    young = block_sums(bench, (bench.judged & bench.young).astype(np.float64))
+    return np.flatnonzero(young <= 0.5 * counted)
 
 
 def _exchanged(

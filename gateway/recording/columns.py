@@ -36,3 +36,6 @@ DERIVED: Final = (
 
 LADDER: Final = ("phase", "group", "stair")
 """What it adds to a calibration ladder: where the run is, by its plan (gateway.bsfm.ladder_labels)."""
+
+SENT: Final = ("sent_v", "sent_age_s")
+"""What our recorder writes since it knows the wire: the last voltage sent, and how long before the row."""

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.recording.columns import CONTRACT, DERIVED, LADDER
+from gateway.recording.columns import CONTRACT, DERIVED, LADDER, SENT
 from gateway.recording.mapping import listed
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ def is_ours(columns: Mapping[str, Floats]) -> bool:
 def covariates(columns: Mapping[str, Floats], time_s: Floats, force_n: Floats) -> tuple[dict[str, Floats], list[str]]:
     """The covariates without holes, and what was left out or filled. columns: all of the recording, at these times."""
     ours = is_ours(columns)
-    names = [name for name in columns if name not in JUDGED and not (ours and name in (*DERIVED, *LADDER))]
+    names = [name for name in columns if name not in JUDGED and not (ours and name in (*DERIVED, *LADDER, *SENT))]
     dropped: dict[str, list[str]] = {}
     found: dict[str, Floats] = {}
     filled: list[str] = []

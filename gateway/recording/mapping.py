@@ -1,8 +1,8 @@
 """Which column of a foreign table is which column of the contract, and in which unit: `--columns time_s=1:ms,force_n=7:n`.
 
 NAME=SOURCE[:UNIT]: NAME as in the contract, or that of a covariate; SOURCE a column's number from 1 or its header;
-UNIT what the numbers are in, by default what NAME ends with. Columns that are not mentioned keep their header's name;
-one without a header's name is left out, for nobody could ask for it.
+UNIT what the numbers are in, by default what NAME ends with, with a minus where their sign is turned (`:-n`). Columns
+that are not mentioned keep their header's name; one without a header's name is left out, for nobody could ask for it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -93,7 +93,7 @@ def _check_unit(name: str, unit: str) -> None:
             f"--columns: {name} ends with no unit, so :{unit} cannot be turned into one; leave it out, or name the "
             "column as the contract does (time_s, force_n, pressure_kpa, ...)"
         )
-    if unit not in LINEAR[quantity[0]]:
+    if unit.removeprefix("-") not in LINEAR[quantity[0]]:
         allowed = ", ".join(LINEAR[quantity[0]])
         raise RecordingError(f"--columns: {unit!r} is no unit for {name}; allowed: {allowed}")
 
@@ -116,7 +116,8 @@ def _picked(source: ColumnSource, names: Sequence[str], file: str) -> Picked:
     quantity = quantity_of(source.name)
     if source.unit is None or quantity is None:
         return Picked(index, source.name)
-    return Picked(index, source.name, *linear_conversion(quantity[0], source.unit, quantity[1]))
+    factor, offset = linear_conversion(quantity[0], source.unit.removeprefix("-"), quantity[1])
+    return Picked(index, source.name, *((-factor, -offset) if source.unit.startswith("-") else (factor, offset)))
 
 
 def _index(source: ColumnSource, names: Sequence[str], file: str) -> int:

@@ -11,8 +11,10 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
+from gateway.recording.columns import SENT
 from gateway.recording.covariates import covariates, filled_in, is_constant, is_ours
 from gateway.recording.errors import RecordingError
+from gateway.recording.even_rows import evened
 from gateway.recording.judged_rows import repeated_readings, valid_by_quality
 from gateway.recording.mapping import EXAMPLE, listed, quantity_of
 from gateway.recording.reader import Recording
@@ -46,7 +48,7 @@ def measurement_of(recording: Recording) -> Measurement:
     position_m, said = _position_m(columns, axis.time_s)
     others, heard = covariates(columns, axis.time_s, columns["force_n"])
     heard += _suspicious(columns["force_n"][usable], {name: values[usable] for name, values in drive.items()})
-    return Measurement(
+    found = Measurement(
         name=recording.path.name,
         time_s=axis.time_s,
         force_n=columns["force_n"],
@@ -58,6 +60,7 @@ def measurement_of(recording: Recording) -> Measurement:
         covariates=others,
         notes=(*notes, *told, *said, *heard),
     )
+    return evened(found, *(columns[name] for name in SENT)) if set(SENT) <= set(columns) else found
 
 
 def _check_columns(recording: Recording) -> None:

@@ -25,6 +25,7 @@ SETTLING_S: Final = 0.5
 _COARSE_S: Final = 1.0
 TOO_COARSE_S: Final = 2.0
 """From here on every response that the catalogue knows is over between two rows; times in ms look like this."""
+_MICROSECONDS_S: Final = 1000.0  # as ms, that would still be one row a second
 _SAME_S: Final = 1.0e-9  # what adding and scaling leaves of two equal stamps
 
 
@@ -79,9 +80,10 @@ def _unknown(recording: Recording, known: Flags) -> list[str]:
 def _refuse_coarse(recording: Recording, time_s: Floats) -> None:
     median_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
     if median_s >= TOO_COARSE_S:
+        unit = "us" if median_s >= _MICROSECONDS_S else "ms"
         raise RecordingError(
             f"{recording.path}, column time_s: one row every {median_s:.3g} s, and a force follows its command within one: "
-            "nothing can be judged between such rows. Are the times in ms? then --columns time_s=...:ms"
+            f"nothing can be judged between such rows. Are the times in {unit}? then --columns time_s=...:{unit}"
         )
 
 

@@ -179,8 +179,8 @@ class Gateway:
 
     def _record(self) -> None:
         if self.recordings and self.sample and self.decision:
-            self.recordings.append(self.sample, self.decision, self.output.pressure_pa)
+            self.recordings.append(self.sample, self.decision, self.output.line)
         if self.ladder and self.sample and self.decision:
-            self.ladder.append(self.sample, self.decision, self.output.pressure_pa)
+            self.ladder.append(self.sample, self.decision, self.output.line)
         if self.ring and self.sample and self.decision:
-            self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.pressure_pa))
+            self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.line))

@@ -23,6 +23,7 @@ from gateway.recording import Recorder
 from gateway.recording.columns import LADDER
 from gateway.registers.words import CalibrationPhase
 from gateway.service.fit_child import FitChild, Result
+from gateway.service.output_exchange import LineState
 from gateway.service.requests import CalibrateRequest, read
 from gateway.service.run_recording import COLUMNS, RunRecording
 
@@ -133,15 +134,15 @@ class LadderKeeper:
         elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
 
-    def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
+    def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         """The cell's own force, without the payload's weight: that is what the model speaks."""
         if self._recording and self._calibrating.running:
             self._payload_n = decision.force_measured_n - self._calibrating.cell_n
             row = replace(decision, force_measured_n=self._calibrating.cell_n)
-            self._recording.append(sample, row, pressure_pa, *self._labels())
+            self._recording.append(sample, row, line, *self._labels())
         elif self._recording and self._closing_s is not None:
             row = replace(decision, force_measured_n=decision.force_measured_n - self._payload_n)
-            self._recording.append(sample, row, pressure_pa, float(self._calibrating.phase), -1.0, float(self._stairs))
+            self._recording.append(sample, row, line, float(self._calibrating.phase), -1.0, float(self._stairs))
             self._close_ladder()
 
     def _labels(self) -> tuple[float, ...]:

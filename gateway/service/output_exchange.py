@@ -12,6 +12,7 @@ asked last is believed by nobody: the line is left alone for one reply time, the
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import inf, nan
 
 from gateway.devices import OutputHost
@@ -30,6 +31,16 @@ _FAILURES_BEFORE_FAULT = 3  # SAFETY: T_dac is three writes or 100 ms; one bad e
 _POLL_PERIOD_S = 0.1
 
 
+@dataclass(frozen=True, slots=True)
+class LineState:
+    """What a recording keeps of the line. pressure_pa: last measured; sent_v: the last voltage that was written to the wire,
+    and when, sent_s; nan before the first."""
+
+    pressure_pa: float = nan
+    sent_v: float = nan
+    sent_s: float = nan
+
+
 class OutputExchange:
     """Asks the device through `write`, keeps what it answered.
 
@@ -40,6 +51,7 @@ class OutputExchange:
     def __init__(self, host: OutputHost, write: Callable[[bytes], None], reply_timeout_s: float) -> None:
         self._host = host
         self._write = write
+        self._sent_v = self._setting_s = nan
         self._reply_timeout_s = reply_timeout_s
         self.garbage_bytes = 0
         self.round_trip_s = nan
@@ -67,6 +79,10 @@ class OutputExchange:
     def sent_v(self) -> float | None:
         """The setting that went out last, None before the first."""
         return self._asked_v if self._asked_v < inf else None
+
+    @property
+    def line(self) -> LineState:
+        return LineState(self.pressure_pa, self._sent_v, self._setting_s)
 
     def want(self, voltage_v: float, now_s: float) -> None:
         """This voltage shall stand on the device, V; sent at once if the wire is free, else as soon as it is."""
@@ -97,6 +113,7 @@ class OutputExchange:
             self._asked_v, self._standing_v = wanted_v, None
             if self._host.idle_question is None:  # this is what a poll would say
                 self._next_poll_s = now_s + _POLL_PERIOD_S
+            self._sent_v, self._setting_s = wanted_v, now_s
             self._send(SetVoltage(wanted_v), now_s)
         elif now_s >= self._next_poll_s:
             self._next_poll_s = now_s + _POLL_PERIOD_S

@@ -8,6 +8,7 @@ from gateway.devices.messages import ForceSample
 from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.service.event_log import EventLog
+from gateway.service.output_exchange import LineState
 from gateway.service.run_recording import COLUMNS, RunRecording
 
 
@@ -47,9 +48,9 @@ class Recordings:
             return {"recording": None}
         return {"recording": str(self._current.recorder.path), "rows": self._current.rows}
 
-    def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
+    def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         if self._current:
-            self._current.append(sample, decision, pressure_pa)
+            self._current.append(sample, decision, line)
 
     def flush(self, now_s: float) -> None:
         """Once a tick; a recorder that has stopped by itself (disk full) is said once and let go."""

@@ -2,12 +2,13 @@
 
 The diagnosis takes a refit of gain, lag and Coulomb friction for granted; here they are differences from the rig's plant
 like any other. What counts is the force: each change is undone by itself in the replay, and the root mean square of
-what that does to the force is its weight. A change of less than a quarter of the tolerance band disturbs nobody.
+what that does to the force is its weight, and no more than what it saves. A change of less than a quarter of the tolerance
+band disturbs nobody, and neither does one in a window whose force is where the reference says.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from gateway.diagnosis import Diagnosis, Measurement
 from gateway.diagnosis.result import Gain
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.watch_opinion import Finding
-from gateway.service.watch_reference import Reference, residuals
+from gateway.service.watch_reference import Reference, residuals, rms_of
 from gateway.service.watch_window import Window
 from gateway.twin.plant import Plant, with_value
 
@@ -45,12 +46,12 @@ class Change:
 
 def finding_of(window: Window, found: Diagnosis, reference: Reference, least_n: float) -> Finding:
     """The strongest difference of this window from the reference; least_n: what a difference must do to the force, N."""
+    excess_n = excess_of(window, reference)
     changes = [change for change in weighed(window, found, reference.plant) if change.force_n >= least_n]
-    if changes:
+    if changes and excess_n >= least_n:
         best = max(changes, key=lambda change: change.force_n)
         sentence = _sentence(best, found.plant, reference.plant)
         return Finding(ResidualCause.of_effect(best.name), sentence, window.excitation_v, best.others)
-    excess_n = excess_of(window, reference)
     if excess_n >= _WITHOUT_A_NAME * least_n:
         sentence = f"{_DIFFERS} {excess_n:.2f} N (rms): {_described(found)}"
         return Finding(ResidualCause.UNKNOWN, sentence, window.excitation_v)
@@ -67,6 +68,8 @@ def excess_of(window: Window, reference: Reference) -> float:
 
 def _described(found: Diagnosis) -> str:
     """What no effect explains, in the words of the screen."""
+    if found.suspects:
+        return found.suspects[0].sentence
     if not found.leftover:
         return "no cause of the catalogue explains it"
     left = max(found.leftover, key=lambda each: each.share)
@@ -81,7 +84,8 @@ def weighed(window: Window, found: Diagnosis, plant: Plant) -> list[Change]:
         changes.append(Change(_possible(cause.name, cause.group), parameters, cause.group))
     undone = [_undone(found.plant, plant, change) for change in changes]
     forces = residuals(window.measurement, [found.plant, *undone])
-    most_n = [inf] * len(BASE) + [_saved_n(cause.gain) for cause in found.causes]
+    refit_n = sqrt(max(rms_of(window.measurement, plant) ** 2 - rms_of(window.measurement, found.plant) ** 2, 0.0))
+    most_n = [refit_n] * len(BASE) + [min(_saved_n(cause.gain), refit_n) for cause in found.causes]
     weights = np.minimum(np.std(forces[1:] - forces[0], axis=1), most_n)
     return [
         Change(change.name, change.parameters, change.others, float(weight))

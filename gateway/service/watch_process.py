@@ -79,7 +79,7 @@ def watch_of(ring: RingReader, options: dict[str, Any]) -> "Watch":
 def diagnosed(measurements: "Sequence[Measurement]", plant: "Plant") -> "Diagnosis":
     from gateway.diagnosis import Options, diagnose
 
-    return diagnose(measurements, plant, Options())
+    return diagnose(measurements, plant, Options(is_own=True))
 
 
 def pause_s(every_s: float, spent_s: float) -> float:

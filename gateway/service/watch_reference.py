@@ -16,11 +16,11 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis import Diagnosis
-from gateway.diagnosis.bench import drive_of
+from gateway.diagnosis.bench import Bench, replay_of
 from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.diagnosis.start import at_its_best
 from gateway.service.watch_window import Window
 from gateway.twin.plant import Plant, with_value
-from gateway.twin.replay import Replay
 
 LINES: Final = {
     "regulator.delay_s": 0.035,
@@ -44,9 +44,8 @@ class Reference:
         self.plant = with_value(self.plant, "cell", "noise_n", 0.0)
 
     def rms_n(self, window: Window) -> float:
-        """Measured minus replayed over the judged rows, without its mean: a tare is no difference."""
-        residual_n = residuals(window.measurement, [self.plant])[0]
-        return float(np.std(residual_n))
+        """Measured minus replayed over the judged rows, see `rms_of`."""
+        return rms_of(window.measurement, self.plant)
 
     def floor_n(self, window: Window) -> float | None:
         """The floor for such a window; None where none is known."""
@@ -71,9 +70,16 @@ class Reference:
                 self.plant = with_value(self.plant, section, name, value)
 
 
+def rms_of(measurement: Measurement, plant: Plant) -> float:
+    """Measured minus replayed over the judged rows, N, without its mean and with the start that fits best: a tare is no
+    difference, and neither is what friction remembers from before the window."""
+    bench = Bench([measurement])
+    return bench.rms_n(at_its_best(bench, plant).residual_n)
+
+
 def residuals(measurement: Measurement, plants: list[Plant]) -> Floats:
     """Measured minus replayed at the judged rows; shape (plants, judged rows)."""
-    readings_n = Replay(drive_of(measurement, "inferred")).run(plants).reading_n
+    readings_n = replay_of(measurement, "inferred").run(plants).reading_n
     return np.asarray((measurement.force_n - readings_n)[:, measurement.usable])
 
 

@@ -7,7 +7,7 @@ Made for a search that tries hundreds of plants on one recording, so it differs 
     - no noise; the null value of a random effect (repeats, outliers) is told apart by rows that the caller names.
 Work is shared: plants with equal regulators share a pressure, those with equal friction besides share a slide, within a
 call and between calls. The stages stand in replay_*.py: grid, regulator, slide (with play, elastic, measured), reading.
-The state before the first row is rest under the command `before_v`.
+The state before the first row is rest under the command `before_v`; what friction remembers there may be given.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.twin.plant import Plant
-from gateway.twin.replay_drive import Drive, Floats
+from gateway.twin.replay_drive import Drive, Floats, Strains
 from gateway.twin.replay_force import Forces
 from gateway.twin.replay_grid import MOST_STEPS, Grid
 from gateway.twin.replay_reading import Readings
@@ -81,13 +81,16 @@ class Replay:
     def notes(self) -> tuple[str, ...]:
         return self.grid.notes
 
-    def run(self, plants: Sequence[Plant]) -> Response:
-        """Replay the recording with each plant. ValueError when there is none, or one is stacked."""
+    def run(self, plants: Sequence[Plant], starts: Sequence[Strains | None] | None = None) -> Response:
+        """Replay the recording with each plant. ValueError when there is none, or one is stacked.
+
+        starts: what each plant's friction remembers when the slide begins (`Drive.settled_s`); None: rest without pressure.
+        """
         if not plants:
             raise ValueError("a replay needs at least one plant")
         plants = [single(plant) for plant in plants]
         pressures, which = self._pressures.of([plant.regulator for plant in plants])
-        slides = self._slides.of(plants, pressures, which)
+        slides = self._slides.of(plants, pressures, which, starts or [None] * len(plants))
         force = np.empty((len(plants), self.grid.rows))
         reading = np.empty_like(force)
         for lane, (plant, slide_n) in enumerate(zip(plants, slides, strict=True)):

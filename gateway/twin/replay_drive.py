@@ -10,6 +10,12 @@ from gateway.twin.surroundings import COLUMNS, UNKNOWN, Surroundings
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
+Strains: TypeAlias = tuple[float, float, float]
+"""What friction remembers, -1..1 for each of its three elements, the stiffest first.
+
+The first is the stiffest element's strain; each further one how an element stands beyond the one before it, as a share of
+what it may: d z = d' z' + (d - d') u. So any three numbers are a state that some history leaves, all 1 is the rising branch,
+and a reversal turns the first number first."""
 Motion: TypeAlias = Literal["inferred", "measured", "measured-reversed"]
 
 
@@ -23,6 +29,7 @@ class Drive:
     position_noise_m: standard deviation; friction elements are made so wide that it does not move them.
     repeated: rows known to repeat the reading before. outliers: spike of each row, in units of the cell's outlier_n.
     before_v: command for a long time before the first row; None: that of the first row.
+    settled_s: until then the pressure is that of this moment for the slide: what went in before the first row has gone.
     """
 
     time_s: Floats
@@ -35,6 +42,7 @@ class Drive:
     repeated: Flags | None = None
     outliers: Floats | None = None
     before_v: float | None = 0.0
+    settled_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.time_s.ndim != 1 or self.time_s.size < 2 or self.time_s[0] != 0.0:

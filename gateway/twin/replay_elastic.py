@@ -64,6 +64,10 @@ def elastic(loads: list[Load], grid: Grid) -> list[Floats]:
     share = together([load.limit_n for load in loads]) * (1.0 / ELEMENTS)
     state, found = np.zeros((ELEMENTS + 1, len(loads))), np.empty_like(drive)
     _march(lanes.at_rest(), drive[:1], share[:1], state, found[:1])
+    for lane, load in enumerate(loads):
+        if load.start is not None:
+            state[:, lane] = load.begins_n, *reversed(load.strains)
+            found[0, lane] = load.begins_n
     if len(loads) <= _SINGLY:
         for lane in range(len(loads)):
             found[1:, lane] = _single(lanes, lane, _listed(lanes.stiffness, drive[1:], share[1:], lane), state)

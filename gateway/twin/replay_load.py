@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.twin.elementwise import Real
-from gateway.twin.friction import side_load_n, side_share, two_sided
+from gateway.twin.friction import ELEMENTS, side_load_n, side_share, two_sided
 from gateway.twin.plant import Plant
-from gateway.twin.replay_drive import Floats
+from gateway.twin.replay_drive import Floats, Strains
 from gateway.twin.sections import Friction
 from gateway.twin.slide import weight_n
 from gateway.twin.surroundings import Moment
@@ -15,13 +15,33 @@ from gateway.twin.surroundings import Moment
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Load:
-    """What presses on one slide: drive_n and limit_n on the grid, weight and the friction's centre included."""
+    """What presses on one slide: drive_n and limit_n on the grid, weight and the friction's centre included.
+
+    start: what friction remembers at the first point; None: it came to rest from no pressure.
+    """
 
     plant: Plant
     pressure_pa: Floats
     thrust_n: Floats
     drive_n: Floats
     limit_n: Floats
+    start: Strains | None = None
+
+    @property
+    def strains(self) -> tuple[float, float, float]:
+        """Of the elements at the first point, the stiffest first; no more than the thrust strains: a pad does not pull."""
+        assert self.start is not None
+        limit_n = float(self.limit_n[0])
+        most = float(self.drive_n[0]) / limit_n if limit_n > 0.0 else 1.0
+        one, two, three = self.start
+        two = 0.5 * (one + two)
+        three = (2.0 * two + three) / 3.0
+        return min(one, most), min(two, most), min(three, most)
+
+    @property
+    def begins_n(self) -> float:
+        """Force at the first point where its strains are given, N."""
+        return float(self.drive_n[0]) - float(self.limit_n[0]) * sum(self.strains) / ELEMENTS
 
     @property
     def rubs(self) -> bool:
@@ -47,7 +67,7 @@ def sideways_n(friction: Friction, thrust_n: Floats, moment: Moment) -> Real:
     return side + side_share(friction, moment) * thrust_n if friction.side_load_n_per_n else side
 
 
-def loaded(plant: Plant, pressure_pa: Floats, moment: Moment) -> Load:
+def loaded(plant: Plant, pressure_pa: Floats, moment: Moment, start: Strains | None = None) -> Load:
     """Thrust and friction limit of a plant under a pressure."""
     friction, contact = plant.friction, plant.contact
     thrust = plant.cylinder.area_m2 * pressure_pa
@@ -56,4 +76,4 @@ def loaded(plant: Plant, pressure_pa: Floats, moment: Moment) -> Load:
     if friction.asymmetry_n != 0.0:
         limit, centre = two_sided(limit, friction.asymmetry_n)
         drive = drive - centre
-    return Load(plant, pressure_pa, thrust, drive, limit)
+    return Load(plant, pressure_pa, thrust, drive, limit, start)

@@ -19,9 +19,9 @@ from gateway.twin.replay_grid import Grid
 from gateway.twin.replay_load import Load
 from gateway.twin.replay_parts import apart, in_parts, together
 
-Band: TypeAlias = tuple[Floats, Floats, float, Real, Real]
+Band: TypeAlias = tuple[Floats, Floats, float, Real, Real, float]
 """Lower edge, upper edge, force at the back stop (negative beyond a gap), N; share of the way out that a step goes, and of
-the way in: one for all steps, or one for each."""
+the way in: one for all steps, or one for each; force to begin with, N."""
 
 _SINGLY: Final = 12  # lanes that are faster one by one in floats than together in numpy
 
@@ -30,11 +30,13 @@ def played(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
     bands = [_band(load, grid.steps_s) for load in loads]
     found = {
-        lane: low for lane, (low, high, _, *shares) in enumerate(bands) if low is high and all(map(_is_whole, shares))
+        lane: low
+        for lane, (low, high, _, *shares, _) in enumerate(bands)
+        if low is high and all(map(_is_whole, shares))
     }
     dragged = [lane for lane in range(len(loads)) if lane not in found]
     if len(dragged) <= _SINGLY:
-        found |= {lane: _single(*bands[lane]) for lane in dragged}
+        found |= {lane: _single(bands[lane]) for lane in dragged}
     else:
         found |= zip(dragged, _together([bands[lane] for lane in dragged]), strict=True)
     return [np.maximum(found[lane], 0.0) if band[2] < 0.0 else found[lane] for lane, band in enumerate(bands)]
@@ -56,7 +58,8 @@ def _band(load: Load, steps_s: Real) -> Band:
     if back_n < 0.0:
         low, high = np.where(low > 0.0, low, back_n), np.where(high >= 0.0, high, back_n)
     out, back = (_share(drag, contact.pad_stiffness_n_per_m, steps_s) for drag in drags(load.plant.friction))
-    return (*_bounded(low, high, back_n, most_n), back_n, out, back)
+    start_n = back_n if load.start is None or back_n < 0.0 else load.begins_n
+    return (*_bounded(low, high, back_n, most_n), back_n, out, back, start_n)
 
 
 def _share(drag_n_s_per_m: Real, stiffness_n_per_m: float, steps_s: Real) -> Real:
@@ -74,8 +77,9 @@ def _bounded(low: Floats, high: Floats, back_n: float, most_n: float) -> tuple[F
     return (high, high) if same else (low, high)
 
 
-def _single(low: Floats, high: Floats, start_n: float, out: Real, back: Real) -> Floats:
+def _single(band: Band) -> Floats:
     """One lane in floats."""
+    low, high, _, out, back, start_n = band
     force = min(max(start_n, float(low[0])), float(high[0]))
     found, least_n, most_n = [force], low[1:].tolist(), high[1:].tolist()
     if _is_whole(out) and _is_whole(back):
@@ -96,7 +100,7 @@ def _single(low: Floats, high: Floats, start_n: float, out: Real, back: Real) ->
 def _together(bands: list[Band]) -> list[Floats]:
     """All lanes at once, and parts of the recording beside each other."""
     low, high = together([band[0] for band in bands]), together([band[1] for band in bands])
-    start = np.clip(np.array([band[2] for band in bands]), low[0], high[0])
+    start = np.clip(np.array([band[5] for band in bands]), low[0], high[0])
     guess = np.where(low[1:] >= low[:-1], low[:-1], high[:-1])
     ways = [[band[way] for band in bands] for way in (3, 4)]
     dragged = not all(_is_whole(share) for shares in ways for share in shares)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gateway.twin.friction import DRY
 from gateway.twin.plant import Plant
 from gateway.twin.replay_cache import Cache
-from gateway.twin.replay_drive import Drive, Floats
+from gateway.twin.replay_drive import Drive, Floats, Strains
 from gateway.twin.replay_elastic import elastic
 from gateway.twin.replay_grid import Grid
 from gateway.twin.replay_load import Load, loaded
@@ -38,19 +38,32 @@ class Slides:
         self._motions = None if drive.motion == "inferred" else Motions(drive, grid)
         self._driven = drive.command_v is not None
         self._forces = Cache()
+        self._first = int(np.searchsorted(grid.time_s, drive.settled_s)) if drive.settled_s > 0.0 else 0
 
-    def of(self, plants: Sequence[Plant], pressures: Sequence[Floats], which: NDArray[np.intp]) -> list[Floats]:
+    def of(
+        self,
+        plants: Sequence[Plant],
+        pressures: Sequence[Floats],
+        which: NDArray[np.intp],
+        starts: Sequence[Strains | None],
+    ) -> list[Floats]:
         """One force per plant; equal ones are the same array."""
-        keys = [self._key(plant) for plant in plants]
+        keys: list[Hashable] = [(self._key(plant), start) for plant, start in zip(plants, starts, strict=True)]
         known = {key: found for key in keys if (found := self._forces.get(key)) is not None}
         missing: dict[Hashable, Load] = {}
-        for key, plant, place in zip(keys, plants, which, strict=True):
+        for key, plant, place, start in zip(keys, plants, which, starts, strict=True):
             if key not in known and key not in missing:
-                missing[key] = loaded(plant, pressures[place], self._grid.moment)
+                missing[key] = loaded(plant, self._settled(pressures[place]), self._grid.moment, start)
         fresh = dict(zip(missing, self._computed(list(missing.values())), strict=True))
         for key, force in fresh.items():  # a long recording's series push each other out, and those known before
             self._forces.put(key, force)
         return [fresh[key] if key in fresh else known[key] for key in keys]
+
+    def _settled(self, pressure_pa: Floats) -> Floats:
+        """The pressure, until it is sure that of the moment from which it is."""
+        if not self._first:
+            return pressure_pa
+        return np.concatenate([np.full(self._first, pressure_pa[self._first]), pressure_pa[self._first :]])
 
     def _key(self, plant: Plant) -> Hashable:
         contact = plant.contact

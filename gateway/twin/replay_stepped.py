@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.twin.elementwise import Real, exponential, larger
-from gateway.twin.friction import FREE_N_PER_M, Elements
+from gateway.twin.friction import ELEMENTS, FREE_N_PER_M, Elements
 from gateway.twin.plant import Plant, stack
 from gateway.twin.replay_drive import Floats
 from gateway.twin.replay_grid import Grid
@@ -21,6 +21,7 @@ from gateway.twin.replay_parts import apart, in_parts, together
 from gateway.twin.slide import SlideState, weight_n
 
 _SINGLY: Final = 1  # lanes that are faster one by one in floats
+_BEFORE_STRAINS: Final = 3  # numbers of a state: place, travel, stiction
 _LENGTH_M: Final = 1.0e-4  # unit of positions and travels where states are compared
 
 
@@ -61,8 +62,11 @@ def stepped(loads: list[Load], grid: Grid) -> list[Floats]:
     slide = _slide(plants, grid.step_s)
     slide.set_side_load(side[0])
     slide.settle(pressure[0])
-    first = slide.force_n
-    state = _scaled(slide)
+    first, state = slide.force_n, _scaled(slide)
+    for lane, load in enumerate(loads):
+        if _is_given(load):
+            first[lane] = load.begins_n
+            state[:, lane] = _begun(load, state.shape[0])
 
     def march(which: NDArray[np.intp], series: list[Floats], state: Floats, forces: Floats) -> None:
         _march(_slide([plants[lane] for lane in which], grid.step_s), series, state, forces)
@@ -101,6 +105,10 @@ def _single(load: Load, grid: Grid) -> Floats:
         slide.set_side_load(sides[0])
     slide.settle(first)
     found, step = [slide.force_n], slide.step
+    if _is_given(load):
+        position, *rest = _begun(load, len(slide.state()))
+        slide.resume([position * _LENGTH_M, *rest])
+        found = [load.begins_n]
     for point, pressure in enumerate(pressures):
         if sides is not None:
             slide.set_side_load(sides[point + 1])
@@ -108,6 +116,18 @@ def _single(load: Load, grid: Grid) -> Floats:
             slide.set_step(*lengths[point])
         found.append(step(pressure))
     return np.array(found)
+
+
+def _is_given(load: Load) -> bool:
+    """Are the strains to begin with given, and is the pad pressed there?"""
+    return load.start is not None and load.rubs and load.begins_n > 0.0
+
+
+def _begun(load: Load, size: int) -> list[float]:
+    """The state that these strains belong to: place on the pad, no travel, no stiction, as many strains as it has."""
+    contact, count = load.plant.contact, size - _BEFORE_STRAINS
+    strains = load.strains if count == ELEMENTS else [sum(load.strains) / ELEMENTS] * count
+    return [(contact.gap_m + load.begins_n / contact.pad_stiffness_n_per_m) / _LENGTH_M, 0.0, 0.0, *strains]
 
 
 def _scaled(slide: SlideState) -> Floats:

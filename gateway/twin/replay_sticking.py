@@ -54,7 +54,8 @@ def sticking(loads: list[Load], grid: Grid) -> list[Floats]:
     lanes = Lanes.of(loads)
     drive, limit = together([load.drive_n for load in loads]), together([load.limit_n for load in loads])
     state = np.zeros((3, len(loads)))
-    state[0] = first = np.clip(0.0, drive[0] - limit[0], drive[0] + limit[0])
+    begins = [0.0 if load.start is None else load.begins_n for load in loads]
+    state[0] = first = np.clip(begins, drive[0] - limit[0], drive[0] + limit[0])
     rising = np.where(np.diff(drive, axis=0) >= 0.0, 1.0, -1.0)
     guess = np.zeros((3, *rising.shape))
     guess[0] = np.maximum(drive[:-1] - limit[:-1] * rising, 0.0)

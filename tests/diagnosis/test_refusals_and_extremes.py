@@ -142,8 +142,10 @@ def test_an_effect_that_is_not_there_cannot_be_switched_off(tmp_path: Path) -> N
 
 def test_a_force_of_a_thousand_times_the_piston_s_asks_for_its_unit(tmp_path: Path) -> None:
     path = str(written(tmp_path / "mn.csv", {**columns(), "force_n": columns()["force_n"] * 1.0e3}))
-    assert "force_n or the command is in another unit" in said(path)
-    assert "is in another unit" not in said(path, "--columns", "time_s=1,command_v=2,force_n=3:mn")
+    text = said(path)
+    assert text.index("E520 mn.csv: the force is ") < text.index("Unknown")
+    assert "force_n is probably in mn; --columns force_n=force_n:mn mends it" in text
+    assert "E52" not in said(path, "--columns", "time_s=1,command_v=2,force_n=3:mn")
 
 
 def test_a_floor_above_the_residual_confirms_nothing(tmp_path: Path) -> None:

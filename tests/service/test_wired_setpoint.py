@@ -10,6 +10,7 @@ from gateway.devices.messages import ForceSample
 from gateway.recording import Recorder, read_recording
 from gateway.registers import Refusal
 from gateway.registers.words import FaultCode, RefusalReason, State
+from gateway.service.output_exchange import LineState
 from gateway.service.run_recording import COLUMNS, RunRecording
 from tests.service.rigs import demo, without_trim
 from tests.service.wired import ENABLE, Wired
@@ -193,8 +194,8 @@ class Rows:
     def __init__(self, directory: Path) -> None:
         self._run = RunRecording(Recorder(directory, {"rig": "demo"}, COLUMNS))
 
-    def append(self, sample: ForceSample, decision: Output, pressure_pa: float) -> None:
-        self._run.append(sample, decision, pressure_pa)
+    def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
+        self._run.append(sample, decision, line)
 
     def close(self) -> Path:
         self._run.recorder.close()

@@ -245,6 +245,27 @@ ENTRIES: Final = (
         "Leave --step and --v-max out to go on, or leave --resume out to begin anew.",
     ),
     Entry(
+        "E520",
+        "a column in another unit",
+        "The measured force, or a pressure, is by a unit's own factor larger or smaller than the plant gives for its drive.",
+        "The table's numbers are in kgf, mN, bar, mV, ms ..., not in what the column's name ends with.",
+        "Give the unit: diagnose FILE --columns force_n=force_n:kgf (the message spells it). Causes come after that.",
+    ),
+    Entry(
+        "E521",
+        "two columns are swapped",
+        "The plant agrees with the recording only when two of its columns are exchanged.",
+        "A header that is one column off, or the numbers in --columns.",
+        "Exchange them: diagnose FILE --columns command_v=force_n,force_n=command_v (the message spells it).",
+    ),
+    Entry(
+        "E522",
+        "the force has the wrong sign",
+        "The measured force falls where the plant's rises, by the same amount.",
+        "The cell's wires are exchanged, the rig's `sign` is wrong, or a pull counts as positive.",
+        "diagnose FILE --columns force_n=force_n:-n turns it; in the rig file, load_cell: sign.",
+    ),
+    Entry(
         "E500",
         "a defect of force-gateway",
         "A verb ended in a way that we did not foresee.",

@@ -26,7 +26,8 @@ _ANY_STATE: Final = "demo"  # whose state directory is meant where neither --sta
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
     """paths: of the recordings, as found; rig: its name, empty for none; known_rig: where it is known here; notes: what was
-    decided; late_s: how late the wires may have made the readings; quantum_n: their known step."""
+    decided; late_s: how late the wires may have made the readings; quantum_n: their known step; is_own: the plant
+    is that of the rig that the recordings were made on."""
 
     paths: tuple[Path, ...]
     measurements: tuple[Measurement, ...]
@@ -36,6 +37,7 @@ class Sources:
     notes: tuple[str, ...]
     late_s: float = 0.0
     quantum_n: float = 0.0
+    is_own: bool = False
 
     @property
     def name(self) -> str:
@@ -54,7 +56,8 @@ def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, 
         _without_polled_pressure(measurement_of(each)) if _of_gateway(each) else measurement_of(each)
         for each in recordings
     )
-    rig_name, plant, notes = _of_rig(known) if known else _recorded(recordings)
+    plant_of_first = None if known else plant_of(recordings[0])
+    rig_name, plant, notes = _of_rig(known) if known else _recorded(recordings, plant_of_first)
     here = known or rig_of(recordings[0])
     return Sources(
         paths=paths,
@@ -65,6 +68,7 @@ def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, 
         notes=notes,
         late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
         quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
+        is_own=plant is (known.plant_profile if known else plant_of_first),
     )
 
 
@@ -94,11 +98,10 @@ def _of_rig(rig: Rig) -> tuple[str, PlantProfile, tuple[str, ...]]:
     return rig.name, plant, (f"rig {rig.name} names no plant: {plant.name} is the start",)
 
 
-def _recorded(recordings: Sequence[Recording]) -> tuple[str, PlantProfile, tuple[str, ...]]:
-    """The rig that the first recording carries or names, else the paper's."""
+def _recorded(recordings: Sequence[Recording], plant: PlantProfile | None) -> tuple[str, PlantProfile, tuple[str, ...]]:
+    """The rig that the first recording carries or names, and its plant where there is one; else the paper's."""
     names = [str(recording.header.get("rig") or "") for recording in recordings]
     notes = [f"the recordings are of several rigs: {', '.join(sorted(set(names)))}"] if len(set(names)) > 1 else []
-    plant = plant_of(recordings[0])
     if plant is None:
         plant = _foreign(load_plant(START_PLANT))
         missing = f"rig {names[0]} is not known here" if names[0] else "the recording names no rig"

@@ -25,11 +25,14 @@ _MOST_NAMES = 4
 def told(
     diagnosis: Diagnosis, notes: tuple[str, ...] = (), loop: tuple[str, ...] = (), run: str = ""
 ) -> Iterator[RenderableType]:
-    """In reading order; every paragraph hangs behind its keyword, so that it wraps at any width.
+    """In reading order, columns that are wrong before all else; every paragraph hangs behind its keyword, so that it wraps at
+    any width.
 
     loop: sentences on the gain in commanded force; run: how to run what to record next, where a plan of it is written.
     """
     yield Text()
+    for suspect in diagnosis.suspects:
+        yield Text(suspect.sentence, style="bold red" if suspect.is_sure else "bold yellow")
     yield Text.assemble(
         (words.title(diagnosis), f"bold {'yellow' if words.blind(diagnosis) else _COLOUR[diagnosis.verdict]}"),
     )
@@ -45,7 +48,8 @@ def told(
     yield from _lost(diagnosis)
     for keyword, sentence in zip(("control", *[""] * len(loop)), loop, strict=False):
         yield _line(keyword, sentence)
-    for note in words.noticed(diagnosis, notes):
+    said = {suspect.sentence for suspect in diagnosis.suspects}
+    for note in (note for note in words.noticed(diagnosis, notes) if note not in said):
         yield _line("note", note, "dim")
     yield from _next(diagnosis, run)
 

@@ -4,13 +4,17 @@ from math import isfinite
 from typing import Any, Final
 
 from gateway.diagnosis.result import Cause, Diagnosis, Interval
+from gateway.service.reporting.diagnosis_words import noticed
 
 FORMAT: Final = 1
 Document = dict[str, Any]
 
 
 def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
-    """Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1. A number that is not finite is null."""
+    """Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1. A number that is not finite is null.
+
+    suspects (columns that are not what they say) and notes stand beside the contract's fields.
+    """
     return {
         "format": FORMAT,
         "verdict": str(diagnosis.verdict),
@@ -35,6 +39,21 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
             "reaches_noise_floor": bool(diagnosis.extended.reaches_noise_floor),
         },
         "runtime_s": _number(runtime_s),
+        "suspects": [
+            {
+                "code": each.code,
+                "recording": each.recording,
+                "column": each.column,
+                "swapped_with": each.other or None,
+                "unit": each.unit or None,
+                "factor": _number(each.factor),
+                "is_sure": each.is_sure,
+                "option": each.option,
+                "sentence": each.sentence,
+            }
+            for each in diagnosis.suspects
+        ],
+        "notes": noticed(diagnosis),
     }
 
 

@@ -45,6 +45,8 @@ def title(diagnosis: Diagnosis) -> str:
 
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, and for `partial` what it lacks."""
+    if any(suspect.is_sure for suspect in diagnosis.suspects):
+        return "The columns are not what their names say: no cause was looked for. First mend this, then ask again."
     if why := blind(diagnosis):
         return f"{why}."
     told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_lack(diagnosis)]
@@ -53,7 +55,9 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def blind(diagnosis: Diagnosis) -> str:
     """Why the recordings say nothing, where they do not and nothing else was found."""
-    found = diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
+    found = (
+        diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
+    )
     return "" if found else remarks.blind([trace.measurement for trace in diagnosis.traces])
 
 
@@ -141,11 +145,17 @@ def gained(cause: Cause) -> str:
 
 
 def explained(diagnosis: Diagnosis) -> float:
-    """Share of the squared error above the noise floor that the extended model takes away, 0..1; nan where there is none."""
+    """Share of the squared error above the noise floor that the causes take away, 0..1; nan where there is none.
+
+    The model's share, or that of the strongest cause: spikes are taken out of the readings before any model is fitted.
+    """
     floor_n2 = diagnosis.baseline.noise_floor_n**2
     excess_n2 = diagnosis.baseline.rms_n**2 - floor_n2
     left_n2 = diagnosis.extended.held_out_rms_n**2 - floor_n2
-    return min(1.0, max(0.0, 1.0 - left_n2 / excess_n2)) if excess_n2 > 0.0 else float("nan")
+    strongest = max((cause.gain.share_of_excess for cause in diagnosis.causes), default=0.0)
+    if excess_n2 <= 0.0:
+        return strongest if diagnosis.causes else float("nan")
+    return min(1.0, max(strongest, 1.0 - left_n2 / excess_n2))
 
 
 def excess_n(diagnosis: Diagnosis) -> float:
@@ -170,7 +180,8 @@ def noticed(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
         for measurement in measurements
         for note in measurement.notes
     ]
-    return list(dict.fromkeys([*before, *(note for note in diagnosis.notes if note not in read), *named]))
+    suspected = [suspect.sentence for suspect in diagnosis.suspects]
+    return list(dict.fromkeys([*suspected, *before, *(note for note in diagnosis.notes if note not in read), *named]))
 
 
 def listed(words: Iterable[str]) -> str:

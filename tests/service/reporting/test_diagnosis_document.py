@@ -39,6 +39,18 @@ CONTRACT = exactly(
     rejected=several(name=TEXT, gain=NUMBER),
     extended=exactly(held_out_rms_n=NUMBER, reaches_noise_floor={"type": "boolean"}),
     runtime_s=NUMBER,
+    suspects=several(
+        code=TEXT,
+        recording=TEXT,
+        column=TEXT,
+        swapped_with={"type": ["string", "null"]},
+        unit={"type": ["string", "null"]},
+        factor=NUMBER,
+        is_sure={"type": "boolean"},
+        option=TEXT,
+        sentence=TEXT,
+    ),
+    notes={"type": "array", "items": TEXT},
 )
 
 

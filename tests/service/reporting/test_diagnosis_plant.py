@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from gateway.diagnosis.result import Estimate
 from gateway.profiles import load_plant
 from gateway.profiles.plant_writer import plant_text
 from gateway.service.reporting.diagnosis_plant import extended_plant
@@ -34,6 +35,23 @@ def test_a_number_that_moved_unasked_does_not_keep_its_old_source() -> None:
     moved = replace(diagnosis(), plant=with_value(diagnosis().plant, "regulator", "delay_s", 0.05))
     origins = extended_plant(moved, START, "a.csv", "2026-11-21").origins
     assert origins["regulator.delay_s"].source == "refitted to a.csv, 2026-11-21"
+
+
+def test_only_what_was_found_is_written() -> None:
+    """One force of a demo gave an area of 7.7e-5 m2 and no friction: it determines neither."""
+    vague = {
+        "area_m2": Estimate("cylinder", 7.7e-5, "m2", (2.0e-5, 9.0e-5)),
+        "lag_s": Estimate("regulator", 0.071, "s", (0.069, 0.073)),
+        "coulomb_n": Estimate("friction", 1.4, "N", (1.35, 1.45)),
+        "clock_offset_s": Estimate("cell", 0.011, "s", (0.0105, 0.0115)),
+    }
+    plant = START.plant
+    for name, found in vague.items():
+        plant = with_value(plant, found.section, name, found.value)
+    profile = extended_plant(diagnosis(causes=(), plant=plant, base_parameters=vague), START, "a.csv", "2026-11-22")
+    assert profile.plant == with_value(START.plant, "friction", "coulomb_n", 1.4)
+    assert profile.origins["cylinder.area_m2"] == START.origins["cylinder.area_m2"]
+    assert profile.origins["friction.coulomb_n"].source == "refitted to a.csv, 2026-11-22"
 
 
 def test_the_description_says_what_was_added_and_to_what() -> None:

@@ -1,0 +1,104 @@
+"""Clean recordings of the gateway's own, of every kind that a first day brings, give no name, and the watch stays silent.
+
+Made in virtual time by tests/service/clean_runs.py: the whole wired gateway, late wake-ups, 9600 baud. The push gate asks
+for few and short ones; --long for all kinds.
+"""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.cli.diagnosing.sources import Sources, read_sources
+from gateway.diagnosis import Diagnosis, Options, Verdict, diagnose
+from gateway.diagnosis.bench import Bench
+from gateway.diagnosis.start import at_its_best
+from gateway.profiles import load_rig
+from gateway.registers.residual_cause import ResidualCause
+from gateway.service.run_recording import COLUMNS
+from gateway.service.watch import Setup, Watch
+from gateway.service.watch_process import diagnosed
+from gateway.service.watch_reference import Reference
+from gateway.twin.plant import with_value
+from tests.service.clean_runs import KINDS, recorded, rows_of
+
+NOISE_N = 0.12  # of the demo rig's cell
+
+
+def read(kind: str, seed: int, directory: Path, lasts_s: float) -> Sources:
+    return read_sources([str(recorded(kind, seed, directory, lasts_s))], rig=None, columns=None, state=None)
+
+
+def answer(sources: Sources) -> Diagnosis:
+    options = Options(late_s=sources.late_s, quantum_n=sources.quantum_n, is_own=sources.is_own)
+    return diagnose(sources.measurements, sources.plant.plant, options)
+
+
+def check_nothing_is_named(found: Diagnosis) -> None:
+    assert found.causes == (), [(cause.name, cause.gain) for cause in found.causes]
+    assert found.suspects == ()
+    assert found.verdict is Verdict.NOTHING_FOUND, found.leftover
+    assert found.baseline.rms_n < 1.2 * NOISE_N
+
+
+@pytest.mark.parametrize("kind", ["from a hold", "taps"])
+def test_a_recording_that_begins_in_the_middle_of_work_gives_no_name(tmp_path: Path, kind: str) -> None:
+    """Before, they gave `warm-up or presliding` and `regulator-hysteresis`."""
+    check_nothing_is_named(answer(read(kind, 1, tmp_path, 20.0)))
+
+
+@pytest.mark.parametrize("kind", ["from wiggles", "from a fall", "sine"])
+def test_what_was_sent_and_the_start_leave_the_cell_s_noise_only(tmp_path: Path, kind: str) -> None:
+    """By the rig's own plant, with nothing fitted but the start and what the wires take."""
+    sources = read(kind, 3, tmp_path, 15.0)
+    plant = with_value(with_value(sources.plant.plant, "cell", "noise_n", 0.0), "cell", "clock_offset_s", 0.011)
+    bench = Bench(sources.measurements)
+    assert bench.rms_n(at_its_best(bench, plant).residual_n) < 1.2 * NOISE_N
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_kind_of_clean_recording_gives_a_name(tmp_path: Path, kind: str, seed: int) -> None:
+    check_nothing_is_named(answer(read(kind, seed, tmp_path, 70.0)))
+
+
+class Ring:
+    """What the watch reads: the rows up to a moment."""
+
+    columns = COLUMNS
+
+    def __init__(self, rows: Sequence[tuple[float, ...]]) -> None:
+        self._rows = np.array(rows)
+        self.now_s = 0.0
+
+    @property
+    def last_s(self) -> float:
+        return float(self._rows[-1, 0])
+
+    def newest(self, count: int) -> bytes:
+        return bytes(self._rows[self._rows[:, 0] <= self.now_s].tobytes())
+
+
+def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list[ResidualCause], Watch]:
+    """What stands after each look, a look every half a window."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    ring, plant = Ring(rows_of(kind, seed, lasts_s)), load_rig("demo").plant
+    assert plant is not None
+    watch = Watch(ring, Reference(plant), Setup(window_s, 0.5 * window_s, 1.0), diagnosed, lambda: ring.now_s)  # type: ignore[arg-type]
+    stood = []
+    for now_s in np.arange(1.3 * window_s, ring.last_s, 0.5 * window_s):
+        ring.now_s = now_s
+        watch.look()
+        stood.append(watch.standing.cause)
+    return stood, watch
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_watch_says_nothing_of_any_kind_of_clean_work(kind: str) -> None:
+    """tests/service/test_watch_in_virtual_time.py asks the same, with a stub for the search, in the push gate."""
+    stood, watch = watched(kind, 5, 190.0, 60.0)
+    assert set(stood) <= {ResidualCause.NONE}, watch.standing

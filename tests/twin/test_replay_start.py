@@ -1,0 +1,72 @@
+"""A replay that begins in the middle goes on as if it had been there from the first row, when it is told what friction
+remembers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gateway.twin.plant import Contact, Cylinder, Friction, Plant, Regulator
+from gateway.twin.replay import Drive, Replay
+
+RATE_HZ = 100.0
+TIME_S = np.arange(1200) / RATE_HZ
+BEFORE_V = np.interp(TIME_S, [0.0, 4.0, 5.0, 12.0], [0.0, 6.0, 6.0, 6.0])  # slides out all the way: strains are 1
+AFTER_V = np.where(TIME_S < 6.0, BEFORE_V, 4.5 + 1.5 * np.cos(2.0 * np.pi * (TIME_S - 6.0) / 3.0))
+CUT = 550  # half a second of rest before it moves again
+PLANT = Plant(
+    regulator=Regulator(lag_s=0.05),
+    cylinder=Cylinder(area_m2=95.0e-6),
+    friction=Friction(coulomb_n=1.5),
+    contact=Contact(pad_stiffness_n_per_m=4.1e4),
+)
+FRICTIONS = {
+    "rigid": {},
+    "rigid with drag": {"viscous_n_s_per_m": 100.0},
+    "presliding": {"presliding_m": 1.0e-4},
+    "by speed": {"stribeck_n": 0.8, "stribeck_speed_m_per_s": 0.003},
+    "by speed, presliding": {"stribeck_n": 0.8, "stribeck_speed_m_per_s": 0.003, "presliding_m": 1.0e-4},
+}
+
+
+def tail(friction: Friction, strains: tuple[float, float, float] | None, lanes: int = 1) -> np.ndarray:
+    """The part behind the cut, replayed alone."""
+    plant = replace(PLANT, friction=friction)
+    drive = Drive(time_s=TIME_S[CUT:] - TIME_S[CUT], command_v=AFTER_V[CUT:], before_v=None)
+    return Replay(drive).run([plant] * lanes, [strains] * lanes).force_n[-1]
+
+
+@pytest.mark.parametrize("kind", FRICTIONS)
+def test_it_goes_on_as_the_whole_does(kind: str) -> None:
+    friction = replace(PLANT.friction, **FRICTIONS[kind])
+    whole = Replay(Drive(time_s=TIME_S, command_v=AFTER_V)).run([replace(PLANT, friction=friction)]).force_n[0, CUT:]
+    moved = 200 if "speed" in kind else 0  # at rest Stribeck's curve lets friction carry more than the branch does
+    assert tail(friction, (1.0, 1.0, 1.0))[moved:] == pytest.approx(whole[moved:], abs=0.02)
+    assert np.max(np.abs(tail(friction, (-1.0, -1.0, -1.0)) - whole)) > 1.0, "the other branch is another force"
+
+
+@pytest.mark.parametrize("kind", FRICTIONS)
+def test_lanes_together_begin_as_one_alone_does(kind: str) -> None:
+    friction = replace(PLANT.friction, **FRICTIONS[kind])
+    plants = [replace(PLANT, friction=replace(friction, coulomb_n=1.5 + 0.01 * lane)) for lane in range(14)]
+    starts = [(-1.0, 0.3, 1.0 - 0.1 * lane) for lane in range(14)]
+    drive = Drive(time_s=TIME_S[CUT:] - TIME_S[CUT], command_v=AFTER_V[CUT:], before_v=None)
+    together = Replay(drive).run(plants, starts).force_n
+    for lane in (0, 13):
+        alone = Replay(drive).run([plants[lane]], [starts[lane]]).force_n[0]
+        assert together[lane] == pytest.approx(alone, abs=1.0e-6)
+
+
+def test_no_strain_pulls_at_a_pad_that_nothing_presses() -> None:
+    drive = Drive(time_s=TIME_S, command_v=BEFORE_V)
+    found = Replay(drive).run([PLANT, PLANT], [(1.0, 1.0, 1.0), None]).force_n
+    assert found.min() >= 0.0
+    assert found[0] == pytest.approx(found[1])
+
+
+def test_until_it_has_settled_the_pressure_is_that_of_this_moment() -> None:
+    """What went in before the first row must not push friction to another branch."""
+    volts = np.where(TIME_S < 0.3, 8.0, 4.0)  # the lags are full of another command than the slide ever saw
+    drive = Drive(time_s=TIME_S, command_v=volts, before_v=None, settled_s=1.0)
+    found = Replay(drive).run([PLANT], [(1.0, 1.0, 1.0)]).force_n[0]
+    assert found[150] == pytest.approx(95.0e-6 * 0.36e6 - 1.5, abs=0.01)
