@@ -1,9 +1,9 @@
 """May a fit be offered for use? Judged by its error on all that was measured: against the rig's band, and what is in use.
 
-Two bounds. The band: twice the RMS error must stay within in_band_tolerance_n, so that about 95 % of the settled forces are in
-band before the trim has done anything. The calibration in use, on the same data: a fit that is worse by more than a tenth, and
-by more than a twentieth of the band (below that nobody feels it), would be a step back. A fit that fails is kept with the
-reason, for data and figures are of use, but it is not offered.
+Two bounds. The band: beyond an RMS error of in_band_tolerance_n a settled force is out of band about as often as in it, before
+the trim has done anything. The calibration in use, on the same data: a fit that is worse by more than a tenth, and by more than
+a twentieth of the band (below that nobody feels it), would be a step back. A fit that fails is kept with the reason, for data
+and figures are of use, but it is not offered.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,6 @@ from gateway.bsfm import Calibration
 from gateway.bsfm.evaluation import Evaluation
 from gateway.bsfm.fit_error import Error, measured_error_n
 
-BAND_SHARE: Final = 0.5  # of the in-band tolerance that the RMS error may have
 WORSE_BY: Final = 1.1
 WORSE_SHARE: Final = 0.05  # of the band: a smaller difference is none
 
@@ -53,7 +52,7 @@ def verdict_on(evaluation: Evaluation, tolerance_n: float | None, in_use: Calibr
     if tolerance_n is None:
         return Verdict(error, None, other, number, "", has_walk)
     bounds = (*_beyond_band(error, tolerance_n), *(_worse(error, other, number, tolerance_n) if other else ()))
-    return Verdict(error, BAND_SHARE * tolerance_n, other, number, _sentence(error, bounds), has_walk)
+    return Verdict(error, tolerance_n, other, number, _sentence(error, bounds), has_walk)
 
 
 def _sentence(error: Error, bounds: tuple[str, ...]) -> str:
@@ -67,9 +66,7 @@ def _sentence(error: Error, bounds: tuple[str, ...]) -> str:
 
 
 def _beyond_band(error: Error, tolerance_n: float) -> tuple[str, ...]:
-    allowed_n = BAND_SHARE * tolerance_n
-    said = f"allowed {allowed_n:.3f} N (half of in_band_tolerance_n {tolerance_n:g} N)"
-    return () if error.rms_n <= allowed_n else (said,)
+    return () if error.rms_n <= tolerance_n else (f"allowed {tolerance_n:.3f} N (in_band_tolerance_n of the rig)",)
 
 
 def _worse(error: Error, other: Error, number: int, tolerance_n: float) -> tuple[str, ...]:

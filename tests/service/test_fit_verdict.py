@@ -59,7 +59,7 @@ def test_what_is_out_of_band_or_worse_than_what_is_in_use_is_kept_and_not_offere
     if why == "the band":
         result, words = (
             fit_and_store(recorded(tmp_path, shape=3.0), "demo", tmp_path),
-            "allowed 0.500 N (half of in_band_",
+            "allowed 1.000 N (in_band_tolerance_n",
         )
     else:
         store_of(tmp_path).use(fit_and_store(recorded(tmp_path), "demo", tmp_path)["stored"])

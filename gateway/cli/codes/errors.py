@@ -225,7 +225,7 @@ ENTRIES: Final = (
     Entry(
         "E435",
         "calibration stored as rejected",
-        "The fit's RMS error on all measured points is more than half of in_band_tolerance_n, or clearly more than that of the "
+        "The fit's RMS error on all measured points is more than in_band_tolerance_n, or clearly more than that of the "
         "calibration in use on the same data.",
         "Too few or too coarse stairs, no reversal part, a tool that slipped, or a zero that moved during the run.",
         "Look at its report, then run a finer ladder: force-gateway calibrate. `calibration use N --force` takes it anyway.",
