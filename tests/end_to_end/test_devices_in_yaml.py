@@ -3,8 +3,8 @@ and a newcomer's `hold` on top."""
 
 import asyncio
 import json
+import select
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gateway.profiles import load_rig
+from gateway.service import link
+from gateway.service.event_log import EventLog
 from gateway.service.simulated_rig import serve
 from tests.end_to_end.conftest import RunningGateway, start, stop
 
@@ -58,13 +60,16 @@ accept_no_device_watchdog: true
 @contextmanager
 def far_ends(folder: Path) -> Iterator[None]:
     """The devices of rig.yaml on two ptys, behind the names that the rig gives; in a thread of the test."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours, theirs = link.pair()
     rig = load_rig(folder / "rig.yaml", simulated=True)
-    thread = threading.Thread(target=lambda: asyncio.run(serve(rig, theirs, folder)))
+    thread = threading.Thread(target=lambda: asyncio.run(serve(rig, theirs, folder, EventLog())))
     thread.start()
-    for name, path in json.loads(ours.recv(65536))["ptys"].items():
-        (folder / name).symlink_to(path)
     try:
+        assert select.select([ours], [], [], 20.0)[0], "the simulated rig tells its ptys"
+        message = link.receive(ours)
+        assert message
+        for name, path in message.body["ptys"].items():
+            (folder / name).symlink_to(path)
         yield
     finally:
         ours.close()
