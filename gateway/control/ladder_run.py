@@ -9,6 +9,7 @@ of the check against the model, for sign and scale.
 """
 
 from collections import deque
+from itertools import pairwise
 from math import sqrt
 from typing import Final, NamedTuple
 
@@ -146,13 +147,23 @@ class LadderRun:
         self._trace.clear()
 
     def _zero(self, now_s: float) -> LadderStep:
+        """Rest force and noise, once the force of before has left: else its way down would count as both."""
         assert self._began_s is not None
-        if now_s - self._began_s >= ZERO_S and len(self._window) >= FEWEST_READINGS:
-            forces = [force_n for _, force_n in self._window]
+        window, waited_s = self._window, now_s - self._began_s
+        while len(window) > FEWEST_READINGS and window[0][0] < now_s - ZERO_S:
+            window.popleft()
+        if waited_s >= ZERO_S and len(window) >= FEWEST_READINGS and (self._is_still() or waited_s >= MOST_DWELL_S):
+            forces = [force_n for _, force_n in window]
             self.rest_n = sum(forces) / len(forces)
             self.noise_n = sqrt(sum((force - self.rest_n) ** 2 for force in forces) / (len(forces) - 1))
             self._begin_next(now_s, self.rest_n)
         return self._answer(None)
+
+    def _is_still(self) -> bool:
+        """No drift beyond the noise, which neighbouring readings tell: a drift counts little between them."""
+        forces = [force_n for _, force_n in self._window]
+        noise_n = sqrt(sum((b - a) ** 2 for a, b in pairwise(forces)) / (2.0 * (len(forces) - 1)))
+        return self._drift_n() <= max(SMALLEST_DRIFT_N, SETTLED_SIGMA * noise_n * sqrt(4.0 / len(forces)))
 
     def _finished(self, now_s: float, since_s: float) -> LadderRow | None:
         """The row of this stair once it has settled, or has had its time."""

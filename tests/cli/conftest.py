@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from gateway.cli.main import command
 from gateway.fieldbus import ModbusTcpServer, ServerSettings
-from gateway.modbus import ModbusError, Peer
+from gateway.modbus import ModbusError, Peer, RequestError
 from gateway.profiles import load_register_map
 from gateway.registers import RegisterMap
 from gateway.registers.words import RefusalReason
@@ -41,6 +41,9 @@ class PlainBank:
 
     def read(self, address: int, count: int) -> bytes:
         return b"".join(self.words.get(at, 0).to_bytes(2, "big") for at in range(address, address + count))
+
+    def refused(self, refusal: RequestError, peer: Peer) -> None:
+        """The protocol's own refusals: nothing here keeps them."""
 
     def check_registers_readable(self, address: int, count: int) -> None:
         if not any(block.first <= address and address + count - 1 <= block.last for block in self.register_map.blocks):

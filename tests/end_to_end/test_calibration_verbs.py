@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.profiles import load_calibration
+from gateway.profiles.find import locate
 from gateway.service.calibration_store import CalibrationStore
 from tests.end_to_end.conftest import start, stop
 from tests.service.coefficients import calibration
@@ -26,7 +27,15 @@ def test_upload_use_and_rollback_while_the_gateway_presses(running, tmp_path: Pa
     at, in_state = ("--gateway", f"127.0.0.1:{running.port}"), ("--state", running.state)
     running.write(0, 1, 2000)
     running.wait_until(lambda status: status["state"] == HOLDING)
-    assert verb("upload", "demo", "--slot", 3, *at) == {"sent": True, "committed": True, "active": 2, "slot": 3}
+    other = tmp_path / "other.yaml"
+    other.write_text((locate("calibration", "demo")).read_text().replace("65.2318728635", "65.4"))
+    assert verb("upload", other, "--slot", 3, *at) == {
+        "sent": True,
+        "committed": True,
+        "active": 2,
+        "slot": 3,
+        "known": False,
+    }
     assert running.words(1644, 1) == [3]
     assert verb("calibration", "use", 1, *in_state)["built_in"]
     assert (running.words(122, 1), running.words(1644, 1)) == ([1], [0xFFFF])

@@ -32,7 +32,11 @@ class Wire:
         self.voltage_v = self.acknowledged_v = 0.0
         self.unanswered_since_s: float | None = None
         self.fault = FaultCode.NONE
-        self.pressure_pa = nan
+        self.pressure_pa = self.round_trip_s = nan
+
+    @property
+    def sent_v(self) -> float:
+        return self.voltage_v
 
     def want(self, voltage_v: float, now_s: float) -> None:
         self.voltage_v = self.acknowledged_v = voltage_v

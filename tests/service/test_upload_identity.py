@@ -104,7 +104,7 @@ def test_a_set_sent_by_a_master_is_the_same_model_but_for_float32(name, tmp_path
         )
         last_n = force_n
     if given.response:
-        assert found.response == replace(RESPONSE, source=f"upload over Modbus by {PEER.host}"), (
+        assert found.response == replace(given.response, source=f"upload over Modbus by {PEER.host}"), (
             "the decimals that were meant"
         )
         assert bench.store.load(2).response == found.response
@@ -285,7 +285,11 @@ def test_a_set_of_140_words_is_taken_as_one_without_stops_and_says_so(action, tm
     found = bench.used[-1].calibration
     assert (bench.outcome, found.number, found.name) == (COMMITTED, 2, "slot-5")
     assert (found.reversal_kind, found.response) == ("blend 14 N", None)
-    assert bench.model_hash == model_hash(replace(DEMO, slip_radii_v=(), slip_shares=())) != model_hash(DEMO)
+    assert (
+        bench.model_hash
+        == model_hash(replace(DEMO, slip_radii_v=(), slip_shares=(), response=None))
+        != model_hash(DEMO)
+    )
     assert "bsfm n=2, blend 14 N" in bench.log[-1]
 
 
