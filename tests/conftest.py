@@ -28,6 +28,7 @@ REAL_TIME = ("end_to_end", "ports")
 bounds in seconds do not compete with each other."""
 
 
+@pytest.hookimpl(tryfirst=True)  # before the workers read the groups
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
         folder = item.path.relative_to(config.rootpath / "tests").parts[0]
