@@ -28,11 +28,13 @@ REAL_TIME = ("end_to_end", "ports")
 bounds in seconds do not compete with each other."""
 
 
-@pytest.hookimpl(tryfirst=True)  # before the workers read the groups
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Here and not with the whole list: the workers read the groups before a conftest may change that."""
+    folder = item.path.relative_to(item.config.rootpath / "tests").parts[0]
+    item.add_marker(pytest.mark.xdist_group("real time" if folder in REAL_TIME else item.path.stem))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    for item in items:
-        folder = item.path.relative_to(config.rootpath / "tests").parts[0]
-        item.add_marker(pytest.mark.xdist_group("real time" if folder in REAL_TIME else str(item.path)))
     if config.getoption("--long"):
         return
     skip = pytest.mark.skip(reason="needs the bigger budget: ./tools/test --long")
