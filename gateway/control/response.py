@@ -61,6 +61,11 @@ class ModelResponse:
         return self.force_n(blend) - self._rest_n
 
     @property
+    def kept_n(self) -> float:
+        """What friction kept pressed at rest when the model was measured: a vented tool rises by so much more."""
+        return max(0.0, self._rest_n)
+
+    @property
     def width_n(self) -> float:
         """How much friction alone can explain."""
         return abs(self.falling_n - self.rising_n)
@@ -95,21 +100,22 @@ class RiseCheck:
         """The zero moved: what was measured before reads that much less now."""
         self.smooth_n -= moved_n
 
-    def judge(self, expected_n: float, width_n: float, touching: bool, interval_s: float) -> FaultCode:
-        """One more new sample against the expected rise; width_n as in ModelResponse."""
+    def judge(self, response: "ModelResponse", blend: float, touching: bool, interval_s: float) -> FaultCode:
+        """One more new sample against the rise that the model expects at this blend state."""
+        expected_n = response.rise_n(blend)
         rise_n = self.measured_rise_n
         wrong_sign = expected_n >= _LEAST_RISE_N and rise_n <= -max(self._threshold_n, _LOWEST_SHARE * expected_n)
         self._wrong_sign_s = self._wrong_sign_s + interval_s if wrong_sign else 0.0
         if self._wrong_sign_s >= _LASTING_S:
             return FaultCode.SIGN_INVERTED
         if not self._proven and touching and expected_n >= _LEAST_RISE_N:
-            return self._judge_gain(expected_n, width_n + _SLACK_N, interval_s)
+            return self._judge_gain(expected_n, response.width_n + _SLACK_N, response.kept_n, interval_s)
         self.is_too_high = False
         return FaultCode.NONE
 
-    def _judge_gain(self, expected_n: float, slack_n: float, interval_s: float) -> FaultCode:
+    def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
         off_n = self.measured_rise_n - expected_n
-        self.is_too_high = off_n > slack_n and self.measured_rise_n > _HIGHEST_SHARE * expected_n
+        self.is_too_high = off_n > slack_n + kept_n and self.measured_rise_n > _HIGHEST_SHARE * expected_n
         too_low = -off_n > slack_n and self.measured_rise_n < _LOWEST_SHARE * expected_n
         wrong = self.is_too_high or too_low
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0

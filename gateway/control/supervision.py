@@ -77,7 +77,7 @@ class Supervisor:
         self._frozen.observe(reading, response, touching)
         is_over = reading.overload or abs(reading.contact_n) >= self._limits.over_force_n
         self._over = self._over + 1 if is_over else 0
-        self._response_fault = self.rise.judge(response.rise_n(blend), response.width_n, touching, reading.interval_s)
+        self._response_fault = self.rise.judge(response, blend, touching, reading.interval_s)
 
     def observe_rest(self, reading: Reading) -> None:
         """While disabled: a force that stays at the safe voltage."""
