@@ -123,9 +123,8 @@ class Admission:
             return _Wish(values, written, is_stop)
         if is_stop:
             return _Wish(commands.values.copy(), 0, True)
-        if (
-            falls & CALIBRATE and not written & ~before & ENABLE
-        ):  # an enable of one's own asks for more than a run's end
+        asks_for_more = written & ~before & ENABLE  # than the end of a run, which anybody may ask for
+        if falls & CALIBRATE and not asks_for_more:
             return _Wish(commands.values.copy(), before & ~CALIBRATE, False)
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None

@@ -101,3 +101,13 @@ def test_a_vented_tool_reaches_the_work_although_friction_kept_more_at_the_ladde
     output = stand.run(3.0)
     assert output.state is State.HOLDING
     assert output.force_measured_n == pytest.approx(12.0, abs=0.5)
+
+
+def test_what_friction_kept_at_rest_is_no_wrong_unit_of_a_vented_tools_first_rise():
+    one = machine(5)
+    assert one.calibration.rising_handles_n[0] > 3.0, "the ladder's lowest stair stays pressed"
+    controller = Controller(settings(Trim()), one.calibration.model(), calibration_id=1, response=one.response)
+    stand = Stand(one.machine, controller)
+    stand.worked().run(0.5)
+    stand.force(5.0)
+    assert stand.run(3.0).state is not State.FAULT, stand.events
