@@ -6,9 +6,7 @@ was interrupted in this moment may ask again. It runs at the lowest ordinary pri
 not feel it.
 """
 
-import contextlib
 import json
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,13 +16,6 @@ if TYPE_CHECKING:
     from gateway.service.ladder_fit import LadderFit
 
 from gateway.service import priority
-
-
-def step_back() -> None:
-    """Out of a parent's real-time class, and behind everybody else."""
-    with contextlib.suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    priority.take(priority.HELPER_NICE)
 
 
 def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]:
@@ -78,7 +69,7 @@ def rejected_sentence(number: int, why: str) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    step_back()
+    priority.run_behind_others()
     asked = json.loads(arguments[0])
     result = fit_and_store(Path(asked["recording"]), asked["rig"], Path(asked["state"]))
     sys.stdout.write(json.dumps(result) + "\n")

@@ -35,6 +35,13 @@ def take(nice: int) -> int:
     return os.getpriority(os.PRIO_PROCESS, 0)
 
 
+def run_behind_others() -> None:
+    """Out of a parent's real-time class, and behind everybody else: for what calculates."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    take(HELPER_NICE)
+
+
 def _lowest_allowed() -> int:
     """By the soft limit, which counts down from 20: 25 allows -5."""
     soft, _ = resource.getrlimit(resource.RLIMIT_NICE)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from gateway.recording.ring import RingReader
-from gateway.service.fit_process import step_back
+from gateway.service import priority
 
 if TYPE_CHECKING:
     from gateway.diagnosis import Diagnosis, Measurement
@@ -33,9 +33,9 @@ _LONGEST_ANSWER: Final = 1 << 16
 _FIRST_AMONG_THE_KILLED: Final = "900"
 
 
-def be_humble() -> None:
+def lower_priority() -> None:
     """Behind everybody else in processor time and memory; one thread for the mathematics."""
-    step_back()
+    priority.run_behind_others()
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     with contextlib.suppress(OSError):
@@ -105,7 +105,7 @@ def run(options: dict[str, Any]) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    be_humble()
+    lower_priority()
     end_with(socket.socket(fileno=int(arguments[0])))
     run(json.loads(arguments[1]))
     return 0
