@@ -1,7 +1,8 @@
 """The method: rational Bezier branches from voltage to force, their inverse, what happens at reversals, and how to fit them.
 
 Public here, without numpy or scipy: the curve, the branches, the model and its calibration, the checks before
-activation. `gateway.bsfm.ladder`, `.fit` and `.order_choice` need numpy and are imported by their own names, never by
+activation. `gateway.bsfm.ladder.measured_ladder`, `.fit` and `.order_choice` need numpy and are imported by their
+own names, never by
 control.
 """
 
@@ -10,8 +11,8 @@ from gateway.bsfm.coefficients import CoefficientFault, CoefficientLimits, Coeff
 from gateway.bsfm.curve import ORDER_MAX, RationalBezier
 from gateway.bsfm.inverse import Status
 from gateway.bsfm.model import Bsfm, Calibration, Response
-from gateway.bsfm.reversal import FALLING, RISING, DeadBand, Direction, LinearBlend, Memory, Reversal
-from gateway.bsfm.slip import SlipStops
+from gateway.bsfm.slip.reversal import FALLING, RISING, DeadBand, Direction, LinearBlend, Memory, Reversal
+from gateway.bsfm.slip.slip_stops import SlipStops
 from gateway.bsfm.validate import validate, validate_coefficients
 
 __all__ = [

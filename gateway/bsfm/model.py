@@ -12,8 +12,8 @@ from typing import Final
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.curve import RationalBezier
 from gateway.bsfm.inverse import Status
-from gateway.bsfm.reversal import LinearBlend, Memory, Reversal
-from gateway.bsfm.slip import SlipStops
+from gateway.bsfm.slip.reversal import LinearBlend, Memory, Reversal
+from gateway.bsfm.slip.slip_stops import SlipStops
 
 _ROUNDS: Final = 100
 _CLOSE_V: Final = 1.0e-14

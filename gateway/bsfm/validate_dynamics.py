@@ -1,7 +1,7 @@
 """Are these slip stops and this response fit to be used? Numbers first, then the stops against the branches.
 
 Index and reasons: gateway.bsfm.coefficients. The stops are a broken model if their radii do not ascend, their shares do not
-add up to 1, or they are so stiff that the voltage after a reversal is not unique (gateway.bsfm.slip).
+add up to 1, or they are so stiff that the voltage after a reversal is not unique (gateway.bsfm.slip.slip_stops).
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from gateway.bsfm.coefficients import (
     Coefficients,
 )
 from gateway.bsfm.model import Response
-from gateway.bsfm.slip import STOPS_MAX, SUM_TOLERANCE, SlipStops
+from gateway.bsfm.slip.slip_stops import STOPS_MAX, SUM_TOLERANCE, SlipStops
 
 
 def stop_faults(stored: Coefficients, limits: CoefficientLimits) -> Iterator[CoefficientFault]:

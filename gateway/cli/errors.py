@@ -27,7 +27,7 @@ class CliError(click.ClickException):
 
 def translated(error: Exception, command_line: str, *, debug: bool) -> CliError:
     """The message for an exception that no verb has caught. Anything unknown is our defect, and says so."""
-    if _is_a(error, "gateway.profiles.faults", "ProfileError"):
+    if _is_a(error, "gateway.profiles.strict_yaml.faults", "ProfileError"):
         return CliError(str(error), exit_codes.CONFIGURATION)
     if _is_a(error, "gateway.recording.errors", "RecordingError"):
         return CliError(f"E403 {error}", exit_codes.DATA)

@@ -94,6 +94,6 @@ def count_of(things: Sized, noun: str) -> str:
 
 def state_directory(state: Path | None, rig: str) -> Path:
     """The directory that `run` would use."""
-    from gateway.service.run_options import RunOptions
+    from gateway.service.supervisor.run_options import RunOptions
 
     return RunOptions(rig=rig, state=state).state_directory

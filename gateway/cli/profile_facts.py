@@ -54,7 +54,7 @@ def _registers(register_map: "RegisterMap") -> str:
 
 
 def _plan(plan: Any) -> str:
-    from gateway.control.experiment_plan import ExperimentPlan
+    from gateway.control.runs.experiment_plan import ExperimentPlan
 
     if isinstance(plan, ExperimentPlan):
         return f"{plan.name}: an experiment of {len(plan.parts)} parts"

@@ -4,13 +4,13 @@
 supervision that shares nothing with it but the readings, over a state table. What a rig file may set is in `settings`.
 """
 
-from gateway.control.compensation import NO_COMPENSATION, Compensation, OutsideForce, Timing
-from gateway.control.compensation_cell import CellMap
-from gateway.control.compensation_command import CommandMap, sent
+from gateway.control.compensation.command_map import CommandMap, sent
+from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation, OutsideForce, Timing
+from gateway.control.compensation.load_cell import CellMap
 from gateway.control.controller import Controller
 from gateway.control.decision import safe_output
 from gateway.control.inputs import NO_COMMAND, Line, Output
-from gateway.control.reasons import FAULT_CODES
+from gateway.control.messages import FAULT_CODES
 from gateway.control.settings import ControlSettings, Defaults, LeadSettings, LeaseAction, Limits, Supervision, Trim
 
 __all__ = [

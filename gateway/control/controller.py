@@ -11,28 +11,28 @@ from math import inf
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.model import Response
-from gateway.control.calibrating import AnyPlan, Calibrating
-from gateway.control.compensation import NO_COMPENSATION, Compensation
-from gateway.control.contact import ContactSense
+from gateway.control.command_edges import CommandFollower, Edges
+from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.decision import Outcome, Standing, output_of, safe_output, warning_bits
 from gateway.control.demand import Demand, ramped_down
-from gateway.control.edges import EdgeJudge, Situation
-from gateway.control.follower import CommandFollower, Edges
+from gateway.control.edge_checks import EdgeJudge, Situation
+from gateway.control.force_loop.force_loop import Moment, Pursuit
+from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.inputs import Line, Output
-from gateway.control.ladder_stairs import RunPlan
+from gateway.control.messages import fault_sentence
 from gateway.control.motion import Motion, Moved
-from gateway.control.pursuit import Moment, Pursuit
-from gateway.control.reading import NO_READING, Reader, Reading, at_time
-from gateway.control.reasons import fault_sentence
-from gateway.control.response import ModelResponse
+from gateway.control.runs.active_run import AnyPlan, Calibrating
+from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.sample_conditioning import NO_READING, Reader, Reading, at_time
 from gateway.control.settings import ControlSettings, LeaseAction
 from gateway.control.state_table import ENABLED_STATES, Event, next_state
-from gateway.control.supervision import Finding, Supervisor, finding
-from gateway.control.telling import Telling
-from gateway.control.timing import timing_of
+from gateway.control.supervision.contact_detection import ContactSense
+from gateway.control.supervision.fault_detection import Finding, Supervisor, finding
+from gateway.control.supervision.one_shot_events import Telling
+from gateway.control.supervision.plausibility import ModelResponse
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
-from gateway.registers.edges import Asked, EdgeRefusal
+from gateway.registers.edge_questions import Asked, EdgeRefusal
 from gateway.registers.words import ControlBit, FaultCode, RefusalReason, State
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)

@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 from math import nan
 
+from gateway.control.force_loop.force_loop import Pursuit
 from gateway.control.inputs import Output
-from gateway.control.pursuit import Pursuit
-from gateway.control.reading import Reading
-from gateway.control.reasons import fault_sentence
+from gateway.control.messages import fault_sentence
+from gateway.control.sample_conditioning import Reading
 from gateway.control.state_table import ENABLED_STATES
 from gateway.registers.command import Command
 from gateway.registers.words import FaultCode, LimitedBy, Mode, RefusalReason, State, StatusBit, WarningBit

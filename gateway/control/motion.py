@@ -8,17 +8,17 @@ from collections.abc import Callable
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
-from gateway.control.calibrating import Calibrating
 from gateway.control.demand import Demand
-from gateway.control.force_law import ModelError
+from gateway.control.force_loop.feedforward import ModelError
+from gateway.control.force_loop.force_loop import Moment, Pursuit
 from gateway.control.inputs import Line
 from gateway.control.limits import NotFiniteError
-from gateway.control.pursuit import Moment, Pursuit
-from gateway.control.reading import Reading
-from gateway.control.response import ModelResponse
+from gateway.control.runs.active_run import Calibrating
+from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import Event
-from gateway.control.supervision import Finding, finding
+from gateway.control.supervision.fault_detection import Finding, finding
+from gateway.control.supervision.plausibility import ModelResponse
 from gateway.registers.words import FaultCode
 
 Moved: TypeAlias = Event | Finding

@@ -11,24 +11,24 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
-from gateway.diagnosis.bench import MOTIONS, Bench
-from gateway.diagnosis.catalogue import BY_NAME, EFFECTS
-from gateway.diagnosis.catalogue_cylinder import COULOMB, DRAG_ASYMMETRY
-from gateway.diagnosis.direct import Direct, coarse, repeats, spikes
-from gateway.diagnosis.effect import Effect, Parameter
+from gateway.diagnosis.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.diagnosis.catalogue.cylinder import COULOMB, DRAG_ASYMMETRY
+from gateway.diagnosis.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
-from gateway.diagnosis.judgement import judged
+from gateway.diagnosis.input_checks import Suspect, suspects
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import Whitener, fast_noise_n, white
-from gateway.diagnosis.point import Point
-from gateway.diagnosis.refine import Fitted
-from gateway.diagnosis.remarks import blind, nothing_to_switch_off, strange_area
+from gateway.diagnosis.notes import blind, nothing_to_switch_off, strange_area
+from gateway.diagnosis.residual_tests import screen
 from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdict
-from gateway.diagnosis.screen import screen
-from gateway.diagnosis.search import search
-from gateway.diagnosis.start import felt
-from gateway.diagnosis.suspects import Suspect, suspects
+from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
+from gateway.diagnosis.search.bench import MOTIONS, Bench
+from gateway.diagnosis.search.direct_evidence import Direct, coarse, repeats, spikes
+from gateway.diagnosis.search.initial_friction import felt
+from gateway.diagnosis.search.levenberg_marquardt import Fitted
+from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.search import search
+from gateway.diagnosis.verdict import judged
 from gateway.twin.plant import Plant, with_value
 
 _LEAST_CHANCE_S, _MOST_CHANCE_S = 1.0e-3, 9.0e-3

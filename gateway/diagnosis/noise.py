@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.diagnosis.bench import Bench
 from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.search.bench import Bench
 
 _LEAST_LEFT: Final = 0.15
 _BINS: Final = 64

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from gateway.diagnosis.input_checks import Suspect
 from gateway.diagnosis.measurement import Floats, Measurement
-from gateway.diagnosis.suspects import Suspect
 from gateway.twin.plant import Plant
 
 Interval = tuple[float, float]

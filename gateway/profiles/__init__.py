@@ -8,16 +8,16 @@ wire_checks, network_checks, edit_marks, rig, report, any_file; schema stands ap
 Nothing here imports scipy: `check` answers at once.
 """
 
-from gateway.profiles.any_file import Checked, check_file
-from gateway.profiles.faults import Fault, ProfileError
 from gateway.profiles.find import root, shipped
-from gateway.profiles.kinds import CALLED
+from gateway.profiles.kinds.any_file import Checked, check_file
+from gateway.profiles.kinds.kinds import CALLED
+from gateway.profiles.kinds.plants import Origin, PlantProfile
 from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
-from gateway.profiles.models import Network, ResidualWatch
-from gateway.profiles.plants import Origin, PlantProfile
-from gateway.profiles.report import Report, check_report, load_rig
-from gateway.profiles.rig import CellLine, OutputLine, Rig
+from gateway.profiles.rigs.assembly import Report, check_report, load_rig
+from gateway.profiles.rigs.rig import CellLine, OutputLine, Rig
+from gateway.profiles.rigs.rig_file import Network, ResidualWatch
 from gateway.profiles.schema import schema
+from gateway.profiles.strict_yaml.faults import Fault, ProfileError
 
 __all__ = [
     "CALLED",

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Final
 
 import gateway
-from gateway.profiles.faults import closest, one_of
+from gateway.profiles.strict_yaml.faults import closest, one_of
 
 FOLDERS: Final = {
     "rig": "rigs",

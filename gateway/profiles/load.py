@@ -11,15 +11,15 @@ from typing import TypeVar
 
 from gateway.bsfm.model import Calibration
 from gateway.devices import DeviceProfile
-from gateway.profiles.calibrations import read_calibration
-from gateway.profiles.device_files import read_device
-from gateway.profiles.faults import Fault, Findings, ProfileError
 from gateway.profiles.find import display, locate
-from gateway.profiles.kinds import CALLED, kind_of
-from gateway.profiles.plants import PlantProfile, read_plant
-from gateway.profiles.register_files import read_registers
-from gateway.profiles.text import Document, parse
-from gateway.registers.map import RegisterMap
+from gateway.profiles.kinds.calibrations import read_calibration
+from gateway.profiles.kinds.devices import read_device
+from gateway.profiles.kinds.kinds import CALLED, kind_of
+from gateway.profiles.kinds.plants import PlantProfile, read_plant
+from gateway.profiles.kinds.registers import read_registers
+from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
+from gateway.profiles.strict_yaml.text import Document, parse
+from gateway.registers.map.register_map import RegisterMap
 
 T = TypeVar("T")
 Read = Callable[[Document], tuple[T | None, list[Fault]]]

@@ -14,15 +14,15 @@ from functools import cache
 from typing import Any, Final
 
 from gateway.bsfm.model import Calibration
-from gateway.control.experiment_plan import ExperimentPlan
-from gateway.control.ladder_stairs import RunPlan
+from gateway.control.runs.experiment_plan import ExperimentPlan
+from gateway.control.runs.ladder_stairs import RunPlan
 from gateway.devices import DeviceProfile
 from gateway.profiles.find import FOLDERS, root
-from gateway.profiles.models import RigFile
-from gateway.profiles.plants import ABOUT
-from gateway.profiles.register_schema import register_map_schema
-from gateway.profiles.sentences import unit_of, without_unit
-from gateway.profiles.typed import adapter, groups
+from gateway.profiles.kinds.plants import ABOUT
+from gateway.profiles.kinds.registers_schema import register_map_schema
+from gateway.profiles.rigs.rig_file import RigFile
+from gateway.profiles.strict_yaml.sentences import unit_of, without_unit
+from gateway.profiles.strict_yaml.typed import adapter, groups
 from gateway.twin import Plant
 
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"

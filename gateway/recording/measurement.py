@@ -11,14 +11,14 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
-from gateway.recording.columns import SENT
-from gateway.recording.covariates import covariates, filled_in, is_constant, is_ours
 from gateway.recording.errors import RecordingError
-from gateway.recording.even_rows import evened
-from gateway.recording.judged_rows import repeated_readings, valid_by_quality
-from gateway.recording.mapping import EXAMPLE, listed, quantity_of
 from gateway.recording.reader import Recording
-from gateway.recording.time_axis import TimeAxis, time_axis
+from gateway.recording.tables.column_mapping import EXAMPLE, listed, quantity_of
+from gateway.recording.tables.columns import SENT
+from gateway.recording.tables.covariates import covariates, filled_in, is_constant, is_ours
+from gateway.recording.tables.even_rows import evened
+from gateway.recording.tables.judged_rows import repeated_readings, valid_by_quality
+from gateway.recording.tables.time_axis import TimeAxis, time_axis
 from gateway.units import linear_conversion
 
 FEWEST_ROWS: Final = 50

@@ -6,9 +6,9 @@ profiles/registers.
 
 from gateway.registers.bank import RegisterBank
 from gateway.registers.command import Command, Status
-from gateway.registers.document import FORMATS, render_block, render_registers
-from gateway.registers.map import Block, Register, RegisterMap, UnknownRegister
-from gateway.registers.map_reader import MapError
+from gateway.registers.map.document import FORMATS, render_block, render_registers
+from gateway.registers.map.map_reader import MapError
+from gateway.registers.map.register_map import Block, Register, RegisterMap, UnknownRegister
 from gateway.registers.refusal import Refusal
 from gateway.registers.rules import BankRules
 from gateway.registers.values import WordOrder

@@ -23,8 +23,8 @@ from gateway.registers.command_block import (
     Values,
 )
 from gateway.registers.echo import ByteOrderEcho
-from gateway.registers.edges import Asked, Decide, decide_nothing
-from gateway.registers.map import Block
+from gateway.registers.edge_questions import Asked, Decide, decide_nothing
+from gateway.registers.map.register_map import Block
 from gateway.registers.ownership import Ownership
 from gateway.registers.refusal import Refusal
 from gateway.registers.rules import BankRules

@@ -24,19 +24,19 @@ from gateway import VERSION
 from gateway.bsfm.model import Calibration
 from gateway.modbus import Peer, RequestError, ServerId
 from gateway.modbus.bits import pack_bits
-from gateway.registers.addresses import no_such_address
 from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, Admitted, Write
 from gateway.registers.command import Command, Status
 from gateway.registers.command_block import CONTROL_WORD, FORCE_SETPOINT, VOLTAGE_SETPOINT, CommandBlock, check_zeros
 from gateway.registers.echo import ByteOrderEcho
-from gateway.registers.edges import Decide
+from gateway.registers.edge_questions import Decide
 from gateway.registers.image import RegisterImage
-from gateway.registers.map import Block, RegisterMap
+from gateway.registers.map.addresses import no_such_address
+from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.ownership import Ownership, ip_number
 from gateway.registers.refusal import Refusal, request_refusal
 from gateway.registers.rules import BankRules
-from gateway.registers.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.status_block import StatusBlock
+from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, RefusalReason, State, StatusBit
 
 BITS: Final = 16

@@ -14,7 +14,7 @@ from typing import Final
 from gateway.registers.command import Command
 from gateway.registers.command_field import CommandField, command_field
 from gateway.registers.image import RegisterImage
-from gateway.registers.map import Block, RegisterMap
+from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.rules import BankRules
 from gateway.registers.values import WordOrder, swap_words, words_swapped_from_little_endian

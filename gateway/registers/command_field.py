@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Final
 
-from gateway.registers.map import Register
+from gateway.registers.map.register_map import Register
 from gateway.registers.refusal import Refusal, allowed_range, quantity
 from gateway.registers.rules import BankRules
 from gateway.registers.values import WordOrder, float32, pack_number, unpack_number

@@ -9,7 +9,7 @@ from typing import Final
 
 from gateway.registers.command_block import check_zeros
 from gateway.registers.image import RegisterImage
-from gateway.registers.map import Register
+from gateway.registers.map.register_map import Register
 from gateway.registers.refusal import Refusal
 from gateway.registers.values import WordOrder, pack_number, unpack_number
 from gateway.registers.words import RefusalReason

@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterable
 from typing import Final
 
-from gateway.registers.map import Block, Register, RegisterMap
+from gateway.registers.map.register_map import Block, Register, RegisterMap
 
 ADDRESSES: Final = 0x10000
 

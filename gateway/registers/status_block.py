@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from gateway.registers.command import Status
 from gateway.registers.image import RegisterImage
-from gateway.registers.map import Register, RegisterMap
+from gateway.registers.map.register_map import Register, RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.values import (
     RAW_LIMITS,

@@ -16,16 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from gateway.ports import PortError
+from gateway.processes import priority
+from gateway.processes.event_file import EventFile
+from gateway.processes.event_log import EventLog
+from gateway.processes.exit_cause import Ending
+from gateway.processes.realtime import use_realtime
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
-from gateway.service import banner, priority
-from gateway.service.cell import Cell, StartError
-from gateway.service.ending import Ending
-from gateway.service.event_file import EventFile
-from gateway.service.event_log import EventLog
+from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
-from gateway.service.realtime import use_realtime
-from gateway.service.run_recording import COLUMNS
+from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.running_rig import Cell, StartError
 
 EXIT_DEFECT, EXIT_DEVICE, EXIT_CONFIGURATION = 1, 69, 78
 

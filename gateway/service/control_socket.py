@@ -3,7 +3,7 @@
 record on|off|status, calibration runs, the calibration in use and its change, last writers of each register and the sentence
 of the last refusal, what the residual watch has found (its process tells it here, others may read it), the loop's health,
 and faults of a simulated rig (passed on to the rig's own socket by the tools themselves). Mode 0600: whoever may write the
-state directory may ask. What each verb takes stands in gateway.service.requests.
+state directory may ask. What each verb takes stands in gateway.service.socket_requests.
 """
 
 from collections.abc import Callable
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gateway.calibrations.upload import Upload
+from gateway.processes.json_socket import Handler, JsonLineServer
 from gateway.registers import RegisterBank
-from gateway.service.json_lines import Handler, JsonLineServer
-from gateway.service.ladder_keeper import LadderKeeper
-from gateway.service.publish import LoopHealth
-from gateway.service.recordings import Recordings
-from gateway.service.requests import Ask, CalibrationRequest, RecordRequest, read
-from gateway.service.upload import Upload
-from gateway.service.watch_desk import WatchDesk
+from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.published_status import LoopHealth
+from gateway.service.running_rig.recordings import Recordings
+from gateway.service.socket_requests import Ask, CalibrationRequest, RecordRequest, read
+from gateway.service.watch_reports import WatchDesk
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from gateway.service import link as guardian_link
+from gateway.processes import message_link as guardian_link
 
 
 class GuardianLine:

@@ -29,16 +29,16 @@ from gateway.devices.messages import (
     SetVoltage,
 )
 from gateway.ports import PacedPty
+from gateway.processes import message_link as guardian_link
+from gateway.processes import priority
+from gateway.processes.clock_tick import Tick
+from gateway.processes.event_file import EventFile
+from gateway.processes.event_log import EventLog
+from gateway.processes.json_socket import JsonLineServer
 from gateway.profiles import Rig, load_rig
-from gateway.profiles.text import Document
-from gateway.profiles.typed import build
-from gateway.service import link as guardian_link
-from gateway.service import priority
-from gateway.service.event_file import EventFile
-from gateway.service.event_log import EventLog
-from gateway.service.json_lines import JsonLineServer
-from gateway.service.requests import FaultRequest, read
-from gateway.service.tick import Tick
+from gateway.profiles.strict_yaml.text import Document
+from gateway.profiles.strict_yaml.typed import build
+from gateway.service.socket_requests import FaultRequest, read
 from gateway.twin import Plant, Twin
 from gateway.twin.plant import with_value
 

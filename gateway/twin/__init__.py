@@ -16,7 +16,7 @@ from gateway.twin.simulation import STEP_S, Twin
 from gateway.twin.surroundings import Surroundings
 
 if TYPE_CHECKING:
-    from gateway.twin.replay import Drive, Replay, Response
+    from gateway.twin.replay.replay import Drive, Replay, Response
 
 __all__ = [
     "STEP_S",
@@ -38,7 +38,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in ("Drive", "Replay", "Response"):
-        from gateway.twin import replay
+        from gateway.twin.replay import replay
 
         return getattr(replay, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from gateway.twin.effects.contact import SLOW, SPINDLE
+from gateway.twin.effects.term import active, switched_on
 from gateway.twin.elementwise import Real
 from gateway.twin.regulator import lag_factor, play
 from gateway.twin.sections import Contact
 from gateway.twin.surroundings import Moment
-from gateway.twin.terms import active, switched_on
-from gateway.twin.terms_contact import SLOW, SPINDLE
 
 
 class ContactState:

@@ -19,10 +19,10 @@ from typing import Final
 
 import numpy as np
 
+from gateway.twin.effects.term import switched_on
 from gateway.twin.elementwise import Real, clip, exponential, larger, sign, sine
 from gateway.twin.sections import Friction
 from gateway.twin.surroundings import Moment
-from gateway.twin.terms import switched_on
 
 _RADIAN_PER_DEGREE: Final = math.pi / 180.0
 _DRAGGED_MM_PER_S: Final = 1.0

@@ -7,12 +7,12 @@ long as the reading lags behind. A clock that runs ahead would need the future: 
 import numpy as np
 from numpy.random import Generator
 
+from gateway.twin.effects.load_cell import TERMS, converted, without_sign
+from gateway.twin.effects.term import active
 from gateway.twin.elementwise import Real, chosen
 from gateway.twin.regulator import lag_factor
 from gateway.twin.sections import LoadCell
 from gateway.twin.surroundings import Moment
-from gateway.twin.terms import active
-from gateway.twin.terms_cell import TERMS, converted, without_sign
 
 _SPARE = 4096  # steps of history that are dropped at once
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from gateway.twin.effects.regulator import bent_command, drooped, hunted, leaked
+from gateway.twin.effects.term import switched_on
 from gateway.twin.elementwise import Real, chosen, clip, exponential, larger, quantised, smaller, where
 from gateway.twin.sections import UNLIMITED, Regulator
-from gateway.twin.terms import switched_on
-from gateway.twin.terms_regulator import bent_command, drooped, hunted, leaked
 
 
 def lag_factor(lag_s: Real, step_s: float) -> Real:

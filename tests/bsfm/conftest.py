@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gateway.bsfm.curve import RationalBezier
-from gateway.bsfm.ladder import Ladder, ladder_plan
+from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
 
 
 class Reference:

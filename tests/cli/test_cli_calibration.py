@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from gateway.calibrations.store import CalibrationStore, as_text
 from gateway.profiles import load_calibration
-from gateway.registers.coefficients import model_hash
-from gateway.service.calibration_store import CalibrationStore, as_text
-from tests.service.coefficients import calibration, mark_of
+from gateway.registers.upload.coefficients import model_hash
+from tests.calibrations.coefficients import calibration, mark_of
 
 
 @pytest.fixture

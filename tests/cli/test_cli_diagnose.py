@@ -17,13 +17,13 @@ import pytest
 from click.testing import Result
 
 import gateway.diagnosis
-from gateway.cli.diagnosing.outputs import write_all
+from gateway.cli.diagnosis.outputs import write_all
 from gateway.diagnosis.result import Diagnosis, Verdict
 from gateway.profiles import load_plant, root
 from gateway.recording import Recorder
-from gateway.service.closed_loop import ClosedLoop
+from gateway.service.closed_loop.study import ClosedLoop
 from gateway.twin import Plant
-from tests.service.reporting.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
+from tests.reports.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
 
 Call = Callable[..., Result]
 
@@ -243,7 +243,7 @@ def test_the_closed_loop_is_measured_only_when_asked_and_told_everywhere(
         before_rms_n=1.2, after_rms_n=0.3, before_max_n=4.0, after_max_n=1.0, before_settled_s=0.6, after_settled_s=0.3,
         rms_ratio=0.25, rms_ratio_ci95=(0.2, 0.3), seeds=(0, 1), compensated=("friction",), not_compensated=(),
     )  # fmt: skip
-    monkeypatch.setattr("gateway.service.closed_loop.closed_loop_gain", lambda base, extended, rig: gain)
+    monkeypatch.setattr("gateway.service.closed_loop.study.closed_loop_gain", lambda base, extended, rig: gain)
     assert "closed_loop" not in json.loads(call("diagnose", str(path), "--json", "-").stdout)
     answer = call("diagnose", str(path), "--closed-loop", "--report", str(report), "--json", str(tmp_path / "out.json"))
     assert answer.exit_code == 0, answer.output
@@ -259,7 +259,7 @@ def test_a_loop_that_could_not_be_closed_says_why(
     def refused(base: Plant, extended: Plant, rig: object) -> ClosedLoop:
         raise ValueError("the curve is not increasing")
 
-    monkeypatch.setattr("gateway.service.closed_loop.closed_loop_gain", refused)
+    monkeypatch.setattr("gateway.service.closed_loop.study.closed_loop_gain", refused)
     answer = call("diagnose", str(table(tmp_path / "a.csv")), "--closed-loop")
     assert answer.exit_code == 0
     assert "control   not measured: the curve is not increasing" in answer.stdout

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from gateway.cli import events as verb
-from gateway.service.event import event_of, record, utc
-from gateway.service.event_file import EventFile
+from gateway.cli.verbs import events as verb
+from gateway.processes.event import event_of, record, utc
+from gateway.processes.event_file import EventFile
 
 NOON_S = 1_795_348_800.0
 SAID = [

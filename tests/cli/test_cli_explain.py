@@ -9,7 +9,7 @@ import pytest
 
 import gateway
 from gateway.cli.codes import CATALOGUE, FAULT_CODES, REFUSAL_CODES, WARNING_CODES
-from gateway.control import reasons
+from gateway.control import messages
 from gateway.registers.words import FaultCode, RefusalReason, WarningBit
 
 CODE = re.compile(r"\b[EWA]\d{3}\b")
@@ -24,7 +24,7 @@ def test_every_fault_warning_and_refusal_has_a_code() -> None:
 
 
 def test_faults_have_the_codes_that_control_says() -> None:
-    assert reasons.FAULT_CODES == FAULT_CODES
+    assert messages.FAULT_CODES == FAULT_CODES
 
 
 def strings_of(path: Path) -> list[str]:

@@ -16,12 +16,12 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from gateway.cli.client import GatewayClient, Reading
-from gateway.cli.monitoring.page import page
-from gateway.cli.monitoring.parts import big, chart, chart_top_n
-from gateway.cli.monitoring.poll import Poller
-from gateway.cli.monitoring.table import View, Writer
-from gateway.cli.monitoring.track import Point, Track, buckets
+from gateway.cli.live_monitor.page import page
+from gateway.cli.live_monitor.parts import big, chart, chart_top_n
+from gateway.cli.live_monitor.poll import Poller
+from gateway.cli.live_monitor.table import View, Writer
+from gateway.cli.live_monitor.track import Point, Track, buckets
+from gateway.cli.master.client import GatewayClient, Reading
 from gateway.registers import RegisterMap
 from gateway.registers.words import FaultCode, State, StatusBit, WarningBit
 
@@ -204,7 +204,7 @@ def test_writers_come_from_the_control_socket_and_their_absence_is_no_trouble(
     fake, register_map: RegisterMap, monkeypatch, tmp_path: Path
 ) -> None:
     answer = {"owner": "10.0.0.7", "writers": {"force_setpoint": {"peer": "10.0.0.7:50001", "time_s": 97.0}}}
-    monkeypatch.setattr("gateway.cli.monitoring.poll.ask", lambda state, request: answer)
+    monkeypatch.setattr("gateway.cli.live_monitor.poll.ask", lambda state, request: answer)
     with GatewayClient("127.0.0.1", fake.port, 1, register_map) as client:
         poller = Poller(client, tmp_path, lambda: 100.0)
         poller.poll()

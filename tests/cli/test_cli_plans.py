@@ -7,10 +7,10 @@ import pytest
 from click.testing import Result
 
 import gateway.diagnosis
-from gateway.control.experiment_plan import ExperimentPlan
+from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.diagnosis.result import Diagnosis
-from gateway.profiles.plan_files import load_plan
-from tests.service.reporting.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
+from gateway.profiles.kinds.plans import load_plan
+from tests.reports.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
 
 Call = Callable[..., Result]
 

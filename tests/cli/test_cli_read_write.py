@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from gateway.cli.client import Assignment, GatewayClient
+from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.registers.words import RefusalReason
 
 

@@ -9,7 +9,7 @@ from gateway.bsfm import Response
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
-from gateway.registers.edges import EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal
 from gateway.registers.words import ControlBit, RefusalReason, State
 
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from gateway.cli import refused
 from gateway.cli.errors import CliError
+from gateway.cli.master import refusal_text
 from gateway.registers import BankRules, RegisterBank, RegisterMap
-from gateway.registers.edges import EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal
 from gateway.registers.words import ControlBit, RefusalReason
 
 OWN = "tare refused: 1.56 V are out: disable the output or set the force to 0 first"
@@ -71,7 +71,7 @@ def test_only_a_gateway_of_this_machine_is_asked_for_its_words(tmp_path: Path) -
             self.where = where
 
     near = {
-        where: bool(refused._sockets_near(Client(where), tmp_path))
+        where: bool(refusal_text._sockets_near(Client(where), tmp_path))
         for where in ("127.0.0.1:5020", "::1:5020", "localhost:1", "10.0.0.7:5020", "cell-3:5020")
     }  # type: ignore[arg-type]
     assert near == {

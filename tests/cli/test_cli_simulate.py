@@ -10,10 +10,10 @@ from click.testing import Result
 
 from gateway.diagnosis import EFFECTS
 from gateway.profiles import load_plant
-from gateway.profiles.plant_writer import plant_text, with_origins
+from gateway.profiles.kinds.plant_writer import plant_text, with_origins
 from gateway.recording import read_table
 from gateway.twin.plant import values, with_value
-from tests.service.reporting.fake_diagnosis import command_v
+from tests.reports.fake_diagnosis import command_v
 
 Call = Callable[..., Result]
 

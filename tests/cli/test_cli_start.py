@@ -9,7 +9,7 @@ import click
 import pytest
 
 from gateway.cli import main
-from gateway.service.guardian import RunOptions
+from gateway.service.supervisor.guardian import RunOptions
 
 HEAVY = ("scipy", "matplotlib", "pandas", "pyarrow", "pymodbus", "rich", "uvloop")
 
@@ -40,7 +40,7 @@ def test_check_never_imports_scipy() -> None:
 
 def test_the_guardian_is_reached_without_numpy() -> None:
     assert loaded_modules("run", "--help", "--json").isdisjoint({"numpy", "yaml", "pydantic"})
-    code = "import sys, gateway.cli.run, gateway.service.guardian; sys.exit('numpy' in sys.modules)"
+    code = "import sys, gateway.cli.verbs.run, gateway.service.supervisor.guardian; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -80,7 +80,7 @@ def test_options_of_run_are_the_fields_of_run_options() -> None:
 )
 def test_an_endpoint_is_read_as_people_write_it(text: str, expected: tuple[str, int], call, monkeypatch) -> None:
     seen: list[RunOptions] = []
-    monkeypatch.setattr("gateway.service.guardian.run", lambda options: seen.append(options) or 0)
+    monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: seen.append(options) or 0)
     assert call("run", "--bind", text).exit_code == 0
     assert seen[0].bind == expected
 
@@ -94,7 +94,7 @@ def test_a_wrong_endpoint_is_a_usage_error(text: str, call) -> None:
 
 def test_run_hands_over_everything_and_ends_with_the_guardians_code(call, monkeypatch, tmp_path: Path) -> None:
     seen: list[RunOptions] = []
-    monkeypatch.setattr("gateway.service.guardian.run", lambda options: seen.append(options) or 69)
+    monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: seen.append(options) or 69)
     answer = call("run", "my.yaml", "--sim", "--state", tmp_path, "--json", "--record", "--realtime")
     assert answer.exit_code == 69
     expected = RunOptions(rig="my.yaml", simulate=True, state=tmp_path, json=True, record=True, realtime=True)
@@ -108,7 +108,7 @@ def test_a_mistyped_verb_gets_a_proposal(call) -> None:
 
 
 def test_a_defect_says_so_without_a_traceback(call, monkeypatch) -> None:
-    monkeypatch.setattr("gateway.service.guardian.run", lambda options: {}["missing"])
+    monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: {}["missing"])
     answer = call("run")
     assert answer.exit_code == 1
     assert answer.stderr.startswith("E500 a defect of force-gateway, not of yours: KeyError")
@@ -129,7 +129,7 @@ def test_what_the_system_refuses_is_told_in_one_line(
     def fail(options: RunOptions) -> int:
         raise error
 
-    monkeypatch.setattr("gateway.service.guardian.run", fail)
+    monkeypatch.setattr("gateway.service.supervisor.guardian.run", fail)
     answer = call("run")
     assert answer.exit_code == exit_code
     assert answer.stderr.startswith(f"{code} /x: {error.strerror}")

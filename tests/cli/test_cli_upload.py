@@ -9,18 +9,18 @@ from pathlib import Path
 import pytest
 
 from gateway.bsfm import CoefficientLimits
-from gateway.cli.uploading import place
+from gateway.calibrations.activation import Activation, InUse
+from gateway.calibrations.store import CalibrationStore, as_text
+from gateway.calibrations.upload import Upload, UploadRules
+from gateway.cli.master.upload import place
 from gateway.modbus import MbapFramer, Peer, answer
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
-from gateway.registers.coefficients import CoefficientSet
 from gateway.registers.command import Status
+from gateway.registers.upload.coefficients import CoefficientSet
 from gateway.registers.words import CommitStatus
-from gateway.service.activation import Activation, InUse
-from gateway.service.calibration_store import CalibrationStore, as_text
-from gateway.service.upload import Upload, UploadRules
-from tests.service.coefficients import calibration
-from tests.service.disk import disk
+from tests.calibrations.coefficients import calibration
+from tests.calibrations.failing_disk import disk
 
 OWN = calibration(8, number=1)
 
@@ -173,7 +173,7 @@ def test_a_gateway_that_is_busy_says_so(gateway, address, call, file):
 
 
 def test_a_commit_that_never_ends_is_waited_for_with_a_bound(gateway, address, call, file, monkeypatch):
-    monkeypatch.setattr("gateway.cli.uploading._PATIENCE_S", 0.05)
+    monkeypatch.setattr("gateway.cli.master.upload._PATIENCE_S", 0.05)
     gateway.upload.apart = lambda work, done: None
     done = call("upload", file, "--gateway", address)
     assert done.exit_code == 1

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import pytest
 
-from gateway.cli.client import GatewayClient
 from gateway.cli.errors import CliError
-from gateway.cli.holding.beat import Beat, Lease
-from gateway.cli.holding.run import End, HoldRun, seen_of
+from gateway.cli.force_hold.heartbeat import Beat, Lease
+from gateway.cli.force_hold.sequence import End, HoldRun, seen_of
+from gateway.cli.master.client import GatewayClient
 from gateway.control.settings import LeaseAction
 from gateway.registers import RegisterMap
 from gateway.registers.words import FaultCode, RefusalReason, State

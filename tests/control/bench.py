@@ -15,7 +15,7 @@ from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.control import Controller, ControlSettings, Limits, Line, Output, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
-from gateway.registers.edges import Asked, EdgeRefusal
+from gateway.registers.edge_questions import Asked, EdgeRefusal
 from gateway.registers.words import ControlBit, FaultCode, Mode
 
 STEP_S = 0.001

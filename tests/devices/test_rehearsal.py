@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gateway.profiles import ProfileError, load_device, root
-from gateway.profiles.text import parse
+from gateway.profiles.strict_yaml.text import parse
 
 
 def loaded(folder: Path, name: str, **changes: Any) -> list[str]:

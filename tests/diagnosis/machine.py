@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis import Measurement
-from gateway.recording.judged_rows import repeated_readings
+from gateway.recording.tables.judged_rows import repeated_readings
 from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
-from gateway.twin.replay import Drive, Replay
+from gateway.twin.replay.replay import Drive, Replay
 from gateway.twin.surroundings import Surroundings
 
 Floats = NDArray[np.float64]

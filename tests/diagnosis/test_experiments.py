@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from gateway.control.experiment_plan import ExperimentPlan
-from gateway.control.experiment_schedule import Schedule, segments_of
-from gateway.control.ladder_stairs import check_stairs
+from gateway.control.runs.experiment_plan import ExperimentPlan
+from gateway.control.runs.experiment_schedule import Schedule, segments_of
+from gateway.control.runs.ladder_stairs import check_stairs
 from gateway.diagnosis import EFFECTS, Measurement, diagnose
-from gateway.diagnosis.experiments import EXPERIMENTS, plan_for, plan_next
+from gateway.diagnosis.experiments.experiments import EXPERIMENTS, plan_for, plan_next
 from gateway.diagnosis.result import NotIdentifiable
 from gateway.profiles import load_plant, load_rig
-from gateway.profiles.plan_files import plain, plan_of
+from gateway.profiles.kinds.plans import plain, plan_of
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
-from gateway.twin.replay import Drive, Replay
-from tests.service.reporting.fake_diagnosis import WARMTH, diagnosis
+from gateway.twin.replay.replay import Drive, Replay
+from tests.reports.fake_diagnosis import WARMTH, diagnosis
 
 RIG = load_rig("demo")
 MODEL, LIMITS = RIG.calibration.model(), RIG.control.limits

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import BY_NAME, Diagnosis, Measurement, Options, diagnose
-from gateway.diagnosis.base_fit import DEFAULT_PLANT, base_parameters, fit_base
-from gateway.diagnosis.bench import Bench
-from gateway.diagnosis.catalogue_sensing import DRIFT, ZERO_PER_K
-from gateway.diagnosis.gram import Normal, held_out
+from gateway.diagnosis.catalogue.sensing import DRIFT, ZERO_PER_K
 from gateway.diagnosis.noise import coloured, white
-from gateway.diagnosis.point import Point
-from gateway.diagnosis.refine import Fitted, Problem, refine
+from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
+from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
+from gateway.diagnosis.search.normal_equations import Normal, held_out
+from gateway.diagnosis.search.parameters import Point
 from gateway.recording import Recording
 from gateway.recording.measurement import measurement_of
-from gateway.service.reporting.diagnosis_document import diagnosis_document
+from gateway.reports.diagnosis.document import diagnosis_document
 from tests.diagnosis.machine import MACHINE, Floats, command_v, measurement, plant, readings_n, recorded, times_s
 
 SHORT_S = times_s(20.0, 100.0)

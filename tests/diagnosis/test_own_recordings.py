@@ -1,6 +1,6 @@
 """Clean recordings of the gateway's own, of every kind that a first day brings, give no name, and the watch stays silent.
 
-Made in virtual time by tests/service/clean_runs.py: the whole wired gateway, late wake-ups, 9600 baud. The push gate asks
+Made in virtual time by tests/watch/clean_runs.py: the whole wired gateway, late wake-ups, 9600 baud. The push gate asks
 for few and short ones; --long for all kinds.
 """
 
@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.cli.diagnosing.sources import Sources, read_sources
+from gateway.cli.diagnosis.sources import Sources, read_sources
 from gateway.diagnosis import Diagnosis, Options, Verdict, diagnose
-from gateway.diagnosis.bench import Bench
-from gateway.diagnosis.start import at_its_best
+from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.initial_friction import at_its_best
 from gateway.profiles import load_rig
 from gateway.registers.residual_cause import ResidualCause
-from gateway.service.run_recording import COLUMNS
-from gateway.service.watch import Setup, Watch
-from gateway.service.watch_process import diagnosed
-from gateway.service.watch_reference import Reference
+from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.twin.plant import with_value
-from tests.service.clean_runs import KINDS, recorded, rows_of
+from gateway.watch.reference import Reference
+from gateway.watch.residual_watch import Setup, Watch
+from gateway.watch.watch_process import diagnosed
+from tests.watch.clean_runs import KINDS, recorded, rows_of
 
 NOISE_N = 0.12  # of the demo rig's cell
 
@@ -99,6 +99,6 @@ def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_watch_says_nothing_of_any_kind_of_clean_work(kind: str) -> None:
-    """tests/service/test_watch_in_virtual_time.py asks the same, with a stub for the search, in the push gate."""
+    """tests/watch/test_watch_in_virtual_time.py asks the same, with a stub for the search, in the push gate."""
     stood, watch = watched(kind, 5, 190.0, 60.0)
     assert set(stood) <= {ResidualCause.NONE}, watch.standing

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement, Options, Verdict, diagnose
-from gateway.diagnosis.base_fit import bare
-from gateway.diagnosis.suspects import SWAPPED, TURNED, UNIT, columns_option, suspects
+from gateway.diagnosis.input_checks import SWAPPED, TURNED, UNIT, columns_option, suspects
+from gateway.diagnosis.search.base_fit import bare
 from gateway.twin.plant import Plant, with_value
-from gateway.twin.replay import Drive, Replay
+from gateway.twin.replay.replay import Drive, Replay
 from gateway.units import LINEAR
 from tests.diagnosis.machine import MACHINE, command_v, measurement, times_s
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Options, Verdict, diagnose
-from gateway.diagnosis.catalogue import BY_NAME
-from gateway.diagnosis.contest import Contest
-from gateway.diagnosis.gram import HeldOut
+from gateway.diagnosis.catalogue.catalogue import BY_NAME
 from gateway.diagnosis.result import Gain
-from gateway.diagnosis.search import Accepted
-from gateway.diagnosis.worth import doubt, gain_of
-from gateway.service.reporting import diagnosis_words as words
+from gateway.diagnosis.search.model_comparison import Contest
+from gateway.diagnosis.search.normal_equations import HeldOut
+from gateway.diagnosis.search.search import Accepted
+from gateway.diagnosis.search.significance import doubt, gain_of
+from gateway.reports.diagnosis import wording as words
 from tests.diagnosis.machine import MACHINE, recorded, times_s
 
 UNSET: Any = None

@@ -12,8 +12,8 @@ import pytest
 
 from gateway.diagnosis import Diagnosis, Measurement, Options, diagnose
 from gateway.recording import read_table
-from gateway.recording.mapping_file import column_mapping
 from gateway.recording.measurement import measurement_of
+from gateway.recording.tables.mapping_file import column_mapping
 
 FOLDER = Path(os.environ.get("FORCE_GATEWAY_DATA") or Path(__file__).parents[3] / "shared" / "data")
 DATA = FOLDER / "zillen-cylinder-friction"

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from gateway.bsfm import Bsfm
+from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import load_calibration, load_rig, root
 from gateway.recording import read_recording
-from gateway.service.calibration_store import CalibrationStore
 from tests.end_to_end.conftest import RunningGateway, start, stop
 
 OFF, CALIBRATING = 0, 5

@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import load_calibration
 from gateway.profiles.find import locate
-from gateway.service.calibration_store import CalibrationStore
+from tests.calibrations.coefficients import calibration
 from tests.end_to_end.conftest import start, stop
-from tests.service.coefficients import calibration
 
 RAMPING, HOLDING = 2, 3
 

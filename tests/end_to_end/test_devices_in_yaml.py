@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from gateway.processes import message_link
+from gateway.processes.event_log import EventLog
 from gateway.profiles import load_rig
-from gateway.service import link
-from gateway.service.event_log import EventLog
 from gateway.service.simulated_rig import serve
 from tests.end_to_end.conftest import RunningGateway, start, stop
 
@@ -60,13 +60,13 @@ accept_no_device_watchdog: true
 @contextmanager
 def far_ends(folder: Path) -> Iterator[None]:
     """The devices of rig.yaml on two ptys, behind the names that the rig gives; in a thread of the test."""
-    ours, theirs = link.pair()
+    ours, theirs = message_link.pair()
     rig = load_rig(folder / "rig.yaml", simulated=True)
     thread = threading.Thread(target=lambda: asyncio.run(serve(rig, theirs, folder, EventLog())))
     thread.start()
     try:
         assert select.select([ours], [], [], 20.0)[0], "the simulated rig tells its ptys"
-        message = link.receive(ours)
+        message = message_link.receive(ours)
         assert message
         for name, path in message.body["ptys"].items():
             (folder / name).symlink_to(path)

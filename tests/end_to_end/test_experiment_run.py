@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.profiles.plan_files import load_plan, plain
+from gateway.profiles.kinds.plans import load_plan, plain
 from gateway.recording import read_recording
 from gateway.recording.measurement import measurement_of
 

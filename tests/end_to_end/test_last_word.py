@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from gateway.service.event_file import EventReader
+from gateway.processes.event_file import EventReader
 from tests.end_to_end.conftest import RunningGateway, start, stop
 from tests.end_to_end.own_devices import OwnDevices
 

@@ -48,7 +48,10 @@ def test_the_guardian_maps_no_numpy(rested):
     [
         ("import gateway.service.control_process", {*HEAVY, "pymodbus", "rich"}),
         ("import gateway.service.simulated_rig", {*HEAVY, "pymodbus", "rich"}),
-        ("import gateway.service.guardian", {*HEAVY, "numpy", "asyncio", "yaml", "pydantic", "serial", "click"}),
+        (
+            "import gateway.service.supervisor.guardian",
+            {*HEAVY, "numpy", "asyncio", "yaml", "pydantic", "serial", "click"},
+        ),
     ],
 )
 def test_each_process_imports_only_what_it_needs(statement, absent):

@@ -16,11 +16,11 @@ from random import Random
 import psutil
 import pytest
 
+from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import load_calibration
-from gateway.registers.coefficients import CoefficientSet, words_of_block
-from gateway.service.calibration_store import CalibrationStore
+from gateway.registers.upload.coefficients import CoefficientSet, words_of_block
+from tests.calibrations.coefficients import calibration, mark_of, requests_of, staged
 from tests.end_to_end.conftest import RunningGateway, start, stop
-from tests.service.coefficients import calibration, mark_of, requests_of, staged
 
 KILLS = 50
 PER_STATE = 25
@@ -53,7 +53,7 @@ class Nursery:
 def nursery() -> Iterator[Nursery]:
     root = Path(__file__).parents[2]
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.end_to_end.commit_nursery"],
+        [sys.executable, "-m", "tests.end_to_end.commit_forks"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

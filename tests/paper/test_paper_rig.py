@@ -12,7 +12,7 @@ from paper.limit import Fastest
 from paper.rigs import bed, copy_of, lifted, paper_plant
 from paper.trials import Lane
 
-from gateway.bsfm.ladder import ladder_plan
+from gateway.bsfm.ladder.measured_ladder import ladder_plan
 from gateway.twin.experiment import staircase
 
 

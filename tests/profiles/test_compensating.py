@@ -8,9 +8,9 @@ import pytest
 from gateway.control import NO_COMPENSATION, CommandMap
 from gateway.diagnosis import EFFECTS
 from gateway.profiles import check_report, load_plant, load_rig
-from gateway.profiles.compensating import ALL_INPUTS, TREATMENTS, By, changed, compensation_of, number_at
-from gateway.profiles.plant_writer import plant_text, with_origins
-from gateway.profiles.uncompensated import REASONS
+from gateway.profiles.kinds.plant_writer import plant_text, with_origins
+from gateway.profiles.rigs.compensation import ALL_INPUTS, TREATMENTS, By, changed, compensation_of, number_at
+from gateway.profiles.rigs.uncompensated import REASONS
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 

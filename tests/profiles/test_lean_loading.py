@@ -5,7 +5,7 @@ import sys
 from time import perf_counter
 
 from gateway.profiles import check_report
-from gateway.profiles.typed import adapter
+from gateway.profiles.strict_yaml.typed import adapter
 
 HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "pyarrow", "pymodbus", "serial", "asyncio")
 

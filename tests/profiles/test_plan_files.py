@@ -6,10 +6,10 @@ import jsonschema
 import pytest
 import yaml
 
-from gateway.control.experiment_plan import Do, ExperimentPlan, Move, Part
-from gateway.control.ladder_stairs import RunPlan
+from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part
+from gateway.control.runs.ladder_stairs import RunPlan
 from gateway.profiles import ProfileError, schema
-from gateway.profiles.plan_files import load_plan, load_plan_fields, plain, plan_of, plan_text
+from gateway.profiles.kinds.plans import load_plan, load_plan_fields, plain, plan_of, plan_text
 
 PLAN = ExperimentPlan(
     name='steps "and" more',

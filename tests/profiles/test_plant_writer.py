@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from gateway.profiles import Origin, PlantProfile, load_plant, shipped
-from gateway.profiles.plant_writer import UNSTATED, plant_text, with_origins
-from gateway.profiles.plants import read_plant
-from gateway.profiles.text import parse
+from gateway.profiles.kinds.plant_writer import UNSTATED, plant_text, with_origins
+from gateway.profiles.kinds.plants import read_plant
+from gateway.profiles.strict_yaml.text import parse
 from gateway.twin import Plant
 from gateway.twin.plant import values, with_value
 

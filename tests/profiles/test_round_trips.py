@@ -9,10 +9,10 @@ import pytest
 from gateway.bsfm import Calibration
 from gateway.devices import DeviceProfile
 from gateway.profiles import find, load_plant, shipped
-from gateway.profiles.models import RigFile
-from gateway.profiles.plants import read_plant
-from gateway.profiles.text import Document, parse
-from gateway.profiles.typed import adapter, build
+from gateway.profiles.kinds.plants import read_plant
+from gateway.profiles.rigs.rig_file import RigFile
+from gateway.profiles.strict_yaml.text import Document, parse
+from gateway.profiles.strict_yaml.typed import adapter, build
 from gateway.registers import RegisterMap
 
 KINDS: dict[str, type] = {"rig": RigFile, "device": DeviceProfile, "calibration": Calibration}

@@ -8,8 +8,8 @@ import pytest
 
 from gateway.profiles import find, schema, shipped
 from gateway.profiles.schema import schema_text
-from gateway.profiles.text import parse
-from gateway.registers import map_reader
+from gateway.profiles.strict_yaml.text import parse
+from gateway.registers.map import map_reader
 
 ROOT = Path(__file__).parents[2] / "profiles"
 SHIPPED = [(kind, name) for kind in find.FOLDERS for name in shipped(kind)]

@@ -7,8 +7,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gateway.profiles import text
-from gateway.profiles.faults import ProfileError
+from gateway.profiles.strict_yaml import text
+from gateway.profiles.strict_yaml.faults import ProfileError
 
 STEADY = settings(derandomize=True, deadline=None)
 Parse = Callable[[bytes], text.Document]

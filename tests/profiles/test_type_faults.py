@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from gateway.profiles.models import RigFile
-from gateway.profiles.text import parse
-from gateway.profiles.typed import build
+from gateway.profiles.rigs.rig_file import RigFile
+from gateway.profiles.strict_yaml.text import parse
+from gateway.profiles.strict_yaml.typed import build
 
 DEMO = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
 

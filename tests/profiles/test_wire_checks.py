@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gateway.profiles import check_report, root
-from gateway.profiles.text import parse
+from gateway.profiles.strict_yaml.text import parse
 
 POLLED = {"ask": "W?", "frame": "W {force:+08.2f}", "unit": "N"}
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, Memory, RationalBezier, SlipStops
-from gateway.bsfm.slip import STIFFEST, half_width_bound_v, middle_and_half
+from gateway.bsfm.slip.slip_stops import STIFFEST, half_width_bound_v, middle_and_half
 
 MANY = settings(derandomize=True, deadline=None, max_examples=150)
 RISING = RationalBezier(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.9, 1.2))

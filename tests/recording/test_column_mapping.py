@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import ColumnMapping, ColumnSource, RecordingError
-from gateway.recording.columns import CONTRACT, DERIVED
-from gateway.recording.mapping import picked, quantity_of
-from gateway.recording.mapping_file import column_mapping, read_mapping
+from gateway.recording.tables.column_mapping import picked, quantity_of
+from gateway.recording.tables.columns import CONTRACT, DERIVED
+from gateway.recording.tables.mapping_file import column_mapping, read_mapping
 from gateway.twin.surroundings import COLUMNS
 from gateway.units import LINEAR, linear_conversion
 

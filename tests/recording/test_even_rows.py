@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement
-from gateway.recording.even_rows import evened
+from gateway.recording.tables.even_rows import evened
 
 RNG = np.random.default_rng(1)
 PERIOD_S = 0.0100007  # an amplifier's clock is never ours

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Measurement
 from gateway.recording import Recording, RecordingError, read_table
-from gateway.recording.columns import DERIVED
-from gateway.recording.judged_rows import repeated_readings, valid_by_quality
-from gateway.recording.mapping_file import column_mapping
 from gateway.recording.measurement import measurement_of
+from gateway.recording.tables.columns import DERIVED
+from gateway.recording.tables.judged_rows import repeated_readings, valid_by_quality
+from gateway.recording.tables.mapping_file import column_mapping
 
 N = 1000
 TIME_S = np.arange(N) / 200.0

@@ -12,19 +12,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gateway.recording import (
-    ColumnMapping,
-    Recorder,
-    RecordingError,
-    csv_table,
-    export_csv,
-    export_parquet,
-    read_recording,
-)
-from gateway.recording.csv_form import csv_form
-from gateway.recording.csv_table import read_csv
-from gateway.recording.mapping import picked
-from gateway.recording.tables import read_table
+from gateway.recording import ColumnMapping, Recorder, RecordingError, export_csv, export_parquet, read_recording
+from gateway.recording.tables import csv_table
+from gateway.recording.tables.any_table import read_table
+from gateway.recording.tables.column_mapping import picked
+from gateway.recording.tables.csv_form import csv_form
+from gateway.recording.tables.csv_table import read_csv
 
 ROWS = [(0.0, 1.5, -0.25), (0.005, 1.5, 3.75), (0.01, 2.25, float("nan"))]
 NAMES = ("time_s", "command_v", "force_n")

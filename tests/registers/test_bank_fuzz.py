@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gateway.modbus import ModbusError, Peer
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
-from gateway.registers.edges import Asked, EdgeRefusal
+from gateway.registers.edge_questions import Asked, EdgeRefusal
 from gateway.registers.words import ControlBit, RefusalReason, State
 
 PEERS = [Peer("10.0.0.1", 1), Peer("10.0.0.2", 2), Peer("fe80::1", 3)]

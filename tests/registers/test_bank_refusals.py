@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gateway.registers.edges import EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal
 from gateway.registers.words import ControlBit, RefusalReason
 
 R = RefusalReason

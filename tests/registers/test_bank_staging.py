@@ -9,7 +9,7 @@ import pytest
 
 from gateway.bsfm.model import Calibration
 from gateway.registers import Refusal, RegisterBank
-from gateway.registers.coefficients import SET_BYTES, CoefficientSet
+from gateway.registers.upload.coefficients import SET_BYTES, CoefficientSet
 from gateway.registers.words import CommitAction, CommitStatus, RefusalReason, UploadReason
 
 CALIBRATION = Calibration(

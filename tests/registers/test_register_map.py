@@ -8,8 +8,8 @@ import pytest
 from gateway.bsfm.validate import CoefficientReason
 from gateway.registers import MapError, RegisterMap, UnknownRegister
 from gateway.registers import words as w
-from gateway.registers.coefficients import HEAD_WORDS, SET_WORDS, TAIL_FROM, UNUSED_WORDS
 from gateway.registers.residual_cause import ResidualCause
+from gateway.registers.upload.coefficients import HEAD_WORDS, SET_WORDS, TAIL_FROM, UNUSED_WORDS
 
 COMMAND = (
     "control_word force_setpoint force_ramp mode heartbeat voltage_setpoint tilt_angle precontact_force contact_ramp payload "

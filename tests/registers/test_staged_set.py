@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.bsfm import CoefficientLimits, CoefficientReason, Coefficients, Response
-from gateway.registers.coefficients import BLOCK_BYTES, SET_BYTES, CoefficientSet, set_crc, words_of_block
-from gateway.registers.staging import StagedFault, check_staged
+from gateway.registers.upload.coefficients import BLOCK_BYTES, SET_BYTES, CoefficientSet, set_crc, words_of_block
+from gateway.registers.upload.staging import StagedFault, check_staged
 from gateway.registers.values import float32
 from gateway.registers.words import UploadReason
 

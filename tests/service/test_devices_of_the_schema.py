@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from gateway.profiles import Report, check_report, root, schema
-from gateway.profiles.text import parse
+from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.words import State
 from tests.service.drawn_devices import Profile, drawn_cell, drawn_output
 from tests.service.wired import Wired

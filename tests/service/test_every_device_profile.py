@@ -10,7 +10,7 @@ from gateway.devices.messages import Accepted, ForceSample, Garbage, Pressure, R
 from gateway.ports import Pty
 from gateway.profiles import load_device, load_rig, shipped
 from gateway.registers.words import FaultCode, State
-from gateway.service.output_exchange import OutputExchange
+from gateway.service.running_rig.output_line import OutputExchange
 from tests.service.wired import Wired
 
 STEP_S, DURATION_S = 0.001, 5.0

@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 
+from gateway.processes.json_socket import JsonLineServer
 from gateway.registers.words import FaultCode, State
 from gateway.service.control_socket import Asked, ControlSocket
-from gateway.service.json_lines import JsonLineServer
-from gateway.service.ladder_keeper import LadderKeeper
-from gateway.service.recordings import Recordings
-from gateway.service.rig_calibrations import RigCalibrations
+from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.calibrations import RigCalibrations
+from gateway.service.running_rig.recordings import Recordings
 from gateway.service.simulated_rig import SimulatedRig
-from gateway.service.watch_desk import WatchDesk
+from gateway.service.watch_reports import WatchDesk
 from tests.service.hostile import garbage, mutants
 from tests.service.wired import ENABLE, Wired
 

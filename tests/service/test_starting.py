@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from gateway.control.settings import LeaseAction
+from gateway.processes.exit_cause import EndCause, Ending
 from gateway.registers.words import FaultCode
 from gateway.service.banner import Ready, banner, info, try_lines
-from gateway.service.cell import _cause_of_restart
-from gateway.service.ending import EndCause, Ending
-from gateway.service.rules import bank_rules, server_settings
-from gateway.service.run_flag import RunFlag
+from gateway.service.clean_shutdown_marker import RunFlag
+from gateway.service.running_rig.bank_rules import bank_rules, server_settings
+from gateway.service.running_rig.running_rig import _cause_of_restart
 from tests.service.rigs import demo, with_supervision
 
 

@@ -18,10 +18,10 @@ from gateway.modbus import Peer
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers import RegisterBank
 from gateway.registers.words import FaultCode, State, WarningBit
-from gateway.service.cell_exchange import CellExchange
-from gateway.service.gateway import Gateway
-from gateway.service.output_exchange import OutputExchange
-from gateway.service.rules import bank_rules
+from gateway.service.running_rig.bank_rules import bank_rules
+from gateway.service.running_rig.gateway_core import Gateway
+from gateway.service.running_rig.load_cell_line import CellExchange
+from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.simulated_rig import SimulatedRig
 from tests.service.rigs import demo
 

@@ -191,6 +191,6 @@ def test_a_replay_takes_plants_one_by_one() -> None:
 
 
 def test_the_real_time_twin_loads_neither_replay_nor_scipy() -> None:
-    code = "import sys, gateway.twin; print(sorted({'scipy', 'gateway.twin.replay'} & set(sys.modules)))"
+    code = "import sys, gateway.twin; print(sorted({'scipy', 'gateway.twin.replay.replay'} & set(sys.modules)))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gateway.twin.plant import Contact, Cylinder, Friction, Plant, Regulator
-from gateway.twin.replay import Drive, Replay
+from gateway.twin.replay.replay import Drive, Replay
 
 RATE_HZ = 100.0
 TIME_S = np.arange(1200) / RATE_HZ

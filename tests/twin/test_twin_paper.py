@@ -16,8 +16,8 @@ import pytest
 import yaml
 
 from gateway.bsfm.branches import Branches
-from gateway.bsfm.fit import fit
-from gateway.bsfm.ladder import FALLING, RISING, Ladder
+from gateway.bsfm.fit.branch_fit import fit
+from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 from gateway.bsfm.model import Calibration
 from gateway.bsfm.validate import CoefficientLimits, validate
 from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from gateway.diagnosis import Measurement, Options, diagnose
-from gateway.diagnosis.base_fit import DEFAULT_PLANT
+from gateway.diagnosis.search.base_fit import DEFAULT_PLANT
 from gateway.recording import read_table
 from gateway.recording.measurement import measurement_of
 from gateway.twin.plant import with_value
-from gateway.twin.replay import Drive, Replay
+from gateway.twin.replay.replay import Drive, Replay
 
 SEED = 11
 ROW_S = 0.005

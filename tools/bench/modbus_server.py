@@ -35,7 +35,7 @@ def real_bank() -> object:
     """The bank of the demo rig, as the service builds it."""
     from gateway.profiles import load_rig
     from gateway.registers import RegisterBank
-    from gateway.service.rules import bank_rules
+    from gateway.service.running_rig.bank_rules import bank_rules
 
     rig = load_rig("demo")
     return RegisterBank(rig.register_map, bank_rules(rig), now=monotonic)

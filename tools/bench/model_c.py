@@ -19,7 +19,7 @@ from math import comb
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from gateway.bsfm.c_code import c_source
+from gateway.bsfm.c_export.code import c_source
 from gateway.bsfm.model import Calibration
 from gateway.profiles import load_calibration
 

@@ -5,11 +5,12 @@
     .venv/bin/python tools/bench/response.py --seeds 20
     .venv/bin/python tools/bench/response.py --write        # calibrate anew, and keep that for the tests
 
-Machines are drawn from a seed (tests/control/foreign.py: dead time 20-150 ms, lags 30-300 ms, one or two, LuGre friction of
+Machines are drawn from a seed (tests/control/foreign/machine.py: dead time 20-150 ms, lags 30-300 ms, one or two,
+LuGre friction of
 0.5-4 N, noise). Each is calibrated by the product's quick ladder, in virtual time, starting with the demo's calibration; then
 the same course with the numbers of the demo rig's file (`fixed`) and with what was measured, trim on and off. "settled" is the
 median time until the force stays within 0.5 N; "of bound" the median of that over what the plant's physics allows
-(tests/control/foreign_course.py says which bound). Never run on hardware.
+(tests/control/foreign/course.py says which bound). Never run on hardware.
 """
 
 import argparse
@@ -25,10 +26,10 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 from gateway.bsfm import Bsfm
 from gateway.control.settings import ControlSettings, LeadSettings, Trim
 from gateway.profiles import load_rig
-from tests.control.foreign import drawn
-from tests.control.foreign_course import Course, allowed_s, course
-from tests.control.foreign_kept import KEPT, kept, stored
-from tests.control.foreign_stand import Calibrated, calibrated, settings
+from tests.control.foreign.course import Course, allowed_s, course
+from tests.control.foreign.kept_calibrations import KEPT, kept, stored
+from tests.control.foreign.machine import drawn
+from tests.control.foreign.stand import Calibrated, calibrated, settings
 
 FIXED: Final = LeadSettings(lag_s=0.072, second_lag_s=0.072)
 

@@ -37,9 +37,9 @@ from paper.paper_values import GROUPS, LADDER_STEP_V, LADDER_TOP_V
 from paper.rigs import copy_of
 
 from gateway.bsfm import Bsfm
-from gateway.bsfm.fit import fit
-from gateway.bsfm.ladder import ladder_plan
-from gateway.bsfm.slip_fit import Walk, fit_joint, fit_stops, judged, walk_of
+from gateway.bsfm.fit.branch_fit import fit
+from gateway.bsfm.ladder.measured_ladder import ladder_plan
+from gateway.bsfm.slip.slip_fit import Walk, fit_joint, fit_stops, judged, walk_of
 from gateway.twin import Plant
 from gateway.twin.experiment import Dwell, Floats, settle, staircase
 

@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.branches import Branches
-from gateway.bsfm.fit import fit, fit_orders
-from gateway.bsfm.fit_result import FitResult
-from gateway.bsfm.ladder import Ladder, LadderPlan, ladder_plan
+from gateway.bsfm.fit.branch_fit import fit, fit_orders
+from gateway.bsfm.fit.result import FitResult
+from gateway.bsfm.ladder.measured_ladder import Ladder, LadderPlan, ladder_plan
 from gateway.bsfm.model import Bsfm
-from gateway.bsfm.slip_fit import fit_joint, walk_of
-from gateway.bsfm.slip_problem import Walk
+from gateway.bsfm.slip.problem import Walk
+from gateway.bsfm.slip.slip_fit import fit_joint, walk_of
 from gateway.twin import Plant, Twin
 from gateway.twin.experiment import Dwell, Floats, staircase
 from gateway.twin.plant import with_value

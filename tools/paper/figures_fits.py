@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from gateway.bsfm.fit_result import FitResult
-from gateway.bsfm.ladder import RISING, Ladder
+from gateway.bsfm.fit.result import FitResult
+from gateway.bsfm.ladder.measured_ladder import RISING, Ladder
 from paper import paper_values
 from paper.drawing import COLOUR, GREY, sheet
 from paper.study import Study

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.control.lead import Lead
+from gateway.control.force_loop.lead_compensator import Lead
 from paper.bounds import allowed_ratio, bound, delay_s, shaken_n
 from paper.comparison import ERROR_GOAL, SETTLING_GOAL, Comparison
 from paper.exercises import PACE_N_PER_S, UNBALANCE_N

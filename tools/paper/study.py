@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.bsfm.fit_result import FitResult
-from gateway.bsfm.ladder import Ladder
+from gateway.bsfm.fit.result import FitResult
+from gateway.bsfm.ladder.measured_ladder import Ladder
 from paper import comparison, exercises
 from paper.calibration import Calibrated, calibrate, paper_ladder, sweep
 from paper.comparison import Comparison

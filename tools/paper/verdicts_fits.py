@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from gateway.bsfm.fit_result import FitResult
+from gateway.bsfm.fit.result import FitResult
 from paper import paper_values
 from paper.study import Study
 from paper.verdict import NORM_TOLERANCE, Verdict, near, word

@@ -1,0 +1,65 @@
+"""The span of the reversal blend, from the minor-loop walk: the staircase alone cannot identify it (METHOD, "Reversal").
+
+Judged as control would use it: volts asked for each force in turn against those that made it, told in newtons. The walk
+begins on the rising branch, after a full cycle down; its first point only says where.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from gateway.bsfm.branches import Branches
+from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.model import Bsfm
+from gateway.bsfm.slip.reversal import LinearBlend
+
+SPANS: Final = 60
+LARGEST_SHARE: Final = 0.7  # of the force range
+FEWEST_POINTS: Final = 8
+
+
+@dataclass(frozen=True, slots=True)
+class SpanChoice:
+    """span_n and the errors on the walk in N: with it, largest with it, and with branches switched at once."""
+
+    span_n: float
+    rms_n: float
+    max_n: float
+    switched_rms_n: float
+    points: int
+
+
+def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
+    """What the control law gets wrong along a walk, N; one shorter than the walk."""
+    memory, errors = model.reversal.start(), []
+    low_n, high_n = model.force_range_n
+    for k in range(1, len(force_n)):
+        memory = model.moved(memory, float(force_n[k - 1]), float(force_n[k]))
+        state = model.share(memory)
+        asked_v, _ = model.voltage_v(min(max(float(force_n[k]), low_n), high_n), state)
+        errors.append(model.force_n(asked_v, state) - model.force_n(float(voltage_v[k]), state))
+    return np.array(errors)
+
+
+def chosen_span(branches: Branches, voltage_v: Floats, force_n: Floats) -> SpanChoice | None:
+    """The span with the smallest error on the walk; None where the walk is too short to tell."""
+    if len(voltage_v) < FEWEST_POINTS:
+        return None
+    model = Bsfm(branches, LinearBlend(0.0))
+    low_n, high_n = model.force_range_n
+    spans_n = np.round((high_n - low_n) * LARGEST_SHARE * np.arange(1, SPANS + 1) / SPANS, 2)
+    errors = [command_error_n(_with(model, span_n), voltage_v, force_n) for span_n in spans_n.tolist()]
+    best = min(range(SPANS), key=lambda k: float(np.mean(errors[k] ** 2)))
+    switched = command_error_n(model, voltage_v, force_n)
+    return SpanChoice(
+        float(spans_n[best]), _rms(errors[best]), float(np.abs(errors[best]).max()), _rms(switched), len(voltage_v)
+    )
+
+
+def _with(model: Bsfm, span_n: float) -> Bsfm:
+    return replace(model, reversal=LinearBlend(span_n))
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values * values)))

@@ -1,0 +1,50 @@
+"""Samples that must not steer a fit: found without a model, or played down by their residual.
+
+Rejection compares repeated readings of one rung (same voltage, same direction) with their median. It asks no model, so
+that a low order's misfit is not called an outlier and all orders are judged on the same samples. Rungs read fewer than
+three times keep everything.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.ladder.measured_ladder import Ladder
+
+REJECT_AT = 6.0  # robust standard deviations
+HUBER_AT = 1.345  # 95 % efficiency on normal noise (Huber 1981)
+NORMAL_MAD = 1.4826
+
+
+def rungs(ladder: Ladder) -> tuple[NDArray[np.intp], int]:
+    """Which rung (voltage and direction) each sample stands on, and how many rungs there are."""
+    _, index = np.unique(np.stack([ladder.voltage_v, ladder.direction]), axis=1, return_inverse=True)
+    flat = np.asarray(index).reshape(-1)
+    return flat, int(flat.max()) + 1
+
+
+def kept(ladder: Ladder) -> NDArray[np.bool_]:
+    """False for readings far from the median of their rung."""
+    index, count = rungs(ladder)
+    order = np.argsort(index, kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(index, minlength=count))[:-1])
+    away, repeated = np.zeros(len(ladder)), np.zeros(len(ladder), dtype=bool)
+    for members in groups:
+        away[members] = ladder.force_n[members] - np.median(ladder.force_n[members])
+        repeated[members] = len(members) >= 3
+    if not repeated.any():
+        return np.ones(len(ladder), dtype=bool)
+    return np.asarray(~repeated | (np.abs(away) <= REJECT_AT * _spread(away[repeated])))
+
+
+def huber_weight(residual_n: Floats) -> Floats:
+    """1 for small residuals, falling as 1/|r| beyond 1.345 robust standard deviations."""
+    scale = max(_spread(residual_n), 1.0e-12)
+    return np.asarray(np.minimum(1.0, HUBER_AT * scale / np.maximum(np.abs(residual_n), 1.0e-300)))
+
+
+def _spread(away_n: Floats) -> float:
+    """Robust standard deviation; coarse counts make the median 0, then the middle 95 % decide."""
+    size = np.abs(away_n)
+    middle = size[size <= np.quantile(size, 0.95)]
+    return float(max(NORMAL_MAD * np.median(size), np.sqrt(np.mean(middle * middle))))

@@ -1,0 +1,91 @@
+"""Numbers about a finished fit: residuals, covariance where the data identify the parameters, the paper's own norm."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.bsfm.fit.outliers import rungs
+from gateway.bsfm.fit.projected_problem import Floats, Lanes, Problem
+from gateway.bsfm.fit.result import NOT_IDENTIFIABLE, Covariance, Residuals
+from gateway.bsfm.fit.solution import Solution
+from gateway.bsfm.ladder.measured_ladder import Ladder
+
+LOG_WEIGHT_ERROR_MAX = 0.5  # a standard error beyond it: the data leave the weight open
+CONDITION_MAX = 1.0e10  # of the scaled normal matrix, whose inverse is wanted
+
+
+def residuals_of(residual_n: Floats) -> Residuals:
+    if not len(residual_n):
+        return Residuals(0.0, 0.0, 0.0, 0)
+    rms_n = float(np.sqrt(np.mean(residual_n * residual_n)))
+    return Residuals(rms_n, float(np.max(np.abs(residual_n))), float(np.mean(residual_n)), len(residual_n))
+
+
+def covariance_of(
+    solution: Solution, rows: list[NDArray[np.bool_]], residual_n: Floats, weight: Floats, box: float
+) -> Covariance | str:
+    """Gauss-Markov covariance at the optimum, or NOT_IDENTIFIABLE. rows: the samples of each curve."""
+    blocks: list[Floats] = []
+    names: list[str] = []
+    first = 0
+    for problem, at in zip(solution.problems, solution.lanes, strict=True):
+        curves = range(first, first + len(problem.curves))
+        mask = np.any([rows[c] for c in curves], axis=0)
+        block = _block(problem, at, _variance(problem, residual_n[mask], weight[mask], solution), solution, box)
+        if block is None:
+            return NOT_IDENTIFIABLE
+        blocks.append(block)
+        names += _names(problem, list(curves), solution)
+        first += len(problem.curves)
+    return Covariance(tuple(names), _diagonal(blocks))
+
+
+def _variance(problem: Problem, residual_n: Floats, weight: Floats, solution: Solution) -> float:
+    """Variance of one sample over the sum of weights, in the problem's normalisation."""
+    free = problem.handle_count + (problem.unknowns if solution.form.model.rational else 0)
+    spare = max(len(residual_n) - free, 1)
+    return float(np.sum(weight * residual_n * residual_n) / weight.sum() / spare)
+
+
+def _block(problem: Problem, at: Lanes, variance: float, solution: Solution, box: float) -> Floats | None:
+    jacobian = at.q[0] @ at.r[0]
+    if solution.form.model.rational:
+        jacobian = np.concatenate([jacobian, problem.sensitivity(at.shares, at.handles)[0]], axis=1)
+    lengths = np.sqrt((jacobian * jacobian).sum(axis=0))
+    if not np.all(lengths > 0.0) or np.any(np.abs(at.theta) >= box):
+        return None
+    normal = (jacobian / lengths).T @ (jacobian / lengths)
+    if np.linalg.cond(normal) > CONDITION_MAX:
+        return None
+    block = np.asarray(variance * np.linalg.inv(normal) / np.outer(lengths, lengths))
+    errors = np.sqrt(np.diag(block))[problem.handle_count :]
+    return None if np.any(errors > LOG_WEIGHT_ERROR_MAX) else block
+
+
+def _names(problem: Problem, curves: list[int], solution: Solution) -> list[str]:
+    branch = ["rising", "falling"] if solution.form.model.per_direction else ["pooled"]
+    handles = {}
+    for c, columns in zip(curves, problem.columns, strict=True):
+        for i, column in enumerate(columns.tolist()):
+            shared = len(curves) == 2 and i in (0, solution.form.order)
+            handles[column] = f"{'both' if shared else branch[c]} b{i}"
+    weights = [f"{branch[c]} log w{i}" for c in curves for i in range(1, solution.form.order + 1)]
+    return [handles[column] for column in sorted(handles)] + (weights if solution.form.model.rational else [])
+
+
+def _diagonal(blocks: list[Floats]) -> Floats:
+    size = sum(len(block) for block in blocks)
+    matrix, at = np.zeros((size, size)), 0
+    for block in blocks:
+        matrix[at : at + len(block), at : at + len(block)] = block
+        at += len(block)
+    return matrix
+
+
+def paper_norm(ladder: Ladder, residual_n: Floats, split: bool) -> float:
+    """Per data set, 2-norm of the residuals of the rung means / number of rungs; the data sets of a split model are added."""
+    index, count = rungs(ladder)
+    readings = np.bincount(index, minlength=count)
+    means = np.bincount(index, residual_n, minlength=count) / readings
+    rising = np.bincount(index, ladder.direction > 0, minlength=count) > 0
+    sets = [means[rising], means[~rising]] if split else [means]
+    return float(sum(np.linalg.norm(part) / len(part) for part in sets if len(part)))

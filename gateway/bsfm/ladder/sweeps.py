@@ -1,0 +1,146 @@
+"""Which way, and which group: a walk of settled points taken apart into whole loops and the minor-loop part.
+
+A run is a stretch in which the voltage goes one way. A group is a full run one way and a full run back; what follows the
+last group with three runs or more is the minor-loop walk. A cycle with far fewer stairs than the others only settled the
+friction. A loop's turning points belong to the run that reached them; a 0 V that ends one group begins the next, too.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
+from gateway.bsfm.ladder.settled_points import SAME_V, Points
+
+FULL_SHARE: Final = 0.95  # of the span: a run from below 5 % to above it is full
+COARSE_SHARE: Final = 0.7  # of the usual number of stairs: below it a cycle is no group
+FEWEST_STAIRS: Final = 3  # each way, the turning point included
+FEWEST_MINOR_RUNS: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Points first .. last (inclusive) in one direction; first is the turning point where it begins."""
+
+    first: int
+    last: int
+    direction: int
+    full: bool
+
+    @property
+    def stairs(self) -> int:
+        return self.last - self.first
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweeps:
+    """ladder: whole groups; minor_v, minor_n: the walk of partial reversals, may be empty; runs: rising and falling ones
+    with stairs enough; left_out: sentences about what is not in it."""
+
+    ladder: Ladder | None
+    minor_v: Floats
+    minor_n: Floats
+    rising: int
+    falling: int
+    left_out: tuple[str, ...]
+
+
+def sweeps(points: Points) -> Sweeps:
+    """Groups and minor loops. ladder is None where no whole group is found: `left_out`, `rising` and `falling` say why."""
+    runs = _runs(points.voltage_v)
+    fine, coarse = _without_coarse(runs)
+    pairs, others = _paired(fine)
+    minor = _minor_runs(others, pairs)
+    said = [*_settling(coarse, points), *_cut([run for run in others if run not in minor], points)]
+    walk = slice(minor[0].first, minor[-1].last + 1) if minor else slice(0, 0)
+    return Sweeps(
+        _ladder(points, pairs) if pairs else None,
+        points.voltage_v[walk],
+        points.force_n[walk],
+        _count(runs, RISING),
+        _count(runs, FALLING),
+        tuple(said),
+    )
+
+
+def _runs(voltage_v: Floats) -> list[Run]:
+    """Stretches of one direction. Where the turning point was read twice each run gets its own reading."""
+    low, high = float(voltage_v.min()), float(voltage_v.max())
+    margin_v = (1.0 - FULL_SHARE) * (high - low)
+    ends_v = (low + margin_v, high - margin_v)
+    runs: list[Run] = []
+    first = direction = 0
+    was_still = False
+    for k, step_v in enumerate(np.diff(voltage_v).tolist(), start=1):
+        way = 0 if abs(step_v) <= SAME_V else RISING if step_v > 0.0 else FALLING
+        if way and way != direction:
+            runs += [_run(voltage_v, first, k - 2 if was_still else k - 1, direction, ends_v)] if direction else []
+            first, direction = k - 1, way
+        was_still = way == 0
+    return [*runs, _run(voltage_v, first, len(voltage_v) - 1, direction, ends_v)] if direction else []
+
+
+def _run(voltage_v: Floats, first: int, last: int, direction: int, ends_v: tuple[float, float]) -> Run:
+    bottom, top = (first, last) if direction == RISING else (last, first)
+    full = bool(voltage_v[bottom] <= ends_v[0] and voltage_v[top] >= ends_v[1])
+    return Run(first, last, direction, full and last - first >= FEWEST_STAIRS)
+
+
+def _paired(runs: list[Run]) -> tuple[list[tuple[Run, Run]], list[Run]]:
+    """Full runs there and back, and the runs that are in no such pair."""
+    pairs: list[tuple[Run, Run]] = []
+    others: list[Run] = []
+    k = 0
+    while k < len(runs):
+        if k + 1 < len(runs) and runs[k].full and runs[k + 1].full and runs[k].direction != runs[k + 1].direction:
+            pairs.append((runs[k], runs[k + 1]))
+            k += 2
+        else:
+            others.append(runs[k])
+            k += 1
+    return pairs, others
+
+
+def _without_coarse(runs: list[Run]) -> tuple[list[Run], list[Run]]:
+    """Runs without the full ones that have far fewer stairs than others of their direction, and those."""
+    usual = {way: max((run.stairs for run in runs if run.full and run.direction == way), default=0) for way in (1, -1)}
+    coarse = [run for run in runs if run.full and run.stairs < COARSE_SHARE * usual[run.direction]]
+    return [run for run in runs if run not in coarse], coarse
+
+
+def _settling(coarse: list[Run], points: Points) -> list[str]:
+    if not coarse:
+        return []
+    stairs = sum(run.stairs for run in coarse)
+    return [f"a coarse cycle of {stairs} stairs from row {points.row[coarse[0].first]} settled the friction: left out"]
+
+
+def _minor_runs(others: list[Run], pairs: list[tuple[Run, Run]]) -> list[Run]:
+    after = pairs[-1][1].last if pairs else -1
+    walk = [run for run in others if run.first >= after]
+    return walk if pairs and len(walk) >= FEWEST_MINOR_RUNS else []
+
+
+def _cut(left: list[Run], points: Points) -> list[str]:
+    return [
+        f"from row {points.row[run.first]} the voltage goes {'up' if run.direction == RISING else 'down'} from "
+        f"{points.voltage_v[run.first]:.3g} to {points.voltage_v[run.last]:.3g} V only: a group cut short, left out"
+        for run in left
+    ]
+
+
+def _ladder(points: Points, pairs: list[tuple[Run, Run]]) -> Ladder:
+    index: list[int] = []
+    direction: list[int] = []
+    group: list[int] = []
+    for number, (there, back) in enumerate(pairs):
+        index += [*range(there.first, there.last + 1), *range(back.first + 1, back.last + 1)]
+        direction += [there.direction] * (there.stairs + 1) + [back.direction] * back.stairs
+        group += [number] * (there.stairs + back.stairs + 1)
+    return Ladder(points.voltage_v[index], points.force_n[index], np.array(direction), np.array(group))
+
+
+def _count(runs: list[Run], direction: int) -> int:
+    return sum(run.stairs for run in runs if run.direction == direction and run.stairs >= FEWEST_STAIRS)

@@ -1,0 +1,1 @@
+"""What happens between the branches when the force turns round: linear blend, or Maxwell slip stops and their fit."""

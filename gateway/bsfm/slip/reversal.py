@@ -1,0 +1,118 @@
+"""What happens between the branches when the force turns round (METHOD.md, "Reversal").
+
+The paper switches branches, which costs up to 0.9 V at once and doubles the error under chatter. Here a state s in [-1,
+1] says where between the branches the plant is: +1 on the rising one, -1 on the falling one. A play operator moves it:
+s += 2 df / span, clipped. An exponential blend was rejected: it drifts under chatter.
+
+Policies have one interface (`Reversal`), so that model and control know none of them: a memory moves with the force, and
+says the share s. LinearBlend remembers s alone, gateway.bsfm.slip.slip_stops one number per stop. `start` is where
+the calibration
+ladder starts, because that is where the policy's branches are true: for two branches that a ladder was fitted to, on the
+rising one.
+
+Noise is kept out before the blend by a dead band, which is a play operator on the force itself: `held` follows the
+force only when it leaves held +- width/2. Width 0 follows exactly.
+"""
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Protocol, TypeAlias
+
+from gateway.bsfm.branches import Branches
+
+RISING, FALLING = 1.0, -1.0
+Memory: TypeAlias = tuple[float, ...]
+"""What a policy remembers of past reversals; made and read by the policy alone."""
+
+
+class Reversal(Protocol):
+    """What happens between the branches. All methods are pure; the memory is immutable."""
+
+    def start(self) -> Memory:
+        """Of a vented tool, where the calibration ladder starts."""
+
+    def at(self, share: float) -> Memory:
+        """A memory with this share; +1 and -1 are the branches, whatever came before."""
+
+    def share(self, memory: Memory) -> float:
+        """s in [-1, 1]: +1 on the rising branch, -1 on the falling one."""
+
+    def moved(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+        """The memory after the force has gone from one value to another without turning round in between."""
+
+    def check(self, branches: Branches) -> None:
+        """ValueError with a sentence where this policy and these branches make no unique voltage."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinearBlend:
+    """span_n: change of force that leads from one branch to the other. 0 switches at once, as the paper does."""
+
+    span_n: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.span_n) and self.span_n >= 0.0):
+            raise ValueError(f"blend span {self.span_n!r} N: 0 or more is needed")
+
+    def start(self) -> Memory:
+        return (RISING,)
+
+    def at(self, share: float) -> Memory:
+        return (share,)
+
+    def share(self, memory: Memory) -> float:
+        return memory[0]
+
+    def moved(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+        return (self.advance(memory[0], to_n - from_n),)
+
+    def check(self, branches: Branches) -> None:
+        """Any branches that increase will do: the voltage is explicit."""
+
+    def advance(self, state: float, delta_n: float) -> float:
+        """The state after the force has moved by delta_n. ValueError unless both are finite; the answer is in [-1, 1]."""
+        if not (isfinite(state) and isfinite(delta_n)):
+            raise ValueError(f"blend state {state!r}, change {delta_n!r} N: not finite")
+        if delta_n == 0.0:
+            return _clipped(state)
+        if abs(delta_n) >= self.span_n:  # all the way; also keeps 2 df / span finite
+            return RISING if delta_n > 0.0 else FALLING
+        return _clipped(state + 2.0 * delta_n / self.span_n)
+
+
+@dataclass(frozen=True, slots=True)
+class DeadBand:
+    """width_n: noise, peak to peak, that must not turn the direction round."""
+
+    width_n: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.width_n) and self.width_n >= 0.0):
+            raise ValueError(f"dead band {self.width_n!r} N: 0 or more is needed")
+
+    def advance(self, held_n: float, force_n: float) -> float:
+        """What the blend may take for the force: held_n while force_n stays within half a width of it."""
+        if not (isfinite(held_n) and isfinite(force_n)):
+            raise ValueError(f"held {held_n!r} N, force {force_n!r} N: not finite")
+        if self.width_n == 0.0:
+            return force_n
+        return max(force_n - self.width_n / 2, min(force_n + self.width_n / 2, held_n))
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """Which way the force last moved: sign +1 rising or -1 falling, and the held force behind the dead band."""
+
+    sign: int = 1
+    held_n: float = 0.0
+
+    def advance(self, force_n: float, dead_band: DeadBand) -> "Direction":
+        """The direction after a new force. A movement within the dead band, or none, keeps it."""
+        held_n = dead_band.advance(self.held_n, force_n)
+        if held_n == self.held_n:
+            return self
+        return Direction(1 if held_n > self.held_n else -1, held_n)
+
+
+def _clipped(state: float) -> float:
+    return max(-1.0, min(1.0, state))

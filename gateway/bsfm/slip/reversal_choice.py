@@ -1,0 +1,64 @@
+"""Linear blend or slip stops? Decided on the half of the minor-loop walk that neither has seen.
+
+Slip stops need the walk for many numbers where the blend has one, so they must be better on data that they were not
+fitted to; then both are fitted to all of it. The blend is identified in any case: upload and C code carry it alone.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.bsfm.branches import Branches
+from gateway.bsfm.fit.blend_span import SpanChoice, chosen_span, command_error_n
+from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.ladder.measured_ladder import Ladder
+from gateway.bsfm.model import Bsfm
+from gateway.bsfm.slip.problem import Walk
+from gateway.bsfm.slip.reversal import LinearBlend
+from gateway.bsfm.slip.slip_fit import SlipFit, fit_joint, walk_of
+
+FEWEST_POINTS: Final = 12  # of the walk: each half must turn round a few times, as a plan's fourteen turns do
+BETTER_SHARE: Final = 0.9  # held-out error of the stops, of the blend's
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReversalChoice:
+    """span: of the blend on the model's own branches. slip: None where the blend is used. *_heldout_n: RMS on the second
+    half of the walk by a fit to the first, nan where it was not tried."""
+
+    model: Bsfm
+    span: SpanChoice
+    slip: SlipFit | None
+    blend_heldout_n: float
+    slip_heldout_n: float
+
+
+def chosen_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> ReversalChoice | None:
+    """None where the walk is too short for anything."""
+    span = chosen_span(branches, volts, newtons)
+    if span is None:
+        return None
+    blend = Bsfm(branches, LinearBlend(span.span_n))
+    if len(volts) < FEWEST_POINTS:
+        return ReversalChoice(blend, span, None, float("nan"), float("nan"))
+    errors_n = _held_out(branches, ladder, volts, newtons)
+    if errors_n[1] >= BETTER_SHARE * errors_n[0]:
+        return ReversalChoice(blend, span, None, *errors_n)
+    slip = fit_joint(branches, [walk_of(ladder), Walk(volts, newtons)])
+    carried = chosen_span(slip.branches, volts, newtons)
+    return ReversalChoice(slip.model, carried or span, slip, *errors_n)
+
+
+def _held_out(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> tuple[float, float]:
+    """RMS of blend and stops on the second half. Both walk through the first, so that they remember what came before."""
+    half = len(volts) // 2
+    span = chosen_span(branches, volts[:half], newtons[:half])
+    try:
+        slip = fit_joint(branches, [walk_of(ladder), Walk(volts[:half], newtons[:half])])
+    except ValueError:  # no loop between the branches that stops could select in
+        return 0.0, float("inf")
+    blend = Bsfm(branches, LinearBlend(span.span_n if span else 0.0))
+    errors = [command_error_n(model, volts, newtons)[half - 1 :] for model in (blend, slip.model)]
+    rms = [float(np.sqrt(np.mean(error * error))) for error in errors]
+    return rms[0], rms[1]

@@ -1,0 +1,83 @@
+"""The joint fit's search: the branches' free numbers that leave the smallest error, with the best shares at each trial.
+
+Errors are told in newtons by the slopes of the branches it starts from, so that they are a function of the numbers alone.
+Penalties on a grid hold the branches to what may drive a plant; a ridge holds the log weights, which the data leave open.
+"""
+
+from typing import Final
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from gateway.bsfm.branches import Branches
+from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.slip.jacobian import in_free_numbers, penalties_by_numbers, voltage_by_numbers, without
+from gateway.bsfm.slip.problem import GENTLEST_N_PER_V, SlipProblem, branches_of, free_numbers
+
+RIDGE: Final = 0.1
+SLOPE_WANTED_N_PER_V: Final = 0.7
+PENALTY: Final = 10.0
+PENALTY_GRID: Final = 33
+STEPS_MAX: Final = 200
+CLOSE: Final = 1.0e-5  # relative gain of a step that is the last
+REFUSED_N: Final = 1.0e3  # residual of branches that are no model
+
+
+class SlipSearch:
+    """Residuals of trial numbers, and their Jacobian."""
+
+    def __init__(self, problem: SlipProblem, start: Branches) -> None:
+        self._problem = problem
+        self._start = start
+        self._grid_v = np.linspace(start.rising.x0, start.rising.x1, PENALTY_GRID)
+        self._slope = problem.system(start).slope
+        self._log_weights = 2 * start.rising.order
+
+    def best(self) -> Branches:
+        """The branches at the minimum."""
+        first = free_numbers(self._start)
+        found = least_squares(self.residuals, first, self.jacobian, x_scale="jac", ftol=CLOSE, max_nfev=STEPS_MAX)
+        return branches_of(found.x, self._start)
+
+    def residuals(self, numbers: Floats) -> Floats:
+        """Weighted errors, penalties, ridge: (rows + 3 grid + log weights,)."""
+        refused = np.full(len(self._slope) + 3 * PENALTY_GRID + self._log_weights, REFUSED_N)
+        try:
+            trial = branches_of(numbers, self._start)
+        except ValueError:  # weights beyond a double
+            return refused
+        if not (trial.rising.is_increasing() and trial.falling.is_increasing()):
+            return refused
+        problem, system = self._problem, self._problem.system(trial, self._slope)
+        error_n = problem.weight * (system.matrix @ problem.best_shares(system) - system.wanted)
+        return np.concatenate([error_n, _penalties(trial, self._grid_v), RIDGE * numbers[-self._log_weights :]])
+
+    def jacobian(self, numbers: Floats) -> Floats:
+        """Of residuals where they are no refusal: (rows + 3 grid + log weights, numbers)."""
+        trial = branches_of(numbers, self._start)
+        penalties = PENALTY * penalties_by_numbers(trial, self._grid_v, SLOPE_WANTED_N_PER_V)
+        ridge = np.zeros((self._log_weights, len(numbers)))
+        ridge[:, -self._log_weights :] = RIDGE * np.eye(self._log_weights)
+        return np.concatenate([self._errors_by_numbers(trial), penalties, ridge])
+
+    def _errors_by_numbers(self, trial: Branches) -> Floats:
+        problem, system = self._problem, self._problem.system(trial, self._slope)
+        shares = problem.best_shares(system)
+        place = problem.places @ shares
+        scale = problem.weight * self._slope
+        rising = voltage_by_numbers(trial.rising, system.rising_v, GENTLEST_N_PER_V)
+        falling = voltage_by_numbers(trial.falling, system.falling_v, GENTLEST_N_PER_V)
+        direct = in_free_numbers(
+            (scale * 0.5 * (1.0 + place))[:, None] * rising, (scale * 0.5 * (1.0 - place))[:, None] * falling
+        )
+        used = shares > 0.0
+        return without(
+            (problem.weight[:, None] * system.matrix)[:, used], problem.heavy_rows(system)[:1, :-1][:, used], direct
+        )
+
+
+def _penalties(branches: Branches, grid_v: Floats) -> Floats:
+    """What a plant would not bear: slopes below the wanted one in N/V, the falling branch below the rising one in N."""
+    rising, falling = branches.rising, branches.falling
+    flat = [np.maximum(0.0, SLOPE_WANTED_N_PER_V - curve.slope(grid_v)) for curve in (rising, falling)]
+    return PENALTY * np.concatenate([*flat, np.maximum(0.0, rising.value(grid_v) - falling.value(grid_v))])

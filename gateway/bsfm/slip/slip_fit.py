@@ -1,0 +1,161 @@
+"""Which reversal describes a rig: slip stops fitted to its walks, judged beside linear blend and switched branches.
+
+Two fits: `fit_stops` leaves the branches as they are, `fit_joint` moves them with the stops (METHOD.md: minor-loop points in
+the fit). The joint fit is the one that pays: branches that were fitted to a staircase already contain its two turns, and no
+selection between them can take these out again. Radii stand on a grid, from a fraction of the loop's width to a share of
+the range; the non-negative fit picks few of them. Shares below SMALLEST_SHARE, and the smallest of more than a set of
+registers carries, are dropped and the rest fitted again.
+
+Both are robust: one round of Huber weights after the first fit. The joint fit is a small least-squares problem with the
+shares projected out, and a ridge on the log weights, which the data leave open. It is held to what may drive a plant
+(slope floor, no crossing) by penalties on a grid: near the ends no walk reaches a branch, so nothing else would. A result
+that fails the exact verdicts all the same is none: then the stops alone are fitted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.bsfm.branches import Branches
+from gateway.bsfm.fit.blend_span import chosen_span, command_error_n
+from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.fit.result import verdicts_of
+from gateway.bsfm.fit.usable_fit import is_moderate
+from gateway.bsfm.ladder.measured_ladder import Ladder
+from gateway.bsfm.model import Bsfm
+from gateway.bsfm.slip.problem import SlipProblem, Walk
+from gateway.bsfm.slip.reversal import LinearBlend
+from gateway.bsfm.slip.search import SlipSearch
+from gateway.bsfm.slip.slip_stops import STOPS_CARRIED, SlipStops, half_width_bound_v
+
+RADII: Final = 12
+SMALLEST_HALF_WIDTHS, LARGEST_RANGE_SHARE = 0.5, 0.4
+SMALLEST_SHARE: Final = 0.01
+HUBER: Final = 1.345
+SIGMA_OF_MAD: Final = 1.4826
+SMALLEST_SIGMA_N: Final = 1.0e-6
+SLOPE_FLOOR_N_PER_V: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlipFit:
+    """Branches with the stops that select between them. rms_n, max_n: of the points that were fitted. joint: the
+    branches were moved."""
+
+    branches: Branches
+    stops: SlipStops
+    rms_n: float
+    max_n: float
+    points: int
+    joint: bool
+
+    @property
+    def model(self) -> Bsfm:
+        return Bsfm(self.branches, self.stops)
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One policy on a walk: RMS and largest error of the command in N, and its model."""
+
+    policy: str
+    rms_n: float
+    max_n: float
+    model: Bsfm
+
+
+def walk_of(ladder: Ladder) -> Walk:
+    """The staircase as a walk: the mean of its groups, where all of them visit the same stairs, else all in order."""
+    groups = [ladder.part(ladder.group == group) for group in ladder.groups]
+    first = groups[0].voltage_v
+    if all(len(group) == len(first) and np.allclose(group.voltage_v, first, atol=5.0e-3) for group in groups):
+        return Walk(first, np.mean([group.force_n for group in groups], axis=0))
+    return Walk(ladder.voltage_v, ladder.force_n)
+
+
+def fit_stops(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
+    """The stops alone. ValueError when there is no point, or no loop between the branches."""
+    problem = SlipProblem(list(walks), _radii_v(branches))
+    problem.weight = problem.weight * _huber(problem, problem.errors_n(branches))
+    return _result(problem, branches, joint=False)
+
+
+def fit_joint(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
+    """Branches and stops together, from these branches on; the stops alone where that leads to no usable model."""
+    stops_only = fit_stops(branches, walks)
+    if branches.rising.order != branches.falling.order:
+        return stops_only
+    problem = SlipProblem(list(walks), _radii_v(branches))
+    trust, moved = problem.weight, branches
+    for _ in range(2):
+        moved = SlipSearch(problem, moved).best()
+        problem.weight = trust * _huber(problem, problem.errors_n(moved))
+    if not (verdicts_of(moved, SLOPE_FLOOR_N_PER_V).usable and is_moderate(moved)):
+        return stops_only
+    joint = _result(problem, moved, joint=True)
+    return joint if joint.rms_n < stops_only.rms_n else stops_only
+
+
+def residuals_n(model: Bsfm, walk: Walk) -> Floats:
+    """Model minus walk in N at each point, the stops moved by the voltages. ValueError unless the model has slip stops."""
+    if not isinstance(model.reversal, SlipStops):
+        raise ValueError("the model has no slip stops")
+    problem = SlipProblem([walk], np.array(model.reversal.radii_v))
+    return problem.errors_n(model.branches, np.array(model.reversal.shares))
+
+
+def judged(branches: Branches, fits: Sequence[SlipFit], training: Walk, held_out: Walk) -> list[Judged]:
+    """Switched branches, the blend with its best span on `training`, and each slip fit, all on `held_out`.
+
+    Judged as control would use them (blend_span.command_error_n): driven by the forces, told in newtons.
+    """
+    choice = chosen_span(branches, training.voltage_v, training.force_n)
+    models = [("branches switched", Bsfm(branches, LinearBlend(0.0)))]
+    if choice:
+        models.append((f"linear blend over {choice.span_n:g} N", Bsfm(branches, LinearBlend(choice.span_n))))
+    models += [(f"slip stops, {'joint fit' if fit.joint else 'branches kept'}", fit.model) for fit in fits]
+    return [_judge(policy, model, held_out) for policy, model in models]
+
+
+def _judge(policy: str, model: Bsfm, walk: Walk) -> Judged:
+    error_n = command_error_n(model, walk.voltage_v, walk.force_n)
+    return Judged(policy, float(np.sqrt(np.mean(error_n**2))), float(np.abs(error_n).max()), model)
+
+
+def _radii_v(branches: Branches) -> Floats:
+    half_v = half_width_bound_v(branches)
+    range_v = branches.rising.x1 - branches.rising.x0
+    if branches.rising == branches.falling:
+        raise ValueError("the branches are one curve: there is no loop that slip stops could select in")
+    radii: Floats = np.geomspace(SMALLEST_HALF_WIDTHS * half_v, max(LARGEST_RANGE_SHARE * range_v, 2 * half_v), RADII)
+    return radii
+
+
+def _huber(problem: SlipProblem, error_n: Floats) -> Floats:
+    """Square roots of Huber's weights; points without trust count neither for the scale nor afterwards."""
+    trusted = np.abs(error_n[problem.weight > 0.0])
+    if trusted.size == 0:
+        raise ValueError("no point to fit slip stops to")
+    limit_n = HUBER * max(SIGMA_OF_MAD * float(np.median(trusted)), SMALLEST_SIGMA_N)
+    weights: Floats = np.sqrt(np.minimum(1.0, limit_n / np.maximum(np.abs(error_n), limit_n)))
+    return weights
+
+
+def _result(problem: SlipProblem, branches: Branches, *, joint: bool) -> SlipFit:
+    """Few stops: the small shares dropped, the others fitted again."""
+    first = problem.shares(branches)
+    largest = np.isin(np.arange(len(first)), np.argsort(first)[-STOPS_CARRIED:])
+    keep = largest & (first >= SMALLEST_SHARE)
+    problem.radii_v, problem.places = problem.radii_v[keep], problem.places[:, keep]
+    shares = problem.shares(branches)
+    error_n = problem.errors_n(branches, shares)[problem.weight > 0.0]
+    keep = shares > 0.0
+    stops = SlipStops(_plain(problem.radii_v[keep]), _plain(shares[keep]))
+    rms_n, max_n = float(np.sqrt(np.mean(error_n**2))), float(np.abs(error_n).max())
+    return SlipFit(branches, stops, rms_n, max_n, len(error_n), joint)
+
+
+def _plain(values: Floats) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)

@@ -1,0 +1,249 @@
+"""The calibrations of one rig: numbered, immutable, and which of them is in use.
+
+STATE/calibrations holds NNNN.yaml, each in the form of the shipped ones with its CRC-32 in the first line, and the
+generations of the selection (gateway.calibrations.selection). Number and content belong together for good; a number that the
+rig's built-in calibration has is not given again. Whatever is damaged is named and passed over: the calibration in use,
+else the one before it, else the built-in one. There is no clock here: dates come with the calibrations.
+
+The methods wait for the disk. Processes and threads may call them at the same time.
+"""
+
+import contextlib
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from gateway.bsfm.model import Calibration, Response
+from gateway.calibrations.selection import BUILT_IN, OWN, Pointer, Selection, read_pointer, write_pointer
+from gateway.processes.durable_file import locked, make_directory, put, sealed, unsealed
+from gateway.profiles import ProfileError
+from gateway.profiles.kinds.calibrations import read_calibration
+from gateway.profiles.strict_yaml.text import parse
+from gateway.registers.upload.staging import SLOTS
+
+_NAME: Final = re.compile(r"(\d{4})\.yaml")
+_LAST: Final = 9999
+UNKNOWN_N: Final = -1.0
+"""rms_n and max_n of a calibration whose data nobody has seen: an upload carries coefficients only."""
+
+
+class StoreError(Exception):
+    """A calibration cannot be stored, read or used; what was in use stays. str: the sentence, which begins with its code."""
+
+    def __init__(self, code: str, sentence: str) -> None:
+        super().__init__(f"{code} {sentence}")
+        self.code = code
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One file of the store; calibration None and a sentence in fault when it is damaged."""
+
+    number: int
+    calibration: Calibration | None
+    fault: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What is in use. calibration None: the built-in one, of a rig that the store was not told. notes: what was passed over."""
+
+    calibration: Calibration | None
+    selection: Selection
+    pointer: Pointer
+    notes: tuple[str, ...] = ()
+
+
+Entries = list[Entry]
+Numbers = list[int]
+
+
+class CalibrationStore:
+    """built_in: the calibration that the rig's file names."""
+
+    def __init__(self, state: Path, built_in: Calibration | None = None) -> None:
+        self.directory = state / "calibrations"
+        self.built_in = built_in
+
+    def add(self, calibration: Calibration) -> int:
+        """Store it under the next number, whatever number it has; that number. StoreError, and nothing has changed, for
+        one that could not be read back or when the disk refuses."""
+        try:
+            make_directory(self.directory)
+            with locked(self.directory) as descriptor:
+                number = self._next_number()
+                put(descriptor, _file_name(number), _readable(replace(calibration, number=number)))
+        except OSError as error:
+            raise _not_stored(error) from error
+        return number
+
+    def list(self) -> Entries:
+        """Every calibration of the store by number, damaged ones with their fault."""
+        return [self._entry(number) for number in self._numbers()]
+
+    def glances(self) -> Iterator[tuple[int, Calibration]]:
+        """Every calibration, the last one first, as its file reads at a glance: a search through hundreds of them must not
+        keep the loop waiting. Nothing is checked, so `load` what is found; what cannot be read is passed over."""
+        for number in reversed(self._numbers()):
+            with contextlib.suppress(OSError, ValueError, TypeError):
+                yield number, _glanced((self.directory / _file_name(number)).read_text(encoding="utf-8"))
+
+    def load(self, number: int) -> Calibration:
+        """A calibration by its number, that of the built-in one included. StoreError when it is not there or damaged."""
+        path = self.directory / _file_name(number)
+        try:
+            calibration = _parsed(path.read_bytes(), path)
+        except FileNotFoundError:
+            return self._built_in(number)
+        except OSError as error:
+            raise StoreError("E432", f"{path} cannot be read: {error.strerror}") from None
+        if calibration.number != number:
+            raise StoreError("E432", f"{path} says that it is calibration {calibration.number}")
+        return calibration
+
+    def number_of(self, data_sha256: str) -> int | None:
+        """The calibration that was made of these very data, None where there is none."""
+        return next((e.number for e in self.list() if e.calibration and e.calibration.data_sha256 == data_sha256), None)
+
+    def standing(self, why_not: Callable[[Calibration], str] = lambda calibration: "") -> Standing:
+        """What is in use: the active one, else the previous, else the built-in. why_not: a sentence for one that is not
+        fit for this rig, empty for one that is."""
+        pointer, notes = self._pointer()
+        for selection in (pointer.active, pointer.previous):
+            if selection.number is None:
+                return Standing(self.built_in, selection, pointer, notes)
+            try:
+                calibration = self.load(selection.number)
+                fault = why_not(calibration)
+            except StoreError as error:
+                fault = str(error)
+            if not fault:
+                return Standing(calibration, selection, pointer, notes)
+            notes = (*notes, f"{fault}; the one before it is used instead of calibration {selection.number}")
+        return Standing(self.built_in, BUILT_IN, pointer, notes)
+
+    def use(self, number: int | None, slot: int | None = None) -> Pointer:
+        """From now on this calibration is in use, None: the built-in one; a slot given is filled with it. StoreError, and
+        nothing has changed, for one that cannot be loaded or when the disk refuses."""
+        if number is not None and self.load(number) is self.built_in:
+            number = None
+        if slot is not None and not 0 <= slot < SLOTS:
+            raise StoreError("E433", f"slot {slot}: there are 0 .. {SLOTS - 1}")
+        return self._change(Selection(number, slot))
+
+    def rollback(self) -> Pointer:
+        """Back to what was in use before the last change; a second one goes forth again. StoreError as `use`."""
+        previous = self.previous()
+        return self.use(previous.number, previous.slot)
+
+    def previous(self) -> Selection:
+        """What a rollback brings back. StoreError where nothing was ever changed."""
+        pointer, _ = self._pointer()
+        if pointer.generation == 0:
+            raise StoreError("E433", "no calibration was in use before this one: there is nothing to go back to")
+        previous = pointer.previous
+        kept = previous.slot is not None and pointer.in_slot(previous.slot) == previous
+        return previous if kept else Selection(previous.number)
+
+    def slot(self, slot: int) -> int | None:
+        """The number of the calibration in a slot (0 .. 7), that of the built-in one included; None when it is empty."""
+        number = self._pointer()[0].slots[slot]
+        return self.built_in.number if number == OWN and self.built_in else number
+
+    def _change(self, selection: Selection) -> Pointer:
+        try:
+            make_directory(self.directory)
+            with locked(self.directory) as descriptor:
+                pointer, _ = read_pointer(self.directory)
+                changed = pointer.with_active(selection, self._to_go_back_to(pointer, selection))
+                return write_pointer(self.directory, descriptor, changed)
+        except OSError as error:
+            raise _not_stored(error) from error
+
+    def _to_go_back_to(self, pointer: Pointer, selection: Selection) -> Selection:
+        """What is in use now, unless it is damaged or is chosen again: then what could be gone back to stays."""
+        active = pointer.active
+        if active.number == selection.number or (active.number is not None and self._entry(active.number).fault):
+            return pointer.previous
+        return active
+
+    def _pointer(self) -> tuple[Pointer, tuple[str, ...]]:
+        try:
+            with locked(self.directory, shared=True):
+                return read_pointer(self.directory)
+        except FileNotFoundError:
+            return Pointer(), ()
+        except OSError as error:
+            return Pointer(), (f"E432 {self.directory} cannot be read: {error.strerror}; built-in calibration used",)
+
+    def _entry(self, number: int) -> Entry:
+        try:
+            return Entry(number, self.load(number))
+        except StoreError as error:
+            return Entry(number, None, str(error))
+
+    def _built_in(self, number: int) -> Calibration:
+        if self.built_in is not None and self.built_in.number == number:
+            return self.built_in
+        known = ", ".join(map(str, self._numbers())) or "none yet"
+        raise StoreError("E433", f"there is no calibration {number} in {self.directory}; there are: {known}")
+
+    def _numbers(self) -> Numbers:
+        names = [path.name for path in self.directory.iterdir()] if self.directory.is_dir() else []
+        return sorted(int(match[1]) for name in names if (match := _NAME.fullmatch(name)))
+
+    def _next_number(self) -> int:
+        spoken_of, _ = read_pointer(self.directory)
+        number = 1 + max(0, *self._numbers(), *spoken_of.numbers, self.built_in.number if self.built_in else 0)
+        if number > _LAST:
+            raise StoreError(
+                "E431", f"{self.directory} holds calibration {_LAST}, the last number: start a new --state"
+            )
+        return number
+
+
+def as_text(calibration: Calibration) -> str:
+    """A calibration as YAML, in the form of the shipped ones: values as JSON, which is YAML and loses no digit."""
+    return "".join(f"{name}: {json.dumps(value, ensure_ascii=False)}\n" for name, value in asdict(calibration).items())
+
+
+def _glanced(text: str) -> Calibration:
+    """`as_text` backwards, for what it has written alone. ValueError or TypeError for anything else."""
+    lines = (line.partition(": ") for line in text.splitlines() if not line.startswith("#"))
+    facts = {name: json.loads(value) for name, _, value in lines}
+    facts = {name: tuple(value) if isinstance(value, list) else value for name, value in facts.items()}
+    response = facts.pop("response", None)
+    return Calibration(**facts, response=Response(**response) if response else None)
+
+
+def _readable(calibration: Calibration) -> bytes:
+    """A calibration's file. StoreError for one that could not be read back as it is."""
+    data = sealed(as_text(calibration))
+    if _parsed(data, Path(calibration.name)) != calibration:
+        raise StoreError("E432", f"{calibration.name} holds a number that no file can")
+    return data
+
+
+def _file_name(number: int) -> str:
+    return f"{number:04d}.yaml"
+
+
+def _not_stored(error: OSError) -> StoreError:
+    return StoreError("E431", f"calibration not stored: {error.strerror or error}")
+
+
+def _parsed(data: bytes, path: Path) -> Calibration:
+    """The calibration of a file's bytes. StoreError for anything but what was sealed."""
+    try:
+        unsealed(data)
+        calibration, faults = read_calibration(parse(data, str(path)))
+    except ValueError as error:
+        raise StoreError("E432", f"{path} {error}") from None
+    except ProfileError as error:
+        calibration, faults = None, list(error.faults)
+    if calibration is None:
+        raise StoreError("E432", str(faults[0]))
+    return calibration

@@ -1,0 +1,225 @@
+"""Serves the staging block: a commit is checked, written and put to use, a slot is selected; and the control socket's
+wish for another calibration. The part in the loop.
+
+One at a time. A worker thread checks (up to milliseconds at order 15) and waits for the disk; `committed` is shown when
+the directory's fsync is through and the set is in use. Whether the output is enabled does not matter, for the controller
+swaps models without a bump. On any failure the active set stays, in the controller and on the disk. A set that the store
+has, or the rig's own, keeps its number and name, so that a master which uploads its recipe for every part does not fill
+the disk, and reading the active set back and committing it changes nothing.
+
+A commit fills its slot and is in use from then on. A dry run ends in `idle` when the set would be accepted. A failure
+that is no coefficient's fault (a full disk, a damaged slot) has failing_index -1 and a reason of its own. commit_notice
+tells what a success does not: a set of the older, shorter form (W330), a set that was known already. Force limits are
+kept with the set: while it is in use the smaller of its limit and the rig's holds. What a tool of this machine asks for
+shows in the active block, not in commit_status, which is the masters'.
+"""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from gateway.calibrations.activation import Activation, InUse, NotFit, uploaded
+from gateway.calibrations.store import Standing, StoreError
+from gateway.modbus import Peer
+from gateway.processes.disk_worker import Apart, Done, Work
+from gateway.registers.map.register_map import RegisterMap
+from gateway.registers.refusal import Refusal
+from gateway.registers.upload.coefficients import HEAD_WORDS
+from gateway.registers.upload.staging import Staged, StagedFault, check_staged
+from gateway.registers.upload.staging_block import StagingBlock
+from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus, RefusalReason, UploadReason
+
+_NO_COEFFICIENT: Final = -1
+_NO_ROOM: Final = "E431"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UploadRules:
+    """What rig and map add. today: the date of a new calibration, UTC, as 2026-11-21."""
+
+    rig_name: str
+    commit_address: int
+    select_address: int
+    today: Callable[[], str]
+
+    @classmethod
+    def of(cls, rig_name: str, register_map: RegisterMap, today: Callable[[], str]) -> "UploadRules":
+        commit, select = register_map.find("commit").address, register_map.find("slot_select").address
+        return cls(rig_name=rig_name, commit_address=commit, select_address=select, today=today)
+
+
+class Upload:
+    """on_use: called in the loop with what is in use from now on. apart: runs work elsewhere and comes back."""
+
+    def __init__(
+        self,
+        staging: StagingBlock,
+        activation: Activation,
+        standing: Standing,
+        rules: UploadRules,
+        log: Callable[[str, str], None],
+    ) -> None:
+        if standing.calibration is None:
+            raise ValueError("a gateway has a calibration, at least the rig's own")
+        self.on_use: Callable[[InUse], None] = lambda in_use: None
+        self._thread = Apart()
+        self.apart: Callable[[Work, Done], None] = self._thread
+        self._staging = staging
+        self._activation = activation
+        self._rules = rules
+        self._log = log
+        self._calibration = standing.calibration
+        self._pointer = replace(standing.pointer, active=standing.selection)
+        self._doing = ""
+        self._shows = False  # whether commit_status tells of what is being done
+        self._notice = NO_NOTICE
+        self._jobs = 0
+        self._said, self._failed_last, self._reason = "", False, 0
+        staging.on_commit = self._on_commit
+        staging.on_select = self._on_select
+
+    def close(self) -> None:
+        """Nothing more is begun; what is under way ends on the disk as it would have."""
+        self._thread.close()
+
+    # -- asked by a master
+
+    def _on_commit(self, action: CommitAction, words: bytes, peer: Peer) -> None:
+        self._check_free(self._rules.commit_address)
+        if action is CommitAction.ROLLBACK:
+            self._begin(f"rollback by {peer}", CommitStatus.WRITING)
+            self.apart(self._activation.take_back, self._on_taken)
+            return
+        self._begin(f"{'dry run' if action is CommitAction.DRY_RUN else 'upload'} by {peer}", CommitStatus.CHECKING)
+        limits = self._activation.limits
+        self.apart(lambda: check_staged(words, limits), lambda found: self._on_checked(found, action, peer))
+
+    def _on_checked(self, found: Any, action: CommitAction, peer: Peer) -> None:
+        if isinstance(found, Exception):
+            self._fail(found)
+        elif isinstance(found, StagedFault):
+            self._fail(NotFit(found))
+        else:
+            self._notice = CommitNotice.WITHOUT_STOPS if found.without_stops else NO_NOTICE
+            if action is CommitAction.DRY_RUN:
+                self._end(CommitStatus.IDLE, self._told("the set would be accepted"))
+            else:
+                self._take(found, peer)
+
+    def _take(self, found: Staged, peer: Peer) -> None:
+        fresh = uploaded(
+            found,
+            name=f"slot-{found.slot}",
+            rig=self._rules.rig_name,
+            date_utc=self._rules.today(),
+            source=f"upload over Modbus by {peer.host}",
+        )
+        known = self._pointer
+        self._staging.show_commit(CommitStatus.WRITING)
+        self.apart(lambda: self._activation.take_uploaded(fresh, found.slot, known), self._on_taken)
+
+    def _on_select(self, slot: int, peer: Peer) -> None:
+        self._check_free(self._rules.select_address)
+        chosen = self._pointer.in_slot(slot)
+        if chosen is None:
+            filled = ", ".join(str(k) for k, number in enumerate(self._pointer.slots) if number is not None) or "none"
+            text = f"slot {slot} is empty, filled: {filled}; active set {self._calibration.number} unchanged"
+            raise Refusal(RefusalReason.EMPTY_SLOT, self._rules.select_address, text, value=slot)
+        self._begin(f"slot {slot} selected by {peer}", CommitStatus.WRITING)
+        self.apart(lambda: self._activation.take(chosen.number, slot), self._on_taken)
+
+    def _check_free(self, address: int) -> None:
+        if self._doing:
+            raise Refusal(RefusalReason.BUSY, address, f"{self._doing} is under way: wait until it has ended")
+
+    # -- asked by a tool of this machine
+
+    def use(self, number: int, *, force: bool = False) -> dict[str, Any]:
+        """Begin to take a calibration by its number; `status` tells how it goes. force: a rejected one, too. ValueError while
+        another is under way."""
+        return self._ask(f"calibration use {number}", lambda: self._activation.take_offered(number, force=force))
+
+    def rollback(self) -> dict[str, Any]:
+        """Begin to go back to what was in use before."""
+        return self._ask("calibration rollback", self._activation.take_back)
+
+    def status(self) -> dict[str, Any]:
+        """What is in use, and how the last job went; job is its number, for whoever began it; reason as failing_reason."""
+        return {
+            "active": self._calibration.number,
+            "name": self._calibration.name,
+            "slot": self._pointer.active.slot,
+            "built_in": self._pointer.active.number is None,
+            "job": self._jobs,
+            "busy": bool(self._doing),
+            "said": self._said,
+            "failed": self._failed_last,
+            "reason": self._reason,
+        }
+
+    def _ask(self, what: str, work: Work) -> dict[str, Any]:
+        if self._doing:
+            raise ValueError(f"{self._doing} is under way: try again when it has ended")
+        self._begin(what, None)
+        self.apart(work, self._on_taken)
+        return self.status()
+
+    # -- how it goes
+
+    def _begin(self, what: str, status: CommitStatus | None) -> None:
+        self._jobs += 1
+        self._doing, self._shows, self._notice = what, status is not None, NO_NOTICE
+        if status is not None:
+            self._staging.show_commit(status)
+
+    def _on_taken(self, result: Any) -> None:
+        if isinstance(result, Exception):
+            self._fail(result)
+            return
+        taken: InUse = result
+        self._calibration = taken.calibration
+        self._pointer = taken.pointer
+        self.on_use(taken)
+        self._notice |= taken.notice
+        self._end(CommitStatus.COMMITTED, self._told(_described(taken)))
+
+    def _fail(self, error: Exception) -> None:
+        """NotFit and StoreError are answers; anything else is our defect, which must not stop the control."""
+        index, reason, active = _NO_COEFFICIENT, int(UploadReason.DEFECT), self._calibration.number
+        self._notice = NO_NOTICE
+        if isinstance(error, NotFit):
+            index, reason, sentence = error.fault.index, int(error.fault.reason), error.fault.sentence(active)
+        elif isinstance(error, StoreError):
+            sentence = f"{error}; active set {active} unchanged"
+            reason = int(UploadReason.STORAGE if error.code == _NO_ROOM else UploadReason.NOT_STORED)
+        else:
+            trace = "".join(traceback.format_exception(error))
+            sentence = f"A499 a defect of ours, active set {active} unchanged:\n{trace}"
+        self._end(CommitStatus.FAILED, sentence, index, reason)
+
+    def _end(self, status: CommitStatus, sentence: str, index: int = 0, reason: int = 0) -> None:
+        self._doing, self._said, self._reason = "", sentence, reason
+        self._failed_last = status is CommitStatus.FAILED
+        if self._shows:
+            self._staging.show_commit(status, index, reason, self._notice)
+        self._log("calibration", sentence)
+
+    def _told(self, what: str) -> str:
+        """The log line of something that went well, with what the notice says."""
+        known = "; known here, it keeps number and name" if self._notice & CommitNotice.KNOWN_SET else ""
+        if self._notice & CommitNotice.WITHOUT_STOPS:
+            old = f"length {HEAD_WORDS}, as of map version 1: no slip stops, no response"
+            return f"W330 {self._doing}: {what}; {old}{known}"
+        return f"info {self._doing}: {what}{known}"
+
+
+def _described(taken: InUse) -> str:
+    """`calibration 17 (slot-3) in use, slot 3: bsfm n=2, slip, 7 stops, 1.2 .. 65.1 N`."""
+    calibration, slot = taken.calibration, taken.pointer.active.slot
+    where = "" if slot is None else f", slot {slot}"
+    low_n, high_n = calibration.allowed_n
+    return (
+        f"calibration {calibration.number} ({calibration.name}) in use{where}: "
+        f"{calibration.kind}, {calibration.reversal_kind}, {low_n:.1f} .. {high_n:.1f} N"
+    )

@@ -1,0 +1,126 @@
+"""Two calibrations over the voltages that both cover: by how much their branches differ, B minus A."""
+
+from dataclasses import dataclass
+from html import escape
+from math import sqrt
+from typing import Any, Final
+
+from gateway.bsfm import Calibration, RationalBezier
+
+_POINTS: Final = 401
+_SHOWN: Final = 9
+_BRANCHES: Final = ("rising", "falling")
+
+Forces = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BranchDifference:
+    """One branch of both, N, at the comparison's voltages."""
+
+    a_n: Forces
+    b_n: Forces
+
+    @property
+    def difference_n(self) -> Forces:
+        return tuple(b - a for a, b in zip(self.a_n, self.b_n, strict=True))
+
+    @property
+    def rms_n(self) -> float:
+        return sqrt(sum(gap * gap for gap in self.difference_n) / len(self.difference_n))
+
+    @property
+    def max_n(self) -> float:
+        """The largest difference, with its sign."""
+        return max(self.difference_n, key=abs)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """voltage_v: evenly over the common range."""
+
+    a: Calibration
+    b: Calibration
+    voltage_v: tuple[float, ...]
+    branches: dict[str, BranchDifference]
+
+    def facts(self) -> dict[str, Any]:
+        return {
+            "a": {"number": self.a.number, "name": self.a.name},
+            "b": {"number": self.b.number, "name": self.b.name},
+            "voltage_range_v": [self.voltage_v[0], self.voltage_v[-1]],
+            **{
+                name: {"rms_n": found.rms_n, "max_n": found.max_n, "at_v": self.place_v(found)}
+                for name, found in self.branches.items()
+            },
+            "reversal": [self.a.reversal_kind, self.b.reversal_kind],
+            "blend_span_n": [self.a.blend_span_n, self.b.blend_span_n],
+        }
+
+    def place_v(self, branch: BranchDifference) -> float:
+        """Where the branch differs most."""
+        return self.voltage_v[branch.difference_n.index(branch.max_n)]
+
+
+def compared(a: Calibration, b: Calibration) -> Comparison:
+    """ValueError when the two have no voltage in common."""
+    low_v, high_v = max(a.x0_v, b.x0_v), min(a.x1_v, b.x1_v)
+    if low_v >= high_v:
+        raise ValueError(f"{_title(a)} and {_title(b)} have no voltage in common")
+    voltage_v = tuple(low_v + (high_v - low_v) * k / (_POINTS - 1) for k in range(_POINTS))
+    models = a.model().branches, b.model().branches
+    branches = {
+        name: BranchDifference(*(_forces(getattr(model, name), voltage_v) for model in models)) for name in _BRANCHES
+    }
+    return Comparison(a, b, voltage_v, branches)
+
+
+def table(comparison: Comparison) -> str:
+    """For the terminal: the figures, then the branches at a few voltages."""
+    lines = [
+        f"{name}  {_title(each)}, {each.reversal_kind}" for name, each in (("A", comparison.a), ("B", comparison.b))
+    ]
+    lines.append("")
+    for name, found in comparison.branches.items():
+        place_v = comparison.place_v(found)
+        lines.append(f"{name:<8} B - A  {found.rms_n:7.3f} N RMS, at most {found.max_n:+.3f} N at {place_v:.2f} V")
+    lines += ["", "     V   rising A  rising B   B - A   falling A falling B   B - A"]
+    for k in range(0, _POINTS, (_POINTS - 1) // (_SHOWN - 1)):
+        forces = (
+            f"{found.a_n[k]:9.2f} {found.b_n[k]:9.2f} {found.difference_n[k]:+8.3f}"
+            for found in comparison.branches.values()
+        )
+        lines.append(f"{comparison.voltage_v[k]:6.2f}  {'   '.join(forces)}")
+    return "\n".join(lines)
+
+
+def page(comparison: Comparison) -> str:
+    """A self-contained HTML page: both loops, and the differences."""
+    from gateway.reports.style import STYLE
+    from gateway.reports.svg import Axis, Chart, spread
+
+    volts = comparison.voltage_v
+    across = Axis(volts[0], volts[-1], "command (V)")
+    forces = [force for found in comparison.branches.values() for force in (*found.a_n, *found.b_n)]
+    loops = Chart(across, Axis(*spread(forces), "force (N)"), "Both loops")
+    gaps = [gap for found in comparison.branches.values() for gap in found.difference_n]
+    differences = Chart(across, Axis(*spread(gaps, around=0.0), "B − A (N)"), "Difference of the branches")
+    differences.level(0.0)
+    for name, found in comparison.branches.items():
+        loops.line(volts, found.a_n, f"{name} faint", f"A, {name}")
+        loops.line(volts, found.b_n, name, f"B, {name}")
+        differences.line(volts, found.difference_n, name, name)
+    title = escape(f"A: {_title(comparison.a)} · B: {_title(comparison.b)}")
+    figures = "".join(f"<figure>{chart.svg()}</figure>" for chart in (loops, differences))
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style></head>\n'
+        f"<body><main><h1>{title}</h1><div class='pair'>{figures}</div></main></body></html>\n"
+    )
+
+
+def _forces(curve: RationalBezier, voltage_v: tuple[float, ...]) -> Forces:
+    return tuple(float(curve.value(volts)) for volts in voltage_v)
+
+
+def _title(calibration: Calibration) -> str:
+    return f"calibration {calibration.number} ({calibration.name}, {calibration.date_utc})"

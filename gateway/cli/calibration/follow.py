@@ -1,0 +1,105 @@
+"""Follows a run to its end with a progress bar; Ctrl-C, SIGTERM and a closed terminal take the force to 0, a second one leaves
+at once."""
+
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import isnan
+from typing import Any, Final
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgressColumn, TextColumn
+
+from gateway.cli.calibration.sources import ENDED, LocalRun, Look, RemoteRun
+from gateway.cli.errors import CliError
+
+_POLL_S: Final = 0.2
+_BEGIN_S: Final = 2.0
+_LOST: Final = (
+    "the run has ended with it, at the safe voltage; what was recorded is kept: force-gateway calibrate --resume"
+)
+_NAMES: Final = {
+    "idle": "starting",
+    "zero": "zero and noise",
+    "check": "sign and scale",
+    "ladder": "ladder",
+    "minor_loops": "reversals",
+    "fitting": "fitting",
+    "stored": "stored",
+    "refused": "fit refused",
+    "stopped": "stopped",
+    "experiment": "experiment",
+    "recorded": "recorded",
+}
+
+
+class NotBegunError(CliError):
+    """Nothing has moved."""
+
+
+def follow(run: LocalRun | RemoteRun) -> dict[str, Any]:
+    """Begin the run and wait for its end; how it ended."""
+    run.begin()
+    with _signals_as_ctrl_c(), _progress() as progress:
+        task = progress.add_task("starting", total=1.0, force="", eta="")
+        try:
+            _wait(run, progress, task)
+        except KeyboardInterrupt:
+            run.stop()
+            _wait(run, progress, task)
+        except NotBegunError:
+            raise
+        except CliError as error:
+            raise CliError(f"{error.format_message()}\n{_LOST}", error.exit_code) from None
+    return run.end()
+
+
+@contextmanager
+def _signals_as_ctrl_c() -> Iterator[None]:
+    """An end from outside stops the run at once, instead of when nobody has followed it for a while."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    before = {number: handler for number, handler in handlers.items() if handler is not signal.SIG_IGN}  # nohup
+    for number in before:
+        signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _progress() -> Progress:
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description:<22}"),
+        BarColumn(bar_width=None),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[force]:>18}"),
+        TextColumn("{task.fields[eta]:>9}"),
+        console=Console(stderr=True),
+        expand=True,
+    )
+
+
+def _wait(run: LocalRun | RemoteRun, progress: Progress, task: TaskID) -> None:
+    began_s = time.monotonic()
+    while True:
+        look = run.look()
+        name = f"{_NAMES.get(look.phase, look.phase)}{look.detail}"
+        progress.update(task, completed=look.progress, description=name, force=_force(look), eta=_eta(look))
+        if look.phase in ENDED:
+            return
+        if look.phase == "idle" and time.monotonic() - began_s > _BEGIN_S:
+            raise NotBegunError("W305 the gateway has not begun the calibration; its log says why")
+        time.sleep(_POLL_S)
+
+
+def _force(look: Look) -> str:
+    return "" if isnan(look.force_n) else f"{look.voltage_v:5.2f} V {look.force_n:7.2f} N"
+
+
+def _eta(look: Look) -> str:
+    if isnan(look.eta_s) or look.eta_s <= 0.0:
+        return ""
+    return f"{int(look.eta_s) // 60}:{int(look.eta_s) % 60:02d} left"

@@ -1,0 +1,93 @@
+"""Going on with a run that was stopped: what its plan was, and which groups it has not climbed.
+
+A group counts once all of its stairs were left by the run itself; a cut one is climbed again, from rest and after the check's
+cycle, as every recording begins. A recording that may not be fitted counts for nothing.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.bsfm.ladder.check import checked_ladder
+from gateway.bsfm.ladder.fault import LadderError
+from gateway.bsfm.ladder.labels import Labels
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.recording import Recording, RecordingError, list_recordings, read_recording
+
+_NO_PLAN: Final = ("stairs", "top_v")  # what the header says beside the plan's own fields
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """plan: fields of the whole run; groups: climbed so far; earlier: numbers of the recordings that have them; finished: the
+    last recording came to its own end; fingerprint: of the rig's files then."""
+
+    plan: dict[str, Any]
+    groups: int
+    earlier: list[int]
+    name: str
+    fingerprint: str
+    last: Path
+    finished: bool
+
+    def plan_with(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """What is left to climb with these changes."""
+        plan = self.plan | changes
+        last_start = int(plan["groups"]) - (not plan["minor_points"])
+        return plan | {"first_group": min(self.groups, last_start)}
+
+    def is_whole(self, plan: dict[str, Any]) -> bool:
+        """Nothing is left of this plan but the fit."""
+        wants_walk = plan["minor_points"] and not self.plan["minor_points"]
+        return self.finished and self.groups >= int(plan["groups"]) and not wants_walk
+
+
+def resumed(state: Path) -> Rest:
+    """What is left of the last recorded ladder. CliError where none is recorded."""
+    ladders = [entry for entry in list_recordings(state) if entry.header.get("ladder")]
+    if not ladders:
+        raise CliError(
+            f"E422 no calibration run is recorded in {state / 'recordings'}: nothing to go on with", exit_codes.DATA
+        )
+    entry = ladders[-1]
+    facts, last = entry.header["ladder"], read_recording(entry.path)
+    plan = {name: value for name, value in facts.items() if name not in _NO_PLAN}
+    plan["tare"] = (
+        False  # the zero is that of the first part (ladder_source); a slide that has pressed does not rest at it
+    )
+    plan["v_max_v"] = facts.get("top_v", plan["v_max_v"])  # the same stairs again, whatever model is in use by now
+    earlier = {number: _whole_groups(_beside(entry.path, number)) for number in entry.header.get("continues", ())}
+    climbed = earlier | {entry.number: _whole_groups(last)}
+    used = [number for number, groups in climbed.items() if groups]
+    header, finished = entry.header, _is_finished(last) and all(earlier.values())
+    groups, fingerprint = sum(climbed.values()), header.get("rig_fingerprint", "")
+    return Rest(plan, groups, used, header.get("name", ""), fingerprint, entry.path, finished)
+
+
+def rig_of(recording: Path, named: str) -> str:
+    """The rig file that a recording names, if that can (still) be read, else the one that was named."""
+    file = str(read_recording(recording).header.get("rig_file", ""))
+    return file if file and Path(file).exists() else named
+
+
+def _beside(path: Path, number: int) -> Recording | None:
+    """None for one that is gone or damaged."""
+    try:
+        return read_recording(path.with_name(f"{number:04d}{path.suffix}"))
+    except (OSError, RecordingError):
+        return None
+
+
+def _whole_groups(recording: Recording | None) -> int:
+    try:
+        checked = checked_ladder(recording.columns, recording.header) if recording else None
+    except LadderError:
+        return 0
+    return 0 if checked is None or checked.only_walk else len(checked.ladder.groups)
+
+
+def _is_finished(recording: Recording) -> bool:
+    """Its last stair was left: the run has come to its own end."""
+    labels = Labels.of(recording.columns)
+    return labels is not None and labels.is_finished

@@ -1,0 +1,126 @@
+"""What the calibration verb does with a store: find, and change with or without a running gateway."""
+
+import fcntl
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.cli import exit_codes
+from gateway.cli.control_socket import ask
+from gateway.cli.errors import CliError
+
+if TYPE_CHECKING:
+    from gateway.bsfm import Calibration
+    from gateway.calibrations.store import CalibrationStore
+    from gateway.profiles import Rig
+
+_PATIENCE_S: Final = 10.0
+_POLL_S: Final = 0.02
+_ANY_CELL_N: Final = 5000.0  # where the rig is not known: what no calibration file may exceed
+
+
+def opened(directory: Path, rig_name: str) -> "CalibrationStore":
+    """The store of a state directory, with the built-in calibration of the rig where that can be read."""
+    from gateway.calibrations.store import CalibrationStore
+
+    rig = _rig(rig_name)
+    return CalibrationStore(directory, rig.calibration if rig else None)
+
+
+def found(store: "CalibrationStore", which: str) -> "Calibration":
+    """A calibration by its number in the store, a shipped name or a file."""
+    from gateway.calibrations.store import StoreError
+    from gateway.profiles import load_calibration
+
+    if not which.isdecimal():
+        return load_calibration(which)
+    try:
+        return store.load(int(which))
+    except StoreError as error:
+        raise CliError(str(error), exit_codes.DATA) from None
+
+
+def in_use(store: "CalibrationStore") -> "Calibration":
+    """The calibration in use, or the one that a gateway would start with."""
+    calibration = store.standing().calibration
+    if calibration is None:
+        raise CliError(f"E433 nothing is stored in {store.directory}; --rig names the rig's own", exit_codes.DATA)
+    return calibration
+
+
+def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
+    """{"use": N, "force": bool} or {"rollback": True}: the gateway's answer when it is through, or our own where none runs."""
+    with _not_running(directory) as is_free:
+        if is_free:
+            return _changed_here(directory, rig_name, request)
+    job = ask(directory, {"do": "calibration", **request})
+    answer, deadline_s = job, time.monotonic() + _PATIENCE_S
+    while answer["busy"] and answer["job"] == job["job"]:
+        if time.monotonic() > deadline_s:
+            raise CliError(f"E431 the gateway has not answered for {_PATIENCE_S:g} s: a disk that hangs?")
+        time.sleep(_POLL_S)
+        answer = ask(directory, {"do": "calibration"})
+    if answer["failed"]:
+        raise CliError(answer["said"], _exit_code(answer["reason"]))
+    return answer
+
+
+def _changed_here(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
+    from gateway.bsfm import CoefficientLimits
+    from gateway.calibrations.activation import Activation, NotFit
+    from gateway.calibrations.store import StoreError
+
+    rig, store = _rig(rig_name), opened(directory, rig_name)
+    activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n if rig else _ANY_CELL_N))
+    before = store.standing().calibration
+    try:
+        force = bool(request.get("force"))
+        taken = (
+            activation.take_back() if "rollback" in request else activation.take_offered(request["use"], force=force)
+        )
+    except NotFit as error:
+        sentence = error.fault.sentence(before.number if before else 0)
+        raise CliError(sentence, exit_codes.DATA) from None
+    except StoreError as error:
+        raise CliError(str(error), exit_codes.FAILED if error.code == "E431" else exit_codes.DATA) from None
+    calibration, active = taken.calibration, taken.pointer.active
+    return {
+        "active": calibration.number,
+        "name": calibration.name,
+        "slot": active.slot,
+        "built_in": active.number is None,
+        "said": f"calibration {calibration.number} ({calibration.name}) will be used from the next start: no gateway runs",
+    }
+
+
+def _exit_code(reason: int) -> int:
+    """A disk that refuses, or a defect of ours, is a failure; all else is a wrong calibration or number."""
+    from gateway.registers.words import UploadReason
+
+    return exit_codes.FAILED if reason in (UploadReason.STORAGE, UploadReason.DEFECT) else exit_codes.DATA
+
+
+def _rig(name: str) -> "Rig | None":
+    from gateway.profiles import ProfileError, load_rig
+
+    try:
+        return load_rig(name)
+    except ProfileError:
+        return None
+
+
+@contextmanager
+def _not_running(directory: Path) -> Iterator[bool]:
+    """Whether no gateway runs on this directory; while True none can start."""
+    if not directory.is_dir():
+        yield True
+        return
+    with (directory / "lock").open("a") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+            return
+        yield True

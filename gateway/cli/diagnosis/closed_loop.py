@@ -1,0 +1,31 @@
+"""`diagnose --closed-loop`: the gain in commanded force, asked of the twin and told."""
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from gateway.cli.diagnosis.sources import Sources
+from gateway.diagnosis.result import Diagnosis
+from gateway.service.closed_loop import study
+from gateway.service.closed_loop.study import ClosedLoop
+from gateway.twin.plant import with_value
+
+
+def measured_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoop | str:
+    """The gain, or a sentence that says why it could not be measured. The cell makes the noise of the plant at the start:
+    the diagnosis has taken it away, and control takes a cell without any for a frozen one."""
+    noise_n = sources.plant.plant.cell.noise_n
+    base, extended = (with_value(plant, "cell", "noise_n", noise_n) for plant in (diagnosis.base, diagnosis.plant))
+    try:
+        return study.closed_loop_gain(base, extended, sources.known_rig)
+    except ValueError as error:
+        return f"not measured: {error}"
+
+
+def document(gain: ClosedLoop | str) -> dict[str, Any]:
+    """For the JSON, beside the contract's fields."""
+    return {"error": gain} if isinstance(gain, str) else asdict(gain)
+
+
+def sentences(gain: ClosedLoop | str) -> Iterator[str]:
+    yield from [gain] if isinstance(gain, str) else study.lines(gain)

@@ -1,0 +1,127 @@
+"""What is diagnosed: recordings by path or number, and the plant that they are compared with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import state_directory
+from gateway.devices import cell_host
+from gateway.diagnosis.measurement import Measurement
+from gateway.diagnosis.search.base_fit import bare
+from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
+from gateway.recording import Recording, find_recording, read_table
+from gateway.recording.measurement import measurement_of
+from gateway.recording.tables.mapping_file import column_mapping
+from gateway.service.fitting.recorded_rig import plant_of, rig_of, rig_texts
+from gateway.twin.plant import values
+
+_WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
+START_PLANT: Final = "paper-slide"
+_ANY_STATE: Final = "demo"  # whose state directory is meant where neither --state nor --rig says one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sources:
+    """paths: of the recordings, as found; rig: its name, empty for none; known_rig: where it is known here; notes: what was
+    decided; late_s: how late the wires may have made the readings; quantum_n: their known step; is_own: the plant
+    is that of the rig that the recordings were made on."""
+
+    paths: tuple[Path, ...]
+    measurements: tuple[Measurement, ...]
+    plant: PlantProfile
+    rig: str
+    known_rig: Rig | None
+    notes: tuple[str, ...]
+    late_s: float = 0.0
+    quantum_n: float = 0.0
+    is_own: bool = False
+
+    @property
+    def name(self) -> str:
+        """The recordings in a few words."""
+        first, count = self.paths[0].name, len(self.paths)
+        return first if count == 1 else f"{first} and {count - 1} more"
+
+
+def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, state: Path | None) -> Sources:
+    """Everything that the diagnosis takes. RecordingError and CliError (65) for data, ProfileError for a rig."""
+    paths = tuple(_path(name, rig, state) for name in names)
+    known = load_rig(rig) if rig else None
+    mapping = column_mapping(columns)
+    recordings = [read_table(path, mapping) for path in paths]
+    measurements = tuple(
+        _without_polled_pressure(measurement_of(each)) if _of_gateway(each) else measurement_of(each)
+        for each in recordings
+    )
+    plant_of_first = None if known else plant_of(recordings[0])
+    rig_name, plant, notes = _of_rig(known) if known else _recorded(recordings, plant_of_first)
+    here = known or rig_of(recordings[0])
+    return Sources(
+        paths=paths,
+        measurements=measurements,
+        plant=plant,
+        rig=rig_name,
+        known_rig=here,
+        notes=notes,
+        late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
+        quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
+        is_own=plant is (known.plant_profile if known else plant_of_first),
+    )
+
+
+def _quantum_n(rig: Rig | None) -> float:
+    """One count of the rig's amplifier, N; 0 where it is not known."""
+    if rig is None:
+        return 0.0
+    line = rig.load_cell
+    return cell_host(line.device, line.sign, line.unit).resolution_n
+
+
+def _path(name: str, rig: str | None, state: Path | None) -> Path:
+    path = Path(name)
+    if name.isdecimal() and not path.exists():
+        return find_recording(state_directory(state, rig or _ANY_STATE), int(name))
+    if not path.exists():
+        raise CliError(
+            f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA
+        )
+    return path
+
+
+def _of_rig(rig: Rig) -> tuple[str, PlantProfile, tuple[str, ...]]:
+    if rig.plant_profile:
+        return rig.name, rig.plant_profile, ()
+    plant = rig.stand_in or load_plant(START_PLANT)
+    return rig.name, plant, (f"rig {rig.name} names no plant: {plant.name} is the start",)
+
+
+def _recorded(recordings: Sequence[Recording], plant: PlantProfile | None) -> tuple[str, PlantProfile, tuple[str, ...]]:
+    """The rig that the first recording carries or names, and its plant where there is one; else the paper's."""
+    names = [str(recording.header.get("rig") or "") for recording in recordings]
+    notes = [f"the recordings are of several rigs: {', '.join(sorted(set(names)))}"] if len(set(names)) > 1 else []
+    if plant is None:
+        plant = _foreign(load_plant(START_PLANT))
+        missing = f"rig {names[0]} is not known here" if names[0] else "the recording names no rig"
+        notes.append(f"{missing}: the plant {START_PLANT} without its effects is the start; --rig names another")
+    return names[0], plant, tuple(notes)
+
+
+def _foreign(profile: PlantProfile) -> PlantProfile:
+    """The start for a machine that nobody described: nobody said that it has this one's delay or seals."""
+    plant = bare(profile.plant)
+    now = {f"{section}.{name}": value for section, name, value in values(plant)}
+    origins = {path: origin for path, origin in profile.origins.items() if origin.value == now[path]}
+    return replace(profile, plant=plant, origins=origins)
+
+
+def _of_gateway(recording: Recording) -> bool:
+    """Is it one of the gateway's own?"""
+    return bool(rig_texts(recording))
+
+
+def _without_polled_pressure(measurement: Measurement) -> Measurement:
+    """The gateway polls the regulator's pressure a few times a second and holds it: it is no witness of transients."""
+    return replace(measurement, pressure_pa=None) if measurement.command_v is not None else measurement

@@ -1,0 +1,149 @@
+"""A diagnosis for a terminal: what is off, the ranked causes with their gains, what is left, what to record next."""
+
+from collections.abc import Iterator
+
+from rich import box
+from rich.console import RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from gateway.diagnosis.result import Cause, Diagnosis, Verdict
+from gateway.reports.diagnosis import wording as words
+
+_COLOUR = {
+    Verdict.NOTHING_FOUND: "green",
+    Verdict.CONFIRMED: "green",
+    Verdict.PARTIAL: "yellow",
+    Verdict.UNKNOWN: "red",
+}
+_MOST_REJECTED = 3
+_MOST_PROPOSALS = 4
+_MOST_NAMES = 4
+
+
+def told(
+    diagnosis: Diagnosis, notes: tuple[str, ...] = (), loop: tuple[str, ...] = (), run: str = ""
+) -> Iterator[RenderableType]:
+    """In reading order, columns that are wrong before all else; every paragraph hangs behind its keyword, so that it wraps at
+    any width.
+
+    loop: sentences on the gain in commanded force; run: how to run what to record next, where a plan of it is written.
+    """
+    yield Text()
+    for suspect in diagnosis.suspects:
+        yield Text(suspect.sentence, style="bold red" if suspect.is_sure else "bold yellow")
+    yield Text.assemble(
+        (words.title(diagnosis), f"bold {'yellow' if words.blind(diagnosis) else _COLOUR[diagnosis.verdict]}"),
+    )
+    yield Text(words.sentence(diagnosis))
+    yield Text()
+    yield _line("off by", _error(diagnosis))
+    if diagnosis.causes:
+        yield _line("left", _extended(diagnosis))
+    yield from _causes(diagnosis)
+    for rest in diagnosis.leftover:
+        share = words.percent(rest.share)
+        yield _line("leftover", f"depends on {rest.depends_on}: {rest.shape} ({share} of the excess)", "yellow")
+    yield from _lost(diagnosis)
+    for keyword, sentence in zip(("control", *[""] * len(loop)), loop, strict=False):
+        yield _line(keyword, sentence)
+    said = {suspect.sentence for suspect in diagnosis.suspects}
+    for note in (note for note in words.noticed(diagnosis, notes) if note not in said):
+        yield _line("note", note, "dim")
+    yield from _next(diagnosis, run)
+
+
+def _line(keyword: str, text: str, style: str = "") -> RenderableType:
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(min_width=8, no_wrap=True, style="dim")
+    grid.add_column(overflow="fold")  # a path that is cut cannot be copied
+    grid.add_row(keyword, Text(text, style=style))
+    return grid
+
+
+def _error(diagnosis: Diagnosis) -> str:
+    baseline = diagnosis.baseline
+    readings = f"{baseline.samples:,}".replace(",", " ")
+    return (
+        f"{words.force(baseline.rms_n)} N RMS with the base model refitted; noise floor "
+        f"{words.force(baseline.noise_floor_n)} N ({readings} readings, {baseline.duration_s:.1f} s)"
+    )
+
+
+def _extended(diagnosis: Diagnosis) -> str:
+    reached = "at the noise floor" if diagnosis.extended.reaches_noise_floor else "above the noise floor"
+    explained = words.percent(words.explained(diagnosis))
+    return (
+        f"{words.force(diagnosis.extended.held_out_rms_n)} N RMS held out with the causes, {reached}; "
+        f"{explained} of the excess explained"
+    )
+
+
+def _causes(diagnosis: Diagnosis) -> Iterator[RenderableType]:
+    if not diagnosis.causes:
+        return
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
+    table.add_column("cause", min_width=23)
+    for name in ("sure", "held out N RMS", "gain N [95 %]", "excess"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for cause in diagnosis.causes:
+        table.add_row(*_cells(cause))
+    yield Text()
+    yield table
+    yield Text()
+    for cause in diagnosis.causes:
+        for name, found in cause.parameters.items():
+            told = f"{found.section}.{name} = {words.estimate(found)}{words.was(diagnosis, name, found)}"
+            yield Padding(Text(told), (0, 0, 0, 2))
+    yield Text()
+
+
+def _cells(cause: Cause) -> tuple[str | Text, ...]:
+    gain = cause.gain
+    group = words.others(cause)
+    name = Text(cause.name, style="bold")
+    if group:
+        name.append(f"\nor {', or '.join(group)}", style="not bold yellow")
+    won_n = gain.held_out_rms_before_n - gain.held_out_rms_after_n
+    low_n, high_n = gain.ci95
+    return (
+        name,
+        words.percent(cause.confidence),
+        words.gained(cause).removesuffix(" N"),
+        f"{words.force(won_n)} [{words.force(low_n)}, {words.force(high_n)}]",
+        words.percent(gain.share_of_excess),
+    )
+
+
+def _lost(diagnosis: Diagnosis) -> Iterator[RenderableType]:
+    ranked = sorted(diagnosis.rejected, key=lambda lost: -lost.gain)[:_MOST_REJECTED]
+    if ranked:
+        gains = ", ".join(f"{lost.name} ({words.force(lost.gain)} N)" for lost in ranked)
+        yield _line("rejected", f"{gains}, nearest first")
+
+
+def _next(diagnosis: Diagnosis, run: str) -> Iterator[RenderableType]:
+    proposals = words.next_recordings(diagnosis)
+    if diagnosis.not_identifiable:
+        count = len(diagnosis.not_identifiable)
+        yield _line(
+            "unseen", f"{count} effect{'s' * (count > 1)} that this recording cannot show: {_unseen(diagnosis)}"
+        )
+    for keyword, (proposal, names) in zip(("next", *[""] * len(proposals)), proposals[:_MOST_PROPOSALS], strict=False):
+        yield _line(keyword, proposal + (f" (shows {_few(names)})" if names else ""), "bold" if keyword else "")
+    if len(proposals) > _MOST_PROPOSALS:
+        yield _line("", f"and {len(proposals) - _MOST_PROPOSALS} more in the report (--report FILE.html)", "dim")
+    if run:
+        yield _line("run", run, "bold")
+    elif proposals:
+        yield _line("", "--plan PLAN.yaml writes what the gateway can run of it, for calibrate --plan", "dim")
+
+
+def _unseen(diagnosis: Diagnosis) -> str:
+    return _few([item.name for item in diagnosis.not_identifiable])
+
+
+def _few(names: tuple[str, ...] | list[str]) -> str:
+    more = len(names) - _MOST_NAMES
+    return words.listed([*names[:_MOST_NAMES], f"{more} more"] if more > 1 else names)

@@ -1,0 +1,162 @@
+"""The thread that keeps the heartbeat: it alone speaks to the gateway, so a terminal that takes no more lines, or one that is
+slow to draw, never costs the lease.
+"""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.force_hold.sequence import HoldRun, Seen, Write, seen_of
+from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
+from gateway.cli.master.refusal_text import explained
+from gateway.registers.words import RefusalReason, WarningBit
+
+DEFAULT_PERIOD_S: Final = 0.05  # of a lease that nobody has told us: 200 ms is usual
+_ACTIONS: Final = {
+    "fault": "safe voltage, fault A310",
+    "hold": "the force stays, with a warning",
+    "ramp": "it ramps to 0 N",
+}
+_BEATS_PER_LEASE: Final = 4.0
+_SHORTEST_PERIOD_S: Final = 0.005
+_LOOK_S: Final = 0.1
+_LOOKS_AFTER_A_LOSS_S: Final = 2.0  # without a lease, or one that we do not know
+
+
+@dataclass(frozen=True, slots=True)
+class Lease:
+    """What is known of the rig's lease. length_s None: it has none."""
+
+    length_s: float | None
+    action: str = "fault"
+
+    @property
+    def period_s(self) -> float:
+        """Between two beats: several may be late before one is missed."""
+        shared = DEFAULT_PERIOD_S if self.length_s is None else self.length_s / _BEATS_PER_LEASE
+        return min(DEFAULT_PERIOD_S, max(_SHORTEST_PERIOD_S, shared))
+
+
+class Beat(threading.Thread):
+    """Runs a HoldRun against a gateway until it ends. `seen` is the newest status; `failure` what went wrong, if anything.
+
+    lease: None where nobody has said what the rig's is.
+    """
+
+    def __init__(self, client: GatewayClient, run: HoldRun, lease: Lease | None, clock: Callable[[], float]) -> None:
+        super().__init__(daemon=True, name="heartbeat")
+        self.hold = run
+        self.seen: Seen | None = None
+        self.warned = WarningBit(0)  # every warning that there was
+        self.failure: CliError | None = None
+        self.stopping = threading.Event()
+        self.dropping = threading.Event()
+        self._client = client
+        self._lease = lease
+        self._period_s = lease.period_s if lease else DEFAULT_PERIOD_S
+        self._clock = clock
+        self._looked_s = 0.0
+        find = client.register_map.find
+        self._names = {
+            name: find(name) for name in ("control_word", "force_setpoint", "force_ramp", "mode", "heartbeat")
+        }
+
+    def run(self) -> None:
+        try:
+            self._look()
+            while self.hold.end is None:
+                began_s = self._clock()
+                self._step(began_s)
+                if self.hold.end is None:
+                    self._wait(self._period_s - (self._clock() - began_s))
+            self._look()
+        except CliError as error:
+            self.failure = error
+
+    def _wait(self, seconds: float) -> None:
+        """The order to drop everything is not waited for."""
+        if not self.dropping.is_set():
+            self.dropping.wait(max(0.0, seconds))
+
+    def _step(self, now_s: float) -> None:
+        assert self.seen
+        write = self.hold.at_once() if self.dropping.is_set() else None
+        write = write or self.hold.next(self.seen, now_s, stops=self.stopping.is_set())
+        if write is None:
+            return
+        try:
+            self._send(write)
+            if write.control_word is not None or now_s - self._looked_s >= _LOOK_S:
+                self._look()
+        except CliError as error:
+            if error.exit_code != exit_codes.DEVICE:
+                raise
+            self._find_again(error)
+
+    def _send(self, write: Write) -> None:
+        values = {"heartbeat": float(write.heartbeat)}
+        if write.control_word is not None:
+            values |= {
+                "control_word": write.control_word,
+                "force_setpoint": write.setpoint_n,
+                "force_ramp": 0,
+                "mode": 0,
+            }
+        frames = self._client.frames(
+            [Assignment(self._names[name], self._names[name].encode(value)) for name, value in values.items()]
+        )
+        with explained(self._client, frames):
+            for frame in frames:
+                try:
+                    self._client.write(frame)
+                except RefusedError:
+                    if not self._proves_byte_order():
+                        raise
+                    self._client.write(frame)
+
+    def _proves_byte_order(self) -> bool:
+        """Some rigs want 1234.5 before an enable. True when that was missing and has been written now."""
+        (reason,) = self._client.read_values([self._client.register_map.find("refusal_reason")])
+        if int(reason.value) != RefusalReason.BYTE_ORDER_UNPROVEN:
+            return False
+        echo = self._client.register_map.find("byte_order_echo")
+        self._client.write_values([Assignment(echo, echo.encode(1234.5))])
+        return True
+
+    def _look(self) -> None:
+        with explained(self._client):
+            readings = self._client.read_block("status")
+        self.seen = seen_of({reading.register.name: float(reading.value) for reading in readings})
+        self.warned |= self.seen.warnings
+        self._looked_s = self._clock()
+
+    def _find_again(self, lost: CliError) -> None:
+        """The connection is gone: while the lease may still run, try to have it back; the next step sees what has happened."""
+        length_s = self._lease.length_s if self._lease else None
+        end_s = self._clock() + (length_s or _LOOKS_AFTER_A_LOSS_S)
+        while True:
+            try:
+                self._look()
+                return
+            except CliError:
+                if self._clock() >= end_s:
+                    raise CliError(f"E180 {self._lost_words(lost)}", exit_codes.DEVICE) from None
+            self._wait(_SHORTEST_PERIOD_S)
+
+    def _lost_words(self, lost: CliError) -> str:
+        seen = f"the gateway at {self._client.where} is lost ({lost.format_message().partition(':')[0]})"
+        if not self.hold.is_pressing:
+            return f"{seen}; nothing had been enabled"
+        if self._lease is None:
+            return (
+                f"{seen}. Where the rig has a lease, it ends now as the rig file says (fault, hold or ramp); without one the "
+                f"gateway goes on pressing {self.hold.force_n:g} N: look at it"
+            )
+        if self._lease.length_s is None:
+            words = "this rig has no lease: if the gateway lives, it goes on pressing"
+            return f"{seen}; {words} {self.hold.force_n:g} N until it is told otherwise"
+        action = _ACTIONS.get(self._lease.action, self._lease.action)
+        return f"{seen}; the lease of {self._lease.length_s * 1e3:.0f} ms is over: {action}"

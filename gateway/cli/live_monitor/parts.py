@@ -1,0 +1,65 @@
+"""Pieces that the page is made of: digits three rows high, and a chart of block characters."""
+
+from collections.abc import Sequence
+from math import isnan
+from typing import Final
+
+from rich.text import Text
+
+from gateway.cli.live_monitor.track import Point
+
+_DIGITS: Final = {
+    "0": ("█▀█", "█ █", "▀▀▀"),
+    "1": ("▀█ ", " █ ", "▀▀▀"),
+    "2": ("▀▀█", "█▀▀", "▀▀▀"),
+    "3": ("▀▀█", " ▀█", "▀▀▀"),
+    "4": ("█ █", "▀▀█", "  ▀"),
+    "5": ("█▀▀", "▀▀█", "▀▀▀"),
+    "6": ("█▀▀", "█▀█", "▀▀▀"),
+    "7": ("▀▀█", "  █", "  ▀"),
+    "8": ("█▀█", "█▀█", "▀▀▀"),
+    "9": ("█▀█", "▀▀█", "▀▀▀"),
+    "-": ("   ", "▀▀ ", "   "),
+    "+": ("   ", "▀█▀", " ▀ "),
+    ".": (" ", " ", "▀"),
+}
+_EIGHTHS: Final = " ▁▂▃▄▅▆▇█"
+
+
+def big(value: float, decimals: int, *, sign: str = "-", width: int, style: str) -> Text:
+    """A number three rows high, with as many decimals as fit into `width` columns. sign: "+" shows a plus too."""
+    if isnan(value):
+        return Text("\n–\n", style="dim")
+    for digits in range(decimals, -1, -1):
+        text = f"{value:{sign}.{digits}f}"
+        rows = [" ".join(_DIGITS[character][row] for character in text) for row in range(3)]
+        if len(rows[0]) <= width:
+            return Text("\n".join(rows), style=style, no_wrap=True)
+    return Text(f"\n{value:{sign}.{decimals}f}\n", style=f"bold {style}")
+
+
+def chart(points: Sequence[Point | None], rows: int, top_n: float) -> Text:
+    """Measured force as columns from 0 to top_n, newest at the right; the setpoint as a line where no column hides it."""
+    text = Text(no_wrap=True)
+    for row in range(rows - 1, -1, -1):
+        for point in points:
+            text.append(*_cell(point, row, rows, top_n))
+        if row:
+            text.append("\n")
+    return text
+
+
+def _cell(point: Point | None, row: int, rows: int, top_n: float) -> tuple[str, str]:
+    if point is None:
+        return " ", ""
+    eighths = round(max(0.0, min(1.0, point.measured_n / top_n)) * rows * 8) - row * 8
+    if eighths > 0:
+        return _EIGHTHS[min(eighths, 8)], "cyan"
+    setpoint_row = int(max(0.0, min(0.999, point.setpoint_n / top_n)) * rows)
+    return ("─", "yellow") if setpoint_row == row and point.setpoint_n > 0 else (" ", "")
+
+
+def chart_top_n(points: Sequence[Point | None]) -> float:
+    """A round force above everything in the chart."""
+    largest = max((max(point.measured_n, point.setpoint_n) for point in points if point), default=0.0)
+    return next((float(top) for top in (5, 10, 20, 30, 40, 50, 75, 100, 150, 200) if largest <= 0.95 * top), 330.0)

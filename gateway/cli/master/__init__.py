@@ -1,0 +1,1 @@
+"""Our own Modbus master: registers by name and in engineering units, uploads, refusals in words."""

@@ -1,0 +1,98 @@
+"""A Modbus exception in words: what was refused, why, and what to do, from the gateway's last-refusal registers.
+
+A gateway on this machine is asked for its own sentence too, which holds the numbers; it counts only where it tells of the same
+refusal as the registers.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Final
+
+from gateway.cli.codes import CATALOGUE, REFUSAL_CODES
+from gateway.cli.errors import CliError
+from gateway.cli.master.client import Frame, GatewayClient, Reading, RefusedError
+from gateway.registers.words import RefusalReason
+
+EXCEPTIONS: Final = {
+    0x01: "function not served",
+    0x02: "no such address",
+    0x03: "value refused",
+    0x04: "device or state forbids it",
+    0x05: "accepted, still working",
+    0x06: "busy, or owned by another master",
+    0x0A: "gateway path unavailable",
+    0x0B: "serial device or unit silent",
+}
+_LAST_REFUSAL: Final = ("refusal_address", "refusal_reason", "refusal_value")
+
+
+@contextmanager
+def explained(client: GatewayClient, frames: "list[Frame] | None" = None, state: Path | None = None) -> Iterator[None]:
+    """Turns a Modbus exception into one message, exit code 1. frames: what is being written, if anything; state: directory
+    of the gateway, where it is on this machine and not among the usual ones."""
+    try:
+        yield
+    except RefusedError as refused:
+        raise CliError(_message(client, refused, frames or [], state)) from None
+
+
+def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], state: Path | None) -> str:
+    exception = f"exception {refused.code:02X} ({EXCEPTIONS.get(refused.code, 'not a known exception')})"
+    reason, at, where = _last_refusal(client, frames)
+    code = REFUSAL_CODES.get(reason)
+    if code is None:
+        return f"{exception} to {refused.request}"
+    entry = CATALOGUE[code]
+    seen = f"{code} {entry.title}: {exception} to {refused.request}; {where}"
+    own = _own_sentence(client, at, reason, state).removeprefix(f"{code} ")
+    return "\n  ".join(part for part in (seen, own, f"{entry.do} (force-gateway explain {code})") if part)
+
+
+def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:
+    """What the gateway itself has said to this refusal; empty where it is elsewhere, or nobody answers."""
+    from gateway.cli.control_socket import ask
+    from gateway.service.supervisor.run_options import default_state_root
+
+    states = [state] if state else _sockets_near(client, default_state_root())
+    for directory in states:
+        try:
+            told = ask(directory, {"do": "last-refusal"})
+        except CliError:
+            continue
+        if (told.get("address"), told.get("reason")) == (address, int(reason)):
+            return str(told["sentence"])
+    return ""
+
+
+def _sockets_near(client: GatewayClient, root: Path) -> list[Path]:
+    host = client.where.rpartition(":")[0]
+    try:
+        is_here = host == "localhost" or ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        is_here = False
+    return sorted(path.parent for path in root.glob("*/control.sock")) if is_here else []
+
+
+def _last_refusal(client: GatewayClient, frames: list[Frame]) -> tuple[RefusalReason, int, str]:
+    """Reason, address and place in words of the last refusal; NONE where the server has no such registers or they tell of
+    another request."""
+    try:
+        address, reason, value = client.read_values([client.register_map.find(name) for name in _LAST_REFUSAL])
+        kind = RefusalReason(int(reason.value))
+    except (CliError, RefusedError, LookupError, ValueError):
+        return RefusalReason.NONE, 0, ""
+    at = int(address.value)
+    if not any(frame.address <= at < frame.address + len(frame.words) for frame in frames):
+        return RefusalReason.NONE, 0, ""
+    return kind, at, f"{_place(client, at, value)}, {kind.name.lower().replace('_', ' ')}"
+
+
+def _place(client: GatewayClient, address: int, value: Reading) -> str:
+    """`force_setpoint = 65 N (address 1)`; without a value where the gateway has none."""
+    for register in client.register_map.registers:
+        if register.address <= address < register.address + register.words:
+            number = f" = {value.value:.9g} {register.unit}".rstrip() if value.is_available else ""
+            return f"{register.name}{number} (address {address})"
+    return f"address {address}"

@@ -1,0 +1,92 @@
+"""The master of an upload: sends the requests, waits for the outcome with a bound, reads the active set back."""
+
+import struct
+import time
+from collections.abc import Iterable
+from typing import Final
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.master.client import Frame, GatewayClient
+from gateway.cli.master.refusal_text import explained
+from gateway.cli.master.upload_frames import Request, Upload
+from gateway.modbus.pdu import WRITE_REGISTER
+from gateway.registers.upload.coefficients import HEAD_WORDS, TAIL_FROM
+from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
+
+_OURS: Final = (UploadReason.STORAGE, UploadReason.DEFECT)
+_PATIENCE_S = 10.0  # a disk may be slow, a hung one is no disk
+_POLL_S: Final = 0.01
+_PLACES: Final = (
+    "rising handle", "rising weight", "falling handle", "falling weight", "slip radius", "slip share", "response",
+)  # fmt: skip
+_RESPONSE: Final = ("dead time", "lag", "second lag")
+
+
+class Master(GatewayClient):
+    """CliError for whatever goes wrong: no answer (69), a refusal (1), a set that fails a check (65)."""
+
+    def send(self, requests: Iterable[Request]) -> None:
+        for request in requests:
+            with explained(self, [Frame(request.address, request.words)]):
+                if request.function == WRITE_REGISTER:
+                    text = f"write 1 at {request.address}"
+                    self._ask("write_register", text, request.address, request.words[0])
+                else:
+                    self.write(Frame(request.address, request.words))
+
+    def calibration_id(self) -> int:
+        with explained(self):
+            return int(self.read_values([self.register_map.find("calibration_id")])[0].value)
+
+    def outcome(self, upload: Upload) -> CommitStatus:
+        """How it ended: idle after a dry run, or committed. CliError when it failed."""
+        deadline_s = time.monotonic() + _PATIENCE_S
+        while True:
+            with explained(self):
+                words = self.read_words(upload.poll.address, upload.poll.count)
+            status, index, reason = struct.unpack(">HhH", struct.pack(">3H", *words))
+            if status == CommitStatus.FAILED:
+                raise self._failed(index, reason)
+            if status in (CommitStatus.IDLE, CommitStatus.COMMITTED):
+                return CommitStatus(status)
+            if time.monotonic() > deadline_s:
+                name = CommitStatus(status).name.lower()
+                raise CliError(f"E431 after {_PATIENCE_S:g} s the gateway is still {name}: a disk that hangs?")
+            time.sleep(_POLL_S)
+
+    def is_known_set(self) -> bool:
+        """Whether the gateway knew the committed set already, so that number and name are the old ones."""
+        with explained(self):
+            (word,) = self.read_words(self.register_map.find("commit_notice").address, 1)
+        return bool(word & CommitNotice.KNOWN_SET)
+
+    def check_active(self, upload: Upload, slot: int) -> None:
+        """The active block holds what was sent, word for word."""
+        sent = struct.unpack(f">{len(upload.set_words) // 2}H", upload.set_words)
+        first = self.register_map.find("order@active").address
+        places = [*range(first, first + HEAD_WORDS)]
+        places += range(first + TAIL_FROM, first + TAIL_FROM + len(sent) - HEAD_WORDS)
+        with explained(self):
+            words = self.read_words(first, HEAD_WORDS)
+            words += self.read_words(first + TAIL_FROM, len(sent) - HEAD_WORDS)
+            (seen,) = self.read_words(self.register_map.find("active_slot").address, 1)
+        different = [at for at, own, found in zip(places, sent, words, strict=True) if own != found]
+        if different or seen != slot:
+            where = f"{len(different)} words differ, the first at {different[0]}" if different else f"slot {seen}"
+            raise CliError(f"E434 committed, but another set is in use now ({where}): another master was quicker?")
+
+    def _failed(self, index: int, reason: int) -> CliError:
+        unchanged = f"active set {self.calibration_id()} unchanged"
+        if reason in _OURS:
+            return CliError(f"E431 the gateway could not store the set, its log says why; {unchanged}")
+        name = self.register_map.find("failing_reason").values.get(reason, f"reason {reason}").replace("_", " ")
+        return CliError(f"E401 {place(index)}: {name}; {unchanged}", exit_codes.DATA)
+
+
+def place(index: int) -> str:
+    """failing_index in words: `index 50, falling weight 2`."""
+    if not 0 <= index < 16 * len(_PLACES):
+        return "the whole set"
+    name = f"{_PLACES[index // 16]} {index % 16}"
+    return f"index {index}, {_RESPONSE[index - 96] if 96 <= index < 99 else name}"

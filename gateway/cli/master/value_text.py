@@ -1,0 +1,94 @@
+"""Register values as people write them (`12`, `voltage`, `enable,tare`, `0x1`) and read them (`12.00 N`, `holding`)."""
+
+from difflib import get_close_matches
+from ipaddress import IPv4Address
+from math import isnan
+
+from gateway.cli.master.client import Reading
+from gateway.registers import Register
+
+
+def parsed(register: Register, text: str) -> bytes:
+    """The words for a value as typed; ValueError with a sentence."""
+    if register.bits:
+        number: float = _bits(register, text)
+    elif register.values:
+        number = _choice(register, text)
+    else:
+        number = _number(text, f"a number in {register.unit}" if register.unit else "a number")
+    return register.encode(number)
+
+
+def shown(reading: Reading) -> str:
+    """A value with its unit or names; `-` when the gateway has none."""
+    register, value = reading.register, reading.value
+    if isnan(value):
+        return "-"
+    if register.bits:
+        names = bit_names(reading)
+        return f"0x{int(value):04X}" + (f" ({', '.join(names)})" if names else "")
+    if register.values:
+        return register.values.get(int(value), f"{int(value)} (no name)")
+    if register.name == "owner_ip":
+        return str(IPv4Address(int(value))) if value else "nobody"
+    is_plain = register.type == "float32" and not register.unit  # a share, a weight, a constant
+    number = f"{value:.6g}" if is_plain else f"{value:.{register.decimals}f}"
+    return f"{number} {register.unit}" if register.unit else number
+
+
+def bit_names(reading: Reading) -> list[str]:
+    """Names of the bits that are set, lowest first."""
+    if isnan(reading.value):
+        return []
+    return [name for bit, name in sorted(reading.register.bits.items()) if int(reading.value) >> bit & 1]
+
+
+def raw(reading: Reading) -> str:
+    """The words as hexadecimal."""
+    return " ".join(f"{word:04X}" for word in reading.words)
+
+
+def _bits(register: Register, text: str) -> int:
+    """A number, or names of bits joined by commas or plus signs."""
+    bits = {_plain(name): bit for bit, name in register.bits.items()}
+    number = 0
+    for word in text.replace("+", ",").split(","):
+        if _plain(word) in bits:
+            number |= 1 << bits[_plain(word)]
+        else:
+            number |= int(_number(word, f"a number or bits of {', '.join(register.bits.values())}", bits))
+    return number
+
+
+def _choice(register: Register, text: str) -> float:
+    names = {_plain(name): number for number, name in register.values.items()}
+    if _plain(text) in names:
+        return names[_plain(text)]
+    return _number(text, f"one of {', '.join(register.values.values())}", names)
+
+
+def _number(text: str, expected: str, names: "dict[str, int] | tuple[()]" = ()) -> float:
+    text = text.strip()
+    try:
+        return int(text, 0)
+    except ValueError:
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        near = get_close_matches(_plain(text), list(names), 1)
+        meant = f"; did you mean {near[0]}?" if near else ""
+        decimal = f"; decimals take a point: {text.replace(',', '.')}" if _is_number(text.replace(",", ".")) else ""
+        raise ValueError(f"{text or 'nothing'} is not {expected}{meant}{decimal}") from None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _plain(name: str) -> str:
+    return name.strip().lower().replace("-", "_").replace(" ", "_")

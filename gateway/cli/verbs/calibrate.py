@@ -1,0 +1,220 @@
+"""`calibrate`: the guided ladder on the gateway that runs, from the questions to the number of a new calibration.
+
+With an experiment as its plan (`diagnose --plan` writes them) it records what the plan puts out, and stores nothing.
+"""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import endpoint, json_option, name_option, state_directory, state_options
+
+_QUESTIONS: Final = (
+    "Does the tool press on the workpiece, or on a stop, that takes {force:.0f} N?",
+    "Are hands and people away, and does nothing else command this tool?",
+    "Is the air on, with supply enough for {top:g} V?",
+)
+_GO_ON: Final = "; force-gateway calibrate --resume goes on"
+_STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
+
+
+@click.command()
+@click.option("--groups", type=click.IntRange(1, 100), help="How often the ladder is climbed  [default: 5]")
+@click.option("--step", "step_v", type=click.FloatRange(min=0.01), help="Height of a stair in V  [default: 0.2]")
+@click.option("--v-max", "v_max_v", type=click.FloatRange(min=0.1), help="Top in V  [default: as the rig allows]")
+@click.option(
+    "--minor", "minor_points", type=click.IntRange(0, 2000), help="Points of the reversal part  [default: 150]"
+)
+@click.option(
+    "--response",
+    "response_steps",
+    type=click.IntRange(0, 200),
+    help="Large steps for dead time and lags  [default: 12]",
+)
+@click.option(
+    "--quick", is_flag=True, help="0.5 V stairs, one group, short reversal part, a few steps: about a minute."
+)
+@click.option("--tare", is_flag=True, help="Take the force at rest as zero first (only with the tool unloaded).")
+@click.option(
+    "--plan",
+    "plan_file",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="Plan as YAML: a ladder's, or an experiment of diagnose --plan.",
+)
+@click.option("--resume", is_flag=True, help="Go on with the groups that the last stopped run did not climb.")
+@name_option
+@click.option("--yes", is_flag=True, help="Do not ask.")
+@click.option(
+    "--gateway", callback=endpoint, metavar="HOST:PORT", help="By Modbus (the rig's own plan), not on this machine."
+)
+@state_options
+@json_option
+def command(
+    *, state: Path | None, rig: str, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **wanted: Any
+) -> None:
+    """Measure a ladder and make a numbered calibration of it, or run and record an experiment (--plan).
+
+    Runs on the gateway of this machine. Ctrl-C takes the force to 0 and keeps the data. Nothing is activated: that is
+    `calibration use N`.
+    """
+    from gateway.cli.calibration.follow import follow
+    from gateway.cli.calibration.plans import is_experiment
+    from gateway.cli.calibration.sources import LocalRun, RemoteRun
+
+    resumes = True
+    if gateway:
+        if any(wanted.values()):
+            raise click.UsageError("by Modbus (--gateway) the gateway runs its own plan: leave the plan's options out")
+        run: LocalRun | RemoteRun = RemoteRun(gateway)
+    else:
+        directory = state_directory(state, rig)
+        asked = _asked(directory, wanted)
+        if asked.whole:
+            _tell(_fitted(asked.whole, rig, directory), as_json, resumes=False)
+            return
+        run = LocalRun(directory, asked.plan, asked.earlier, asked.name)
+        resumes = not is_experiment(asked.plan)
+    preview = run.preview()
+    if gateway is None:
+        _warn_of_another_rig(asked, preview)
+    _ask(preview, yes)
+    _tell(follow(run), as_json, resumes=resumes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What to climb: the plan's fields, and the recordings that it goes on from. whole: the recording of a run that has
+    everything, so that only the fit is left; fingerprint: of the rig that the earlier ones were made on."""
+
+    plan: dict[str, Any]
+    earlier: list[int] = field(default_factory=list)
+    name: str = ""
+    whole: Path | None = None
+    fingerprint: str = ""
+
+
+def _asked(directory: Path, wanted: dict[str, Any]) -> _Asked:
+    from gateway.control.runs.ladder_stairs import QUICK
+
+    fields: dict[str, Any] = {}
+    if wanted["quick"]:
+        fields |= {name: getattr(QUICK, name) for name in ("step_v", "groups", "minor_points", "response_steps")}
+    if wanted["plan_file"]:
+        fields |= _from_file(wanted["plan_file"], wanted)
+    names = ("groups", "step_v", "v_max_v", "minor_points", "response_steps")
+    fields |= {name: wanted[name] for name in names if wanted[name] is not None}
+    if wanted["tare"]:
+        fields["tare"] = True
+    if wanted["resume"]:
+        return _resumed(directory, fields, wanted["name"] or "")
+    return _Asked(fields, name=wanted["name"] or "")
+
+
+def _resumed(directory: Path, fields: dict[str, Any], name: str) -> _Asked:
+    """The rest of the last run; fields: what is asked for otherwise now, which may be more groups, but no other stairs."""
+    from gateway.cli.calibration.resume import resumed
+
+    rest = resumed(directory)
+    changed = [f"{key} {value:g}" for key, value in fields.items() if key in _STAIRS and value != rest.plan[key]]
+    if changed:
+        stairs = ", ".join(f"{key} {rest.plan[key]:g}" for key in _STAIRS)
+        raise CliError(
+            f"E437 --resume goes on with the ladder of {rest.last} ({stairs}), not with {', '.join(changed)}: leave that out, "
+            "or leave --resume out to begin anew",
+            exit_codes.USAGE,
+        )
+    plan = rest.plan_with(fields)
+    whole = rest.last if rest.is_whole(plan) else None
+    return _Asked(plan, rest.earlier, name or rest.name, whole, rest.fingerprint)
+
+
+def _fitted(recording: Path, rig: str, directory: Path) -> dict[str, Any]:
+    """The end of a run that has everything but its fit: as `follow` answers."""
+    from gateway.cli.calibration.resume import rig_of
+    from gateway.service.fitting.fit_process import fit_and_store
+
+    result = fit_and_store(recording, rig_of(recording, rig), directory)
+    phase = "stored" if "stored" in result else "refused"
+    sentence = result.pop("refused", "") or "info the run is whole: nothing was climbed again"
+    click.echo(f"{recording} has every stair of its plan: nothing is climbed again", err=True)
+    return {"phase": phase, "recording": str(recording), "sentence": sentence} | result
+
+
+def _warn_of_another_rig(asked: _Asked, preview: dict[str, Any]) -> None:
+    if asked.fingerprint and asked.fingerprint != preview["rig_fingerprint"]:
+        click.echo(
+            f"the files of rig {preview['rig']} have changed since the first part was recorded: if cell, cylinder or regulator "
+            "are others now, begin anew without --resume",
+            err=True,
+        )
+
+
+def _from_file(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
+    """The plan's fields; UsageError where options of a ladder stand beside an experiment."""
+    from gateway.cli.calibration.plans import fields_of, is_experiment
+
+    fields = fields_of(path)
+    options = ("groups", "step_v", "v_max_v", "minor_points", "response_steps", "quick", "resume", "name")
+    if is_experiment(fields) and any(wanted[name] for name in options):
+        raise click.UsageError(
+            f"{path} is an experiment: --groups, --step, --v-max, --minor, --response, --quick, --resume, --name are a ladder's"
+        )
+    return fields
+
+
+def _ask(preview: dict[str, Any], yes: bool) -> None:
+    """What will happen and how long it takes; then the preconditions, each of which may end it here."""
+    if preview:
+        top = f"{preview['v_max_v']:.1f} V (about {preview['force_max_n']:.0f} N)"
+        where = ", on a simulated rig" if preview["simulated"] else ""
+        what = preview["experiment"] or f"{preview['stairs']} stairs"
+        click.echo(f"{preview['rig']}: {what} up to {top}, about {_minutes(preview['eta_s'])}{where}", err=True)
+        for note in preview["notes"]:
+            click.echo(f"  {note}", err=True)
+    if yes:
+        return
+    for question in (*(_QUESTIONS if preview.get("check", True) else _QUESTIONS[:2]), *preview.get("questions", ())):
+        words = question.format(force=preview.get("force_max_n", 60.0), top=preview.get("v_max_v", 8.0))
+        if not click.confirm(words, err=True):
+            raise CliError("not begun: nothing has moved")
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.1f} min"
+
+
+def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
+    """The table and the number, or why there is none."""
+    from gateway.cli.verbs.fit import show
+
+    document = _document(end)
+    if as_json:
+        click.echo(json.dumps(end | {"fit": document}))
+    elif document:
+        show(document)
+    elif end["phase"] == "stored":
+        click.echo(
+            f"calibration {end['stored']} is stored, not active; force-gateway calibration use {end['stored']} there"
+        )
+    elif end["phase"] == "recorded":
+        path = Path(end["recording"])
+        number = f"{int(path.stem)}" if path.stem.isdecimal() else str(path)
+        click.echo(f"recorded in {path}; force-gateway diagnose {number} takes it")
+    if end["phase"] in ("stored", "recorded"):
+        return
+    kept = f"\nthe data are kept in {end['recording']}{_GO_ON if resumes else ''}" if end.get("recording") else ""
+    if end["phase"] == "refused":  # by the data, or by the verdict on a fit that is kept
+        raise CliError(str(end.get("sentence") or "the fit was refused: see the gateway's log"), exit_codes.DATA)
+    raise CliError(f"{str(end.get('sentence') or 'calibration stopped').removeprefix('info ')}{kept}")
+
+
+def _document(end: dict[str, Any]) -> dict[str, Any]:
+    if not end.get("document"):
+        return {}
+    document: dict[str, Any] = json.loads(Path(end["document"]).read_text(encoding="utf-8"))
+    return document

@@ -1,0 +1,220 @@
+"""`calibration`: the numbered calibrations of a rig: list, show, use, go back, compare, take along.
+
+A running gateway is asked through its control socket, so that the change makes no bump; without one the store is changed
+under the lock that a gateway would hold.
+"""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import json_option, state_directory, state_options
+
+if TYPE_CHECKING:
+    from gateway.bsfm import Calibration
+    from gateway.calibrations.store import Entry, Standing
+
+
+@click.group(name="calibration")
+def command() -> None:
+    """List, show, use, compare and export calibrations."""
+
+
+@command.command(name="list")
+@state_options
+@json_option
+def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
+    """List the calibrations of a state directory; * is in use, x was rejected."""
+    from gateway.calibrations.selection import OWN
+    from gateway.cli.calibration.stored import opened
+
+    store = opened(state_directory(state, rig), rig)
+    standing, entries = store.standing(), store.list()
+    if as_json:
+        facts = {
+            "active": _number(standing),
+            "notes": standing.notes,
+            "built_in": _built_in(store.built_in, standing),
+            "calibrations": [_facts(entry, standing) for entry in entries],
+        }
+        click.echo(json.dumps(facts, indent=2))
+        return
+    for note in standing.notes:
+        click.echo(note, err=True)
+    click.echo("  NUMBER  made        model     reversal        forces              rms N   max N  slots  name")
+    if store.built_in:
+        mark = "*" if standing.selection.number is None else " "
+        click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, _slots(standing, OWN))} (the rig's own)")
+    for entry in entries:
+        is_rejected = entry.calibration is not None and bool(entry.calibration.rejected)
+        mark = "*" if standing.selection.number == entry.number else "x" if is_rejected else " "
+        told = (
+            _line(entry.calibration, _slots(standing, entry.number))
+            if entry.calibration
+            else f"unusable: {entry.fault}"
+        )
+        click.echo(f"{mark} {entry.number:<8}{told}")
+
+
+@command.command(name="show")
+@click.argument("which", metavar="[N]", required=False)
+@state_options
+@json_option
+def show_command(*, which: str | None, state: Path | None, rig: str, as_json: bool) -> None:
+    """Show calibration N (default: the one in use) with all its numbers."""
+    from gateway.calibrations.store import as_text
+    from gateway.cli.calibration.stored import found, in_use, opened
+
+    store = opened(state_directory(state, rig), rig)
+    calibration = found(store, which) if which else in_use(store)
+    click.echo(json.dumps(asdict(calibration), indent=2) if as_json else as_text(calibration), nl=as_json)
+
+
+@command.command(name="use")
+@click.argument("number", metavar="N", type=click.IntRange(min=1))
+@click.option("--force", is_flag=True, help="Also one whose fit was rejected.")
+@state_options
+@json_option
+def use_command(*, number: int, force: bool, state: Path | None, rig: str, as_json: bool) -> None:
+    """Use calibration N from now on.
+
+    A running gateway swaps it without a bump. `calibration rollback` goes back.
+    """
+    from gateway.cli.calibration.stored import change
+
+    _tell_change(change(state_directory(state, rig), rig, {"use": number, "force": force}), as_json=as_json)
+
+
+@command.command(name="rollback")
+@state_options
+@json_option
+def rollback_command(*, state: Path | None, rig: str, as_json: bool) -> None:
+    """Use again what was in use before the last change."""
+    from gateway.cli.calibration.stored import change
+
+    _tell_change(change(state_directory(state, rig), rig, {"rollback": True}), as_json=as_json)
+
+
+@command.command(name="compare")
+@click.argument("a", metavar="A")
+@click.argument("b", metavar="B")
+@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw both loops into this HTML file.")
+@state_options
+@json_option
+def compare_command(*, a: str, b: str, plot: Path | None, state: Path | None, rig: str, as_json: bool) -> None:
+    """Compare calibrations A and B over the voltages that both cover.
+
+    Numbers of the store, shipped names or files. Differences are B minus A.
+    """
+    from gateway.cli.calibration.comparison import compared, page, table
+    from gateway.cli.calibration.stored import found, opened
+
+    store = opened(state_directory(state, rig), rig)
+    first, second = found(store, a), found(store, b)
+    try:
+        comparison = compared(first, second)
+    except ValueError as error:
+        raise CliError(f"E433 {error}", exit_codes.DATA) from None
+    if plot:
+        plot.write_text(page(comparison), encoding="utf-8")
+    click.echo(json.dumps(comparison.facts(), indent=2) if as_json else table(comparison))
+
+
+@command.command(name="export")
+@click.argument("which", metavar="N")
+@click.option("--yaml", "yaml_file", type=click.Path(path_type=Path, allow_dash=True), help="YAML; - is stdout.")
+@click.option("--c", "c_directory", type=click.Path(path_type=Path, file_okay=False), help="C header and source.")
+@click.option("--force", is_flag=True, help="Overwrite.")
+@state_options
+def export_command(
+    *, which: str, yaml_file: Path | None, c_directory: Path | None, force: bool, state: Path | None, rig: str
+) -> None:
+    """Take calibration N along, as YAML (default) or as C."""
+    from gateway.calibrations.store import as_text
+    from gateway.cli.calibration.stored import found, opened
+
+    if yaml_file and c_directory:
+        raise click.UsageError("--yaml or --c, not both")
+    calibration = found(opened(state_directory(state, rig), rig), which)
+    if c_directory:
+        _write({c_directory / name: text for name, text in _c_source(calibration).items()}, force=force)
+    elif yaml_file and yaml_file != Path("-"):
+        _write({yaml_file: as_text(calibration)}, force=force)
+    else:
+        click.echo(as_text(calibration), nl=False)
+
+
+def _c_source(calibration: "Calibration") -> dict[str, str]:
+    from gateway.bsfm.c_export.code import c_source
+
+    try:
+        return c_source(calibration)
+    except ValueError as error:
+        raise CliError(f"E433 {error}", exit_codes.DATA) from None
+
+
+def _write(texts: dict[Path, str], *, force: bool) -> None:
+    """All or, where one is there already, none."""
+    for path in texts:
+        if path.exists() and not force:
+            raise CliError(f"E405 {path} exists and was left alone; --force overwrites it")
+    for path, text in texts.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        click.echo(f"wrote {path}", err=True)
+
+
+def _number(standing: "Standing") -> int | None:
+    return standing.calibration.number if standing.calibration else None
+
+
+def _built_in(own: "Calibration | None", standing: "Standing") -> dict[str, Any] | None:
+    """The rig's own calibration, which is no file of the store."""
+    from gateway.calibrations.selection import OWN
+    from gateway.registers.upload.coefficients import model_hash
+
+    if own is None:
+        return None
+    active, slots = standing.selection.number is None, _slots(standing, OWN)
+    return {"number": own.number, "name": own.name, "active": active, "slots": slots, "model_hash": model_hash(own)}
+
+
+def _facts(entry: "Entry", standing: "Standing") -> dict[str, Any]:
+    from gateway.registers.upload.coefficients import model_hash
+
+    return {
+        "number": entry.number,
+        "active": standing.selection.number == entry.number,
+        "slots": _slots(standing, entry.number),
+        "model_hash": entry.calibration and model_hash(entry.calibration),
+        "fault": entry.fault or None,
+        "calibration": asdict(entry.calibration) if entry.calibration else None,
+    }
+
+
+def _slots(standing: "Standing", number: int) -> list[int]:
+    """Those that hold this calibration."""
+    return [slot for slot, held in enumerate(standing.pointer.slots) if held == number]
+
+
+def _line(calibration: "Calibration", slots: list[int]) -> str:
+    low_n, high_n = calibration.allowed_n
+    forces = f"{low_n:.1f} .. {high_n:.1f} N"
+    rms, worst = (f"{error_n:.3f}" if error_n >= 0.0 else "-" for error_n in (calibration.rms_n, calibration.max_n))
+    return (
+        f"{calibration.date_utc:<12}{calibration.kind:<10}{calibration.reversal_kind:<16}{forces:<18}{rms:>7} {worst:>7}"
+        f"  {','.join(map(str, slots)):<5}  {calibration.name} · {calibration.source}{_rejected(calibration)}"
+    )
+
+
+def _rejected(calibration: "Calibration") -> str:
+    return f" · rejected, not offered: {calibration.rejected}" if calibration.rejected else ""
+
+
+def _tell_change(answer: dict[str, Any], *, as_json: bool) -> None:
+    click.echo(json.dumps(answer) if as_json else answer["said"].removeprefix("info "))

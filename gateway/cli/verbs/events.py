@@ -1,0 +1,87 @@
+"""`events`: what the gateway has said, from its state directory; it need not be running."""
+
+import json
+import re
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import json_option, state_directory, state_options
+from gateway.processes.event import SEVERITIES, Event, line_of, utc
+from gateway.processes.event_file import EventReader
+
+_UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+_LOOK_S: Final = 0.25  # how often --follow looks for more
+
+
+def since(context: click.Context, parameter: click.Parameter, value: str | None) -> str:
+    """10m, 2h, 1.5d or an ISO 8601 time (without a zone: UTC) as events write it; empty for none."""
+    if value is None:
+        return ""
+    if ago := re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", value.strip()):
+        seconds = time.time() - float(ago[1]) * _UNITS_S[ago[2]]
+        return utc(max(0.0, seconds))
+    try:
+        moment = datetime.fromisoformat(value.strip())
+        moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+        return utc(moment.timestamp())
+    except (ValueError, OverflowError):
+        raise click.BadParameter(f"{value} is neither 90s, 10m, 2h, 1d nor a time such as 2026-11-22T10:30") from None
+
+
+@click.command()
+@click.option(
+    "--since",
+    "after",
+    callback=since,
+    metavar="10m|TIME",
+    help="Only what is younger: 90s, 10m, 2h, 1d, or a time (UTC unless it says otherwise).",
+)
+@click.option("--severity", type=click.Choice(SEVERITIES), default="info", help="This severity and worse.")
+@click.option("--code", "codes", multiple=True, metavar="CODE", help="Only this code, such as W204; may be repeated.")
+@click.option("--follow", is_flag=True, help="Wait for more; Ctrl-C ends it.")
+@json_option
+@state_options
+def command(
+    *, after: str, severity: str, codes: tuple[str, ...], follow: bool, as_json: bool, state: Path | None, rig: str
+) -> None:
+    """Show what the gateway has said: faults, refusals, restarts.
+
+    Time (UTC), severity, cause, code, sentence. `force-gateway explain CODE` says what to do.
+    """
+    directory = state_directory(state, rig)
+    if not directory.is_dir():
+        raise CliError(
+            f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA
+        )
+    with EventReader(directory) as reader:
+        _show(reader, _wanted(after, severity, {code.upper() for code in codes}), follow, as_json)
+
+
+def _wanted(after: str, severity: str, codes: set[str]) -> Callable[[Event], bool]:
+    severities = SEVERITIES[SEVERITIES.index(severity) :]
+
+    def wanted(event: Event) -> bool:
+        return event.time >= after and event.severity in severities and (not codes or event.code in codes)
+
+    return wanted
+
+
+def _show(reader: EventReader, wanted: Callable[[Event], bool], follow: bool, as_json: bool) -> None:
+    events = reader.kept()
+    try:
+        while True:
+            for event in filter(wanted, events):
+                click.echo(json.dumps(event._asdict()) if as_json else line_of(event))
+            if not follow:
+                return
+            time.sleep(_LOOK_S)
+            events = reader.more()
+    except KeyboardInterrupt:
+        return

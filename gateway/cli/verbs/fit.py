@@ -1,0 +1,146 @@
+"""`fit`: which model describes a ladder, as a table and as a report with plots."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import json_option, name_option, state_directory
+
+if TYPE_CHECKING:
+    from gateway.service.fitting.ladder_fit import LadderFit
+
+MODELS: Final = ("pfm", "psfm", "bfm", "bsfm")
+_ORDER_MAX: Final = 15
+
+
+def _models(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, ...]:
+    names = tuple(name.strip().lower() for name in value.split(",") if name.strip())
+    if not names or not set(names) <= set(MODELS):
+        raise click.BadParameter(f"{value} is not a list of {', '.join(MODELS)}")
+    return names
+
+
+def _orders(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
+    """`1-5`, `2`, `1,3,5` as numbers."""
+    orders: set[int] = set()
+    for part in value.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdecimal() or (dash and not last.isdecimal()):
+            raise click.BadParameter(f"{value} is not a list of orders such as 1-5 or 2,3")
+        orders |= set(range(int(first), int(last or first) + 1))
+    if not orders or not 1 <= min(orders) <= max(orders) <= _ORDER_MAX:
+        raise click.BadParameter(f"{value}: orders are 1 .. {_ORDER_MAX}")
+    return tuple(sorted(orders))
+
+
+@click.command()
+@click.argument("recording", metavar="RECORDING")
+@click.option("--models", callback=_models, default=",".join(MODELS), show_default=True, help="Which to compare.")
+@click.option("--orders", callback=_orders, default="1-5", show_default=True, help="Orders, such as 1-5 or 2,3.")
+@click.option(
+    "--ties", type=click.Choice(["tied", "free"]), default="tied", show_default=True, help="Shared ends or not."
+)
+@click.option(
+    "--outliers",
+    type=click.Choice(["reject", "keep", "huber"]),
+    default="reject",
+    show_default=True,
+    help="What to do.",
+)
+@click.option("--columns", metavar="MAP", help="time_s=1:ms,command_v=2,force_n=3:kgf, or a YAML file of such lines.")
+@click.option("--force-unit", metavar="UNIT", help="What the force is in (N, kgf, gf, lbf), if the table does not say.")
+@click.option(
+    "--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML report; default beside the recording."
+)
+@click.option("--no-report", is_flag=True, help="Write no report.")
+@click.option("--store", is_flag=True, help="Store the chosen fit as a numbered calibration (it is not activated).")
+@name_option
+@click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway.")
+@click.option("--rig", help="The rig it must be from; default the recording's own.")
+@json_option
+def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:
+    """Fit the four models to a recorded ladder, and say which to use.
+
+    RECORDING is a number of `recordings list`, a .fgr file, or a CSV or Parquet table with time_s, command_v, force_n.
+    """
+    from rich.console import Console
+
+    with Console(stderr=True).status("fitting"):
+        fit = _fitted(recording, options)
+    target = None if options["no_report"] else options["report"] or _beside(fit.recording.path)
+    if store:
+        fit.document["calibration"] = _stored(fit, options)
+    if target:
+        from gateway.service.fitting.ladder_fit import write_report
+
+        write_report(fit, target)
+        fit.document["report"] = str(target)
+    if as_json:
+        click.echo(json.dumps(fit.document, indent=2))
+    else:
+        show(fit.document)
+    if store and fit.verdict.rejected:
+        from gateway.service.fitting.fit_process import rejected_sentence
+
+        raise CliError(rejected_sentence(fit.document["calibration"], fit.verdict.rejected), exit_codes.DATA)
+
+
+def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
+    """Everything that can be wrong with the data, as exit code 65."""
+    from gateway.bsfm.fit.evaluation import Question
+    from gateway.bsfm.fit.result import ModelName, Ties
+    from gateway.bsfm.ladder.fault import LadderError
+    from gateway.recording.tables.mapping_file import column_mapping
+    from gateway.service.fitting.ladder_fit import fit_recording
+    from gateway.service.fitting.ladder_source import Background, find_source, read_source
+
+    path = find_source(name, state_directory(options["state"], options["rig"] or "demo"))
+    if not path.exists():
+        raise CliError(
+            f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA
+        )
+    mapping = column_mapping(options["columns"])
+    models = tuple(ModelName(model) for model in options["models"])
+    question = Question(
+        models=models, orders=options["orders"], ties=Ties(options["ties"]), outliers=options["outliers"]
+    )
+    background = Background(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
+    try:
+        return fit_recording(read_source(path, mapping), question, background, options["name"] or "")
+    except LadderError as error:
+        raise CliError(f"E421 {path}: {error}", exit_codes.DATA) from None
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f"{path.stem}.fit.html")
+
+
+def _stored(fit: "LadderFit", options: dict[str, Any]) -> int:
+    from gateway.bsfm.ladder.fault import LadderError
+    from gateway.calibrations.store import CalibrationStore
+    from gateway.profiles import load_rig
+    from gateway.service.fitting.ladder_fit import calibration_of
+
+    rig = load_rig(options["rig"] or fit.document["rig"] or "demo")
+    state = state_directory(options["state"], rig.name)
+    try:
+        calibration = calibration_of(fit, rig.load_cell.range_n)
+    except LadderError as error:
+        raise CliError(f"E421 {fit.recording.path}: {error}", exit_codes.DATA) from None
+    return CalibrationStore(state, rig.calibration).add(calibration)
+
+
+def show(document: dict[str, Any]) -> None:
+    """Table and sentences, for a terminal."""
+    from rich.console import Console
+
+    from gateway.cli.calibration.fit_table import fit_table, summary
+
+    console = Console()
+    console.print(fit_table(document))
+    for line in summary(document):
+        console.print(line, highlight=False, soft_wrap=True)

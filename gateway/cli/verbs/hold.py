@@ -1,0 +1,166 @@
+"""`hold`: a force, kept by this terminal: enable, a heartbeat, one line of state, and a ramp to 0 when it is told to stop."""
+
+import json
+import re
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from gateway.cli.errors import CliError
+from gateway.cli.options import Endpoint, gateway_options, json_option
+
+if TYPE_CHECKING:
+    from gateway.cli.force_hold.heartbeat import Beat, Lease
+
+_SHOW_S: Final = 0.1
+_UNITS: Final = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+
+
+def _duration(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
+    """`10s`, `500ms`, `2min` or a number of seconds."""
+    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+) ?(ms|s|min|h|)", text.strip()) if text is not None else None
+    if text is not None and found is None:
+        raise click.BadParameter(f"{text} is no time such as 10s, 500ms or 2min")
+    return float(found[1]) * _UNITS[found[2]] if found else None
+
+
+@click.command()
+@click.argument("newton", type=float)
+@click.option("--for", "for_s", callback=_duration, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
+@click.option("--reset", "resets", is_flag=True, help="Reset a latched fault first.")
+@click.option("--rig", metavar="RIG", help="The rig that runs there: its lease sets the pace of the heartbeat.")
+@gateway_options
+@json_option
+def command(
+    *, newton: float, rig: str | None, for_s: float | None, endpoint: Endpoint, as_json: bool, **options: Any
+) -> None:
+    """Hold NEWTON until Ctrl-C, which ramps the force to 0.
+
+    Sets the force, enables, and keeps the heartbeat that a rig with a lease wants. A second Ctrl-C skips the ramp.
+
+    Example: force-gateway hold 12 --for 10s
+    """
+    from gateway.cli.force_hold.heartbeat import Beat
+    from gateway.cli.force_hold.sequence import HoldRun
+    from gateway.cli.master.client import GatewayClient
+    from gateway.cli.master.refusal_text import explained
+    from gateway.profiles import load_register_map
+
+    if not (isfinite(newton) and newton >= 0.0):
+        raise click.UsageError(f"{newton:g} N is no force to hold")
+    lease = _lease(rig)
+    register_map = load_register_map(options["map_name"])
+    with GatewayClient(*endpoint, options["unit"], register_map) as client:
+        with explained(client):
+            (heartbeat,) = client.read_values([register_map.find("heartbeat")])
+        run = HoldRun(_checked(register_map, newton), heartbeat=int(heartbeat.value), resets=options["resets"])
+        beat = Beat(client, run, lease, time.monotonic)
+        _follow(beat, for_s, as_json=as_json)
+    _tell(beat, client.where, as_json=as_json)
+
+
+def _lease(rig: str | None) -> "Lease | None":
+    """What the rig file says; None where none is named."""
+    from gateway.cli.force_hold.heartbeat import Lease
+    from gateway.profiles import load_rig
+
+    if rig is None:
+        return None
+    supervision = load_rig(rig, simulated=True).control.supervision
+    return Lease(supervision.lease_s, supervision.lease_action.value)
+
+
+def _checked(register_map: Any, newton: float) -> float:
+    """A force that the register can carry; the rig's own limits are the gateway's to tell."""
+    try:
+        register_map.find("force_setpoint").encode(newton)
+    except ValueError as error:
+        raise click.UsageError(f"NEWTON: {error}") from None
+    return newton
+
+
+def _follow(beat: "Beat", for_s: float | None, *, as_json: bool) -> None:
+    """Show the line until the beat ends; what stops it comes as a signal, as the end of its time, or as a closed pipe."""
+    from gateway.cli.force_hold.state_line import Shown
+
+    shown, began_s = Shown(as_json=as_json), time.monotonic()
+    with _signals(beat):
+        beat.start()
+        while beat.is_alive():
+            beat.join(_SHOW_S)
+            now_s = time.monotonic() - began_s
+            if for_s is not None and now_s >= for_s:
+                beat.stopping.set()
+            try:
+                if beat.seen:
+                    shown.show(beat.seen, now_s)
+            except BrokenPipeError:
+                beat.stopping.set()
+                beat.join()
+                sys.stdout = open("/dev/null", "w")  # noqa: PTH123, SIM115 - nobody reads what would follow
+    with suppress(BrokenPipeError):
+        shown.close()
+
+
+@contextmanager
+def _signals(beat: "Beat") -> Iterator[None]:
+    """The first of Ctrl-C, SIGTERM and a closed terminal ramps down, the second drops the force at once."""
+
+    def on_signal(number: int, frame: object) -> None:
+        (beat.dropping if beat.stopping.is_set() else beat.stopping).set()
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _tell(beat: "Beat", where: str, *, as_json: bool) -> None:
+    """How it ended; CliError when not as asked."""
+    from gateway.cli.force_hold.sequence import End
+
+    end = beat.hold.end
+    if as_json:
+        click.echo(json.dumps({"end": end.value if end and not beat.failure else "failed"}))
+    if beat.failure:
+        raise beat.failure
+    if end is End.FAULT:
+        raise CliError(_fault_words(beat))
+    if end is End.DISABLED:
+        raise CliError(f"{_disabled_words(beat)} ({where})")
+    if not as_json:
+        click.echo("0 N, disabled: the output is at the safe voltage", err=True)
+
+
+def _disabled_words(beat: "Beat") -> str:
+    """Why the output is off although nobody here has asked for it."""
+    from gateway.registers.words import WarningBit
+
+    if beat.warned & WarningBit.MASTER_LOST:
+        return "A310 the lease ran out: the gateway has ramped to 0 N and let go; a busy machine? --rig tells the lease"
+    if beat.warned & WarningBit.RESTARTED:
+        return "A401 the gateway has started anew, in OFF: its log has the first cause"
+    return "W336 somebody else has cleared enable; the output is at the safe voltage"
+
+
+def _fault_words(beat: "Beat") -> str:
+    """The fault's sentence, and how to go on."""
+    from gateway.cli.codes import CATALOGUE, FAULT_CODES
+
+    assert beat.seen
+    code = FAULT_CODES[beat.seen.fault]
+    entry = CATALOGUE[code]
+    when = f"while holding {beat.hold.force_n:g} N" if beat.hold.is_pressing else "is latched"
+    return (
+        f"{code} {entry.title}, {when}: {entry.seen} The output is at the safe voltage\n"
+        f"  {entry.do} (force-gateway explain {code})\n"
+        f"  then: force-gateway hold {beat.hold.force_n:g} --reset"
+    )

@@ -1,0 +1,92 @@
+"""`monitor`: what the gateway does, live in a terminal, by Modbus; or one frame as text or picture."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from gateway.cli.options import Endpoint, gateway_options
+
+if TYPE_CHECKING:
+    from gateway.cli.live_monitor.poll import Poller
+
+_POLL_S: Final = 0.1
+_PICTURE_SIZE: Final = (112, 34)
+_TEXT_SIZE: Final = (80, 24)
+
+
+@click.command()
+@click.option("--once", is_flag=True, help="Print one frame and end.")
+@click.option("--svg", type=click.Path(path_type=Path, dir_okay=False), help="Write one frame to FILE as a picture.")
+@click.option(
+    "--seconds", type=click.FloatRange(min=0.0), help="End after this time; with --once or --svg, watch first."
+)
+@click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory: shows last writers.")
+@gateway_options
+def command(*, svg: Path | None, seconds: float | None, endpoint: Endpoint, **options: Any) -> None:
+    """Show a gateway live: state, force, alarms.
+
+    Ctrl-C ends. Works against any gateway that speaks the register map, at 80x24 and larger.
+    """
+    import sys
+
+    from gateway.cli.live_monitor.poll import Poller
+    from gateway.cli.master.client import GatewayClient
+    from gateway.cli.master.refusal_text import explained
+    from gateway.profiles import load_register_map
+
+    register_map = load_register_map(options["map_name"])
+    with GatewayClient(*endpoint, options["unit"], register_map) as client:
+        poller = Poller(client, options["state"], time.monotonic)
+        with explained(client):
+            poller.poll()  # the first one fails loudly: a wrong address is no reason to wait
+        if svg or options["once"] or not sys.stdout.isatty():
+            _watch(poller, seconds or 0.0)
+            _picture(poller, svg) if svg else _text(poller)
+        else:
+            _live(poller, seconds)
+
+
+def _watch(poller: "Poller", seconds: float) -> None:
+    end_s = time.monotonic() + seconds
+    while time.monotonic() < end_s:
+        time.sleep(_POLL_S)
+        poller.poll_or_note()
+
+
+def _live(poller: "Poller", seconds: float | None) -> None:
+    from rich.console import Console
+    from rich.live import Live
+
+    from gateway.cli.live_monitor.page import page
+
+    console = Console()
+    end_s = time.monotonic() + seconds if seconds else float("inf")
+    try:
+        with Live(console=console, screen=True, auto_refresh=False) as live:
+            while time.monotonic() < end_s:
+                live.update(page(poller.view(*console.size)), refresh=True)
+                time.sleep(_POLL_S)
+                poller.poll_or_note()
+    except KeyboardInterrupt:
+        pass
+
+
+def _text(poller: "Poller") -> None:
+    import sys
+
+    from rich.console import Console
+
+    from gateway.cli.live_monitor.page import page
+
+    console = Console()
+    size = console.size if sys.stdout.isatty() else _TEXT_SIZE
+    Console(width=size[0]).print(page(poller.view(*size)))
+
+
+def _picture(poller: "Poller", svg: Path) -> None:
+    from gateway.cli.live_monitor.picture import svg_picture
+
+    svg.write_text(svg_picture(poller.view(*_PICTURE_SIZE)), encoding="utf-8")
+    click.echo(f"wrote {svg}", err=True)

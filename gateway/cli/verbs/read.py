@@ -1,0 +1,72 @@
+"""`read`: registers by name, in engineering units."""
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gateway.cli.options import Endpoint, gateway_options, json_option
+
+if TYPE_CHECKING:
+    from gateway.cli.master.client import Reading
+    from gateway.registers import Register, RegisterMap
+
+
+@click.command()
+@click.argument("names", metavar="NAME...", nargs=-1, required=True)
+@gateway_options
+@json_option
+def command(*, names: tuple[str, ...], endpoint: Endpoint, unit: int, map_name: str, as_json: bool) -> None:
+    """Read registers by name, in engineering units.
+
+    NAME, NAME@BLOCK, or a whole BLOCK (command, status, float_abcd, ...).
+
+    Example: force-gateway read force_measured state
+    """
+    from gateway.cli.master.client import GatewayClient
+    from gateway.cli.master.refusal_text import explained
+    from gateway.cli.master.value_text import raw, shown
+    from gateway.profiles import load_register_map
+
+    register_map = load_register_map(map_name)
+    registers = _found(register_map, names)
+    with GatewayClient(*endpoint, unit, register_map) as client, explained(client):
+        readings = client.read_values(registers)
+    if as_json:
+        click.echo(json.dumps({label(reading.register): _facts(reading) for reading in readings}, indent=2))
+        return
+    width = max(len(label(reading.register)) for reading in readings)
+    for reading in readings:
+        click.echo(f"{label(reading.register):<{width}}  {shown(reading):<28}  {raw(reading)}")
+
+
+def label(register: "Register") -> str:
+    """The name as `read` takes it."""
+    from gateway.registers.map.register_map import PLAIN_BLOCKS
+
+    return register.name if register.block in PLAIN_BLOCKS else f"{register.name}@{register.block}"
+
+
+def _found(register_map: "RegisterMap", names: tuple[str, ...]) -> "list[Register]":
+    from gateway.registers import UnknownRegister
+
+    blocks = {block.name for block in register_map.blocks}
+    found: list[Register] = []
+    for name in names:
+        try:
+            found += register_map.registers_of(name) if name in blocks else [register_map.find(name)]
+        except UnknownRegister as error:
+            raise click.UsageError(str(error)) from None
+    return found
+
+
+def _facts(reading: "Reading") -> dict[str, Any]:
+    from gateway.cli.master.value_text import shown
+
+    return {
+        "value": reading.value if reading.is_available else None,
+        "text": shown(reading),
+        "unit": reading.register.unit,
+        "address": reading.register.address,
+        "words": list(reading.words),
+    }

@@ -1,0 +1,37 @@
+"""`run`: the gateway itself. Hands over to the guardian, which is why nothing else may be imported here."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gateway.cli.options import endpoint
+
+
+@click.command()
+@click.argument("rig", default="demo")
+@click.option("--sim", "simulate", is_flag=True, help="Simulate the rig's devices, whatever its file says.")
+@click.option(
+    "--bind",
+    callback=endpoint,
+    metavar="HOST:PORT",
+    help="Listen here instead of where the rig says; port 0: any free one.",
+)
+@click.option(
+    "--state",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="State directory (default: $XDG_STATE_HOME/force-gateway/RIG).",
+)
+@click.option("--record", is_flag=True, help="Record from the start.")
+@click.option("--realtime", is_flag=True, help="SCHED_FIFO and locked memory for the control process.")
+@click.option("--json", is_flag=True, help="At READY, print one JSON line: ports, ptys and process ids.")
+@click.pass_context
+def command(context: click.Context, /, **options: Any) -> None:
+    """Run the gateway on RIG (default: demo).
+
+    RIG is a shipped name or a file. Ctrl-C ramps the force to 0 and stops; a second Ctrl-C skips the ramp.
+    """
+    from gateway.service.supervisor.guardian import run
+    from gateway.service.supervisor.run_options import RunOptions
+
+    context.exit(run(RunOptions(**options)))  # the options are the dataclass's fields, by name

@@ -1,0 +1,146 @@
+"""`simulate`: a plant run over a recording, and how far it is from what was measured."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from gateway.cli.options import json_option
+
+if TYPE_CHECKING:
+    from gateway.cli.diagnosis.sources import Sources
+    from gateway.diagnosis.measurement import Floats, Measurement
+    from gateway.profiles import PlantProfile
+
+FORMAT = 1
+_WAYS = {
+    "inferred": "position_mm is not taken for the motion of the slide: inferred motion fits better",
+    "measured": "position_mm is taken for the motion of the slide",
+    "measured-reversed": "position_mm is taken for the motion of the slide, and counts down when the tool moves out",
+}
+
+_MOST_STEPS: Final = 2_000_000  # one plant alone may have many
+
+
+@click.command()
+@click.argument("recording", metavar="RECORDING")
+@click.option("--rig", metavar="R.yaml", help="The rig; default the recording's own.")
+@click.option(
+    "--plant", metavar="PLANT.yaml", help="The plant to run, such as diagnose --extend writes; default the rig's."
+)
+@click.option("--columns", metavar="MAP", help="time_s=1:ms,force_n=7:n for foreign tables, or a YAML file.")
+@click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False), help="Write the simulated series.")
+@click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory, for numbers.")
+@json_option
+def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str | None, **options: Any) -> None:
+    """Run a plant over a recording, and compare the forces.
+
+    RECORDING is what diagnose takes. Residuals are measured minus simulated.
+    """
+    from gateway.cli.diagnosis.outputs import check_targets, write_all
+    from gateway.cli.diagnosis.sources import read_sources
+    from gateway.profiles import load_plant
+
+    profile = load_plant(plant) if plant else None
+    sources = read_sources([recording], **options)
+    measurement, profile = sources.measurements[0], profile or sources.plant
+    check_targets([csv_file] if csv_file else [], [*sources.paths, *([Path(plant)] if plant else [])])
+    simulated_n, notes = _simulated(measurement, profile)
+    facts = _facts(measurement, simulated_n) | {
+        "plant": profile.name,
+        "notes": [*sources.notes, *measurement.notes, *notes],
+    }
+    if csv_file:
+        write_all({csv_file: _table(measurement, simulated_n, facts)})
+    if as_json:
+        click.echo(json.dumps({"format": FORMAT, **facts}, indent=2, ensure_ascii=False))
+    else:
+        _show(sources, facts)
+    if csv_file:
+        click.echo(f"wrote {csv_file}", err=True)
+
+
+def _simulated(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Floats, list[str]]":
+    """Readings, N. Where a position was measured nobody says which way is out, or whether it is that of the slide at all
+    and not of the tool along the workpiece: as in a diagnosis, the way that fits best is taken."""
+    import numpy as np
+
+    from gateway.diagnosis.search.bench import MOTIONS, drive_of
+    from gateway.twin.replay.drive import Motion
+    from gateway.twin.replay.replay import Replay
+
+    ways: tuple[Motion, ...] = ("inferred",) if measurement.position_m is None else MOTIONS
+    replays = [Replay(drive_of(measurement, way), most_steps=_MOST_STEPS) for way in ways]
+    answers = [replay.run([profile.plant]).reading_n[0] for replay in replays]
+    errors = [float(np.mean((measurement.force_n - answer)[measurement.usable] ** 2)) for answer in answers]
+    best = int(np.argmin(errors))
+    told = [_WAYS[ways[best]]] if measurement.position_m is not None else []
+    return np.asarray(answers[best]), [*told, *replays[best].notes]
+
+
+def _facts(measurement: "Measurement", simulated_n: "Floats") -> dict[str, Any]:
+    """Residuals over the rows that may be judged, and by direction of motion."""
+    from gateway.reports.diagnosis.series import FALLING, RISING, direction
+
+    left_n = measurement.force_n - simulated_n
+    ways = direction(measurement)
+    parts = {"all": measurement.usable}
+    parts |= {name: measurement.usable & (ways == way) for name, way in (("rising", RISING), ("falling", FALLING))}
+    return {
+        "recording": measurement.name,
+        "residual_n": {name: _figures(left_n[mask]) for name, mask in parts.items() if mask.any()},
+        "duration_s": measurement.duration_s,
+    }
+
+
+def _figures(left_n: "Floats") -> dict[str, Any]:
+    import numpy as np
+
+    return {
+        "rows": int(left_n.size),
+        "rms_n": float(np.sqrt(np.mean(left_n * left_n))),
+        "max_n": float(np.abs(left_n).max()),
+        "mean_n": float(left_n.mean()),
+    }
+
+
+def _table(measurement: "Measurement", simulated_n: "Floats", facts: dict[str, Any]) -> str:
+    """CSV of the recording contract, simulated_n and residual_n besides; usable: 1 where the row was judged."""
+    import io
+
+    import numpy as np
+
+    columns = {"time_s": measurement.time_s, "force_n": measurement.force_n}
+    if measurement.command_v is not None:
+        columns["command_v"] = measurement.command_v
+    if measurement.pressure_pa is not None:
+        columns["pressure_kpa"] = measurement.pressure_pa / 1e3
+    columns |= {"simulated_n": simulated_n, "residual_n": measurement.force_n - simulated_n}
+    columns["usable"] = measurement.usable.astype(np.float64)
+    text = io.StringIO()
+    text.write(f"# recording: {facts['recording']}\n# plant: {facts['plant']}\n")
+    np.savetxt(text, np.stack(list(columns.values()), axis=1), "%.9g", ",", header=",".join(columns), comments="")
+    return text.getvalue()
+
+
+def _show(sources: "Sources", facts: dict[str, Any]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from gateway.reports.diagnosis.wording import force
+
+    console = Console()
+    console.print(f"{facts['recording']} · rig {sources.rig or 'not named'} · plant {facts['plant']}", highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="dim")
+    table.add_column("direction")
+    for name in ("rows", "RMS N", "max N", "mean N"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for name, part in facts["residual_n"].items():
+        numbers = (force(part[key]) for key in ("rms_n", "max_n", "mean_n"))
+        table.add_row(name, f"{part['rows']:,}".replace(",", " "), *numbers, style="bold" if name == "all" else None)
+    console.print(table)
+    for note in facts["notes"]:
+        console.print(Text(f"note      {note}", style="dim"), soft_wrap=True)

@@ -1,0 +1,100 @@
+"""`upload`: a calibration from the master's side, exactly as a robot or a PLC would bring it.
+
+Decisions: --dry-run lets the gateway check everything and store nothing (its own dry run, commit word 2). With
+--print-frames every request is printed before it is sent; both together print the requests of a real commit and send
+nothing, so that no gateway is needed. The gateway says `committed` when the set is on its disk and in use; then the
+active block is read back and compared word by word.
+"""
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gateway.cli import exit_codes
+from gateway.cli.errors import CliError
+from gateway.cli.options import Endpoint, gateway_options, json_option
+
+if TYPE_CHECKING:
+    from gateway.bsfm import Calibration
+    from gateway.cli.master.upload_frames import Upload
+    from gateway.registers import RegisterMap
+
+
+@click.command()
+@click.argument("file", metavar="FILE")
+@click.option("--slot", type=click.IntRange(0, 7), default=0, show_default=True, help="Recipe slot that it fills.")
+@click.option("--print-frames", is_flag=True, help="Print every Modbus request, for those who program a PLC.")
+@click.option("--dry-run", is_flag=True, help="Check only, store nothing. With --print-frames: send nothing.")
+@click.option("--fc06", is_flag=True, help="Write single words, as masters do that have FC06 only.")
+@gateway_options
+@json_option
+def command(*, file: str, map_name: str, as_json: bool, **options: Any) -> None:
+    """Upload a calibration over Modbus and put it to use.
+
+    FILE is a calibration file or a shipped name. A set that fails a check changes nothing.
+    """
+    from gateway.cli.master.upload_frames import facts, listing
+    from gateway.profiles import load_register_map
+
+    calibration, register_map = _loaded(file), load_register_map(map_name)
+    upload, unit = _upload(calibration, register_map, options), options["unit"]
+    only_print = options["print_frames"] and options["dry_run"]
+    if options["print_frames"] and not as_json:
+        click.echo("\n".join(listing(upload, register_map, unit)))
+    told = {} if only_print else _sent(upload, register_map, options)
+    if as_json:
+        frames = {"frames": facts(upload, unit)} if options["print_frames"] else {}
+        click.echo(json.dumps({"sent": not only_print, **told, **frames}))
+    elif not only_print:
+        click.echo(_sentence(calibration, told))
+
+
+def _loaded(file: str) -> "Calibration":
+    """The file to upload, with METHOD's checks: what can be said here need not go to the gateway."""
+    from gateway.profiles import ProfileError, load_calibration
+
+    try:
+        return load_calibration(file)
+    except ProfileError as error:
+        raise CliError(str(error), exit_codes.DATA) from None
+
+
+def _upload(calibration: "Calibration", register_map: "RegisterMap", options: dict[str, Any]) -> "Upload":
+    from gateway.cli.master.upload_frames import upload_of
+    from gateway.registers.words import CommitAction
+
+    check_only = options["dry_run"] and not options["print_frames"]
+    action = CommitAction.DRY_RUN if check_only else CommitAction.COMMIT
+    try:
+        return upload_of(calibration, register_map, slot=options["slot"], action=action, fc06=options["fc06"])
+    except ValueError as error:
+        text = f"E406 {error}: name the file as the rig's calibration, or fit it with fewer"
+        raise CliError(text, exit_codes.DATA) from None
+
+
+def _sent(upload: "Upload", register_map: "RegisterMap", options: dict[str, Any]) -> dict[str, Any]:
+    """Stage, commit, wait, read back; what to tell. CliError when it did not come to that."""
+    from gateway.cli.master.upload import Master
+
+    endpoint: Endpoint = options["endpoint"]
+    master = Master(*endpoint, options["unit"], register_map)
+    with master:
+        master.send(upload.requests)
+        master.outcome(upload)
+        committed, known = not options["dry_run"], False
+        if committed:
+            master.check_active(upload, options["slot"])
+            known = master.is_known_set()
+        active = master.calibration_id()
+        return {"committed": committed, "active": active, "slot": options["slot"], "known": known}
+
+
+def _sentence(calibration: "Calibration", told: dict[str, Any]) -> str:
+    if not told["committed"]:
+        return f"{calibration.name} passes every check; nothing was stored, active set {told['active']} unchanged"
+    known = "; the gateway knew it, and keeps its number and name" if told["known"] else ""
+    return (
+        f"{calibration.name} is in use as calibration {told['active']}, slot {told['slot']}: "
+        f"{calibration.reversal_kind}, durable, and read back word by word{known}"
+    )

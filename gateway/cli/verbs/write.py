@@ -1,0 +1,91 @@
+"""`write`: registers by name, in engineering units, all of them in one request where Modbus allows."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gateway.cli.options import Endpoint, gateway_options, json_option
+
+if TYPE_CHECKING:
+    from gateway.cli.master.client import Assignment, Frame
+    from gateway.registers import RegisterMap
+
+
+@click.command()
+@click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True)
+@click.option("--dry-run", is_flag=True, help="Say what would be sent, and send nothing that writes.")
+@click.option(
+    "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory: tells why in numbers."
+)
+@gateway_options
+@json_option
+def command(*, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, as_json: bool, **options: Any) -> None:
+    """Write registers by name, in engineering units.
+
+    NAME=VALUE in the register's unit; modes and bits by name. Those of one block go out in one request. A request that the
+    gateway refuses ends with exit code 1, what it refused, why, and what to do.
+
+    Example: force-gateway write force_setpoint=12 control_word=enable
+    """
+    from gateway.cli.master.client import GatewayClient
+    from gateway.cli.master.refusal_text import explained
+    from gateway.profiles import load_register_map
+
+    register_map = load_register_map(options["map_name"])
+    wanted = [_assignment(register_map, text) for text in assignments]
+    _refuse_doubles(wanted)
+    with GatewayClient(*endpoint, options["unit"], register_map) as client:
+        with explained(client):
+            frames = client.frames(wanted)
+        with explained(client, frames, options["state"]):
+            for frame in [] if dry_run else frames:
+                client.write(frame)
+    _tell(frames, wanted, dry_run=dry_run, as_json=as_json)
+
+
+def _assignment(register_map: "RegisterMap", text: str) -> "Assignment":
+    from gateway.cli.master.client import Assignment
+    from gateway.cli.master.value_text import parsed
+    from gateway.registers import UnknownRegister
+
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise click.UsageError(f"{text} is not NAME=VALUE, such as force_setpoint=12")
+    try:
+        register = register_map.find(name.strip())
+        if not register.is_writable:
+            raise click.UsageError(f"{name} is read only: {register.text}")
+        return Assignment(register, parsed(register, value))
+    except UnknownRegister as error:
+        raise click.UsageError(str(error)) from None
+    except ValueError as error:
+        raise click.UsageError(f"{name}: {error}") from None
+
+
+def _refuse_doubles(wanted: "list[Assignment]") -> None:
+    addresses = [assignment.register.address for assignment in wanted]
+    for assignment in wanted:
+        if addresses.count(assignment.register.address) > 1:
+            raise click.UsageError(f"{assignment.register.name} is given twice")
+
+
+def _tell(frames: "list[Frame]", wanted: "list[Assignment]", *, dry_run: bool, as_json: bool) -> None:
+    if as_json:
+        sent = [{"address": frame.address, "words": list(frame.words), "kept": list(frame.kept)} for frame in frames]
+        click.echo(json.dumps({"sent": not dry_run, "frames": sent}))
+        return
+    for assignment in wanted:
+        click.echo(f"{assignment.register.name} = {_as_shown(assignment)}")
+    for frame in frames:
+        words = " ".join(f"{word:04X}" for word in frame.words)
+        kept = f", {', '.join(frame.kept)} kept as read" if frame.kept else ""
+        click.echo(f"{'would send' if dry_run else 'sent'} FC16 address {frame.address}: {words}{kept}")
+
+
+def _as_shown(assignment: "Assignment") -> str:
+    from gateway.cli.master.client import Reading
+    from gateway.cli.master.value_text import shown
+
+    return shown(Reading(assignment.register, assignment.register.decode(assignment.data), ()))

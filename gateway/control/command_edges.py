@@ -1,0 +1,88 @@
+"""Follows the command block: which bits rose and fell, what is demanded, and whether the heartbeat moved."""
+
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+from gateway.bsfm import Bsfm
+from gateway.control.demand import Demand, demand_of
+from gateway.control.limits import NotFiniteError, narrowed
+from gateway.control.settings import ControlSettings
+from gateway.control.supervision.lease import Lease
+from gateway.registers.command import Command
+from gateway.registers.words import ControlBit
+
+_ENABLE, _CALIBRATE = int(ControlBit.ENABLE), int(ControlBit.START_CALIBRATION)
+_MOMENTARY: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
+
+
+class Edges(NamedTuple):
+    """Bits of the control word that rose and that fell; stops: the output is to go off, whatever else."""
+
+    rises: int = 0
+    falls: int = 0
+    stops: bool = False
+
+
+NO_EDGES: Final = Edges()
+
+
+class CommandFollower:
+    """`demand` is the last one that made sense; `not_finite` names the number that did not, or is empty."""
+
+    def __init__(self, settings: ControlSettings) -> None:
+        self.command = Command()
+        self.demand: Demand = demand_of(self.command, settings)
+        self.not_finite = ""
+        self._word = 0
+        self.lease = Lease(settings.supervision.lease_s)
+        self._settings = self._rig_settings = settings
+        self._adopt_heartbeat = False
+
+    def use(self, model: Bsfm) -> None:
+        """Hold to the force limits of this calibration, too: the demand of the last command may become a smaller one."""
+        limits = narrowed(self._rig_settings.limits, model.limits_n)
+        self._settings = replace(self._rig_settings, limits=limits)
+        self._demand()
+
+    def expect_clearing(self) -> None:
+        """The bank is asked to zero the command: no bit stands any more, and the next heartbeat value is its doing and not a
+        beat."""
+        self._word = 0
+        self._adopt_heartbeat = True
+
+    def edges_of(self, command: Command) -> Edges:
+        """What changes in the control word with this command. Reset, tare and takeover act whenever they are written as 1."""
+        word = int(command.control_word)
+        if command.number == self.command.number:
+            word &= ~_MOMENTARY  # the bank's own change of a command that has acted
+        rises, falls = word & ~self._word, self._word & ~word
+        return Edges(rises, falls, command.stops or bool(falls & _ENABLE and not rises & _CALIBRATE))
+
+    def take(self, now_s: float, command: Command) -> Edges:
+        """From now on this is the command; none of its edges act twice."""
+        if command is self.command:
+            return NO_EDGES
+        edges = self.edges_of(command)
+        self._word = 0 if edges.stops else int(command.control_word) & ~_MOMENTARY
+        self.command = command
+        if self._adopt_heartbeat:
+            self._adopt_heartbeat = False
+            if not command.control_word:
+                self.lease.adopt(command.heartbeat)
+        self.lease.observe(now_s, command.heartbeat)
+        self._demand()
+        return edges
+
+    def demanded(self, command: Command) -> Demand:
+        """What this command would demand. NotFiniteError as `demand_of`."""
+        return demand_of(command, self._settings)
+
+    def _demand(self) -> None:
+        try:
+            self.demand, self.not_finite = demand_of(self.command, self._settings), ""
+        except NotFiniteError as error:
+            self.not_finite = str(error)
+
+    @property
+    def who(self) -> str:
+        return self.command.peer or "a command"

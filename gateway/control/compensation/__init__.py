@@ -1,0 +1,1 @@
+"""What control takes back of the defects that a diagnosis has found."""

@@ -1,0 +1,200 @@
+"""Can this write be taken now? The one place that knows, asked by the bank inside the write, answered without any effect.
+
+What is answered with None here the controller does: its step has no refusal of its own. Edges in one write are decided in
+the order in which they act (stop, reset, tare, enable, start calibration), each for the state that the one before leaves.
+A stop alone is never refused. While a run has the output, or the force is on its way to 0, nothing else is taken but the
+heartbeat, a takeover, and the end of the run.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+from gateway.control.command_edges import CommandFollower, Edges
+from gateway.control.runs.active_run import AnyPlan, Calibrating
+from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.sample_conditioning import Reading
+from gateway.control.state_table import ENABLED_STATES
+from gateway.control.tare import Zero
+from gateway.registers.command import Command
+from gateway.registers.edge_questions import Asked, EdgeRefusal
+from gateway.registers.words import ControlBit, RefusalReason, State
+
+_ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
+_CALIBRATE, _TAKE = int(ControlBit.START_CALIBRATION), int(ControlBit.TAKE_OWNERSHIP)
+_WHOLE: Final = ControlBit(0)
+
+BLOCKS: Final = {
+    RefusalReason.FAULT_LATCHED: "a fault is latched: see fault_code, then write force_setpoint 0 and reset_fault (bit 1)",
+    RefusalReason.NOT_READY: "not ready yet: wait for bit 1 (ready) of status_word; first words of a device, an overloaded "
+    "cell, a force that stays at the safe voltage, or the end of the gateway",
+    RefusalReason.OUTPUT_FAULT: "the output device does not answer as it should: power, cable, baud?",
+    RefusalReason.CELL_SILENT: "no fresh sample of the load cell: power, cable, stream mode?",
+}
+"""Why the output cannot be enabled."""
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; expected_n:
+    force that the voltages of late still make, by the model; ramps_down: the force goes to 0, and then the output off."""
+
+    now_s: float
+    state: State
+    faulted_s: float
+    reading: Reading
+    block: RefusalReason
+    voltage_v: float
+    applied_n: float
+    expected_n: float
+    ramps_down: bool
+
+
+class EdgeJudge:
+    """Reads what it is given, changes nothing of it."""
+
+    def __init__(self, follower: CommandFollower, zero: Zero, calibrating: Calibrating) -> None:
+        self._follower = follower
+        self._zero = zero
+        self._calibrating = calibrating
+
+    def refusal(self, asked: Asked, at: Situation) -> EdgeRefusal | None:
+        """Why this write cannot be taken now; None takes it."""
+        edges = self._follower.edges_of(asked.command)
+        if not edges.stops and (busy := self._busy(asked, edges, at)):
+            return busy
+        return next(self._refusals(asked.command, edges, at), None)
+
+    def of_run(self, plan: AnyPlan, at: Situation) -> EdgeRefusal | None:
+        """Why a run cannot begin now, for whoever asks; None begins it."""
+        if at.state is State.CALIBRATING:
+            return _no_run(RefusalReason.CALIBRATING, self._running())
+        if self._calibrating.is_busy:
+            why = "the last ladder is being fitted: wait until calibration_phase is stored or refused"
+            return _no_run(RefusalReason.FITTING, why)
+        if why := self._forbids_run(plan, at):
+            return _no_run(RefusalReason.CALIBRATION_REFUSED, why)
+        if at.state is State.OFF and (blocked := _blocked(at, ControlBit.START_CALIBRATION)):
+            return blocked
+        return self._tare(self._follower.command, at.state, at) if plan.tare else None
+
+    # -- the whole write
+
+    def _busy(self, asked: Asked, edges: Edges, at: Situation) -> EdgeRefusal | None:
+        is_calibrating = at.state is State.CALIBRATING
+        if not is_calibrating and not (at.ramps_down and at.state in ENABLED_STATES):
+            return None
+        acts, changes = edges.rises & ~_TAKE, asked.changes()
+        if not acts and not changes:
+            return None
+        asks = ", ".join((*changes, *(bit.name.lower() for bit in ControlBit if acts & bit and bit.name)))
+        if is_calibrating:
+            return EdgeRefusal(RefusalReason.CALIBRATING, _WHOLE, f"{asks} refused: {self._running()}")
+        seen = f"{at.applied_n:.1f} N on the way to 0 N, then the output is off"
+        return EdgeRefusal(RefusalReason.STOPPING, _WHOLE, f"{asks} refused: {seen}; enable again then")
+
+    def _running(self) -> str:
+        """What has the output, how long still, and how it is ended."""
+        calibrating = self._calibrating
+        if not calibrating.running:
+            return "a run has just ended and its force goes to 0: try again when state is off"
+        what, left_s = calibrating.what, calibrating.eta_s
+        cure = (
+            "control_word 0 alone, or Ctrl-C at its terminal, ends it"
+            if calibrating.is_local
+            else "control_word 0 ends it"
+        )
+        return f"{what} has the output, {left_s:.0f} s left; {cure}"
+
+    # -- edge by edge
+
+    def _refusals(self, command: Command, edges: Edges, at: Situation) -> Iterator[EdgeRefusal]:
+        state = State.OFF if edges.stops and at.state in ENABLED_STATES else at.state
+        if edges.rises & _RESET:
+            yield from _some(self._reset(command, at))
+            state = State.OFF
+        if edges.rises & _TARE:
+            yield from _some(self._tare(command, state, at))
+        if edges.rises & _ENABLE and state not in ENABLED_STATES:
+            yield from _some(_blocked(_in(state, at), ControlBit.ENABLE))
+        if edges.rises & _CALIBRATE:
+            yield from _some(self.of_run(RunPlan(), _in(state, at)))
+            if held := _setpoints(command):
+                why = f"{' and '.join(held)}: a run begins with setpoint 0"
+                yield _no_run(RefusalReason.CALIBRATION_REFUSED, why)
+
+    def _reset(self, command: Command, at: Situation) -> EdgeRefusal | None:
+        if at.state in ENABLED_STATES:
+            text = f"reset refused: no fault is latched, state {at.state.name}"
+            return EdgeRefusal(RefusalReason.NOTHING_TO_RESET, ControlBit.RESET_FAULT, text)
+        if held := _held(command):
+            text = f"reset_fault needs enable 0 and setpoint 0: {' and '.join(held)}"
+            return EdgeRefusal(RefusalReason.RESET_NEEDS_ZERO, ControlBit.RESET_FAULT, text)
+        if at.state is State.OFF:
+            return None  # as many programs begin: there is no fault latched, and that is what was asked for
+        if not self._follower.lease.would_be_fresh_since(at.faulted_s, at.now_s, command.heartbeat):
+            text = f"reset refused: heartbeat = {command.heartbeat} as at the fault: write another value with the reset"
+            return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
+        return None
+
+    def _tare(self, command: Command, state: State, at: Situation) -> EdgeRefusal | None:
+        why = self._forbids_tare(command, state, at)
+        return EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, f"tare refused: {why}") if why else None
+
+    def _forbids_tare(self, command: Command, state: State, at: Situation) -> str:
+        if state is State.FAULT:
+            return "a fault is latched: reset it first"
+        if at.state in ENABLED_STATES and at.voltage_v > 0.0:
+            return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
+        if not at.reading.is_fresh:
+            return "no fresh load-cell sample"
+        if at.expected_n > self._zero.largest_spread_n:
+            return f"about {at.expected_n:.1f} N are still on their way to 0: wait a moment"
+        return self._zero.unsteady(self._follower.demanded(command).gravity_n)
+
+    def _forbids_run(self, plan: AnyPlan, at: Situation) -> str:
+        begins = "it begins from OFF, or from READY with force 0"
+        if at.state not in (State.OFF, State.READY):
+            return f"state {at.state.name}, {begins}"
+        if at.state is State.READY and at.applied_n > 0.0:
+            return f"state READY with {at.applied_n:.1f} N applied, {begins}"
+        try:
+            self._calibrating.tried(plan)
+        except ValueError as error:
+            return str(error)
+        return ""
+
+
+def _in(state: State, at: Situation) -> Situation:
+    """The same moment in the state that an edge before has left."""
+    return at if state is at.state else replace(at, state=state)
+
+
+def _blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
+    reason = RefusalReason.FAULT_LATCHED if at.state is State.FAULT else at.block
+    if not reason:
+        return None
+    what = "enable" if bit is ControlBit.ENABLE else "calibration"
+    return EdgeRefusal(reason, bit, f"{what} refused: {BLOCKS[reason]}")
+
+
+def _no_run(reason: RefusalReason, why: str) -> EdgeRefusal:
+    return EdgeRefusal(reason, ControlBit.START_CALIBRATION, f"calibration refused: {why}")
+
+
+def _held(command: Command) -> list[str]:
+    """What a reset would let loose."""
+    bits = ((ControlBit.ENABLE, "enable is 1"), (ControlBit.START_CALIBRATION, "start_calibration is 1"))
+    return [words for bit, words in bits if command.control_word & bit] + _setpoints(command)
+
+
+def _setpoints(command: Command) -> list[str]:
+    """Those that are not 0."""
+    force_n, voltage_v = command.force_setpoint_n, command.voltage_setpoint_v
+    force = [f"force_setpoint is {force_n:.2f} N"] if force_n else []
+    return force + ([f"voltage_setpoint is {1e3 * voltage_v:.0f} mV"] if voltage_v else [])
+
+
+def _some(refused: EdgeRefusal | None) -> Iterator[EdgeRefusal]:
+    if refused:
+        yield refused

@@ -1,0 +1,1 @@
+"""From the accepted force to the voltage: feedforward, lead compensation, bounded trim, limits."""

@@ -1,0 +1,154 @@
+"""From the accepted force to the feedforward voltage: approach, ramp, direction, inverse model.
+
+Approach: without contact the tool waits at the pre-contact force; from contact the target rises over contact_ramp_s, or
+by the force ramp where that is slower. Lost contact takes the target back at once: a free tool must not shoot out with
+the full force. The reversal's memory follows changes of the target (gateway.bsfm.slip.reversal), never the measured force,
+whose noise would chatter; a vented tool starts where the calibration ladder starts, and a tool that has lost contact on the
+rising branch, because it slides outwards.
+"""
+
+from math import isfinite
+from typing import Final
+
+from gateway.bsfm import RISING, Bsfm, Status
+from gateway.control.demand import Demand
+from gateway.control.force_loop.transport_delay import Delayed
+from gateway.control.limits import TICK_S, Pace, is_below_usable, narrowed, ramped
+from gateway.control.settings import Limits
+from gateway.registers.words import LimitedBy
+
+_CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
+APPROACH_N: Final = 1.0  # above what friction keeps: a vented tool moves
+LEAST_SLOPE_N_PER_V: Final = 1.0  # a flatter model is a model's end, not a plant's
+_OK: Final = Status.OK
+
+
+class ModelError(Exception):
+    """The model gave no usable voltage for a finite force."""
+
+
+class Approach:
+    """Goal and rate of the target by contact. `touched_s` is when the present contact began."""
+
+    def __init__(self) -> None:
+        self._touched_s: float | None = None
+
+    def goal(self, now_s: float, demand: Demand, touching: bool, law: "ForceLaw") -> tuple[float, float]:
+        """(goal N, rate N/s) for this step."""
+        applied_n = law.applied_n
+        if not touching:
+            self._touched_s = None
+            return min(demand.force_n, law.approaching_n(demand.precontact_n)), demand.ramp_n_per_s
+        if self._touched_s is None:
+            self._touched_s = now_s
+        left_s = demand.contact_ramp_s - (now_s - self._touched_s)
+        rise_n = demand.force_n - applied_n
+        if left_s <= 0.0 or rise_n <= 0.0:
+            return demand.force_n, demand.ramp_n_per_s
+        return demand.force_n, min(demand.ramp_n_per_s, rise_n / max(left_s, TICK_S))
+
+
+class ForceLaw:
+    """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers."""
+
+    def __init__(
+        self, model: Bsfm, limits: Limits, response_lag_s: float, delay_s: float = 0.0, ahead_s: float = 0.0
+    ) -> None:
+        """delay_s: before the force begins to follow at all, not part of response_lag_s; ahead_s: how far the aim runs ahead of
+        the applied target on a ramp, because the plant arrives so much later."""
+        self.model = model
+        self._rig_limits = limits
+        self._limits = narrowed(limits, model.limits_n)
+        self._lag_s = response_lag_s
+        self._delayed = Delayed(delay_s)
+        self._ahead_s = ahead_s
+        self.reset()
+
+    def retime(self, response_lag_s: float, delay_s: float, ahead_s: float) -> None:
+        """Another response from now on."""
+        self._lag_s, self._ahead_s = response_lag_s, ahead_s
+        self._delayed = Delayed(delay_s)
+        self._delayed.restart(self.applied_n)
+
+    def reset(self) -> None:
+        """Vented: nothing applied, nothing remembered."""
+        self.applied_n = self.aimed_n = self.reference_n = 0.0
+        self._delayed.restart(0.0)
+        self._memory = self.model.reversal.start()
+        self._pace = Pace()
+        self._carry_over_v = 0.0
+
+    @property
+    def blend(self) -> float:
+        """Where between the branches the plant is, -1 .. 1."""
+        return self.model.reversal.share(self._memory)
+
+    def approaching_n(self, precontact_n: float) -> float:
+        """The pre-contact force, but never one that cannot move a vented tool: what friction keeps pressed at the ladder's
+        lowest stair is the friction itself, and where the ladder begins to press it has been overcome twice."""
+        return max(precontact_n, 2.0 * self.model.force_range_n[0] + APPROACH_N)
+
+    def use(self, model: Bsfm, gravity_n: float) -> None:
+        """Swap the model without a bump: the voltage difference is carried over and fades. An equal one changes nothing,
+        for no share says as much as the memory that it would replace."""
+        if model == self.model:
+            return
+        before_v, _ = self.feedforward(gravity_n)
+        self.model, self._memory = model, model.reversal.at(self.blend)
+        self._limits = narrowed(self._rig_limits, model.limits_n)
+        after_v, _ = self.feedforward(gravity_n)
+        self._carry_over_v += before_v - after_v
+
+    def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
+        """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what does not come from
+        the slide: the payload's weight, forces from outside."""
+        self._pace.earn(dt_s)
+        last_n = self.applied_n
+        self.applied_n = ramped(goal_n, last_n, rate_n_per_s, self._pace.available_s)
+        moved_n = self.applied_n - last_n
+        self._pace.spend(moved_n, rate_n_per_s)
+        aimed_n, self.aimed_n = self.aimed_n, ramped(goal_n, self.applied_n, rate_n_per_s, self._ahead_s)
+        self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
+        heard_n = self._delayed.advance(self.applied_n, dt_s)
+        self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
+        self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
+        return moved_n
+
+    def _turn(self, from_n: float, to_n: float) -> None:
+        """What the slide, whose thrust the model knows, remembers of this movement."""
+        if self.applied_n <= 0.0:
+            self._memory = self.model.reversal.start()
+        elif from_n != to_n:
+            self._memory = self.model.moved(self._memory, from_n, to_n)
+
+    def fall_back(self, goal_n: float) -> None:
+        """Contact lost: at once down to the goal, and on the rising branch for the next contact."""
+        self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
+        self._memory = self.model.reversal.at(RISING)
+
+    def slope_n_per_v(self, gravity_n: float) -> float:
+        """How much force a volt makes at the working point, N/V, by the branches as they are shared there."""
+        rising, falling = self.model.branches.rising, self.model.branches.falling
+        force_n, share = self.aimed_n - gravity_n, 0.5 + 0.5 * self.blend
+        slopes = [max(LEAST_SLOPE_N_PER_V, curve.slope(curve.inverse(force_n)[0])) for curve in (rising, falling)]
+        return 1.0 / (share / slopes[0] + (1.0 - share) / slopes[1])
+
+    def take_over(self, force_n: float, blend: float = RISING) -> None:
+        """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
+        self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
+        self._delayed.restart(self.applied_n)
+        self._memory = self.model.reversal.at(blend)
+
+    def feedforward(self, gravity_n: float) -> tuple[float, LimitedBy]:
+        """Voltage for the applied contact force by the inverse model, and what limited it. ModelError if there is none."""
+        if self.applied_n <= 0.0:
+            return 0.0, LimitedBy.NONE
+        if is_below_usable(self.applied_n, self._limits):
+            return 0.0, LimitedBy.SMALLEST_FORCE
+        try:
+            voltage_v, status = self.model.voltage_v(self.aimed_n - gravity_n, self.blend)
+        except ValueError as error:
+            raise ModelError(f"model: {error}") from error
+        if not isfinite(voltage_v):
+            raise ModelError(f"model: {voltage_v} V for {self.aimed_n:.2f} N")
+        return voltage_v + self._carry_over_v, LimitedBy.NONE if status is _OK else LimitedBy.CALIBRATION_RANGE

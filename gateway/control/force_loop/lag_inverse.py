@@ -1,0 +1,172 @@
+"""The lags of the plant as a calibration has measured them, inverted nearly as fast as range and slew allow.
+
+As the lead of the rig file (gateway.control.force_loop.lead_compensator), this carries a model of the two lags
+behind the voltage that really stood
+on the output, and asks for what brings the model to the wish. But how fast is not one number. With a horizon h the law is
+that of a second-order system of natural frequency 1/h and damping DAMPING. The shortest horizon is used from which the push
+and the brake that must follow it both stay within what the output can do: two pulses of length h that bring the model from
+where it is to rest at the wish. So a small step is nearly over when the dead time is, a large one runs along the limits, and
+none is pushed harder than it can be braked; a step from 0 V, where there is little to brake with, is the example.
+
+The shortest horizon of all is a share of the lags: a shorter one gains little and asks for more than the output's wire,
+which carries one setting at a time, can follow.
+"""
+
+from math import exp, inf
+from typing import Final, NamedTuple
+
+from gateway.control.settings import LeadSettings, Limits
+
+SHORTEST_S: Final = 0.02
+FAST_PERIODS: Final = 0.7  # the same for short lags, which let go of what is wrong by themselves
+PERIODS: Final = 1.0  # of the wire, that a horizon must have
+WIRE_S: Final = 0.03  # that one setting keeps the wire, until it is known
+SLOWEST_WIRE_S: Final = 0.1  # a later answer was a hitch
+LATE_S: Final = 0.005  # by which a decision that waited for the wire is old
+SHARE: Final = 0.12  # of the sum of the lags
+DAMPING: Final = 0.9
+GROWTH: Final = 1.2  # from one horizon to the next
+HORIZONS: Final = 20
+SLEW_SHARE: Final = 0.7  # of h: how far the slew takes the output in a pulse that it has to fill
+BRAKE_S: Final = 0.03  # of slew: as far from the wish as a brake may take the output, which has to come back
+SLOW_S: Final = 0.1  # sum of the lags: below it a push of PUSH_S is most of the way, and the linear law alone is used
+EQUAL_V: Final = 1.0e-3  # below what an output can resolve: no push, the wish itself
+LEAST_LAG_S: Final = 1.0e-3
+
+
+class Pulses(NamedTuple):
+    """Two pulses of horizon_s from a state to rest. By what the states' distances count for the first pulse and, with it, the
+    second: up = a1 e1 + a2 e2, down = b1 e1 + b2 e2 + b3 up, all distances to the wish."""
+
+    horizon_s: float
+    a1: float
+    a2: float
+    b1: float
+    b3: float
+
+
+class Push:
+    """first_v, second_v: where the model's lags are."""
+
+    def __init__(self, settings: LeadSettings, limits: Limits) -> None:
+        longer_s, shorter_s = sorted((settings.lag_s, settings.second_lag_s), reverse=True)
+        if shorter_s > (1.0 - 1.0e-3) * longer_s:
+            longer_s, shorter_s = 1.0005 * longer_s, 0.9995 * shorter_s  # the general form is 0/0 for equal ones
+        self._lag_s, self._second_lag_s = longer_s, shorter_s if shorter_s >= LEAST_LAG_S else 0.0
+        self.first_v = self.second_v = limits.safe_voltage_v
+        self._limits = limits
+        self._lags_s = lags_s = longer_s + self._second_lag_s
+        self._is_slow = lags_s >= SLOW_S
+        self._damping = DAMPING if self._is_slow else 1.0
+        self._horizons = [SHORTEST_S * GROWTH**k for k in range(HORIZONS)]
+        if self._second_lag_s:
+            self._later = [_decays(self._lag_s, self._second_lag_s, 0.06 * lags_s * 1.35**k) for k in range(12)]
+            self._pulses = [_pulses(self._lag_s, self._second_lag_s, horizon_s) for horizon_s in self._horizons]
+        self._wire_s = inf
+        self.know_wire(WIRE_S)
+
+    def know_wire(self, wire_s: float) -> None:
+        """One setting keeps the wire so long: what is decided meanwhile waits, and what stands stays. nan: not known."""
+        if not abs(wire_s - self._wire_s) > LATE_S:
+            return
+        self._wire_s = wire_s = min(wire_s, SLOWEST_WIRE_S)
+        least_s = max(SHARE * self._lags_s, PERIODS * wire_s + LATE_S) if self._is_slow else FAST_PERIODS * wire_s
+        self._first = next((k for k, at_s in enumerate(self._horizons) if at_s >= least_s), HORIZONS - 1)
+        self.horizon_s = self._horizons[self._first]
+        self._decay = exp(-self.horizon_s / self._lag_s)
+
+    @property
+    def landing_s(self) -> float:
+        """How much later than the wish the model arrives where no limit acts."""
+        return 2.0 * self._damping * self.horizon_s if self._second_lag_s else self.horizon_s
+
+    def advance(self, voltage_v: float, dt_s: float) -> None:
+        """voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
+        first_v, second_v = self.first_v - voltage_v, self.second_v - voltage_v
+        decay = exp(-dt_s / self._lag_s)
+        self.first_v = voltage_v + decay * first_v
+        if not self._second_lag_s:
+            self.second_v = self.first_v
+            return
+        second_decay = exp(-dt_s / self._second_lag_s)
+        passed = self._lag_s * (decay - second_decay) / (self._lag_s - self._second_lag_s)
+        self.second_v = voltage_v + second_decay * second_v + passed * first_v
+
+    def led_v(self, wanted_v: float, standing_v: float) -> float:
+        """What to ask for now. standing_v: on the output. A wish outside the range passes, and the stage says so."""
+        lowest_v = min(self._limits.voltage_min_v, wanted_v)
+        highest_v = max(self._limits.voltage_max_v, wanted_v)
+        first_v, second_v = self.first_v - wanted_v, self.second_v - wanted_v
+        if self._second_lag_s:
+            asked_v = self._two(first_v, second_v, wanted_v, (lowest_v, highest_v, standing_v))
+        else:
+            asked_v = wanted_v - first_v * self._decay / (1.0 - self._decay)
+        return wanted_v if abs(asked_v - wanted_v) < EQUAL_V else max(lowest_v, min(highest_v, asked_v))
+
+    def _two(self, first_v: float, second_v: float, wanted_v: float, room: tuple[float, float, float]) -> float:
+        """Two lags: the linear law where its pulses stay within the room, else along the limits and back."""
+        if not self._is_slow:
+            return wanted_v + self._linear(first_v, second_v)
+        lowest_v, highest_v, standing_v = room
+        reach_v = BRAKE_S * self._limits.voltage_slew_v_per_s
+        deepest_v, steepest_v = max(lowest_v, wanted_v - reach_v), min(highest_v, wanted_v + reach_v)
+        asked_v = wanted_v
+        for k, pulses in enumerate(self._pulses[self._first :]):
+            up_v = pulses.a1 * first_v + pulses.a2 * second_v
+            brake_v = wanted_v + pulses.b1 * first_v + pulses.b3 * up_v
+            asked_v = wanted_v + (self._linear(first_v, second_v) if k == 0 else up_v)
+            rise_v = SLEW_SHARE * pulses.horizon_s * self._limits.voltage_slew_v_per_s
+            is_rising, pushed_v = up_v > 0.0, wanted_v + up_v
+            if is_rising:
+                low_v, high_v = deepest_v, highest_v
+            else:
+                low_v, high_v = lowest_v, min(steepest_v, max(lowest_v, pushed_v) + rise_v)
+            if lowest_v <= pushed_v <= min(highest_v, standing_v + rise_v) and low_v <= brake_v <= high_v:
+                return asked_v
+            if k == 0:
+                push_v, stop_v = (highest_v, deepest_v) if is_rising else (lowest_v, steepest_v)
+                if self._may_push(first_v, second_v, push_v - wanted_v, stop_v - wanted_v):
+                    return push_v
+        return asked_v
+
+    def _may_push(self, first_v: float, second_v: float, push_v: float, brake_v: float) -> bool:
+        """Whether after one more tick along the limit the brake still stops it short of the wish. All as distances to the wish.
+        A brake upwards comes as late as the slew makes its middle."""
+        way = 1.0 if push_v > 0.0 else -1.0
+        if way * second_v >= 0.0:
+            return False
+        rises_s = 0.0 if way > 0.0 else 0.5 * (brake_v - push_v) / self._limits.voltage_slew_v_per_s
+        kept, second_kept, passed = _decays(self._lag_s, self._second_lag_s, self._wire_s + LATE_S + rises_s)
+        first_v, second_v = first_v - push_v, second_v - push_v
+        first_v, second_v = push_v + kept * first_v, push_v + second_kept * second_v + passed * first_v
+        first_v, second_v = first_v - brake_v, second_v - brake_v
+        later = (brake_v + second_kept * second_v + passed * first_v for _, second_kept, passed in self._later)
+        return way * (second_v + brake_v) < 0.0 and all(way * at_v < 0.0 for at_v in later)
+
+    def _linear(self, first_v: float, second_v: float) -> float:
+        """The second-order law of the shortest horizon, as a distance to the wish."""
+        speed = (first_v - second_v) / self._second_lag_s
+        bend = -(second_v / self.horizon_s + 2.0 * self._damping * speed) / self.horizon_s
+        return first_v + self._lag_s * (speed + self._second_lag_s * bend)
+
+
+def _decays(lag_s: float, second_lag_s: float, after_s: float) -> tuple[float, float, float]:
+    """What is left of the first lag's distance and of the second's, and what the second takes over of the first's."""
+    kept, second_kept = exp(-after_s / lag_s), exp(-after_s / second_lag_s)
+    return kept, second_kept, lag_s * (kept - second_kept) / (lag_s - second_lag_s)
+
+
+def _pulses(lag_s: float, second_lag_s: float, horizon_s: float) -> Pulses:
+    """Both states at rest after 2 horizons: two equations, linear in the two pulses."""
+    kept, second_kept = exp(-horizon_s / lag_s), exp(-horizon_s / second_lag_s)
+    passed = lag_s * (kept - second_kept) / (lag_s - second_lag_s)
+    given = 1.0 - second_kept - passed  # of a pulse, what the second lag has of it after one horizon
+    share = passed - given * kept / (1.0 - kept)
+    by = -1.0 / (second_kept * given + share * (1.0 - kept))
+    return Pulses(
+        horizon_s,
+        by * (second_kept * passed + share * kept),
+        by * second_kept * second_kept,
+        -kept * kept / (1.0 - kept),
+        -kept,
+    )

@@ -1,0 +1,157 @@
+"""The trim of a rig whose response is measured: an integral of the force error that cannot hurt.
+
+It learns only once the transient of the last movement is over, by the model of dead time and lags, and some time longer, for
+what an error of that model leaves. It integrates in newtons, at the pace of
+gateway.control.force_loop.response_timing, and turns them into volts
+by the slope of the model where the rig works. Within the dead zone it rests, and having begun to correct it goes on to a
+third of it, so that an error is not left at the zone's edge. The zone is the rig's, but never less than what the noise of
+the cell makes of a smoothed error.
+
+What was learned belongs to the force and to the direction in which it was reached: friction is off the other way after a turn.
+So it fades within SAME_WAY_N of travel on and within OTHER_WAY_N of travel back, and comes back with the target. Only what was
+learned with the same sign in both directions, an offset of that range of forces, outlives a turn.
+
+A supervisor watches for hunting: corrections that change sign again and again at one target are friction's (or the
+world's), not the model's. Each makes the zone wider and the pace slower; after MOST_TURNS the trim stands still until the
+target has moved by more than NEW_TARGET_N, and says so.
+"""
+
+from math import exp, sqrt
+from typing import Final
+
+from gateway.control.limits import trim_ranged
+from gateway.control.settings import Timing, Trim
+from gateway.registers.words import LimitedBy
+
+SMOOTHING_S: Final = 0.15
+LEAST_SEEN_S: Final = 0.08  # of an error, before it is believed
+SIGMAS: Final = 3.5  # of the smoothed error's noise: the least zone
+LEFT_SHARE: Final = 0.33  # of the zone, at which a correction ends
+NOISE_S: Final = 2.0  # over which the noise is estimated
+WIDER: Final = 1.5  # zone after each turn
+SLOWER: Final = 0.6  # pace after each turn
+MOST_TURNS: Final = 5
+NEW_TARGET_N: Final = 1.0
+SAME_WAY_N: Final = 5.0
+OTHER_WAY_N: Final = 1.0
+
+
+class MeasuredTrim:
+    """value_v is added to the feedforward; limited_by says whether it stands at its limit; hunted: it stands still because its
+    corrections kept changing sign."""
+
+    def __init__(self, settings: Trim, timing: Timing) -> None:
+        self._settings = settings
+        self._timing = timing
+        self._noise_n2 = 0.0
+        self._same_way_n = min(SAME_WAY_N, settings.memory_n)
+        self._before_n: float | None = None
+        self._smooth_n = self._seen_s = self._interval_s = 0.0
+        self._way = self._last_way = self._turns = 0
+        self.reset()
+
+    @property
+    def is_off(self) -> bool:
+        return self._settings.gain_v_per_n_s <= 0.0
+
+    @property
+    def hunted(self) -> bool:
+        return self._turns >= MOST_TURNS
+
+    def reset(self) -> None:
+        self.value_v, self.limited_by = 0.0, LimitedBy.NONE
+        self._at_n = self._turned_n = self._anchor_n = 0.0
+        self._going = self._going_then = 1
+        self._common_v = self._own_v = self._anchor_v = self._common_at_n = 0.0
+        self._learned_v = {1: 0.0, -1: 0.0}
+        self._rest()
+        self._calm()
+
+    def resume(self, value_v: float) -> None:
+        """Go on from a correction that another trim has learned."""
+        self.value_v, self.limited_by = trim_ranged(value_v, self._settings.limit_v)
+        self._own_v = self._anchor_v = self.value_v
+
+    def travel(self, moved_n: float) -> None:
+        """The applied target moved by so much, N."""
+        if not moved_n:
+            return
+        self._at_n += moved_n
+        if self._going * (self._at_n - self._turned_n) > 0.0:
+            self._turned_n = self._at_n
+        elif abs(self._at_n - self._turned_n) > NEW_TARGET_N:
+            self._keep_common()
+            self._going, self._turned_n = -self._going, self._at_n
+        if abs(self._at_n - self._calm_at_n) > NEW_TARGET_N:
+            self._calm()
+        self._recall()
+
+    def _keep_common(self) -> None:
+        """At a turn: what both directions agree on."""
+        self._learned_v[self._going] = self.value_v
+        up_v, down_v = self._learned_v[1], self._learned_v[-1]
+        agreed_v = min(abs(up_v), abs(down_v)) if up_v * down_v > 0.0 else 0.0
+        self._common_v, self._common_at_n = agreed_v if up_v > 0.0 else -agreed_v, self._anchor_n
+        self._own_v = self._anchor_v - self._common_v
+
+    def _common_here_v(self) -> float:
+        return self._common_v * exp(-abs(self._at_n - self._common_at_n) / self._same_way_n)
+
+    def _recall(self) -> None:
+        """What is left of the correction here."""
+        if not (self._own_v or self._common_v):
+            return
+        away_n = self._going_then * (self._at_n - self._anchor_n)
+        reach_n = self._same_way_n if away_n >= 0.0 else OTHER_WAY_N
+        self.value_v = self._common_here_v() + self._own_v * exp(-abs(away_n) / reach_n)
+        self.limited_by = LimitedBy.NONE
+
+    def rest(self) -> None:
+        """Nothing may be learned now: what was smoothed belongs to another moment."""
+        self._rest()
+
+    def integrate(self, error_n: float, slope_n_per_v: float, interval_s: float) -> None:
+        """error_n: wanted minus measured, on a new sample; slope_n_per_v: of the model at the working point."""
+        if self.is_off or self.hunted:
+            return
+        self._smooth(error_n, interval_s)
+        zone_n = self._zone_n()
+        if abs(self._smooth_n) > zone_n and self._seen_s >= LEAST_SEEN_S:
+            self._turn(1 if self._smooth_n > 0.0 else -1)
+        elif self._way * self._smooth_n < LEFT_SHARE * zone_n:
+            self._way = 0
+        if not self._way:
+            return
+        pace_per_s = self._timing.integral_per_s * SLOWER**self._turns
+        wanted_v = self.value_v + pace_per_s * error_n / slope_n_per_v * interval_s
+        self.value_v, self.limited_by = trim_ranged(wanted_v, self._settings.limit_v)
+        self._anchor_v, self._anchor_n, self._going_then = self.value_v, self._at_n, self._going
+        self._own_v = self.value_v - self._common_here_v()
+
+    def _turn(self, way: int) -> None:
+        if self._last_way and way != self._last_way:
+            self._turns += 1
+        self._way = self._last_way = way
+
+    def _smooth(self, error_n: float, interval_s: float) -> None:
+        if self._before_n is not None:
+            share = interval_s / (NOISE_S + interval_s)
+            self._noise_n2 += share * (0.5 * (error_n - self._before_n) ** 2 - self._noise_n2)
+            behind_s = min(SMOOTHING_S, self._seen_s)  # the mean at first, then forgetting
+            self._smooth_n += (error_n - self._smooth_n) * interval_s / (behind_s + interval_s)
+        else:
+            self._smooth_n = error_n
+        self._interval_s, self._before_n = interval_s, error_n
+        self._seen_s += interval_s
+
+    def _zone_n(self) -> float:
+        smoothed = sqrt(self._noise_n2 * min(1.0, self._interval_s / min(2.0 * SMOOTHING_S, self._seen_s)))
+        return float(max(self._settings.dead_zone_n, SIGMAS * smoothed) * WIDER**self._turns)
+
+    def _rest(self) -> None:
+        self._way, self._smooth_n, self._seen_s, self._interval_s = 0, 0.0, 0.0, 0.0
+        self._before_n = None
+
+    def _calm(self) -> None:
+        self._turns = self._last_way = 0
+        self._calm_at_n = self._at_n

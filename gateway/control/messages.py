@@ -1,0 +1,76 @@
+"""The sentences of control: a code, what was seen in numbers, what it probably is, one thing to do (FIRST-HOUR's rule)."""
+
+from typing import Final
+
+from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
+from gateway.registers.words import FaultCode
+
+FAULT_CODES: Final[dict[FaultCode, str]] = {
+    FaultCode.SIGN_INVERTED: "A302",
+    FaultCode.GAIN_WRONG: "A303",
+    FaultCode.MASTER_LOST: "A310",
+    FaultCode.SAMPLE_STALE: "A311",
+    FaultCode.SAMPLE_FROZEN: "A312",
+    FaultCode.OVER_FORCE: "A313",
+    FaultCode.OUTPUT_SILENT: "A314",
+    FaultCode.OUTPUT_REFUSED: "A315",
+    FaultCode.OUTPUT_ALTERED: "A316",
+    FaultCode.OUTPUT_LOST: "A317",
+    FaultCode.CELL_LOST: "A318",
+    FaultCode.LOOP_STALLED: "A319",
+    FaultCode.NOT_FINITE: "A320",
+    FaultCode.MODEL_INVALID: "A321",
+    FaultCode.INTERNAL: "A499",
+    FaultCode.MACHINE_BUSY: "A403",
+}
+"""What `explain` knows each fault by."""
+
+
+def fault_sentence(fault: FaultCode, detail: str) -> str:
+    return f"{FAULT_CODES[fault]} {detail}"
+
+
+def unreachable_sentence(seen: Evidence) -> str:
+    """A301 in numbers, and what it probably is."""
+    return (
+        f"A301 {seen.voltage_v:.2f} V out, {seen.measured_n:.1f} N measured, {seen.expected_n:.1f} expected: "
+        f"{unreachable_words(seen)}"
+    )
+
+
+def hunting_sentence(force_n: float, turns: int) -> str:
+    """W360: the trim has backed off."""
+    return (
+        f"W360 at {force_n:.1f} N the trim has turned round {turns} times: the force sticks and slips, or the "
+        "workpiece moves; the trim stands still until there is another setpoint"
+    )
+
+
+def sign_sentence(rise_n: float, expected_n: float) -> str:
+    return fault_sentence(
+        FaultCode.SIGN_INVERTED,
+        f"force went {rise_n:+.1f} N where {expected_n:+.1f} N were expected: swap the cell's signal wires or set sign: -1",
+    )
+
+
+def gain_sentence(rise_n: float, expected_n: float) -> str:
+    share = rise_n / expected_n
+    return fault_sentence(
+        FaultCode.GAIN_WRONG,
+        f"force rose {rise_n:.1f} N where {expected_n:.1f} N were expected ({share:.0%}): 981% or 10% means that kgf and N "
+        "are mixed up; check the unit and span of the load cell in the rig file",
+    )
+
+
+def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -> str:
+    return (
+        f"A301 calibration stopped: {voltage_v:.2f} V out, the force rose by {rise_n:.1f} N where {expected_n:.1f} N were "
+        "expected: no air, valve closed or no contact"
+    )
+
+
+def stuck_sentence(measured_n: float, limit_n: float) -> str:
+    return (
+        f"W304 {measured_n:.1f} N measured at the safe voltage, allowed {limit_n:.1f} N: stuck in contact, valve open or zero "
+        "moved; free the tool or tare"
+    )

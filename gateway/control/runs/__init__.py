@@ -1,0 +1,1 @@
+"""What the controller conducts by itself: calibration ladders and experiments."""

@@ -1,0 +1,166 @@
+"""The calibration run or experiment that the controller conducts, if any, and what remains to be said about the last one.
+
+Asked for by control_word bit 5 with the rig's own plan, or by a person at this machine with a plan of theirs. A local run
+does not depend on the master's lease: nobody on the fieldbus has asked for it; the service ends it when the person is gone.
+A run never takes the force beyond the rig's force_max_n (`ceiling`): a ladder leaves out what would, an experiment ends.
+"""
+
+from math import nan
+from typing import Final, TypeAlias
+
+from gateway.bsfm import Bsfm
+from gateway.control.force_loop.force_loop import Pursuit
+from gateway.control.runs.experiment_plan import ExperimentPlan
+from gateway.control.runs.experiment_run import ExperimentRun
+from gateway.control.runs.ladder_run import LadderRow, LadderRun, LadderStep
+from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.sample_conditioning import Reading
+from gateway.control.settings import ControlSettings
+from gateway.control.supervision.fault_detection import Finding
+from gateway.control.supervision.force_ceiling import Ceiling
+from gateway.control.supervision.plausibility import ModelResponse
+from gateway.registers.words import CalibrationPhase, FaultCode
+
+AnyPlan: TypeAlias = RunPlan | ExperimentPlan
+AnyRun: TypeAlias = LadderRun | ExperimentRun
+
+_PHASES: Final = {phase: phase.name.lower().replace("_", " ") for phase in CalibrationPhase}
+
+
+class Calibrating:
+    """phase and progress stay after the end. model: what the check of the next run compares with; cell_n: cell force of the
+    last step, without the payload's weight; target_n: what the model expects of the voltage that the run wants; is_local
+    stays until the output is off; said: a sentence for the log; refused: why the last plan asked for was not begun."""
+
+    def __init__(self, settings: ControlSettings, model: Bsfm) -> None:
+        self.phase = CalibrationPhase.IDLE
+        self.progress = 0.0
+        self.eta_s = 0.0
+        self.cell_n = nan
+        self.target_n = 0.0
+        self.said = self.refused = ""
+        self.is_local = False
+        self.run: AnyRun | None = None
+        self.last_row: LadderRow | None = None
+        self._settings = settings
+        self.model = model
+        self._asked: AnyPlan | None = None
+        self._stop_asked = ""
+        self._ceiling = self._new_ceiling()
+
+    @property
+    def running(self) -> bool:
+        return self.run is not None
+
+    @property
+    def is_busy(self) -> bool:
+        """A run, or the fit of one."""
+        return self.running or self.phase is CalibrationPhase.FITTING
+
+    @property
+    def what(self) -> str:
+        """The run in words: `calibration (ladder, 43 %)`."""
+        name = f"experiment {self.run.plan.name}" if isinstance(self.run, ExperimentRun) else "a calibration"
+        return f"{name} ({_PHASES[self.phase]}, {self.progress:.0%})"
+
+    def use(self, model: Bsfm) -> None:
+        """Of a later run; one that runs keeps what it was begun with."""
+        self.model = model
+
+    def ask(self, plan: AnyPlan) -> AnyRun:
+        """A local run for the next step to begin. ValueError with a sentence for a plan that the rig does not allow."""
+        run = self.tried(plan)
+        self._asked, self.refused = plan, ""
+        self.phase = CalibrationPhase.IDLE
+        return run
+
+    def tried(self, plan: AnyPlan) -> AnyRun:
+        """What a plan would do. ValueError with a sentence for one that the rig does not allow."""
+        if isinstance(plan, ExperimentPlan):
+            return ExperimentRun(plan, self._settings, self.model)
+        return LadderRun(plan, self._settings, self.model)
+
+    def ask_stop(self, sentence: str) -> None:
+        """The next step ends the run: the force goes to 0 along the rig's ramp."""
+        self._stop_asked = sentence
+
+    def take_asked(self) -> AnyPlan | None:
+        asked, self._asked = self._asked, None
+        return asked
+
+    def begin(self, plan: AnyPlan, *, is_local: bool) -> None:
+        self.run = self.tried(plan)
+        self.is_local, self._stop_asked = is_local, ""
+        self.phase, self.progress, self.last_row = CalibrationPhase.ZERO, 0.0, None
+        self.eta_s, self.target_n = self.run.eta_s, 0.0
+        self._ceiling = self._new_ceiling()
+
+    def climb(self, now_s: float, reading: Reading, pursuit: Pursuit, response: ModelResponse) -> Finding | None:
+        """One step of the run, through the voltage stage; what ended it (a fault, or a sentence), None while it goes on."""
+        run = self.run
+        assert run
+        self.cell_n = reading.cell_n
+        if self._stop_asked:
+            return Finding(FaultCode.NONE, self._stop_asked)
+        step = run.step(now_s, reading)
+        self.phase, self.progress, self.eta_s = step.phase, step.progress, step.eta_s
+        self.last_row = step.row or self.last_row
+        if run.found:
+            return run.found
+        if run.is_done:
+            return Finding(FaultCode.NONE, run.ended)
+        voltage_v = self._below_ceiling(now_s, reading, step, pursuit.stage.voltage_v)
+        if voltage_v is None:
+            return Finding(FaultCode.NONE, self._too_high(step.voltage_v, "the run is stopped"))
+        self.target_n = max(0.0, run.model.force_n(voltage_v, run.direction))
+        pursuit.follow(voltage_v, response.force_n(run.direction), run.direction)
+        return None
+
+    def end(self) -> None:
+        """Whatever ends it; complete or not is told by the run itself."""
+        if self.run:
+            self.phase = self.run.end_phase if self.run.is_done else CalibrationPhase.STOPPED
+        self.run, self.eta_s, self.target_n = None, 0.0, 0.0
+
+    def rest(self) -> None:
+        """The output is off."""
+        self.end()
+        self.is_local = False
+
+    def take_refused(self) -> str:
+        refused, self.refused = self.refused, ""
+        return refused
+
+    def take_said(self) -> str:
+        said, self.said = self.said, ""
+        return said
+
+    # -- the rig's largest force
+
+    def _new_ceiling(self) -> Ceiling:
+        limits = self._settings.limits
+        return Ceiling(limits.force_max_n, self.model, limits.safe_voltage_v)
+
+    def _below_ceiling(self, now_s: float, reading: Reading, step: LadderStep, present_v: float) -> float | None:
+        """The voltage that this step may put out; None where the run cannot go on without passing the ceiling. What has
+        to be left out of a ladder is left out from its next step on."""
+        run, ceiling = self.run, self._ceiling
+        assert run
+        ceiling.observe(reading)
+        if step.row:
+            ceiling.settled(step.row)
+        was_reached = run.direction > 0 and ceiling.is_reached(run.noise_n)
+        if not was_reached and not (step.row and ceiling.is_beyond(step.voltage_v, run.noise_n)):
+            return step.voltage_v
+        if isinstance(run, ExperimentRun):
+            return None
+        if not run.leave_out(now_s, step.voltage_v, was_there=was_reached):
+            return None
+        self.said = self._too_high(step.voltage_v, "the run goes on with the stairs below")
+        return min(present_v, step.voltage_v)
+
+    def _too_high(self, voltage_v: float, what_now: str) -> str:
+        return (
+            f"A350 {self._ceiling.measured_n:.1f} N measured, {voltage_v:.2f} V would take it beyond what this rig allows, "
+            f"force_max_n = {self._settings.limits.force_max_n:g} N: {what_now}"
+        )

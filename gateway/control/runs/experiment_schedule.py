@@ -1,0 +1,147 @@
+"""A plan on a rig: voltages over time, within the limits of that rig, or a sentence why not."""
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from math import isfinite
+from typing import Final
+
+from gateway.bsfm import Bsfm, Status
+from gateway.control.runs.experiment_plan import MOST_SEGMENTS, Do, ExperimentPlan, Move, plan_faults
+from gateway.control.runs.ladder_stairs import highest_voltage_v
+from gateway.control.settings import Limits
+
+_SLACK_V: Final = 1.0e-9  # shares that add up to one do so but for rounding
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Evenly to a voltage in over_s (0: at once), then hold_s there. part: index of the plan's."""
+
+    to_v: float
+    over_s: float
+    hold_s: float
+    part: int
+
+    @property
+    def duration_s(self) -> float:
+        return self.over_s + self.hold_s
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """What the rig may use, and why no more."""
+
+    limits: Limits
+    model: Bsfm
+    low_v: float
+    top_v: float
+
+    def level_v(self, move: Move) -> float:
+        """ValueError outside the range."""
+        if move.to_share is not None:
+            return self.low_v + move.to_share * (self.top_v - self.low_v)
+        volts, told = (move.to_v, f"{move.to_v:g} V") if move.to_v is not None else self._of_force(move.to_n or 0.0)
+        return self.checked_v(float(volts or 0.0), told)
+
+    def _of_force(self, force_n: float) -> tuple[float, str]:
+        volts, status = self.model.branches.rising.inverse(force_n)
+        if status is Status.HIGH:
+            raise ValueError(
+                f"{force_n:g} N, allowed up to {self.model.branches.rising.value(self.top_v):.1f} N (calibration in use)"
+            )
+        return max(volts, self.low_v), f"{force_n:g} N"
+
+    def checked_v(self, volts: float, told: str) -> float:
+        if not (isfinite(volts) and self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V):
+            low_n, high_n = (self.model.branches.rising.value(end_v) for end_v in (self.low_v, self.top_v))
+            raise ValueError(
+                f"{told}, allowed {self.low_v:g} .. {self.top_v:g} V (about {max(0.0, low_n):.0f} .. {high_n:.0f} N): "
+                f"beyond lie the rig's limits (force_max_n = {self.limits.force_max_n:g} N), the end of the calibration in "
+                f"use, or the over-force trip at {self.limits.over_force_n:g} N"
+            )
+        return min(max(volts, self.low_v), self.top_v)
+
+
+def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segment, ...]:
+    """The whole plan in volts. ValueError with a sentence for a plan that the rig does not allow, or that is none."""
+    for _, sentence in plan_faults(plan):
+        raise ValueError(f"plan {plan.name}: {sentence}")
+    usable = _Range(limits, model, limits.voltage_min_v, highest_voltage_v(limits, model))
+    segments: list[Segment] = []
+    at_v = usable.low_v
+    for p, part in enumerate(plan.parts):
+        for m, move in enumerate(part.moves):
+            try:
+                found = list(_moved(move, at_v, usable, p))
+            except ValueError as error:
+                raise ValueError(f"plan {plan.name}, part {part.name}, move {m + 1} ({move.do}): {error}") from None
+            segments += found
+            at_v = segments[-1].to_v
+    if len(segments) > MOST_SEGMENTS:
+        raise ValueError(f"plan {plan.name}: {len(segments)} stairs and turns, at most {MOST_SEGMENTS}")
+    return tuple(segments)
+
+
+def _moved(move: Move, at_v: float, usable: _Range, part: int) -> Iterator[Segment]:
+    over_s, hold_s = move.over_s or 0.0, move.hold_s or 0.0
+    if move.do is Do.DWELL:
+        yield Segment(at_v, 0.0, hold_s, part)
+    elif move.do is Do.REVERSALS:
+        yield from _swings(move, at_v, usable, part)
+    elif move.do is Do.LADDER:
+        goal_v, stairs = usable.level_v(move), move.stairs or 1
+        for k in range(1, stairs + 1):
+            yield Segment(at_v + (goal_v - at_v) * k / stairs, 0.0, hold_s, part)
+    else:
+        yield Segment(usable.level_v(move), over_s, hold_s, part)
+
+
+def _swings(move: Move, at_v: float, usable: _Range, part: int) -> Iterator[Segment]:
+    """Up first; from level to turn takes half of over_s, so that the speed is the same throughout."""
+    size_v = move.size_v if move.size_v is not None else (move.size_share or 0.0) * (usable.top_v - usable.low_v)
+    over_s, hold_s = move.over_s or 0.0, move.hold_s or 0.0
+    turns = [
+        usable.checked_v(turn_v, f"{size_v:.3g} V around {at_v:.3g} V")
+        for turn_v in (at_v + size_v / 2.0, at_v - size_v / 2.0)
+    ]
+    for k in range(2 * (move.times or 0)):
+        yield Segment(turns[k % 2], over_s if k else over_s / 2.0, hold_s, part)
+    yield Segment(at_v, over_s / 2.0, 0.0, part)
+
+
+class Schedule:
+    """Voltage over time, from the first segment's start on."""
+
+    def __init__(self, segments: tuple[Segment, ...], from_v: float) -> None:
+        self.segments = segments
+        self._starts_s = [0.0, *accumulate(segment.duration_s for segment in segments)]
+        self._from_v = [from_v, *(segment.to_v for segment in segments)]
+        self._ways: list[int] = []
+        for before_v, after_v in pairwise(self._from_v):
+            last = self._ways[-1] if self._ways else 1
+            self._ways.append((after_v > before_v) - (after_v < before_v) or last)
+
+    @property
+    def duration_s(self) -> float:
+        return self._starts_s[-1]
+
+    @property
+    def top_v(self) -> float:
+        return max(segment.to_v for segment in self.segments)
+
+    def index(self, elapsed_s: float) -> int:
+        """Of the segment that runs at this time; the last one's after the end."""
+        return min(bisect_right(self._starts_s, elapsed_s) - 1, len(self.segments) - 1)
+
+    def voltage_v(self, elapsed_s: float) -> float:
+        k = self.index(elapsed_s)
+        segment, since_s = self.segments[k], elapsed_s - self._starts_s[k]
+        if since_s >= segment.over_s:
+            return segment.to_v
+        return self._from_v[k] + (segment.to_v - self._from_v[k]) * since_s / segment.over_s
+
+    def direction(self, elapsed_s: float) -> int:
+        """+1 when the voltage last rose, -1 when it last fell."""
+        return self._ways[self.index(elapsed_s)]

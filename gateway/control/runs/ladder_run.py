@@ -1,0 +1,231 @@
+"""One calibration run, stair by stair: what to put out now, how far it is, and when a stair has settled.
+
+A stair is left when the data say that it has settled: the means of the two halves of a window differ by no more than the
+noise, measured before the first stair, explains. The window begins when, by the pace of the check's stairs (ladder_pace),
+the transient of a step of this size is over: no transport delay can look like rest, nor the slow end of a lag. A stair that
+never settles is left after MOST_DWELL_S and counted. The voltage changes with a reading only: the recording's rows say when.
+Supervision is not here: the controller watches as always. Only what a ladder alone can see is judged: each settled stair
+of the check against the model, for sign and scale.
+"""
+
+from collections import deque
+from itertools import pairwise
+from math import sqrt
+from typing import Final, NamedTuple
+
+from gateway.bsfm import Bsfm
+from gateway.control.messages import gain_sentence, ladder_silent_sentence, sign_sentence
+from gateway.control.runs.ladder_pace import LadderPace, Trace
+from gateway.control.runs.ladder_stairs import RunPlan, Stair, stairs_of
+from gateway.control.sample_conditioning import Reading
+from gateway.control.settings import ControlSettings
+from gateway.control.supervision.fault_detection import Finding
+from gateway.registers.words import CalibrationPhase, FaultCode
+
+ZERO_S: Final = 0.6
+WINDOW_S: Final = 0.2
+FEWEST_READINGS: Final = 6
+MOST_DWELL_S: Final = 3.5
+GUESSED_DWELL_S: Final = 0.65
+SETTLED_SIGMA: Final = 2.0
+SMALLEST_DRIFT_N: Final = 0.03
+LEAST_EXPECTED_N: Final = 3.0
+LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = 0.3, 3.0, 0.1
+
+
+class LadderRow(NamedTuple):
+    """One settled stair. force_n: mean of the window, zeroed cell force; settled: False if it was left unsettled."""
+
+    stair: Stair
+    force_n: float
+    dwell_s: float
+    settled: bool
+
+
+class LadderStep(NamedTuple):
+    """What one step answers. progress: 0 .. 1; row: of a stair that has just ended."""
+
+    voltage_v: float
+    phase: CalibrationPhase
+    progress: float
+    eta_s: float
+    row: LadderRow | None = None
+
+
+class LadderRun:
+    """stairs: others than the plan's own. ValueError for a plan that the rig does not allow."""
+
+    end_phase: Final = CalibrationPhase.FITTING
+
+    def __init__(
+        self, plan: RunPlan, settings: ControlSettings, model: Bsfm, stairs: tuple[Stair, ...] | None = None
+    ) -> None:
+        self.plan = plan
+        self.stairs = stairs_of(plan, settings.limits, model) if stairs is None else stairs
+        self.found: Finding | None = None
+        self.noise_n = self.rest_n = 0.0
+        self.unsettled = 0
+        self.done = 0
+        self.model = model
+        self._rest_v = settings.limits.safe_voltage_v
+        self._began_s: float | None = None
+        self._stair_s: float | None = None
+        self._window: deque[tuple[float, float]] = deque()
+        self._dwelt_s = 0.0
+        self._pace, self._trace = LadderPace(), Trace()
+        self._last_n = 0.0
+
+    @property
+    def is_done(self) -> bool:
+        return self.done >= len(self.stairs)
+
+    @property
+    def is_waiting(self) -> bool:
+        """Rest force and noise are not known yet."""
+        return self._stair_s is None
+
+    @property
+    def ended(self) -> str:
+        """What is said at its end."""
+        return f"info calibration ladder done: {self.done} stairs, {self.unsettled} of them never settled"
+
+    @property
+    def eta_s(self) -> float:
+        dwell_s = self._dwelt_s / self.done if self.done else GUESSED_DWELL_S
+        rest_s = 0.0 if self._stair_s is not None else ZERO_S
+        return rest_s + dwell_s * (len(self.stairs) - self.done)
+
+    @property
+    def direction(self) -> float:
+        """Which branch the plant is on, as a blend state."""
+        return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
+
+    def leave_out(self, now_s: float, voltage_v: float, *, was_there: bool) -> bool:
+        """No stair from now on is as high as this voltage; whether any is left. was_there: the output has been; if not, the
+        smaller stairs of the ladder may still try after a check, and the same stair is no other one on the way down."""
+        phase = self._stair.phase
+        tries_again = phase is CalibrationPhase.CHECK and not was_there
+        left = [
+            stair
+            for stair in self.stairs[self.done :]
+            if stair.voltage_v < voltage_v or (tries_again and stair.phase is not phase)
+        ]
+        last_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
+        if not was_there and left and left[0].direction < 0 and left[0].voltage_v >= last_v:
+            left = left[1:]
+        self.stairs = (*self.stairs[: self.done], *left)
+        self._stair_s = now_s
+        self._window.clear()
+        self._trace.clear()
+        return bool(left)
+
+    @property
+    def _stair(self) -> Stair:
+        return self.stairs[min(self.done, len(self.stairs) - 1)]
+
+    def step(self, now_s: float, reading: Reading) -> LadderStep:
+        """reading: of this moment; only new usable ones count."""
+        if self._began_s is None:
+            self._began_s = now_s
+        if not (reading.is_new and reading.is_usable):
+            return self._answer(None)
+        self._window.append((now_s, reading.cell_n))
+        if self._stair_s is None:
+            return self._zero(now_s)
+        self._trace.append((now_s - self._stair_s, reading.cell_n))
+        row = self._finished(now_s, self._stair_s)
+        if row:
+            self._judge(row)
+            self._begin_next(now_s, row.force_n)
+        return self._answer(row)
+
+    def _begin_next(self, now_s: float, settled_n: float) -> None:
+        if not self._pace.is_known:
+            self._pace.observe(self._trace, self._last_n, settled_n, self.noise_n)
+        self._stair_s, self._last_n = now_s, settled_n
+        self._window.clear()
+        self._trace.clear()
+
+    def _zero(self, now_s: float) -> LadderStep:
+        """Rest force and noise, once the force of before has left: else its way down would count as both."""
+        assert self._began_s is not None
+        window, waited_s = self._window, now_s - self._began_s
+        while len(window) > FEWEST_READINGS and window[0][0] < now_s - ZERO_S:
+            window.popleft()
+        if waited_s >= ZERO_S and len(window) >= FEWEST_READINGS and (self._is_still() or waited_s >= MOST_DWELL_S):
+            forces = [force_n for _, force_n in window]
+            self.rest_n = sum(forces) / len(forces)
+            self.noise_n = sqrt(sum((force - self.rest_n) ** 2 for force in forces) / (len(forces) - 1))
+            self._begin_next(now_s, self.rest_n)
+        return self._answer(None)
+
+    def _is_still(self) -> bool:
+        """No drift beyond the noise, which neighbouring readings tell: a drift counts little between them."""
+        forces = [force_n for _, force_n in self._window]
+        noise_n = sqrt(sum((b - a) ** 2 for a, b in pairwise(forces)) / (2.0 * (len(forces) - 1)))
+        return self._drift_n() <= max(SMALLEST_DRIFT_N, SETTLED_SIGMA * noise_n * sqrt(4.0 / len(forces)))
+
+    def _finished(self, now_s: float, since_s: float) -> LadderRow | None:
+        """The row of this stair once it has settled, or has had its time."""
+        dwell_s, blind_s = now_s - since_s, self._blind_s()
+        window = self._window
+        while window and (window[0][0] < since_s + blind_s or self._is_spare(now_s)):
+            window.popleft()
+        if dwell_s < blind_s + WINDOW_S or len(window) < FEWEST_READINGS:
+            return None if dwell_s < MOST_DWELL_S or not window else self._row(dwell_s, settled=False)
+        if self._drift_n() <= self._allowed_n():
+            return self._row(dwell_s, settled=True)
+        return self._row(dwell_s, settled=False) if dwell_s >= MOST_DWELL_S else None
+
+    def _blind_s(self) -> float:
+        """After a step, until its window may begin: half of that lies behind the transient's end."""
+        return self._pace.blind_s(self._step_n(), self.noise_n) - (0.5 * WINDOW_S if self._pace.is_known else 0.0)
+
+    def _step_n(self) -> float:
+        """Size of this stair's step by the model."""
+        stair, way = self._stair, float(self._stair.direction)
+        before_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
+        return self.model.force_n(stair.voltage_v, way) - self.model.force_n(before_v, way)
+
+    def _is_spare(self, now_s: float) -> bool:
+        return self._window[0][0] < now_s - WINDOW_S and len(self._window) > FEWEST_READINGS
+
+    def _drift_n(self) -> float:
+        forces = [force_n for _, force_n in self._window]
+        half = len(forces) // 2
+        return abs(sum(forces[-half:]) - sum(forces[:half])) / half
+
+    def _allowed_n(self) -> float:
+        """What the noise alone makes of the difference of two half windows."""
+        return max(SMALLEST_DRIFT_N, SETTLED_SIGMA * self.noise_n * sqrt(4.0 / len(self._window)))
+
+    def _row(self, dwell_s: float, *, settled: bool) -> LadderRow:
+        forces = [force_n for _, force_n in self._window]
+        row = LadderRow(self._stair, sum(forces) / len(forces), dwell_s, settled)
+        self.done += 1
+        self.unsettled += not settled
+        self._dwelt_s += dwell_s
+        return row
+
+    def _judge(self, row: LadderRow) -> None:
+        """Sign and scale of a rising stair of the check (A302, A303), or no answer at all (A301)."""
+        if row.stair.phase is not CalibrationPhase.CHECK or row.stair.direction < 0:
+            return
+        volts = row.stair.voltage_v
+        expected_n = self.model.force_n(volts, 1.0) - self.model.force_n(self._rest_v, 1.0)
+        rise_n = row.force_n - self.rest_n
+        if expected_n < LEAST_EXPECTED_N or LOWEST_SHARE * expected_n <= rise_n <= HIGHEST_SHARE * expected_n:
+            return
+        if rise_n <= -LOWEST_SHARE * expected_n:
+            self.found = Finding(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
+        elif rise_n < SILENT_SHARE * expected_n:
+            self.found = Finding(FaultCode.NONE, ladder_silent_sentence(volts, rise_n, expected_n))
+        else:
+            self.found = Finding(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
+
+    def _answer(self, row: LadderRow | None) -> LadderStep:
+        if self._stair_s is None or not self.stairs:
+            return LadderStep(self._rest_v, CalibrationPhase.ZERO, 0.0, self.eta_s)
+        progress = self.done / len(self.stairs)
+        volts = self._rest_v if self.is_done else self._stair.voltage_v
+        return LadderStep(volts, self._stair.phase, progress, self.eta_s, row)

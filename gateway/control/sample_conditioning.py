@@ -1,0 +1,81 @@
+"""What a sample means at the time of a step: corrected for known defects of the cell, zeroed, gravity compensated, with its
+age and whether it can be used."""
+
+from dataclasses import dataclass, replace
+from math import isfinite, nan
+from typing import Final
+
+from gateway.control.compensation.load_cell import CellMap
+from gateway.control.settings import Supervision
+from gateway.control.tare import Zero
+from gateway.devices.messages import ForceSample, Quality
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """cell_n: zeroed cell force, nan unless usable; contact_n: with the payload's weight; interval_s: since the sample
+    before, 0 unless this one is new; overload: saturated or said so by the device; age_s: nan before the first
+    sample; raw_n: as the cell said it, in N."""
+
+    cell_n: float = nan
+    contact_n: float = nan
+    age_s: float = nan
+    interval_s: float = 0.0
+    is_new: bool = False
+    is_fresh: bool = False
+    is_usable: bool = False
+    overload: bool = False
+    raw_n: float = nan
+
+
+NO_READING: Final = Reading()
+
+
+def at_time(reading: Reading, later_s: float, supervision: Supervision) -> Reading:
+    """The same reading later_s after it was made: older, and perhaps no longer fresh; not new any more."""
+    age_s = reading.age_s + max(0.0, later_s)
+    return replace(reading, age_s=age_s, interval_s=0.0, is_new=False, is_fresh=age_s <= supervision.sample_timeout_s)
+
+
+class Reader:
+    """Turns samples into readings; a sample given twice is not new the second time."""
+
+    def __init__(self, supervision: Supervision, cell: CellMap | None = None) -> None:
+        """cell: its known defects; None: the reading is the force."""
+        self.zero = Zero(supervision)
+        self._cell = cell
+        self._saturation_n = supervision.saturation_n
+        self._timeout_s = supervision.sample_timeout_s
+        self._last_s = nan
+
+    def read(
+        self, now_s: float, sample: ForceSample | None, gravity_n: float, around: tuple[float, float] = (nan, 0.0)
+    ) -> Reading:
+        """around: temperature of the cell in degrees C (nan: not known) and voltage on the output."""
+        if sample is None:
+            return NO_READING
+        force_n = sample.force_n
+        overload = sample.quality is Quality.OVERLOAD or abs(force_n) >= self._saturation_n
+        usable = isfinite(force_n) and not overload
+        if self._cell is not None and usable:
+            force_n = self._cell.force_n(force_n, *around)
+        interval_s = self._interval_s(sample.time_s)
+        if interval_s > 0.0 and usable:
+            self.zero.observe(force_n)
+        age_s = max(0.0, now_s - sample.time_s)
+        cell_n = force_n - self.zero.zero_n if usable else nan
+        fresh = age_s <= self._timeout_s
+        return Reading(
+            cell_n, cell_n + gravity_n, age_s, interval_s, interval_s > 0.0, fresh, usable, overload, sample.force_n
+        )
+
+    def _interval_s(self, time_s: float) -> float:
+        """Time since the sample before, at most the time-out; 0 for the same one, or one from the past."""
+        last_s = self._last_s
+        if time_s <= last_s:
+            return 0.0
+        self._last_s = time_s
+        if time_s - last_s <= self._timeout_s:
+            return time_s - last_s
+        self.zero.forget()  # also for the first sample, where last_s is nan
+        return self._timeout_s

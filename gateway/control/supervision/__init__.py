@@ -1,0 +1,1 @@
+"""What is watched while the output is enabled, apart from the force loop."""

@@ -1,0 +1,39 @@
+"""Does the tool touch? Threshold with hysteresis in force and in time: two samples make contact, 0.1 s below half the
+threshold ends it.
+
+The release waits because a fast unloading undershoots; the onset does not, because the force must not stay at the
+pre-contact force longer than it has to.
+"""
+
+from typing import Final
+
+from gateway.control.sample_conditioning import Reading
+
+_SAMPLES_TO_TOUCH: Final = 2
+_RELEASE_S: Final = 0.1
+_RELEASE_SHARE: Final = 0.5
+
+
+class ContactSense:
+    """threshold_n: contact force from which the tool counts as touching (rig default contact_threshold_n)."""
+
+    def __init__(self, threshold_n: float) -> None:
+        self.touching = False
+        self._touch_n = threshold_n
+        self._release_n = threshold_n * _RELEASE_SHARE
+        self._above = 0
+        self._below_s = 0.0
+
+    def update(self, reading: Reading) -> bool:
+        """Contact now. Only new, usable samples count; an overload leaves it as it is."""
+        if reading.is_new and reading.is_usable:
+            self._count(reading.contact_n, reading.interval_s)
+        return self.touching
+
+    def _count(self, contact_n: float, interval_s: float) -> None:
+        self._above = self._above + 1 if contact_n >= self._touch_n else 0
+        self._below_s = self._below_s + interval_s if contact_n < self._release_n else 0.0
+        if self._above >= _SAMPLES_TO_TOUCH:
+            self.touching = True
+        elif self._below_s >= _RELEASE_S:
+            self.touching = False

@@ -1,0 +1,149 @@
+"""Looks for the first cause of a fault (SAFETY.md's table), apart from the force law, and only while the output is enabled.
+
+Checks run in a fixed order and the first one found is the cause: what makes others follow comes first (our own loop,
+then the output line, then the cell, then what the cell says, then the master). While disabled the same facts only
+refuse an enable.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.control.inputs import Line
+from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence
+from gateway.control.sample_conditioning import Reading
+from gateway.control.settings import ControlSettings
+from gateway.control.supervision.plausibility import ModelResponse, RiseCheck
+from gateway.control.supervision.stuck_sensor import FrozenWatch
+from gateway.registers.words import FaultCode, RefusalReason
+
+_STUCK_S: Final = 1.0
+_FAR_OFF: Final = 3.0  # measured over expected force that points at the cell rather than at the process
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A first cause and its sentence."""
+
+    fault: FaultCode
+    sentence: str
+
+
+_LINE_WORDS: Final = {
+    FaultCode.OUTPUT_REFUSED: "the output device refused a voltage: check its range and its profile",
+    FaultCode.OUTPUT_ALTERED: "the output device accepted another voltage than asked: check wire and profile",
+    FaultCode.OUTPUT_LOST: "the output's port went away: check the plug; it reopens by itself",
+}
+
+
+def finding(fault: FaultCode, detail: str) -> Finding:
+    return Finding(fault, fault_sentence(fault, detail))
+
+
+def _lateness(line: Line, allowed_s: float) -> Finding:
+    """Our defect, or the machine's load: the larger part of the lateness tells."""
+    seen = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
+    dropped = "what arrived meanwhile was dropped"
+    if line.waited_s is None:
+        return finding(FaultCode.LOOP_STALLED, f"{seen}: the machine is overloaded; {dropped}")
+    waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"
+    if line.waited_s < 0.5 * line.late_s:
+        return finding(FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or a defect of ours; {dropped}")
+    cure = "the machine is too busy: end other programs, or `run --realtime`"
+    return finding(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {cure}; {dropped}")
+
+
+class Supervisor:
+    """Counts on every new sample; `first_cause` is asked once per step while enabled."""
+
+    def __init__(self, settings: ControlSettings) -> None:
+        self._limits = settings.limits
+        self._bounds = settings.supervision
+        self.rise = RiseCheck(settings.defaults.contact_threshold_n)
+        self._frozen = FrozenWatch(settings.supervision)
+        self._over = 0
+        self._response_fault = FaultCode.NONE
+        self._stuck_s = 0.0
+
+    def start(self) -> None:
+        """At enable."""
+        self.rise.start()
+        self._frozen.start()
+        self._response_fault = FaultCode.NONE
+        self._over = 0
+
+    def observe(self, reading: Reading, response: ModelResponse, blend: float, touching: bool) -> None:
+        """Every new sample, enabled or not."""
+        self.rise.smooth(reading)
+        self._frozen.observe(reading, response, touching)
+        is_over = reading.overload or abs(reading.contact_n) >= self._limits.over_force_n
+        self._over = self._over + 1 if is_over else 0
+        self._response_fault = self.rise.judge(response, blend, touching, reading.interval_s)
+
+    def observe_rest(self, reading: Reading) -> None:
+        """While disabled: a force that stays at the safe voltage."""
+        stuck = reading.is_usable and reading.contact_n > self._bounds.stuck_n
+        self._stuck_s = self._stuck_s + reading.interval_s if stuck else 0.0
+
+    @property
+    def is_stuck(self) -> bool:
+        return self._stuck_s >= _STUCK_S
+
+    def enable_block(self, now_s: float, reading: Reading, line: Line) -> RefusalReason:
+        """Why an enable would be refused now, apart from a latched fault."""
+        if line.fault or self._is_silent(now_s, line):
+            return RefusalReason.OUTPUT_FAULT
+        if line.cell_lost or not reading.is_fresh:
+            return RefusalReason.CELL_SILENT
+        if line.acknowledged_v is None or not reading.is_usable or self.is_stuck:
+            return RefusalReason.NOT_READY
+        return RefusalReason.NONE
+
+    def first_cause(self, now_s: float, reading: Reading, line: Line, expected_n: float) -> Finding | None:
+        """expected_n: the model's rise, for the sentences."""
+        return self._of_line(now_s, line) or self._of_cell(reading, line) or self._of_force(reading, expected_n)
+
+    def _is_silent(self, now_s: float, line: Line) -> bool:
+        since_s = line.unanswered_since_s
+        return since_s is not None and now_s - since_s > self._bounds.output_timeout_s
+
+    def _of_line(self, now_s: float, line: Line) -> Finding | None:
+        if line.late_s > self._bounds.stall_s:
+            return _lateness(line, self._bounds.stall_s)
+        if line.fault:
+            return finding(line.fault, _LINE_WORDS.get(line.fault, "reported by the output line"))
+        if self._is_silent(now_s, line):
+            bound_ms = self._bounds.output_timeout_s * 1e3
+            return finding(
+                FaultCode.OUTPUT_SILENT, f"no answer from the output device for {bound_ms:.0f} ms: power or wires"
+            )
+        return None
+
+    def _of_cell(self, reading: Reading, line: Line) -> Finding | None:
+        if line.cell_lost:
+            return finding(FaultCode.CELL_LOST, "the load cell's port went away: check the plug; it reopens by itself")
+        if not reading.is_fresh:
+            seen = f"last sample {reading.age_s * 1e3:.0f} ms old, allowed {self._bounds.sample_timeout_s * 1e3:.0f} ms"
+            return finding(FaultCode.SAMPLE_STALE, f"{seen}: power, wires or stream mode of the amplifier")
+        if not (reading.is_usable or reading.overload):
+            return finding(FaultCode.NOT_FINITE, "the load cell's reading is not a number")
+        return None
+
+    def _of_force(self, reading: Reading, expected_n: float) -> Finding | None:
+        if self._over >= self._limits.over_force_samples:
+            return finding(FaultCode.OVER_FORCE, self._over_words(reading, expected_n))
+        if words := self._frozen.words:
+            self._frozen.tripped()
+            said = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
+            return finding(FaultCode.SAMPLE_FROZEN, said)
+        if self._response_fault is FaultCode.SIGN_INVERTED:
+            return Finding(FaultCode.SIGN_INVERTED, sign_sentence(self.rise.measured_rise_n, expected_n))
+        if self._response_fault is FaultCode.GAIN_WRONG:
+            return Finding(FaultCode.GAIN_WRONG, gain_sentence(self.rise.measured_rise_n, expected_n))
+        return None
+
+    def _over_words(self, reading: Reading, expected_n: float) -> str:
+        if reading.overload:
+            return f"cell saturated ({self._bounds.saturation_n:.0f} N is 98 % of its range): over-force, open or shorted wires"
+        seen = f"{reading.contact_n:.1f} N measured, allowed {self._limits.over_force_n:.1f} N, {expected_n:.1f} N expected"
+        far_off = abs(reading.contact_n) > _FAR_OFF * abs(expected_n)
+        return f"{seen}: kgf and N mixed up, or a wrong span?" if far_off else f"{seen}: a jam, or the tool was pushed"

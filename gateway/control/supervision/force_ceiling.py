@@ -1,0 +1,73 @@
+"""A run stays below the rig's largest force, whatever the calibration in use expects: by what the load cell says.
+
+Two looks. Before a higher stair: were the force to go on as it rose from the stair before to this one, in the shape of the
+calibration in use, it must not pass the ceiling. And at every sample of a rising stair, for what rises otherwise. The
+ceiling is force_max_n less what noise makes of single readings.
+"""
+
+from collections import deque
+from typing import Final
+
+from gateway.bsfm import Bsfm
+from gateway.bsfm.ladder.plan import RISING
+from gateway.control.runs.ladder_run import LadderRow
+from gateway.control.sample_conditioning import Reading
+
+_SAMPLES: Final = 3
+_LEAST_MARGIN_N: Final = 0.4
+_SIGMAS: Final = 3.0
+
+
+class Ceiling:
+    """force_max_n: contact force that the rig allows; model: the calibration in use."""
+
+    def __init__(self, force_max_n: float, model: Bsfm, rest_v: float) -> None:
+        self._force_max_n = force_max_n
+        self._model = model
+        self._rest_v = rest_v
+        self._recent_n: deque[float] = deque(maxlen=_SAMPLES)
+        self._given_n = 0.0
+        self._last: tuple[float, float] | None = None
+        self._before: tuple[float, float] | None = None
+
+    @property
+    def measured_n(self) -> float:
+        """Contact force of the last samples, 0 before the first."""
+        return sum(self._recent_n) / len(self._recent_n) if self._recent_n else 0.0
+
+    def observe(self, reading: Reading) -> None:
+        """Every reading."""
+        if reading.is_new and reading.is_usable:
+            self._recent_n.append(reading.contact_n)
+            self._given_n = reading.contact_n - reading.cell_n
+
+    def settled(self, row: LadderRow) -> None:
+        """A stair that has ended."""
+        if row.stair.direction < 0:
+            self._last = self._before = None
+        else:
+            self._before, self._last = self._last, (row.stair.voltage_v, row.force_n)
+
+    def is_reached(self, noise_n: float) -> bool:
+        """Whether the force of now is as high as it may be."""
+        return len(self._recent_n) == _SAMPLES and self.measured_n >= self._ceiling_n(noise_n)
+
+    def is_beyond(self, voltage_v: float, noise_n: float) -> bool:
+        """Whether a stair of this voltage would pass the ceiling, after the ones that have settled."""
+        return self._expected_n(voltage_v) + self._given_n > self._ceiling_n(noise_n)
+
+    def _ceiling_n(self, noise_n: float) -> float:
+        return self._force_max_n - max(_LEAST_MARGIN_N, _SIGMAS * noise_n)
+
+    def _expected_n(self, voltage_v: float) -> float:
+        """Cell force of a higher stair, by those below it; 0 where there is none to go by."""
+        if self._last is None or voltage_v <= self._last[0]:
+            return 0.0
+        (last_v, last_n), (before_v, before_n) = self._last, self._before or (self._rest_v, 0.0)
+        before_model_n, last_model_n, model_n = (
+            self._model.force_n(volts, float(RISING)) for volts in (before_v, last_v, voltage_v)
+        )
+        model_rise_n = last_model_n - before_model_n
+        if model_rise_n <= 0.0:
+            return last_n
+        return last_n + max(0.0, last_n - before_n) * (model_n - last_model_n) / model_rise_n

@@ -1,0 +1,124 @@
+"""The measured force against the model: residual, sign and gain.
+
+There is no separate test move: the first rise in contact is the test. Expected is the model's force at the voltage
+after a first-order lag, above its force at rest. SIGN_INVERTED: the cell goes down where the model goes up, watched for
+as long as the output is enabled, with or without contact (a cell with swapped wires never reports contact). GAIN_WRONG:
+in contact, outside 30-300 % of the expected rise and off by more than friction explains, until one rise has passed;
+later the same signature means lost air, which only warns. While the first rise is too high the target is held back
+(`is_too_high`), so that a wrong gain is named before it becomes over-force. Below the contact threshold a cell that
+reads ten times too little looks like air: the tool waits, and the warning A301 tells.
+"""
+
+from typing import Final
+
+from gateway.bsfm import Bsfm
+from gateway.control.sample_conditioning import Reading
+from gateway.registers.words import FaultCode
+
+_SMOOTHING_S: Final = 0.05
+_LASTING_S: Final = 0.3  # a violation must last this long: impacts and lag do not
+_LEAST_RISE_N: Final = 1.0  # below it noise decides
+_PROVING_RISE_N: Final = 5.0  # a rise of this size with the right gain ends the gain check
+_LOWEST_SHARE: Final = 0.3
+_HIGHEST_SHARE: Final = 3.0
+_SLACK_N: Final = 1.0
+
+
+class ModelResponse:
+    """What the model expects now: both branches at the lagged voltage, N of cell force above rest."""
+
+    def __init__(self, model: Bsfm, lag_s: float, rest_v: float) -> None:
+        self._lag_s = lag_s
+        self._rest_v = rest_v
+        self._lagged_v = rest_v
+        self.use(model)
+
+    def retime(self, lag_s: float) -> None:
+        """Another lag from now on."""
+        self._lag_s = lag_s
+
+    def use(self, model: Bsfm) -> None:
+        self._model = model
+        self._rest_n = model.force_n(self._rest_v, 1.0)
+        self._evaluate()
+
+    def advance(self, voltage_v: float, dt_s: float) -> None:
+        """voltage_v stood on the output for the last dt_s."""
+        if dt_s > 0.0:
+            self._lagged_v += (voltage_v - self._lagged_v) * dt_s / (self._lag_s + dt_s)
+            self._evaluate()
+
+    def _evaluate(self) -> None:
+        self.rising_n = self._model.force_n(self._lagged_v, 1.0)
+        self.falling_n = self._model.force_n(self._lagged_v, -1.0)
+
+    def force_n(self, blend: float) -> float:
+        """Expected cell force at this blend state."""
+        return self.falling_n + (0.5 + 0.5 * blend) * (self.rising_n - self.falling_n)
+
+    def rise_n(self, blend: float) -> float:
+        """The same above the force at rest."""
+        return self.force_n(blend) - self._rest_n
+
+    @property
+    def kept_n(self) -> float:
+        """What friction kept pressed at rest when the model was measured: a vented tool rises by so much more."""
+        return max(0.0, self._rest_n)
+
+    @property
+    def width_n(self) -> float:
+        """How much friction alone can explain."""
+        return abs(self.falling_n - self.rising_n)
+
+
+class RiseCheck:
+    """Smoothed rise of the cell force since enable, judged on every new sample."""
+
+    def __init__(self, contact_threshold_n: float) -> None:
+        """smooth_n: the cell force behind a low-pass, for judgement and sentences."""
+        self._threshold_n = contact_threshold_n
+        self.smooth_n = 0.0
+        self.start()
+
+    def start(self) -> None:
+        """At enable. A positive rest counts as residual force in contact, not as zero error."""
+        self._base_n = min(self.smooth_n, self._threshold_n)
+        self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = 0.0
+        self._proven = False
+        self.is_too_high = False
+
+    @property
+    def measured_rise_n(self) -> float:
+        return self.smooth_n - self._base_n
+
+    def smooth(self, reading: Reading) -> None:
+        """Every new sample, enabled or not."""
+        if reading.is_usable:
+            self.smooth_n += (reading.cell_n - self.smooth_n) * reading.interval_s / (_SMOOTHING_S + reading.interval_s)
+
+    def shift(self, moved_n: float) -> None:
+        """The zero moved: what was measured before reads that much less now."""
+        self.smooth_n -= moved_n
+
+    def judge(self, response: "ModelResponse", blend: float, touching: bool, interval_s: float) -> FaultCode:
+        """One more new sample against the rise that the model expects at this blend state."""
+        expected_n = response.rise_n(blend)
+        rise_n = self.measured_rise_n
+        wrong_sign = expected_n >= _LEAST_RISE_N and rise_n <= -max(self._threshold_n, _LOWEST_SHARE * expected_n)
+        self._wrong_sign_s = self._wrong_sign_s + interval_s if wrong_sign else 0.0
+        if self._wrong_sign_s >= _LASTING_S:
+            return FaultCode.SIGN_INVERTED
+        if not self._proven and touching and expected_n >= _LEAST_RISE_N:
+            return self._judge_gain(expected_n, response.width_n + _SLACK_N, response.kept_n, interval_s)
+        self.is_too_high = False
+        return FaultCode.NONE
+
+    def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
+        off_n = self.measured_rise_n - expected_n
+        self.is_too_high = off_n > slack_n + kept_n and self.measured_rise_n > _HIGHEST_SHARE * expected_n
+        too_low = -off_n > slack_n and self.measured_rise_n < _LOWEST_SHARE * expected_n
+        wrong = self.is_too_high or too_low
+        self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0
+        self._right_gain_s = self._right_gain_s + interval_s if expected_n >= _PROVING_RISE_N and not wrong else 0.0
+        self._proven = self._right_gain_s >= _LASTING_S
+        return FaultCode.GAIN_WRONG if self._wrong_gain_s >= _LASTING_S else FaultCode.NONE

@@ -1,0 +1,82 @@
+"""Is the load cell still alive behind its readings? A cell that repeats one value, bit for bit, while its frames go on.
+
+Two ways to tell. While the force changes: since the value last changed, the rising branch (the least force a voltage can
+leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five quanta. That is
+friction-proof; a single number would trip on every small reversal, where friction really holds the force. Only in contact: in
+free air a quiet cell rightly repeats itself. While the force stands still: more equal samples than the cell's own noise allows
+(cell_noise), or than the rig says (frozen_equal_samples).
+"""
+
+from math import inf
+from typing import Final
+
+from gateway.control.sample_conditioning import Reading
+from gateway.control.settings import Supervision
+from gateway.control.supervision.plausibility import ModelResponse
+from gateway.control.supervision.repeated_readings import CellNoise
+
+_QUANTA: Final = 5.0
+_WIDER_LOOP: Final = 0.5  # friction may have grown by this share of the loop since the calibration
+
+
+class FrozenWatch:
+    """Fed with every reading; `is_frozen` after each."""
+
+    def __init__(self, supervision: Supervision) -> None:
+        self._frozen_s = supervision.frozen_s
+        self._least_change_n = _QUANTA * supervision.sample_quantum_n
+        self._told_limit = supervision.frozen_equal_samples
+        self._noise = CellNoise()
+        self._value_n = inf
+        self._slack_n = 0.0
+        self.start()
+
+    def start(self) -> None:
+        """At enable: what happened before does not count."""
+        self._equal = 1
+        self._equal_s = 0.0
+        self._watch_model()
+
+    def _watch_model(self) -> None:
+        self._same_s = 0.0
+        self._least_n, self._most_n = -inf, inf
+
+    def observe(self, reading: Reading, response: ModelResponse, touching: bool) -> None:
+        """One more new reading."""
+        if reading.is_usable:
+            self._noise.observe(reading.raw_n, reading.interval_s, touching)
+        if reading.raw_n != self._value_n:
+            self._value_n = reading.raw_n
+            self.start()
+        else:
+            self._equal += 1
+            self._equal_s += reading.interval_s
+            self._same_s += reading.interval_s
+        if not touching:
+            self._watch_model()
+        self._slack_n = _WIDER_LOOP * response.width_n
+        self._least_n = max(self._least_n, response.rising_n)
+        self._most_n = min(self._most_n, response.falling_n)
+
+    @property
+    def is_frozen(self) -> bool:
+        return bool(self.words)
+
+    @property
+    def words(self) -> str:
+        """What was seen and why it cannot be, empty for a cell that may be alive."""
+        must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
+        if self._same_s >= self._frozen_s and must_have_moved:
+            return f"repeated for {self._same_s:.2f} s while the force must have changed"
+        seen = f"repeated for {self._equal_s:.2f} s, {self._equal} samples bit for bit"
+        if self._told_limit is not None:
+            return (
+                f"{seen}, allowed {self._told_limit} (frozen_equal_samples)" if self._equal > self._told_limit else ""
+            )
+        if self._equal >= self._noise.limit and self._equal_s >= self._frozen_s:
+            return f"{seen}, while its noise has left at most {self._noise.longest} equal so far"
+        return ""
+
+    def tripped(self) -> None:
+        """The fault is told: these equal samples are not learned from."""
+        self._noise.forget_run()

@@ -1,0 +1,1 @@
+"""The effects that the diagnosis knows, in the order of the signal."""

@@ -1,0 +1,191 @@
+"""Effects of the electro-pneumatic regulator: command voltage in, pressure out."""
+
+from typing import Final
+
+from gateway.diagnosis.catalogue.effect import Effect, Form, Parameter, Scene, Start, fixed
+
+DELAY: Final = Parameter("regulator", "delay_s", "s", 0.0, 0.0, 1.0, 0.001)
+LAG: Final = Parameter("regulator", "lag_s", "s", 0.0, 0.0, 2.0, 0.002)
+SECOND_LAG: Final = Parameter("regulator", "second_lag_s", "s", 0.0, 0.0, 2.0, 0.002)
+DEAD_BAND: Final = Parameter("regulator", "dead_band_pa", "Pa", 0.0, 0.0, 2.0e5, 100.0)
+HYSTERESIS: Final = Parameter("regulator", "hysteresis_pa", "Pa", 0.0, 0.0, 2.0e5, 200.0)
+COMMAND_STEP: Final = Parameter("regulator", "command_step_v", "V", 0.0, 0.0, 2.0, 0.0001)
+BOW: Final = Parameter("regulator", "command_bow", "1", 0.0, -0.25, 0.25, 0.002)
+S_SHAPE: Final = Parameter("regulator", "command_s", "1", 0.0, -0.12, 0.12, 0.002)
+SUPPLY: Final = Parameter("regulator", "supply_pa", "Pa", 1.0e12, 1.0e4, 1.0e12, 1000.0)
+CEILING: Final = Parameter("regulator", "ceiling_pa", "Pa", 1.0e12, 1.0e4, 1.0e12, 1000.0)
+DROOP: Final = Parameter("regulator", "droop_pa_per_pa", "Pa/Pa", 0.0, -2.0, 2.0, 0.01)
+DROOP_SHARE: Final = Parameter("regulator", "droop_share_per_pa", "1/Pa", 0.0, -2.0e-5, 2.0e-5, 1.0e-8)
+LEAK: Final = Parameter("regulator", "leak_per_s", "1/s", 0.0, 0.0, 1.0, 0.001)
+LEAK_FLOW: Final = Parameter("regulator", "leak_flow_pa", "Pa", 0.0, 0.0, 5.0e5, 500.0)
+HUNTING: Final = Parameter("regulator", "hunting_pa", "Pa", 0.0, 0.0, 1.0e5, 300.0)
+HUNTING_HZ: Final = Parameter("regulator", "hunting_hz", "Hz", 5.0, 0.1, 40.0, 0.001, shape=True)
+HUNTING_PHASE: Final = Parameter("regulator", "hunting_phase_rad", "rad", 0.0, -10.0, 10.0, 0.02, shape=True)
+SLEW: Final = Parameter("regulator", "slew_pa_per_s", "Pa/s", 1.0e12, 1.0e4, 1.0e12, 1.0e4)
+
+NEAR: Final = (0.93, 0.96, 0.985)
+SLOW_LAGS: Final = ("transport-delay", "clock-offset", "extra-lag", "viscous-friction")
+LIMITS: Final = (
+    "sensor-quadratic",
+    "sensor-cubic",
+    "supply-saturation",
+    "contact-nonlinearity",
+    "command-nonlinearity",
+    "end-stop",
+)
+_TRANSIENTS: Final = "steps or ramps of the command, several times its lag apart, at 100 rows a second or more"
+_SLOW_STEPS: Final = "a slow staircase up and down over the whole range with small steps"
+
+
+def _supply(scene: Scene) -> tuple[Start, ...]:
+    """A fall from UNLIMITED to just below the pressures that were reached."""
+    return tuple((limit_pa - SUPPLY.null,) for limit_pa in limits(scene.pressures_pa) if limit_pa > 2.0e4)
+
+
+def limits(reached: tuple[float, ...]) -> tuple[float, ...]:
+    """Where what was reached may have met a limit: below each quantile, and closely below the largest."""
+    return tuple(0.97 * quantile for quantile in reached[1:-1]) + tuple(share * reached[-1] for share in NEAR)
+
+
+def _slew(scene: Scene) -> tuple[Start, ...]:
+    fastest = max(scene.pressure_rate_pa_per_s, 1.0e4)
+    return tuple((share * fastest - SLEW.null,) for share in (0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.2))
+
+
+def _steps(scene: Scene) -> tuple[Start, ...]:
+    return tuple((step_v,) for step_v in scene.command_steps_v)
+
+
+def _dead_band(scene: Scene) -> tuple[Start, ...]:
+    return tuple((band_pa,) for band_pa in scene.dead_bands_pa)
+
+
+def _hunting(scene: Scene) -> tuple[Start, ...]:
+    return tuple((1.0e3, line_hz, 0.0) for line_hz in scene.lines_hz if 0.7 <= line_hz <= 40.0)
+
+
+REGULATOR: Final = (
+    Effect(
+        name="transport-delay",
+        family="regulator",
+        what="time before the pressure begins to follow the command",
+        signature="the whole response comes late; the residual follows the slope of the force",
+        excitation=_TRANSIENTS,
+        experiment="steps of the command with pressure_kpa recorded: a delay shows in both, a clock offset in one",
+        least=7.0e-4,
+        forms=(Form(parameters=(DELAY,), probes=fixed((0.004,), (0.02,), (0.06,))),),
+        group=SLOW_LAGS,
+    ),
+    Effect(
+        name="extra-lag",
+        family="regulator",
+        what="a second first-order lag behind the regulator's own",
+        signature="steps begin softly and then follow; the residual follows the curvature of the force",
+        excitation=_TRANSIENTS,
+        experiment="steps of the command with the pressure recorded, 200 rows a second or more",
+        least=7.0e-4,
+        forms=(Form(parameters=(SECOND_LAG,), probes=fixed((0.005,), (0.02,), (0.06,))),),
+        group=SLOW_LAGS,
+    ),
+    Effect(
+        name="dead-band",
+        family="regulator",
+        what="changes of the command below a threshold are not followed",
+        signature="the force stands still while the command creeps, then jumps",
+        excitation="steps of the command smaller than the dead band, up and down",
+        experiment="a staircase of 0.01 V steps up and down around three levels",
+        forms=(Form(parameters=(DEAD_BAND,), probes=_dead_band, exact=True),),
+        group=("regulator-hysteresis", "command-quantisation"),
+    ),
+    Effect(
+        name="regulator-hysteresis",
+        family="regulator",
+        what="the pressure depends on the direction from which the command came",
+        signature="a loop of constant width between command and pressure",
+        excitation=_SLOW_STEPS,
+        experiment="a staircase up and down with the pressure recorded: the loop stands between command and pressure",
+        forms=(Form(parameters=(HYSTERESIS,), probes=fixed((600.0,), (3.0e3,), (1.0e4,), (3.0e4,))),),
+        group=("coulomb-friction",),
+    ),
+    Effect(
+        name="command-quantisation",
+        family="regulator",
+        what="the command input has coarse steps",
+        signature="the force is a staircase of a ramp; the residual is a saw tooth of the command",
+        excitation="ramps or many different levels of the command",
+        experiment="a ramp of 0.05 V/s over two volts",
+        forms=(Form(parameters=(COMMAND_STEP,), probes=_steps, exact=True, everywhere=True),),
+        group=("dead-band",),
+    ),
+    Effect(
+        name="command-nonlinearity",
+        family="regulator",
+        what="the pressure is no straight line of the command",
+        signature="the residual bends with the command, before lag and friction",
+        excitation="levels over the whole range",
+        experiment="a slow staircase over the whole range with the pressure recorded",
+        forms=(
+            Form(parameters=(BOW,), probes=fixed((0.01,)), proportional=True),
+            Form(parameters=(S_SHAPE,), probes=fixed((0.01,)), proportional=True),
+        ),
+        group=LIMITS,
+    ),
+    Effect(
+        name="supply-saturation",
+        family="regulator",
+        what="the air line cannot give more pressure",
+        signature="the force stops rising above one level, whatever the command",
+        excitation="commands above the supply pressure",
+        experiment="a staircase to full scale with supply_kpa or pressure_kpa recorded",
+        forms=(Form(parameters=(SUPPLY,), probes=_supply), Form(parameters=(CEILING,), probes=_supply)),
+        group=LIMITS,
+    ),
+    Effect(
+        name="supply-droop",
+        family="regulator",
+        what="the pressure follows swings of the supply",
+        signature="the residual follows supply_kpa",
+        excitation="a supply that swings, recorded as supply_kpa",
+        experiment="hold three levels while another consumer draws air from the same line, with supply_kpa recorded",
+        forms=(
+            Form(parameters=(DROOP,), probes=fixed((0.02,)), needs=("supply_kpa",), proportional=True),
+            Form(parameters=(DROOP_SHARE,), probes=fixed((1.0e-7,)), needs=("supply_kpa",), proportional=True),
+        ),
+    ),
+    Effect(
+        name="leak",
+        family="regulator",
+        what="air escapes between valve and cylinder",
+        signature="the force falls while the command stands still, or misses most just above zero pressure",
+        excitation="dwells of several seconds at several levels, steps up and down",
+        experiment="hold three levels for 10 s each, then steps up and down between them",
+        forms=(
+            Form(parameters=(LEAK,), probes=fixed((0.003,), (0.03,))),
+            Form(parameters=(LEAK_FLOW,), probes=fixed((5.0e3,)), proportional=True),
+        ),
+        group=LIMITS,
+        rarity=2.0,
+    ),
+    Effect(
+        name="regulator-hunting",
+        family="regulator",
+        what="the regulator's own loop oscillates",
+        signature="a line in the spectrum below 40 Hz while there is pressure",
+        excitation="dwells under pressure, sampled at more than twice the line",
+        experiment="hold three levels for 10 s each at 200 rows a second, spindle off",
+        forms=(
+            Form(parameters=(HUNTING, HUNTING_HZ, HUNTING_PHASE), probes=_hunting, proportional=True, quadrature=True),
+        ),
+        group=("mains-hum", "spindle-vibration"),
+    ),
+    Effect(
+        name="slew-limit",
+        family="regulator",
+        what="the pressure has a fastest rate of change",
+        signature="large steps are ramps, small ones are not",
+        excitation="steps of different sizes",
+        experiment="steps of 0.5, 1, 2 and 4 V up and down",
+        forms=(Form(parameters=(SLEW,), probes=_slew),),
+        group=("leak",),
+    ),
+)

@@ -1,0 +1,187 @@
+"""Effects of load cell, amplifier, cabling and clock."""
+
+from typing import Final
+
+from gateway.diagnosis.catalogue.contact import MONOTONE
+from gateway.diagnosis.catalogue.effect import Effect, Form, Parameter, Scene, Start, fixed
+from gateway.diagnosis.catalogue.regulator import LIMITS, SLOW_LAGS
+
+ZERO: Final = Parameter("cell", "zero_n", "N", 0.0, -1.0e4, 1.0e4, 0.05, settled=True)  # fitted as the offset
+ZERO_PER_K: Final = Parameter("cell", "zero_n_per_k", "N/K", 0.0, -20.0, 20.0, 0.005)
+SPAN_PER_K: Final = Parameter("cell", "span_per_k", "1/K", 0.0, -0.2, 0.2, 5.0e-4)
+WARM_UP: Final = Parameter("cell", "warm_up_n", "N", 0.0, -50.0, 50.0, 0.05)
+WARM_UP_TIME: Final = Parameter("cell", "warm_up_s", "s", 60.0, 1.0, 1.0e4, 0.5, shape=True)
+DRIFT: Final = Parameter("cell", "drift_n_per_s", "N/s", 0.0, -10.0, 10.0, 5.0e-4)
+QUADRATIC: Final = Parameter("cell", "quadratic_per_n", "1/N", 0.0, -0.1, 0.1, 2.0e-4)
+CUBIC: Final = Parameter("cell", "cubic_per_n2", "1/N2", 0.0, -0.01, 0.01, 5.0e-6)
+HUM: Final = Parameter("cell", "hum_n", "N", 0.0, 0.0, 50.0, 0.05)
+HUM_HZ: Final = Parameter("cell", "hum_hz", "Hz", 50.0, 49.0, 61.0, 0.001, shape=True)
+HUM_PHASE: Final = Parameter("cell", "hum_phase_rad", "rad", 0.0, -10.0, 10.0, 0.02, shape=True)
+CLOCK_OFFSET: Final = Parameter("cell", "clock_offset_s", "s", 0.0, -1.0, 1.0, 0.001)
+CLOCK_SKEW: Final = Parameter("cell", "clock_skew", "1", 0.0, -0.05, 0.05, 2.0e-5)
+CROSSTALK: Final = Parameter("cell", "crosstalk_n_per_v", "N/V", 0.0, -20.0, 20.0, 0.01)
+SIGN_LOST: Final = Parameter("cell", "sign_lost", "1", 0.0, 0.0, 1.0, 0.05, settled=True)
+REPEATED: Final = Parameter("cell", "repeated_share", "1", 0.0, 0.0, 1.0, 0.01)
+OUTLIER_SHARE: Final = Parameter("cell", "outlier_share", "1", 0.0, 0.0, 0.5, 0.001)
+OUTLIER: Final = Parameter("cell", "outlier_n", "N", 0.0, 0.0, 1.0e4, 0.1)
+QUANTUM: Final = Parameter("cell", "quantum_n", "N", 0.0, 0.0, 100.0, 0.001)
+
+_TEMPERATURE: Final = "a temperature that goes up and down by some kelvin, recorded as temperature_c"
+
+
+def _hum(scene: Scene) -> tuple[Start, ...]:
+    return tuple((0.1, mains_hz, 0.0) for mains_hz in scene.mains_hz)
+
+
+def _warm_up(scene: Scene) -> tuple[Start, ...]:
+    return tuple((0.2, share * scene.duration_s) for share in (0.05, 0.15, 0.4))
+
+
+def _drift(scene: Scene) -> tuple[Start, ...]:
+    return ((0.3 / max(scene.duration_s, 1.0),),)
+
+
+SENSING: Final = (
+    Effect(
+        name="thermal-zero-drift",
+        family="sensing and logging",
+        what="the zero of the load cell moves with temperature",
+        signature="the residual follows temperature_c at any force",
+        excitation=_TEMPERATURE,
+        experiment="a warm-up and a cool-down without force and under force, with temperature_c recorded",
+        forms=(Form(parameters=(ZERO_PER_K,), probes=fixed((0.02,)), needs=("temperature_c",), proportional=True),),
+        group=MONOTONE,
+    ),
+    Effect(
+        name="thermal-span-drift",
+        family="sensing and logging",
+        what="the sensitivity of the load cell moves with temperature",
+        signature="the residual follows temperature_c times the force",
+        excitation=_TEMPERATURE + ", at low and high force",
+        experiment="reversals over the whole range at two temperatures, with temperature_c recorded",
+        forms=(Form(parameters=(SPAN_PER_K,), probes=fixed((0.001,)), needs=("temperature_c",), proportional=True),),
+    ),
+    Effect(
+        name="warm-up",
+        family="sensing and logging",
+        what="after switching on the zero settles exponentially",
+        signature="an exponential in time, at any force",
+        excitation="the first minutes after switching on",
+        experiment="record from switching on for ten minutes without force, with temperature_c recorded",
+        forms=(Form(parameters=(WARM_UP, WARM_UP_TIME), probes=_warm_up, proportional=True),),
+        group=MONOTONE,
+    ),
+    Effect(
+        name="linear-drift",
+        family="sensing and logging",
+        what="the zero moves steadily in time",
+        signature="a straight line in time, at any force",
+        excitation="a recording of a minute or more that returns to the same levels",
+        experiment="ten minutes without force, then ten at one force, with temperature_c and distance_m recorded",
+        forms=(Form(parameters=(DRIFT,), probes=_drift, proportional=True),),
+        group=MONOTONE,
+    ),
+    Effect(
+        name="sensor-quadratic",
+        family="sensing and logging",
+        what="the load cell's line is bent to one side",
+        signature="the residual is a parabola of the force",
+        excitation="levels over the whole range",
+        experiment="dead weights on the load cell, five levels",
+        forms=(Form(parameters=(QUADRATIC,), probes=fixed((2.0e-4,)), proportional=True),),
+        group=LIMITS,
+    ),
+    Effect(
+        name="sensor-cubic",
+        family="sensing and logging",
+        what="the load cell's line is bent symmetrically",
+        signature="the residual is a cubic of the force",
+        excitation="levels over the whole range",
+        experiment="dead weights on the load cell, seven levels",
+        forms=(Form(parameters=(CUBIC,), probes=fixed((5.0e-6,)), proportional=True),),
+        group=LIMITS,
+    ),
+    Effect(
+        name="mains-hum",
+        family="sensing and logging",
+        what="the mains couple into the cell's cable",
+        signature="a line at 50 or 60 Hz, or where the sampling folds it",
+        excitation="any; sampled at 120 rows a second or more to tell it from other lines",
+        experiment="ten seconds at rest at 500 rows a second",
+        forms=(Form(parameters=(HUM, HUM_HZ, HUM_PHASE), probes=_hum, proportional=True, quadrature=True),),
+        group=("spindle-vibration", "regulator-hunting"),
+    ),
+    Effect(
+        name="clock-offset",
+        family="sensing and logging",
+        what="the clock of the force differs from that of the command",
+        signature="the whole force comes late or early",
+        excitation="steps or ramps of the command",
+        experiment="steps of the command with pressure_kpa recorded by the clock of the force",
+        least=7.0e-4,
+        rarity=3.0,
+        forms=(Form(parameters=(CLOCK_OFFSET,), probes=fixed((0.003,), (0.03,), (-0.02,))),),
+        group=SLOW_LAGS,
+    ),
+    Effect(
+        name="clock-skew",
+        family="sensing and logging",
+        what="one clock runs faster than the other",
+        signature="the force comes later and later",
+        excitation="steps from the beginning to the end of a minute or more",
+        experiment="steps of the command over ten minutes",
+        forms=(Form(parameters=(CLOCK_SKEW,), probes=fixed((2.0e-4,), (2.0e-3,), (-2.0e-4,), (-2.0e-3,))),),
+    ),
+    Effect(
+        name="repeated-samples",
+        family="sensing and logging",
+        what="the logger writes the last reading again",
+        signature="readings that are equal to the last digit",
+        excitation="any motion",
+        experiment="count the amplifier's own sample numbers",
+        forms=(),
+        direct=True,
+        marks=(REPEATED,),
+    ),
+    Effect(
+        name="outliers",
+        family="sensing and logging",
+        what="single wrong readings",
+        signature="spikes of one row",
+        excitation="any",
+        experiment="ten minutes at rest; then with the valve's cable moved away",
+        forms=(),
+        direct=True,
+        marks=(OUTLIER_SHARE, OUTLIER),
+    ),
+    Effect(
+        name="sensor-quantisation",
+        family="sensing and logging",
+        what="the amplifier's counts are coarse",
+        signature="readings lie on a lattice coarser than the noise",
+        excitation="any",
+        experiment="read the amplifier's resolution setting",
+        forms=(),
+        direct=True,
+        marks=(QUANTUM,),
+    ),
+    Effect(
+        name="valve-crosstalk",
+        family="sensing and logging",
+        what="the command's voltage couples into the force reading",
+        signature="the reading jumps with the command, before any air has moved",
+        excitation="steps of the command at 100 rows a second or more",
+        experiment="steps of the command with the air shut off",
+        forms=(Form(parameters=(CROSSTALK,), probes=fixed((0.02,)), needs=("command_v",), proportional=True),),
+    ),
+    Effect(
+        name="sign-loss",
+        family="sensing and logging",
+        what="the sign of negative readings is lost",
+        signature="readings that should be negative are mirrored",
+        excitation="forces below zero",
+        experiment="pull at the load cell by hand",
+        forms=(Form(parameters=(SIGN_LOST, ZERO), probes=fixed((1.0, 0.0), (1.0, -0.3), (1.0, -1.0)), exact=True),),
+        group=("backlash",),
+    ),
+)

@@ -1,0 +1,280 @@
+"""What to record next: for each effect of the catalogue an experiment that shows it, and one plan for several of them.
+
+An experiment names the blocks that the gateway runs by itself, the columns that must be recorded, and what a person has to
+do: `apart` from the run (dead weights on the cell), or `meanwhile` (turn the tool). What is done meanwhile changes what
+every other block would show, so such a run stands alone.
+Why an experiment shows its effect is the catalogue's own signature.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import Final
+
+from gateway.control.runs.experiment_plan import ExperimentPlan, Part
+from gateway.diagnosis.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.diagnosis.experiments import blocks as block
+from gateway.diagnosis.result import Diagnosis
+
+RECORDED: Final = frozenset({"time_s", "command_v", "force_n", "pressure_kpa"})
+"""What a gateway records by itself, pressure where its output device measures it."""
+USUAL_LONGEST_S: Final = 600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """How one effect is made to show. columns: to record besides command and force; check: the coarse cycle may come
+    first."""
+
+    name: str
+    why: str
+    parts: tuple[Part, ...]
+    columns: tuple[str, ...] = ()
+    apart: str = ""
+    meanwhile: str = ""
+    check: bool = True
+
+    @property
+    def duration_s(self) -> float:
+        return sum(part.duration_s for part in self.parts)
+
+    @property
+    def is_alone(self) -> bool:
+        """The gateway can do it without anybody's help, with what it records itself."""
+        return not self.meanwhile and not self.apart and set(self.columns) <= RECORDED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A plan for several effects. left_out: (effect, why it needs a run of its own); apart: what a person does besides."""
+
+    experiment: ExperimentPlan
+    left_out: tuple[tuple[str, str], ...] = ()
+    apart: tuple[str, ...] = ()
+
+    @property
+    def total_s(self) -> float:
+        return self.experiment.duration_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Way:
+    """One way to experiment, which several effects share."""
+
+    names: tuple[str, ...]
+    parts: tuple[Part, ...]
+    columns: tuple[str, ...] = ()
+    apart: str = ""
+    meanwhile: str = ""
+    check: bool = True
+
+
+_PRESSURE: Final = ("pressure_kpa",)
+_WARM: Final = ("temperature_c",)
+_WAYS: Final = (
+    _Way(names=("transport-delay", "extra-lag", "slew-limit"), parts=(block.STEPS,), columns=_PRESSURE),
+    _Way(names=("clock-offset",), parts=(block.STEPS, block.RAMPS), columns=_PRESSURE),
+    _Way(names=("clock-skew",), parts=(block.LASTING,)),
+    _Way(names=("dead-band",), parts=(block.FINE,), columns=_PRESSURE),
+    _Way(names=("regulator-hysteresis",), parts=(block.STAIRCASE, block.FINE), columns=_PRESSURE),
+    _Way(names=("command-quantisation",), parts=(block.SLOW_RAMP,)),
+    _Way(names=("command-nonlinearity", "supply-saturation"), parts=(block.STAIRCASE, block.STEPS), columns=_PRESSURE),
+    _Way(
+        names=("supply-droop",),
+        parts=(block.THREE_LEVELS,),
+        columns=("supply_kpa",),
+        meanwhile="let another consumer on the same air line switch on and off every few seconds",
+    ),
+    _Way(names=("leak",), parts=(block.DWELLS, block.STEPS), columns=_PRESSURE),
+    _Way(names=("regulator-hunting",), parts=(block.REST, block.DWELLS), columns=_PRESSURE),
+    _Way(names=("coulomb-friction", "viscous-friction"), parts=(block.RAMPS, block.STROKES), columns=_PRESSURE),
+    _Way(names=("stribeck-friction",), parts=(block.RAMPS, block.RESTS)),
+    _Way(
+        names=("presliding", "load-dependent-friction", "asymmetric-friction"), parts=(block.REVERSALS, block.STROKES)
+    ),
+    _Way(names=("dwell-stiction",), parts=(block.RESTS,)),
+    _Way(names=("creep",), parts=(block.DWELLS, block.CYCLES)),
+    _Way(
+        names=("contact-nonlinearity", "sensor-quadratic", "sensor-cubic"),
+        parts=(block.STAIRCASE,),
+        columns=_PRESSURE,
+        apart="put dead weights on the load cell, seven levels up and down: a bent cell shows with them, a bent contact "
+        "does not",
+    ),
+    _Way(
+        names=("end-stop",),
+        parts=(block.STAIRCASE,),
+        columns=("position_mm",),
+        apart="run the plan again with the workpiece 1 mm nearer: a stop then takes another share",
+    ),
+    _Way(
+        names=("side-load",),
+        parts=(block.REVERSALS,),
+        columns=("feed_mm_s", "tilt_deg"),
+        meanwhile="let the robot feed at two speeds, and stand, for some seconds each",
+    ),
+    _Way(
+        names=("tilt-gravity",),
+        parts=(block.LEVEL,),
+        columns=("tilt_deg",),
+        meanwhile="turn the tool to 0, 45, 90 and 135 degrees, 10 s each, with its pad on a workpiece that turns along",
+    ),
+    _Way(
+        names=("feed-drag",),
+        parts=(block.LEVEL,),
+        columns=("feed_mm_s",),
+        meanwhile="let the robot feed at 0, 5 and 15 mm/s in both directions",
+    ),
+    _Way(
+        names=("spindle-vibration",),
+        parts=(block.LEVEL,),
+        columns=("spindle_rpm",),
+        meanwhile="run the spindle at nothing, half and full speed, 20 s each",
+    ),
+    _Way(
+        names=("pad-wear",),
+        parts=(block.CYCLES,),
+        columns=("distance_m", "temperature_c"),
+        apart="note distance_m: wear follows the way that was ground, drift follows time and goes on at rest",
+    ),
+    _Way(
+        names=("position-dependence", "position-ripple"),
+        parts=(block.LEVEL,),
+        columns=("position_mm",),
+        meanwhile="let the robot go the whole way forth and back at two speeds",
+    ),
+    _Way(names=("backlash",), parts=(block.TOUCHES, block.REVERSALS)),
+    _Way(
+        names=("thermal-zero-drift", "thermal-span-drift"),
+        parts=(block.CYCLES,),
+        columns=_WARM,
+        apart="warm the cell up by some kelvin (a lamp), run the plan, let it cool down, run it again",
+    ),
+    _Way(
+        names=("warm-up",),
+        parts=(block.LONG_REST,),
+        columns=_WARM,
+        apart="switch the amplifier off for half an hour before",
+    ),
+    _Way(names=("linear-drift",), parts=(block.CYCLES,)),
+    _Way(names=("mains-hum", "outliers"), parts=(block.REST, block.DWELLS)),
+    _Way(names=("repeated-samples", "sensor-quantisation"), parts=(block.REST, block.RAMPS)),
+    _Way(
+        names=("valve-crosstalk",),
+        parts=(block.STEPS,),
+        meanwhile="shut the air off and vent the line before; what moves then is no force",
+        check=False,
+    ),
+    _Way(
+        names=("sign-loss",),
+        parts=(block.TOUCHES,),
+        apart="pull at the load cell by hand, with the output off: the reading must become negative",
+    ),
+)
+
+
+def _why(name: str) -> str:
+    effect = BY_NAME[name]
+    return f"{effect.what}: {effect.signature}"
+
+
+def _experiments() -> Iterator[Experiment]:
+    ways = {name: way for way in _WAYS for name in way.names}
+    for effect in EFFECTS:
+        way = ways[effect.name]
+        yield Experiment(
+            name=effect.name,
+            why=_why(effect.name),
+            parts=way.parts,
+            columns=way.columns,
+            apart=way.apart,
+            meanwhile=way.meanwhile,
+            check=way.check,
+        )
+
+
+EXPERIMENTS: Final[dict[str, Experiment]] = {experiment.name: experiment for experiment in _experiments()}
+"""By name of the effect, in the catalogue's order."""
+
+
+def plan_for(names: Iterable[str], *, besides: Iterable[str] = (), longest_s: float = inf) -> Plan:
+    """One plan that shows each of these effects, or tells them apart: blocks that several need once, shortest first.
+
+    Where some need a person meanwhile and others do not, those that do are left out. Those of `besides` are taken as far as
+    longest_s goes, those of `names` whatever the time.
+    KeyError for a name that the catalogue does not have, ValueError for none.
+    """
+    first = tuple(dict.fromkeys(names))
+    asked = [EXPERIMENTS[name] for name in dict.fromkeys((*first, *besides))]
+    if not asked:
+        raise ValueError("a plan needs at least one effect")
+    together = [each for each in asked if not each.meanwhile] or [
+        each for each in asked if each.meanwhile == asked[0].meanwhile
+    ]
+    left_out = [(each.name, f"needs a run of its own: {each.meanwhile}") for each in asked if each not in together]
+    chosen, parts = _fitting(together, first, longest_s)
+    left_out += [
+        (each.name, f"would take {_extra_s(each, parts):.0f} s more") for each in together if each not in chosen
+    ]
+    return Plan(
+        experiment=_merged(chosen, parts),
+        left_out=tuple(left_out),
+        apart=tuple(dict.fromkeys(each.apart for each in chosen if each.apart)),
+    )
+
+
+def plan_next(diagnosis: Diagnosis, *, longest_s: float = USUAL_LONGEST_S) -> Plan | None:
+    """What to record after this: what tells the groups apart, and shows what the recording could not; None for nothing.
+
+    Groups come first and may take what time they need. Of the effects that the recording could not show, those are taken
+    that the gateway can do alone, as far as the time goes; the others only where there is nothing else.
+    """
+    groups = [name for cause in diagnosis.causes if len(cause.group) > 1 for name in cause.group]
+    unseen = [each.name for each in diagnosis.not_identifiable if each.name not in groups]
+    alone = [name for name in unseen if EXPERIMENTS[name].is_alone]
+    names = [*groups, *alone] or unseen
+    if not names:
+        return None
+    plan = plan_for(groups or (alone or unseen)[:1], besides=names, longest_s=longest_s)
+    left = [(name, _help(EXPERIMENTS[name])) for name in unseen if name not in names]
+    return Plan(experiment=plan.experiment, left_out=(*plan.left_out, *left), apart=plan.apart)
+
+
+def _help(experiment: Experiment) -> str:
+    wanted = [name for name in experiment.columns if name not in RECORDED]
+    said = [f"record {' and '.join(wanted)}"] if wanted else []
+    return "; ".join([*said, *(text for text in (experiment.meanwhile, experiment.apart) if text)])
+
+
+def _fitting(
+    experiments: Sequence[Experiment], must: Sequence[str], longest_s: float
+) -> tuple[list[Experiment], list[Part]]:
+    """What must be, then greedily what adds least; of equals the first one asked for."""
+    chosen = [each for each in experiments if each.name in must]
+    parts = list(dict.fromkeys(part for each in chosen for part in each.parts))
+    rest = [each for each in experiments if each not in chosen]
+    while rest:
+        best = min(rest, key=lambda each: _extra_s(each, parts))
+        if chosen and _extra_s(best, parts) + sum(part.duration_s for part in parts) > longest_s:
+            break
+        rest.remove(best)
+        chosen.append(best)
+        parts += [part for part in best.parts if part not in parts]
+    return chosen, sorted(parts, key=lambda part: part.duration_s)
+
+
+def _extra_s(experiment: Experiment, parts: Sequence[Part]) -> float:
+    return sum(part.duration_s for part in experiment.parts if part not in parts)
+
+
+def _merged(experiments: Sequence[Experiment], parts: Sequence[Part]) -> ExperimentPlan:
+    names = tuple(each.name for each in experiments)
+    return ExperimentPlan(
+        name=f"{names[0]} and {len(names) - 1} more" if len(names) > 2 else " and ".join(names),
+        description=experiments[0].why if len(names) == 1 else "",
+        shows=names,
+        columns=tuple(dict.fromkeys(column for each in experiments for column in each.columns)),
+        by_hand=tuple(dict.fromkeys(each.meanwhile for each in experiments if each.meanwhile)),
+        check=all(each.check for each in experiments),
+        parts=tuple(parts),
+    )

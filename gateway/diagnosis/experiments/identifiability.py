@@ -1,0 +1,48 @@
+"""What this recording can show at all, asked before any judgement.
+
+An effect is visible if one of its starts, which are sizes that one would notice, changes the readings beyond what the
+base model could absorb and the noise could hide.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from gateway.diagnosis.catalogue.effect import Effect
+from gateway.diagnosis.result import NotIdentifiable
+from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.candidates import Score
+
+_VISIBLE: Final = 30.0  # chi-square that an effect must reach at a noticeable size
+
+
+def invisible(
+    bench: Bench, effects: Sequence[Effect], scores: Sequence[Score], taken: frozenset[str]
+) -> tuple[NotIdentifiable, ...]:
+    """Effects that this recording cannot show, with the reason; `taken` are part of the base model or found."""
+    strength: dict[str, float] = {}
+    share: dict[str, float] = {}
+    for score in scores:
+        name = score.candidate.effect.name
+        strength[name] = max(strength.get(name, 0.0), score.power)
+        share[name] = max(share.get(name, 0.0), score.alone)
+    answers = []
+    columns = bench.columns()
+    for effect in effects:
+        if effect.name in taken or effect.direct or strength.get(effect.name, 0.0) >= _VISIBLE:
+            continue
+        why = _why(effect, columns, strength.get(effect.name), share.get(effect.name, 0.0))
+        answers.append(NotIdentifiable(effect.name, why, effect.experiment))
+    return tuple(answers)
+
+
+def _why(effect: Effect, columns: frozenset[str], strength: float | None, share: float) -> str:
+    wanted = [form.needs for form in effect.forms if not set(form.needs) <= columns]
+    if strength is None and wanted:
+        names = sorted({name for needs in wanted for name in needs if name not in columns})
+        return f"the recording has no column {' or '.join(names)} that varies; it needs {effect.excitation}"
+    if strength is None or strength == 0.0:
+        return f"nothing in the recording excites it; it needs {effect.excitation}"
+    if share < 0.05:
+        absorbed = 100.0 * (1.0 - share)
+        return f"the base model's own parameters absorb {absorbed:.0f} % of it; it needs {effect.excitation}"
+    return f"at a noticeable size it would stay within the noise; it needs {effect.excitation}"

@@ -1,0 +1,139 @@
+"""What a residual may depend on, asked without a name for the cause: columns, time, direction, speed, force, lines.
+
+`outside` questions are of things that no effect of the catalogue has: a foreign column, a jump in time, a square of the
+temperature, a line in part of the time. They compete with the effects, so that a cause without a name takes none from
+the catalogue. The others (direction, speed, curves of the force) are what a wrong form of a named effect leaves, and are
+asked only at the end.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import fast_noise_n
+from gateway.diagnosis.search.bench import BLOCKS, SURROUNDINGS, Bench
+from gateway.diagnosis.search.hints import lines_hz
+
+_STEPS: Final = 40  # places where a jump in time is looked for
+_LATE_S: Final = (1.0, 4.0, 16.0)
+_MOST_PAIRED: Final = 8  # covariates whose products are asked
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What the residual may depend on, in which shape; columns (k, rows); among: how many places were tried."""
+
+    depends_on: str
+    shape: str
+    columns: Floats
+    outside: bool
+    among: int = 1
+
+
+def questions(bench: Bench, residual_n: Floats, white: Floats) -> Iterator[Question]:
+    """All of them, for the raw and the whitened residual of the present model."""
+    simulated = bench.measured_n - residual_n
+    force = standard(simulated, bench)
+    yield from _of_columns(bench, force)
+    yield from _of_time(bench, force)
+    yield from _of_lines(bench, white)
+    if float(np.std(simulated[bench.judged])) > fast_noise_n(residual_n[bench.judged]):  # else a trim follows the noise
+        yield from _of_motion(bench, simulated, force)
+
+
+def standard(column: Floats, bench: Bench) -> Floats:
+    """Mean 0 and spread 1 over the judged force rows, zero elsewhere."""
+    rows = bench.judged & np.isfinite(column)
+    if not rows.any():
+        return np.zeros(bench.rows)
+    centred = np.where(rows, column - float(np.mean(column[rows])), 0.0)
+    spread = float(np.sqrt(np.mean(centred[rows] ** 2)))
+    return centred / spread if spread > 1.0e-12 else np.zeros(bench.rows)
+
+
+def _of_columns(bench: Bench, force: Floats) -> Iterator[Question]:
+    columns = {}
+    for name in sorted(bench.columns() - {"command_v", "pressure_kpa"}):
+        column = standard(bench.covariate(name), bench)
+        if np.any(column):
+            columns[name] = column
+    for name, column in columns.items():
+        foreign = name not in SURROUNDINGS
+        yield Question(name, "in proportion", column[None], foreign)
+        yield Question(name, "in proportion to it times the force", (column * force)[None], foreign)
+        yield Question(name, "curved", np.vstack([column, column**2]), name != "position_mm")
+        yield Question(name, "follows it late, by seconds", _late(bench, column), True)
+    for first, second in combinations(list(columns)[:_MOST_PAIRED], 2):
+        product = standard(columns[first] * columns[second], bench)
+        yield Question(f"{first} x {second}", "in proportion to their product", product[None], True)
+
+
+def _late(bench: Bench, column: Floats) -> Floats:
+    """The column behind first-order lags of 1, 4 and 16 s."""
+    from scipy.signal import lfilter
+
+    found = np.zeros((len(_LATE_S), bench.rows))
+    for segment in bench.segments:
+        if segment.is_force:
+            row_s = float(np.median(np.diff(bench.measurements[segment.recording].time_s)))
+            for k, late_s in enumerate(_LATE_S):
+                share = 1.0 - np.exp(-row_s / late_s)
+                start = column[segment.rows][0]
+                found[k, segment.rows] = start + lfilter([share], [1.0, share - 1.0], column[segment.rows] - start)
+    return np.asarray(found * bench.force_rows)
+
+
+def _waves(bench: Bench) -> Floats:
+    """Sines and cosines of one to three periods over each recording, (6, rows)."""
+    phase = np.zeros(bench.rows)
+    for segment in bench.segments:
+        rows = segment.rows.stop - segment.rows.start
+        phase[segment.rows] = 2.0 * np.pi * np.arange(rows) / rows
+    return np.vstack([turn(count * phase) for count in (1, 2, 3) for turn in (np.sin, np.cos)])
+
+
+def _of_time(bench: Bench, force: Floats) -> Iterator[Question]:
+    seconds = bench.time_s()
+    time = standard(seconds, bench)
+    yield Question("time", "a slow trend", np.vstack([time, time**2, time**3]), False)
+    yield Question("time", "the gain drifts: a trend times the force", np.vstack([time * force, time**2 * force]), True)
+    yield Question("time", "the gain wanders", _waves(bench) * force, True)
+    for place in range(1, _STEPS):
+        part = np.zeros(bench.rows)
+        for segment in bench.segments:
+            if segment.is_force:
+                rows = segment.rows.stop - segment.rows.start
+                part[segment.rows] = np.arange(rows) * _STEPS >= place * rows
+        at_s = float(np.min(seconds[part > 0.0])) if np.any(part) else 0.0
+        yield Question("time", f"a jump at {at_s:.0f} s", (part * bench.force_rows)[None], True)
+        yield Question("time", f"the gain jumps at {at_s:.0f} s", np.vstack([part * force, part]), True)
+
+
+def _of_lines(bench: Bench, white: Floats) -> Iterator[Question]:
+    seconds = bench.time_s()
+    for line_hz in lines_hz(bench, white):
+        angle = 2.0 * np.pi * line_hz * seconds
+        waves = np.vstack([np.sin(angle), np.cos(angle)]) * bench.force_rows
+        yield Question("time", f"a line at {line_hz:.3g} Hz", waves, False, max(bench.rows // 2, 1))
+        for name, half in (("first", 0), ("second", 1)):
+            inside = (bench.block_of_row % BLOCKS) // (BLOCKS // 2) == half
+            shape = f"a line at {line_hz:.3g} Hz in the {name} half"
+            yield Question("time", shape, waves * inside, True, max(bench.rows // 2, 1))
+
+
+def _of_motion(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Question]:
+    slope = bench.slope_n_per_s(simulated_n)
+    moving = np.sign(slope) * bench.force_rows
+    time = standard(bench.time_s(), bench)
+    command = standard(bench.command(), bench)
+    yield Question("force", "curved", np.vstack([force**2, force**3, force**4]), False)
+    yield Question("direction", "differs between rising and falling", moving[None], False)
+    yield Question("direction", "differs between rising and falling, with the force", (moving * force)[None], False)
+    drifting = np.vstack([time, time**2, _waves(bench)]) * moving
+    yield Question("direction", "the difference between rising and falling changes in time", drifting, True)
+    yield Question("speed", "in proportion to the rate of the force", standard(slope, bench)[None], False)
+    yield Question("command", "curved", np.vstack([command, command**2, command**3]), False)

@@ -1,0 +1,141 @@
+"""A look at what the model leaves: does it depend on anything at all?
+
+Each question is a handful of columns beside the model; the answer counts only beyond chance over all questions asked, on the
+whitened residual. The measured force is never a regressor: its own noise would answer (false findings in nearly every
+run of a prototype); the simulated force is. What has no shape at all is asked of the power, block by block.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.residual_questions import Question, questions
+from gateway.diagnosis.result import Leftover
+from gateway.diagnosis.search.bench import BLOCKS, Bench
+from gateway.diagnosis.search.levenberg_marquardt import Fitted
+from gateway.diagnosis.search.normal_equations import Normal
+
+_LEVEL: Final = 1.0e-3  # of a false answer over all questions
+_LEAST_SHARE: Final = 0.01  # of the whitened squared residual
+_AT_ONCE: Final = 60  # questions
+_MOST: Final = 6
+_AROUND: Final = 14  # lines to either side that a wandering line stands out of
+_STANDS_OUT: Final = 16.0  # times their mean
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A question that the residual answers. gain: chi-square beside the model; share: of the whitened squared residual."""
+
+    question: Question
+    gain: float
+    share: float
+    log_chance: float
+
+    @property
+    def leftover(self) -> Leftover:
+        return Leftover(self.question.depends_on, self.question.shape, min(self.share, 1.0))
+
+
+def best_answer(
+    bench: Bench, fitted: Fitted, whiten: Whitener, given: Collection[Leftover], *, outside: bool
+) -> Answer | None:
+    """The most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
+    white = whiten(fitted.residual_n)
+    known = {(each.depends_on, each.shape) for each in given}
+    asked = (
+        each
+        for each in questions(bench, fitted.residual_n, white)
+        if (each.outside or not outside) and (each.depends_on, each.shape) not in known
+    )
+    return _best(bench, fitted, whiten, asked)
+
+
+def _best(bench: Bench, fitted: Fitted, whiten: Whitener, asked: Iterator[Question]) -> Answer | None:
+    """Some at a time: a thousand columns would be gigabytes at once."""
+    model, white = whiten(fitted.jacobian), whiten(fitted.residual_n)
+    total = max(float(white @ white), 1.0)
+    tried, best = 0, None
+    while some := list(islice(asked, _AT_ONCE)):
+        tried += sum(each.among for each in some)
+        columns = whiten(bench.reduced(np.vstack([each.columns for each in some])))
+        found = [each for each in _answers(Normal(model, columns, white), some, total) if each.share >= _LEAST_SHARE]
+        best = min([*found, *([best] if best else [])], key=lambda each: each.log_chance, default=None)
+    return best if best and best.log_chance < np.log(_LEVEL / tried) else None
+
+
+def _answers(normal: Normal, asked: Sequence[Question], total: float) -> Iterator[Answer]:
+    """Each question's gain beside the model; `normal` holds the columns of all of them in order."""
+    from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
+
+    at = 0
+    for question in asked:
+        indices = list(range(at, at + question.columns.shape[0]))
+        at += len(indices)
+        usable = [k for k in indices if normal.power[k] > 1.0e-6 * max(normal.raw_power[k], 1.0e-300)]
+        gain = normal.add(usable).gain if usable else 0.0
+        chance = float(chi2_law.logsf(gain, len(indices))) + float(np.log(question.among))
+        yield Answer(question, gain, gain / total, chance)
+
+
+def screen(bench: Bench, fitted: Fitted, whiten: Whitener, given: Sequence[Leftover]) -> tuple[Leftover, ...]:
+    """What the search gave already, then everything that the residual still depends on, the most telling first.
+
+    Each answer is taken out before the next question.
+    """
+    leftovers = list(given)
+    while len(leftovers) < _MOST:
+        answer = best_answer(bench, fitted, whiten, leftovers, outside=False)
+        if answer is None:
+            break
+        leftovers.append(answer.leftover)
+        taken = np.vstack([fitted.jacobian, bench.reduced(answer.question.columns)])
+        fitted = Fitted(fitted.point, fitted.free, fitted.residual_n, fitted.chi2, taken)
+    return (*leftovers, *_unsteady(bench, whiten(fitted.residual_n)))
+
+
+def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
+    """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
+    from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
+
+    times_are_sure = bool(np.all(bench.weights == 1.0)) and all(map(_evenly_sampled, bench.measurements))
+    for segment in bench.segments:
+        if segment.is_force:
+            part = white[segment.rows]
+            counted = part[bench.usable[segment.rows]]
+            if counted.size < BLOCKS or not counted.any():
+                continue
+            levels = np.array([np.mean(block**2) for block in np.array_split(counted, BLOCKS)])
+            usual = float(np.median(levels))
+            apart = np.sum((levels / levels.mean() - 1.0) ** 2) * counted.size / BLOCKS / 2.0
+            if chi2_law.sf(apart, BLOCKS - 1) < _LEVEL and times_are_sure:
+                share = float(np.sum(np.maximum(levels - usual, 0.0)) / np.sum(levels))
+                yield Leftover("time", "louder at some times than at others", share)
+            if (share := _wandering(part)) > _LEAST_SHARE:
+                yield Leftover("time", "a line that wanders, or comes and goes", share)
+
+
+def _evenly_sampled(measurement: Measurement) -> bool:
+    """Are rows hardly missing? Whitening takes rows for evenly spaced; where they are not, noise seems to come and go."""
+    rows_s = np.diff(measurement.time_s)
+    return float(np.mean(rows_s > 1.9 * np.median(rows_s))) < 0.02
+
+
+def _wandering(part: Floats) -> float:
+    """Share of the power in lines that stand out of their surroundings in single blocks."""
+    standing, total = 0.0, 0.0
+    for block in np.array_split(part, BLOCKS):
+        power = np.abs(np.fft.rfft(block * np.hanning(block.size))) ** 2
+        total += float(power.sum())
+        if power.size < 7:
+            continue
+        best = int(np.argmax(power[3:-3])) + 3
+        around = np.r_[power[max(best - _AROUND, 1) : best - 2], power[best + 3 : best + _AROUND]]
+        if around.size and power[best] > _STANDS_OUT * float(around.mean()):
+            standing += float(power[best - 2 : best + 3].sum())
+    return standing / max(total, 1.0e-300)

@@ -1,0 +1,1 @@
+"""The search for causes: candidates, model comparison, refinement, and the mathematics that they share."""

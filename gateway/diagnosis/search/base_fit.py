@@ -1,0 +1,103 @@
+"""The base model: the rig's plant with gain (area), offset, regulator lag and Coulomb friction refitted.
+
+Without a rig the start is the shipped slide's dimensions with every effect at its null value: nobody has said that the
+recorder's machine has the delay, the second lag or the seals of the paper's. A coarse look over lag and friction comes
+first, for a search that begins with the wrong half of the loop never finds the other; then Levenberg-Marquardt.
+"""
+
+from dataclasses import replace
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.catalogue.catalogue import EFFECTS
+from gateway.diagnosis.catalogue.cylinder import AREA, COULOMB
+from gateway.diagnosis.catalogue.effect import Parameter
+from gateway.diagnosis.catalogue.regulator import LAG
+from gateway.diagnosis.catalogue.sensing import CLOCK_OFFSET
+from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.initial_friction import begun, start_parameters
+from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
+from gateway.diagnosis.search.parameters import Point
+from gateway.twin.plant import UNLIMITED, Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
+
+DEFAULT_PLANT: Final = Plant(
+    regulator=Regulator(lag_s=0.072),
+    cylinder=Cylinder(area_m2=95.0e-6),
+    friction=Friction(coulomb_n=1.0),
+    contact=Contact(pad_stiffness_n_per_m=4.1e4),
+    cell=LoadCell(),
+)
+_LAGS_S: Final = (0.005, 0.02, 0.05, 0.1, 0.2)
+_COULOMBS_N: Final = (0.0, 0.3, 1.0, 2.5, 6.0)
+
+
+def bare(plant: Plant) -> Plant:
+    """The plant's dimensions and base parameters, every effect at its null value: what is known of a foreign machine."""
+    kept = {AREA.path, LAG.path, COULOMB.path}
+    for effect in EFFECTS:
+        for parameter in effect.parameters:
+            if not parameter.shape and parameter.path not in kept:
+                plant = with_value(plant, parameter.section, parameter.name, float(parameter.null))
+    for section, name in (("contact", "mass_kg"), ("contact", "pad_damping_n_s_per_m"), ("cell", "filter_s")):
+        plant = with_value(plant, section, name, 0.0)  # a filter that is not there looks like crosstalk
+    return with_value(plant, "cell", "range_n", UNLIMITED)  # nobody said which cell it is
+
+
+def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -> tuple[Parameter, ...]:
+    """What is refitted. hidden: names of effects that are switched off; late_s: how late readings may come, see Options."""
+    commanded = any(each.command_v is not None for each in bench.measurements)
+    found = [AREA]
+    found += [LAG] if commanded else []
+    found += [COULOMB] if "coulomb-friction" not in hidden else []
+    found += [replace(CLOCK_OFFSET, low=0.0, high=late_s)] if late_s > 0.0 else []
+    return tuple(found)
+
+
+def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Whitener) -> Fitted:
+    """The refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
+    start = Point(plant, tuple(0.0 for _ in bench.measurements))
+    coarse, strains = _coarse(bench, start, free, whiten), start_parameters(bench, plant)
+    coarse_ones = begun(bench, coarse, whiten) if strains else [coarse]
+    problems = [Problem(point, (*free, *strains)) for point in coarse_ones]
+    return min(refine(bench, problems, whiten, waves=16 if strains else 8), key=lambda each: each.chi2)
+
+
+def refit(bench: Bench, fitted: Fitted, whiten: Whitener, waves: int = 3) -> Fitted:
+    """The same model again, after rows or noise have changed."""
+    return refine(bench, [Problem(fitted.point, fitted.free)], whiten, waves)[0]
+
+
+def _coarse(bench: Bench, start: Point, free: tuple[Parameter, ...], whiten: Whitener) -> Point:
+    """The best of a grid, gain and offset by linear regression."""
+    start = _scaled(bench, start, bench.simulate([start])[0])
+    lags = {start.value(LAG), *_LAGS_S} if LAG in free else {start.value(LAG)}
+    frictions = {start.value(COULOMB), *_COULOMBS_N} if COULOMB in free else {start.value(COULOMB)}
+    points = [start.moved(LAG, lag).moved(COULOMB, friction) for lag, friction in product(lags, frictions)]
+    simulated = bench.simulate(points)
+    costs = [_regression(bench, simulated[k], whiten)[2] for k in range(len(points))]
+    best = int(np.argmin(costs))
+    return _scaled(bench, points[best], simulated[best])
+
+
+def _scaled(bench: Bench, point: Point, simulated_n: Floats) -> Point:
+    """The point with area and offsets that regression finds; unchanged where the force does not answer."""
+    gain, offset, _ = _regression(bench, simulated_n, None)
+    if not 0.02 < gain < 50.0:
+        return point.with_offsets([offset + point.offsets_n[0]] * len(point.offsets_n))
+    offsets = [offset] * len(point.offsets_n)
+    return replace(point, offsets_n=tuple(offsets)).moved(AREA, point.value(AREA) * gain)
+
+
+def _regression(bench: Bench, simulated_n: Floats, whiten: Whitener | None) -> tuple[float, float, float]:
+    """Gain, offset and cost of measured = gain x simulated + offset over the judged force rows."""
+    rows = bench.judged
+    x, y = simulated_n[rows], bench.measured_n[rows]
+    spread = float(np.var(x))
+    gain = float(np.mean((x - x.mean()) * (y - y.mean())) / spread) if spread > 1.0e-12 else 0.0
+    offset = float(y.mean() - gain * x.mean())
+    residual = y - gain * x - offset
+    return gain, offset, float(residual @ residual)

@@ -1,0 +1,173 @@
+"""Steps and dead bands of the command that the remainder shows: where a search for them has to begin.
+
+Both change the command itself, in jumps: a saw tooth of n teeth is met only by a step within 1/(20n) of the true one, and
+a dead band decides at each command anew. So sizes are tried densely; steps first by the waves that their teeth begin
+with, which forgive ten times more, then by the teeth themselves. Friction cannot be left out: it swallows just the
+small changes that they make. Dead bands are tried in the twin, with rigid friction; steps need so many that they go
+through a lag and a play of the force only. The whole twin refines the best few.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.catalogue.cylinder import AREA, COULOMB
+from gateway.diagnosis.catalogue.regulator import DEAD_BAND, LAG
+from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.search.bench import Bench, Segment
+from gateway.diagnosis.search.levenberg_marquardt import Fitted
+from gateway.diagnosis.search.normal_equations import Normal
+from gateway.diagnosis.search.parameters import Point
+from gateway.twin.elementwise import Real, smaller
+from gateway.twin.plant import Plant
+
+_SMALLEST_STEP_V: Final = 0.0125
+_USUAL_STEPS_V: Final = (10.0 / 1023.0, 10.0 / 511.0, 10.0 / 255.0, 5.0 / 1023.0, 5.0 / 255.0)
+_LARGEST_SPAN_V: Final = 20.0  # a command beyond it is no voltage
+_BANDS_V: Final = np.geomspace(0.004, 0.8, 160)
+_FINER: Final = np.linspace(-1.0, 1.0, 41)  # between the neighbours of a step that was found
+_LOOKED_AT: Final = 12
+_BEST: Final = 3
+_WHOLE: Final = 0.35  # a step that explains best when shrunk below this share of itself is not the step
+_FINE_POINTS: Final = ("presliding_m", "stribeck_n", "dwell_stiction_n", "viscous_n_s_per_m", "asymmetry_n_s_per_m")
+_BUNCH: Final = 0.25  # of the lag
+_AT_ONCE: Final = 3_000_000  # numbers of one kind in memory
+
+
+def likely_steps_v(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[float, ...]:
+    """Steps of the command whose saw tooth is most like the residual, the best first."""
+    return _likely(bench, fitted, whiten, _steps_v(_span_v(bench))) if _span_v(bench) > 0.0 else ()
+
+
+def likely_dead_bands_pa(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[float, ...]:
+    """Dead bands of the target with which the twin explains most of the residual, the best first."""
+    if _span_v(bench) == 0.0:
+        return ()
+    regulator = fitted.point.plant.regulator
+    bands_pa = _BANDS_V * regulator.full_scale_pa / regulator.full_scale_v
+    rigid = replace(fitted.point, plant=_rigid(fitted.point.plant))
+    without = bench.simulate([rigid])
+    cost = np.zeros(bands_pa.size)
+    for part in _parts(bands_pa.size, bench.rows):
+        columns = bench.reduced(
+            bench.simulate([rigid.moved(DEAD_BAND, band_pa) for band_pa in bands_pa[part]]) - without
+        )
+        normal = Normal(whiten(fitted.jacobian), whiten(columns), whiten(fitted.residual_n))
+        cost[part] = normal.power - 2.0 * normal.slope
+    return tuple(bands_pa[np.argsort(cost)[:_BEST]].tolist())
+
+
+def _rigid(plant: Plant) -> Plant:
+    """The same plant with friction that costs little to replay."""
+    return replace(plant, friction=replace(plant.friction, **dict.fromkeys(_FINE_POINTS, 0.0)))
+
+
+def _span_v(bench: Bench) -> float:
+    spans = [float(np.ptp(each.command_v)) for each in bench.measurements if each.command_v is not None]
+    return min(max(spans, default=0.0), _LARGEST_SPAN_V)
+
+
+def _steps_v(span_v: float) -> Floats:
+    steps, step = [], _SMALLEST_STEP_V
+    while step < min(0.5 * span_v, 1.0):
+        steps.append(step)
+        step *= 1.0 + _spacing(step, span_v)
+    return np.array([*steps, *_USUAL_STEPS_V])
+
+
+def _spacing(step_v: Real, span_v: float) -> Real:
+    """Relative distance of steps whose waves differ by a third of a turn at the end of the span."""
+    return smaller(step_v / (3.0 * span_v), 0.05)
+
+
+def _likely(bench: Bench, fitted: Fitted, whiten: Whitener, tried: Floats) -> tuple[float, ...]:
+    span_v, best = _span_v(bench), list[float]()
+    for size in tried[np.argsort(-_promises(bench, fitted, whiten, tried))]:
+        if all(abs(size / other - 1.0) > 1.5 * _spacing(size, span_v) for other in best):
+            best.append(float(size))
+        if len(best) == _LOOKED_AT:
+            break
+    finer = np.array([size * (1.0 + _spacing(size, span_v) * _FINER) for size in best])
+    gains = _gains(bench, fitted, whiten, finer.ravel()).reshape(finer.shape)
+    sharpest = finer[np.arange(len(best)), np.argmax(gains, axis=1)]
+    return tuple(sharpest[np.argsort(-np.max(gains, axis=1))[:_BEST]].tolist())
+
+
+def _promises(bench: Bench, fitted: Fitted, whiten: Whitener, tried: Floats) -> Floats:
+    """How much the first wave of each step's teeth is like the residual, in no unit; rows in bunches: a lag is slow."""
+    told = whiten(whiten(fitted.residual_n)) * bench.usable
+    slope, power = np.zeros(tried.size), np.full(tried.size, 1.0e-300)
+    for segment, command_v, row_s in _driven(bench):
+        bunch = max(int(_BUNCH * fitted.point.value(LAG) / row_s), 1)
+        rows = np.arange(0, command_v.size, bunch)
+        sums, some_v = np.add.reduceat(told[segment.rows], np.maximum(rows - bunch // 2, 0)), command_v[rows]
+        for part in _parts(tried.size, rows.size):
+            waves = _error(_waved(some_v[:, None], tried[part]), some_v, bunch * row_s, fitted.point)
+            waves -= waves.mean(axis=0)
+            slope[part] += sums @ waves
+            power[part] += bunch * np.einsum("ij,ij->j", waves, waves)
+    return np.asarray(np.maximum(slope, 0.0) ** 2 / power)
+
+
+def _parts(columns: int, rows: int) -> Iterator[slice]:
+    """Some columns at a time: a long recording has many rows."""
+    many = max(_AT_ONCE // rows, 1)
+    yield from (slice(first, first + many) for first in range(0, columns, many))
+
+
+def _driven(bench: Bench) -> Iterator[tuple[Segment, Floats, float]]:
+    """Forces that a command drives: where they stand, the command of each row, V, and the usual distance of rows, s."""
+    for segment in bench.segments:
+        measurement = bench.measurements[segment.recording]
+        if segment.is_force and measurement.command_v is not None:
+            yield segment, measurement.command_v, float(np.median(np.diff(measurement.time_s)))
+
+
+def _waved(command_v: Floats, steps_v: Floats) -> Floats:
+    """The command, rounded to steps whose teeth are their first wave only."""
+    return np.asarray(command_v - steps_v / math.pi * np.sin(2.0 * math.pi / steps_v * command_v))
+
+
+def _gains(bench: Bench, fitted: Fitted, whiten: Whitener, tried: Floats) -> Floats:
+    """Chi-square that each step explains of the whitened residual."""
+    found = np.zeros(tried.size)
+    for part in _parts(tried.size, bench.rows):
+        vectors = np.zeros((tried[part].size, bench.rows))
+        for segment, command_v, row_s in _driven(bench):
+            rounded = np.round(command_v[:, None] / tried[part]) * tried[part]
+            vectors[:, segment.rows] = _error(rounded, command_v, row_s, fitted.point).T
+        normal = Normal(whiten(fitted.jacobian), whiten(bench.reduced(vectors)), whiten(fitted.residual_n))
+        power = np.maximum(normal.power, 1.0e-300)
+        found[part] = np.where(normal.slope > _WHOLE * power, normal.slope**2 / power, 0.0)
+    return found
+
+
+def _error(given_v: Floats, command_v: Floats, row_s: float, point: Point) -> Floats:
+    """What it makes of the force, in volts, that these were given (rows, steps) and not the command (rows,)."""
+    both = _lagged(np.concatenate([given_v, command_v[:, None]], axis=1), point.value(LAG), row_s)
+    regulator, friction_pa = point.plant.regulator, point.value(COULOMB) / point.value(AREA)
+    played = _dragged(both, friction_pa * regulator.full_scale_v / regulator.full_scale_pa)
+    return np.asarray(played[:, :-1] - played[:, -1:])
+
+
+def _lagged(command_v: Floats, lag_s: float, row_s: float) -> Floats:
+    """Behind the regulator's lag; a row sees the command of the row before."""
+    from scipy.signal import lfilter
+
+    share = 1.0 - math.exp(-row_s / max(lag_s, 1.0e-6))
+    return np.asarray(lfilter([0.0, share], [1.0, share - 1.0], command_v, axis=0))
+
+
+def _dragged(values: Floats, half_width: float) -> Floats:
+    """Play operator along the rows: what rigid friction lets through."""
+    low, high, found = values - half_width, values + half_width, np.empty_like(values)
+    state = np.maximum(low[0], 0.0)
+    for least, most, out in zip(low, high, found, strict=True):
+        np.maximum(state, least, out=out)
+        np.minimum(out, most, out=out)
+        state = out
+    return found

@@ -1,0 +1,108 @@
+"""What friction remembers when a recording begins: unknown, fitted with the base model, and never a finding.
+
+A slide that was pressed before the first row stands anywhere within its loop, a seal that gives way has its elements
+strained by the last reversals, and a recording that moves through a part of its range only may never forget it. On clean
+recordings of the demo rig such starts were called warm-up, presliding, dwell-stiction and creep. So the strains of the
+friction elements (friction.py) at the first settled row are parameters of each recording beside gain, lag and friction;
+three where the plant has presliding, one for all where its friction is rigid. Those that the recording does not feel are
+not fitted. Where motion is measured there is nothing to fit: friction follows the position.
+"""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.catalogue.effect import Parameter
+from gateway.diagnosis.measurement import Flags, Floats
+from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.search.bench import Bench, begins_at_rest
+from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
+from gateway.diagnosis.search.parameters import Point, StrainOf
+from gateway.twin.plant import Plant
+from gateway.twin.replay.drive import Strains
+
+_TRIED: Final[tuple[Strains, ...]] = (
+    (0.0, 0.0, 0.0),
+    *((one, two, three) for one in (1.0, -1.0) for two in (1.0, -1.0) for three in (1.0, -1.0)),
+)
+"""The middle, both branches, and what reversals of different sizes within the loop leave."""
+_WAVES: Final = 4
+_FELT: Final = 2.0  # chi-square that the whole way of a strain must make for it to be fitted
+_FAINT: Final = 0.1  # of the noise: what is less of the start is forgotten
+_YOUNGEST: Final = 0.25  # of a recording may count as its beginning
+
+
+def start_parameters(bench: Bench, plant: Plant) -> tuple[Parameter, ...]:
+    """The strains of every recording whose motion is inferred."""
+    if bench.motion != "inferred" or not any(each.command_v is not None for each in bench.measurements):
+        return ()
+    yields = plant.friction.presliding_m > 0.0
+    return tuple(
+        StrainOf(recording, elements)
+        for recording in range(len(bench.measurements))
+        for elements in (((0,), (1,), (2,)) if yields else ((0, 1, 2),))
+    )
+
+
+def begun(bench: Bench, point: Point, whiten: Whitener, most: int = 3) -> list[Point]:
+    """The point with the best few starts for each recording, the best first: a fit may end in the wrong one."""
+    points = [replace(point, starts=(strains,) * len(bench.measurements)) for strains in _TRIED]
+    costs = [_costs(bench, residual) for residual in whiten(_centred(bench, bench.residuals(bench.simulate(points))))]
+    ranked = np.argsort(np.array(costs), axis=0)[:most]
+    return [replace(point, starts=tuple(_TRIED[int(index)] for index in best)) for best in ranked]
+
+
+def at_its_best(bench: Bench, plant: Plant) -> Fitted:
+    """This very plant with the offset and the start that fit each recording best: what of its error is not the start's."""
+    whiten = white(bench, bench.measured_n)
+    (point,) = begun(bench, Point(plant, tuple(0.0 for _ in bench.measurements)), whiten, most=1)
+    return refine(bench, [Problem(point, start_parameters(bench, plant))], whiten, waves=_WAVES)[0]
+
+
+def _centred(bench: Bench, residuals: Floats) -> Floats:
+    """Without the offset of each recording."""
+    found = residuals.copy()
+    for segment in bench.segments:
+        part, usable = found[:, segment.rows], bench.usable[segment.rows]
+        part -= usable * (part.sum(axis=1) / max(int(usable.sum()), 1))[:, None]
+    return found
+
+
+def _costs(bench: Bench, residual: Floats) -> list[float]:
+    """Squared residual of each recording."""
+    costs = [0.0] * len(bench.measurements)
+    for segment in bench.segments:
+        costs[segment.recording] += float(np.sum(residual[segment.rows] ** 2))
+    return costs
+
+
+def felt(bench: Bench, fitted: Fitted, whiten: Whitener) -> Fitted:
+    """The same fit without strains that its recording does not feel; marks the rows that feel them as young."""
+    offsets = len(fitted.point.offsets_n)
+    columns = whiten(fitted.jacobian)
+    kept = [
+        not isinstance(parameter, StrainOf) or float(np.sum(column**2)) > _FELT
+        for parameter, column in zip(fitted.free, columns[offsets:], strict=True)
+    ]
+    bench.young = _young(bench, fitted, whiten)
+    free = tuple(parameter for parameter, keep in zip(fitted.free, kept, strict=True) if keep)
+    rows = [True] * offsets + kept
+    return replace(fitted, free=free, jacobian=fitted.jacobian[np.array(rows)])
+
+
+def _young(bench: Bench, fitted: Fitted, whiten: Whitener) -> Flags:
+    """Rows until the last one that feels the start of its recording, at most the first quarter of it."""
+    young = np.zeros(bench.rows, dtype=bool)
+    offsets = len(fitted.point.offsets_n)
+    for parameter, column in zip(fitted.free, fitted.jacobian[offsets:], strict=True):
+        if isinstance(parameter, StrainOf):
+            for segment in bench.segments:
+                if segment.recording == parameter.recording and not begins_at_rest(
+                    bench.measurements[segment.recording]
+                ):
+                    part = np.flatnonzero(np.abs(column[segment.rows]) > _FAINT * whiten.floor_n)
+                    most = int(_YOUNGEST * (segment.rows.stop - segment.rows.start))
+                    last = min(int(part[-1]) + 1, most) if part.size else 0
+                    young[segment.rows.start : segment.rows.start + last] = True
+    return young

@@ -1,0 +1,87 @@
+"""A point of the search: a plant, and an offset for each recording. Parameters are read and moved by name."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from gateway.diagnosis.catalogue.effect import Form, Parameter, Start
+from gateway.twin.plant import Plant, with_value
+from gateway.twin.replay.drive import Strains
+
+_ZERO: Final = "cell.zero_n"
+_UNSTRAINED: Final[Strains] = (0.0, 0.0, 0.0)
+STARTS: Final = "start"
+"""Section of the parameters that belong to a recording's beginning and to no plant."""
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class StrainOf(Parameter):
+    """Strain of some friction elements, all alike, at the beginning of one recording."""
+
+    recording: int = 0
+    elements: tuple[int, ...] = ()
+
+    def __init__(self, recording: int, elements: tuple[int, ...]) -> None:
+        name = f"strain_{''.join(str(element) for element in elements)}_of_{recording}"
+        Parameter.__init__(self, STARTS, name, "1", 0.0, -1.0, 1.0, 0.05)
+        object.__setattr__(self, "recording", recording)
+        object.__setattr__(self, "elements", elements)
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Everything that a simulation needs; hashable, so that simulations can be remembered.
+
+    starts: what friction remembers at the beginning of each recording; None, or none at all: rest without pressure.
+    """
+
+    plant: Plant
+    offsets_n: tuple[float, ...]
+    starts: tuple[Strains | None, ...] = ()
+
+    def start(self, recording: int) -> Strains | None:
+        return self.starts[recording] if self.starts else None
+
+    def value(self, parameter: Parameter) -> float:
+        """Of the zero: the first recording's offset, which stands for it."""
+        if isinstance(parameter, StrainOf):
+            strains = self.start(parameter.recording) or _UNSTRAINED
+            return sum(strains[element] for element in parameter.elements) / len(parameter.elements)
+        if parameter.path == _ZERO:
+            return self.offsets_n[0]
+        return float(getattr(getattr(self.plant, parameter.section), parameter.name))
+
+    def moved(self, parameter: Parameter, value: float) -> "Point":
+        """The same point with one parameter at `value`, kept within its bounds."""
+        kept = min(max(float(value), parameter.low), parameter.high)
+        if isinstance(parameter, StrainOf):
+            return self._strained(parameter, kept)
+        if parameter.path == _ZERO:  # of all recordings by as much
+            return self.with_offsets([offset_n + kept - self.offsets_n[0] for offset_n in self.offsets_n])
+        return replace(self, plant=with_value(self.plant, parameter.section, parameter.name, kept))
+
+    def _strained(self, parameter: StrainOf, value: float) -> "Point":
+        starts = list(self.starts or (None,) * len(self.offsets_n))
+        first, second, third = (
+            value if element in parameter.elements else strain
+            for element, strain in enumerate(starts[parameter.recording] or _UNSTRAINED)
+        )
+        starts[parameter.recording] = (first, second, third)
+        return replace(self, starts=tuple(starts))
+
+    def with_offsets(self, offsets_n: Sequence[float]) -> "Point":
+        return replace(self, offsets_n=tuple(float(offset) for offset in offsets_n))
+
+
+def started(point: Point, form: Form, start: Start) -> Point:
+    """Where a form's start leads: sizes are added to the present values, shapes are taken as they stand."""
+    for parameter, number in zip(form.parameters, start, strict=True):
+        point = point.moved(parameter, number if parameter.shape else point.value(parameter) + number)
+    return point
+
+
+def back_at(point: Point, before: Point, parameters: Sequence[Parameter]) -> Point:
+    """The same point with these parameters where they were before."""
+    for parameter in parameters:
+        point = point.moved(parameter, before.value(parameter))
+    return point

@@ -1,0 +1,151 @@
+"""What is reported, and what is a finding: the models at their best, the gain of each cause on unseen blocks, and doubts.
+
+The search whitens, for a test needs to know what noise can do. The reported model is the one of the two fits, whitened or
+plain, that predicts the held-out blocks better: where a cause is missing from the catalogue, a whitened fit would
+sacrifice the slow part of the force to details. A cause is no finding when its gain may be nothing, when it leaves the error as
+large, or when it and its like win by chance only; it is told with the reason, and the model is made without it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.random import default_rng
+from numpy.typing import NDArray
+
+from gateway.diagnosis.catalogue.catalogue import BY_NAME
+from gateway.diagnosis.catalogue.cylinder import AREA
+from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.result import Gain
+from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
+from gateway.diagnosis.search.normal_equations import HeldOut, held_out
+from gateway.diagnosis.search.search import Accepted, Found, without
+
+_BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
+_SAME_AREA: Final = 0.2
+_LEAST_SAVED: Final = 0.02  # of the held-out squared error
+_LEFT_AS_LARGE: Final = 0.995  # of the base model's error: what is left of it is all of it
+_LEAST_SURE: Final = 0.5  # share of resampled recordings that an effect and its like must win
+_PARTS: Final = 100
+_SEED: Final = 43
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """The models that are reported: base, extended, and the extended one without each accepted effect."""
+
+    base: Fitted
+    fitted: Fitted
+    without: tuple[Fitted, ...]
+    whiten: Whitener
+    held_out: HeldOut
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped:
+    """What the search had accepted and the judgement did not; gain_n: of the held-out RMS; why: as a sentence."""
+
+    name: str
+    gain_n: float
+    why: str
+
+    @property
+    def note(self) -> str:
+        return f"{self.name} is no finding: {self.why}"
+
+
+def worthy(bench: Bench, found: Found) -> tuple[Found, Reported, tuple[Dropped, ...]]:
+    """What is reported once everything counts again, without effects that are no finding then, the worst of them first."""
+    reported, dropped = _reported(bench, found), list[Dropped]()
+    while found.accepted:
+        gains = [
+            gain_of(held_out(bench, without_it, reported.whiten), reported.held_out, 0.0)
+            for without_it in reported.without
+        ]
+        doubts = [doubt(each, gain) for each, gain in zip(found.accepted, gains, strict=True)]
+        rms_n = bench.rms_n(reported.base.residual_n)
+        if not any(doubts) and reported.held_out.rms_n > _LEFT_AS_LARGE * rms_n:
+            doubts = [f"with it the error is as large on unseen blocks as without: {rms_n:.3g} N"] * len(gains)
+        if not any(doubts):
+            break
+        worst = min((k for k, why in enumerate(doubts) if why), key=lambda k: gains[k].ci95[0])
+        taken, kept = found.accepted[worst], found.accepted[:worst] + found.accepted[worst + 1 :]
+        won_n = gains[worst].held_out_rms_before_n - gains[worst].held_out_rms_after_n
+        dropped.append(Dropped(taken.effect.name, won_n, doubts[worst]))
+        fitted = without(bench, found.fitted, found.base, taken, kept, found.whiten) if kept else found.base
+        found = replace(found, fitted=fitted, accepted=kept)
+        reported = _reported(bench, found)
+    return found, reported, tuple(dropped)
+
+
+def doubt(accepted: Accepted, gain: Gain) -> str:
+    """Why this is no finding, as a sentence; empty where it is one."""
+    name, contest = accepted.effect.name, accepted.contest
+    before_n, after_n = gain.held_out_rms_before_n, gain.held_out_rms_after_n
+    if gain.ci95[0] <= 0.0:
+        return f"what it gains on unseen blocks may be nothing: {gain.ci95[0]:.2g} .. {gain.ci95[1]:.2g} N"
+    if after_n**2 > (1.0 - _LEAST_SAVED) * before_n**2:
+        return f"it leaves the error as large: {before_n:.3g} N before, {after_n:.3g} N after"
+    wins = sum(contest.shares.get(each, 0.0) for each in {name, *BY_NAME[name].group})
+    return f"it wins in {100.0 * wins:.0f} % of the ways to resample the recording only" if wins < _LEAST_SURE else ""
+
+
+def _reported(bench: Bench, found: Found) -> Reported:
+    """Every model twice, whitened and plain; the kind whose extended model predicts better.
+
+    Dependences without a name count again: the reported errors are those of the simulation, and of nothing beside it.
+    """
+    bench.put_back()
+    plain = white(bench, found.fitted.residual_n)
+    models = [found.base, found.fitted, *(_without(each, found) for each in found.accepted)]
+    problems = [Problem(each.point, each.free) for each in models]
+    kinds = [(found.whiten, refine(bench, problems, found.whiten, waves=3)), (plain, _plainly(bench, problems, plain))]
+    errors = [held_out(bench, fits[1], whiten) for whiten, fits in kinds]
+    best = 1 if errors[1].rms_n < _BETTER * errors[0].rms_n else 0
+    whiten, fits = kinds[best]
+    return Reported(fits[0], fits[1], tuple(fits[2:]), whiten, errors[best])
+
+
+def _plainly(bench: Bench, problems: Sequence[Problem], plain: Whitener) -> list[Fitted]:
+    """Each model at its plain optimum. The whitened one may be far from it in the area, which slow changes tell best:
+    then it is looked for from the base model's plain area, too."""
+    fits = refine(bench, problems, plain, waves=3)
+    area_m2 = fits[0].point.value(AREA)
+    if all(abs(each.point.value(AREA) / area_m2 - 1.0) < _SAME_AREA for each in fits):
+        return fits
+    again = [Problem(each.point.moved(AREA, area_m2), each.free) for each in fits]
+    others = refine(bench, again, plain, waves=12)
+    return [min(pair, key=lambda each: each.chi2) for pair in zip(fits, others, strict=True)]
+
+
+def _without(accepted: Accepted, found: Found) -> Fitted:
+    return found.base if len(found.accepted) == 1 else accepted.contest.beside
+
+
+def gain_of(before: HeldOut, after: HeldOut, floor_n: float) -> Gain:
+    errors_before, errors_after, counts = (
+        np.add.reduceat(values, _edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
+    )
+    blocks = counts.size
+    weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=400)
+    rms_before = np.sqrt((weights @ errors_before) / (weights @ counts))
+    rms_after = np.sqrt((weights @ errors_after) / (weights @ counts))
+    low, high = np.quantile(rms_before - rms_after, (0.025, 0.975))
+    return Gain(
+        before.rms_n, after.rms_n, (float(low), float(high)), share_of_excess(before.rms_n, after.rms_n, floor_n)
+    )
+
+
+def _edges(held: HeldOut) -> NDArray[np.intp]:
+    """Where parts begin that are drawn anew for an interval: finer than the blocks that are left out, for an effect may show
+    in one of these only, and then a fifth of all ways to draw blocks would not have it."""
+    counted = np.cumsum(held.squares > 0.0)
+    parts = min(_PARTS, int(counted[-1]) // 2)
+    return np.asarray(np.searchsorted(counted, np.arange(parts) * counted[-1] // parts, side="right"))
+
+
+def share_of_excess(before_n: float, after_n: float, floor_n: float) -> float:
+    excess = before_n**2 - min(floor_n, after_n) ** 2
+    return float(min(max((before_n**2 - after_n**2) / excess, 0.0), 1.0)) if excess > 0.0 else 0.0

@@ -1,0 +1,205 @@
+"""From what the search found to the answer: gains on unseen blocks, intervals, the verdict.
+
+What is a finding is decided in worth.py. Standard errors are the larger of the whitened fit's own and the
+jackknife's over blocks, which believes in no noise model.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.diagnosis.catalogue.effect import Effect, Parameter
+from gateway.diagnosis.experiments.identifiability import invisible
+from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.noise_floor import replicate_floor_n
+from gateway.diagnosis.notes import remarks, too_high_a_floor
+from gateway.diagnosis.result import (
+    Baseline,
+    Cause,
+    Diagnosis,
+    Estimate,
+    Extended,
+    Gain,
+    Leftover,
+    Rejected,
+    Trace,
+    Verdict,
+)
+from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.direct_evidence import Direct
+from gateway.diagnosis.search.levenberg_marquardt import Fitted
+from gateway.diagnosis.search.normal_equations import covariance, held_out
+from gateway.diagnosis.search.parameters import STARTS
+from gateway.diagnosis.search.search import Found
+from gateway.diagnosis.search.significance import Dropped, Reported, gain_of, share_of_excess, worthy
+from gateway.twin.plant import Plant, with_value
+
+_REACHED: Final = 1.05  # residual over floor that counts as reached
+_ABOVE: Final = 1.1  # residual over a known floor that asks for a cause
+_LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
+_DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
+_LEAST_REJECTED: Final = 5.0e-3  # of the RMS
+
+
+def judged(
+    bench: Bench,
+    found: Found,
+    direct: Sequence[Direct],
+    left: Sequence[Leftover],
+    effects: Sequence[Effect],
+    given_floor_n: float | None,
+) -> Diagnosis:
+    """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
+    found, reported, dropped = worthy(bench, found)
+    rms_n = bench.rms_n(reported.base.residual_n)
+    too_high = given_floor_n is not None and given_floor_n > rms_n
+    known_n = _replicates(bench) if given_floor_n is None or too_high else given_floor_n
+    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n, reported.held_out.rms_n)
+    reaches = reported.held_out.rms_n <= _REACHED * floor_n
+    causes = _causes(bench, found, reported, floor_n) + _direct_causes(bench, reported, direct, floor_n)
+    causes.sort(key=lambda cause: -cause.gain.share_of_excess)
+    names = frozenset(cause.name for cause in causes)
+    fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in effects}
+    unseen = invisible(bench, effects, found.first.scores, names | fixed)
+    unexplained = known_n is not None and rms_n > _ABOVE * known_n
+    return Diagnosis(
+        verdict=_verdict(causes, left, reached=known_n is not None and reaches, unexplained=unexplained),
+        baseline=Baseline(rms_n, floor_n, int(bench.judged.sum()), sum(each.duration_s for each in bench.measurements)),
+        causes=tuple(causes),
+        leftover=tuple(left),
+        not_identifiable=unseen,
+        rejected=_rejected(bench, found, rms_n, {*names, *_grouped(causes), *(each.name for each in unseen)}, dropped),
+        extended=Extended(reported.held_out.rms_n, reaches),
+        base=_plant(reported.base),
+        plant=_extended(reported, causes),
+        base_parameters=_estimates(
+            bench, reported.base, [each for each in reported.base.free if each.section != STARTS], reported.whiten
+        ),
+        traces=_traces(bench, reported),
+        experiments=_experiments(causes),
+        notes=(
+            *remarks(bench.measurements, reported.fitted.point.offsets_n, floor_n),
+            *(each.note for each in dropped),
+            *((too_high_a_floor(given_floor_n, rms_n),) if too_high and given_floor_n is not None else ()),
+        ),
+    )
+
+
+def _verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
+    if not causes:
+        return Verdict.UNKNOWN if left or unexplained else Verdict.NOTHING_FOUND
+    return Verdict.CONFIRMED if reached and not left else Verdict.PARTIAL
+
+
+def _replicates(bench: Bench) -> float | None:
+    floors = [floor for each in bench.measurements if (floor := replicate_floor_n(each)) is not None]
+    return max(floors) if len(floors) == len(bench.measurements) else None
+
+
+def _causes(bench: Bench, found: Found, reported: Reported, floor_n: float) -> list[Cause]:
+    return [
+        Cause(
+            accepted.effect.name,
+            accepted.contest.group(accepted.effect.name),
+            accepted.contest.shares.get(accepted.effect.name, 0.0),
+            _estimates(bench, reported.fitted, accepted.form.parameters, reported.whiten),
+            gain_of(held_out(bench, without, reported.whiten), reported.held_out, floor_n),
+        )
+        for accepted, without in zip(found.accepted, reported.without, strict=True)
+    ]
+
+
+def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], floor_n: float) -> list[Cause]:
+    """Findings of the readings themselves, as far as they matter beside the extended model."""
+    residual = bench.raw_n - bench.simulate([reported.fitted.point])[0]
+    after_n = float(np.sqrt(np.mean(residual[bench.judged] ** 2)))
+    causes = []
+    for each in direct:
+        before_n = float(np.sqrt(np.mean(residual[bench.judged | each.rows] ** 2)))
+        if each.name == "sensor-quantisation":
+            before_n, now_n = after_n, float(np.sqrt(max(after_n**2 - each.values[0][1] ** 2 / 12.0, 0.0)))
+        else:
+            now_n = after_n
+        least = 0.0 if each.name == "repeated-samples" else _LEAST_DIRECT  # few copies are no chance either
+        if before_n**2 - now_n**2 > least * before_n**2:
+            gain = Gain(
+                before_n, now_n, (before_n - now_n, before_n - now_n), share_of_excess(before_n, now_n, floor_n)
+            )
+            causes.append(Cause(each.name, (each.name,), 0.99, _direct_estimates(each), gain))
+    return causes
+
+
+def _direct_estimates(direct: Direct) -> dict[str, Estimate]:
+    return {
+        parameter.name: Estimate(parameter.section, value, parameter.unit, _interval(value, error))
+        for parameter, value, error in direct.values
+    }
+
+
+def _interval(value: float, error: float) -> tuple[float, float]:
+    return value - _DEVIATIONS * error, value + _DEVIATIONS * error
+
+
+def _estimates(bench: Bench, fitted: Fitted, parameters: Sequence[Parameter], whiten: Whitener) -> dict[str, Estimate]:
+    own = np.sqrt(np.maximum(np.diag(covariance(fitted, whiten)), 0.0))
+    errors = np.maximum(own, held_out(bench, fitted, whiten).jackknife)[len(fitted.point.offsets_n) :]
+    settled = [(each, 0.0) for each in parameters if each.settled]
+    estimates = {}
+    for parameter, error in (*zip(fitted.free, errors, strict=True), *settled):
+        if parameter in parameters:
+            value = fitted.point.value(parameter)
+            low, high = _interval(value, float(error))
+            within = (max(low, parameter.low), min(high, parameter.high))
+            estimates[parameter.name] = Estimate(parameter.section, value, parameter.unit, within)
+    return estimates
+
+
+def _plant(fitted: Fitted) -> Plant:
+    return with_value(fitted.point.plant, "cell", "zero_n", float(np.mean(fitted.point.offsets_n)))
+
+
+def _extended(reported: Reported, causes: Sequence[Cause]) -> Plant:
+    """The extended plant, with what the readings told by themselves."""
+    plant = _plant(reported.fitted)
+    for cause in causes:
+        if BY_NAME[cause.name].direct:
+            for name, estimate in cause.parameters.items():
+                plant = with_value(plant, estimate.section, name, estimate.value)
+    return plant
+
+
+def _grouped(causes: Sequence[Cause]) -> set[str]:
+    return {name for cause in causes for name in cause.group}
+
+
+def _rejected(
+    bench: Bench, found: Found, rms_n: float, told: set[str], dropped: Sequence[Dropped]
+) -> tuple[Rejected, ...]:
+    """Losers of the first contest and of the last, by the part of the RMS that they would save of unseen blocks, N."""
+    gains = {each.name: each.gain_n for each in dropped}
+    for contest in (found.first, found.last):
+        before_n = held_out(bench, contest.beside, found.whiten).rms_n
+        for finalist in contest.finalists:
+            if finalist.effect.name not in {*told, *(each.name for each in dropped)}:
+                share = 1.0 - held_out(bench, finalist.fitted, found.whiten).rms_n / before_n
+                gains[finalist.effect.name] = rms_n * share
+    best = sorted(gains.items(), key=lambda item: -item[1])
+    known = {each.name for each in dropped}
+    return tuple(Rejected(name, gain_n) for name, gain_n in best if name in known or gain_n > _LEAST_REJECTED * rms_n)
+
+
+def _traces(bench: Bench, reported: Reported) -> tuple[Trace, ...]:
+    before, after = bench.simulate([reported.base.point, reported.fitted.point])
+    return tuple(
+        Trace(bench.measurements[segment.recording], before[segment.rows], after[segment.rows])
+        for segment in bench.segments
+        if segment.is_force
+    )
+
+
+def _experiments(causes: Sequence[Cause]) -> tuple[str, ...]:
+    """What to record to tell the members of each group apart."""
+    names = [name for cause in causes if len(cause.group) > 1 for name in cause.group]
+    return tuple(dict.fromkeys(BY_NAME[name].experiment for name in names))

@@ -1,0 +1,197 @@
+"""What a process has to say to people: on stderr and in the state directory's event file, and the loop waits for neither.
+
+A paused terminal blocks its writer, and so may a disk; each has a queue and a thread of its own. At most 10 lines a
+second per cause: a flooding client cannot fill a disk, and the number of lines left out is said. Causes carry addresses,
+so that they are without number; only those of the last second are kept. A disk that takes no events is said once, on
+stderr (E150): nothing else depends on it.
+"""
+
+import contextlib
+import queue
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, Self
+
+from gateway.processes.event import Event, event_of, line_of, record
+from gateway.processes.event_file import EventFile
+
+LINES_PER_S: Final = 10
+_LONGEST_QUEUE: Final = 1000
+_MOST_CAUSES: Final = 1000
+_END_BOUND_S: Final = 1.0
+_ROUND_S: Final = 1.0
+
+
+class EventLog:
+    """log(cause, sentence) from any thread; log.note(cause, sentence) for the file alone.
+
+    The cause's first word is the event's; all of it is what lines are limited by. clock: monotonic, wall: since the epoch, s.
+    """
+
+    def __init__(
+        self,
+        write: Callable[[str], object] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        source: str = "control",
+        file: EventFile | None = None,
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        self._clock, self._wall, self._source = clock, wall, source
+        self._windows: dict[str, _Window] = {}
+        self._lock = threading.Lock()
+        to_terminal = write or sys.stderr.write
+        self._terminal = Drain("terminal", lambda event: to_terminal(line_of(event) + "\n"), self._tell_left_out)
+        self._file = file
+        self._disk = Drain("events", _Disk(file, self._terminal.put, self._event)) if file else None
+
+    def __call__(self, cause: str, sentence: str) -> None:
+        self._say(self._source, cause, sentence)
+
+    def speaking_for(self, source: str) -> Callable[[str, str], None]:
+        """The same log for what another process has found and told this one."""
+        return lambda cause, sentence: self._say(source, cause, sentence)
+
+    def note(self, cause: str, sentence: str) -> None:
+        """For the file only: the terminal knows it already. Not limited."""
+        if self._disk:
+            self._disk.put(self._event(cause, sentence))
+
+    def __enter__(self) -> Self:
+        for drain in self._drains():
+            drain.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """What is said until now is still written, unless a terminal or a disk takes nothing for a second."""
+        self._tell_left_out(at_the_end=True)
+        for drain in self._drains():
+            drain.end()
+        if self._file and self._disk and not self._disk.is_alive:
+            self._file.close()
+
+    def _drains(self) -> tuple["Drain", ...]:
+        return (self._terminal, self._disk) if self._disk else (self._terminal,)
+
+    def _say(self, source: str, cause: str, sentence: str) -> None:
+        now_s = self._clock()
+        with self._lock:
+            window = self._windows.get(cause)
+            if window is None or now_s - window.began_s >= 1.0:
+                if window is None and len(self._windows) >= _MOST_CAUSES:
+                    self._forget_old(now_s)
+                self._put_left_out(cause, window)
+                self._windows[cause] = window = _Window(now_s, source)
+            window.count += 1
+            window.sentence = sentence
+        if window.count <= LINES_PER_S:
+            self._put(self._event(cause, sentence, source))
+
+    def _tell_left_out(self, *, at_the_end: bool = False) -> None:
+        """A flood that has ended is counted too."""
+        now_s = self._clock()
+        with self._lock:
+            for cause, window in tuple(self._windows.items()):
+                if at_the_end or now_s - window.began_s >= 1.0:
+                    self._put_left_out(cause, self._windows.pop(cause))
+
+    def _put_left_out(self, cause: str, window: "_Window | None") -> None:
+        """With the code of what is left out, so that it is found where that is looked for."""
+        if window is not None and window.count > LINES_PER_S:
+            code = self._event(cause, window.sentence).code
+            told = f"{window.count - LINES_PER_S} more lines of {cause!r} left out"
+            self._put(self._event(cause, f"{code} {told}" if code else told, window.source))
+
+    def _forget_old(self, now_s: float) -> None:
+        recent = {cause: window for cause, window in self._windows.items() if now_s - window.began_s < 1.0}
+        self._windows = recent if len(recent) < _MOST_CAUSES else {}
+
+    def _event(self, cause: str, sentence: str, source: str = "") -> Event:
+        return event_of(self._wall(), source or self._source, cause, sentence)
+
+    def _put(self, event: Event) -> None:
+        for drain in self._drains():
+            drain.put(event)
+
+
+@dataclass(slots=True)
+class _Window:
+    """One second of one cause: how many lines it had, and the last of them."""
+
+    began_s: float
+    source: str
+    count: int = 0
+    sentence: str = ""
+
+
+class Drain:
+    """A queue and the thread that empties it into `write`, whose OSError and ValueError (a terminal that is gone) nobody minds.
+
+    What does not fit in the queue is left out; the registers still show the cause. each_round: called when nothing has come
+    for a second.
+    """
+
+    def __init__(
+        self, name: str, write: Callable[[Event], object], each_round: Callable[[], None] | None = None
+    ) -> None:
+        self._write = write
+        self._each_round = each_round
+        self._events: queue.Queue[Event | None] = queue.Queue(_LONGEST_QUEUE)
+        self._thread = threading.Thread(target=self._run, name=f"event-log {name}", daemon=True)
+
+    @property
+    def is_alive(self) -> bool:
+        return self._thread.is_alive()
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def put(self, event: Event) -> None:
+        with contextlib.suppress(queue.Full):
+            self._events.put_nowait(event)
+
+    def end(self) -> None:
+        """All that is in the queue is written first, if that takes no longer than a second."""
+        with contextlib.suppress(queue.Full):
+            self._events.put(None, timeout=_END_BOUND_S)
+        self._thread.join(_END_BOUND_S)
+
+    def _run(self) -> None:
+        while True:
+            try:
+                event = self._events.get(timeout=_ROUND_S if self._each_round else None)
+            except queue.Empty:
+                if self._each_round:
+                    self._each_round()
+                continue
+            if event is None:
+                return
+            with contextlib.suppress(OSError, ValueError):
+                self._write(event)
+
+
+class _Disk:
+    """Events to the file; the first that it does not take raises the alarm, the first that it takes again ends it."""
+
+    def __init__(self, file: EventFile, alarm: Callable[[Event], None], event: Callable[[str, str], Event]) -> None:
+        self._file, self._alarm, self._event = file, alarm, event
+        self._lost = 0
+
+    def __call__(self, event: Event) -> None:
+        try:
+            self._file.append(record(event))
+        except OSError as error:
+            self._lost += 1
+            if self._lost == 1:
+                sentence = f"E150 events are not kept: {error.strerror or error}; control goes on, stderr has them"
+                self._alarm(self._event("events", sentence))
+            return
+        if self._lost:
+            lost, self._lost = self._lost, 0
+            self._file.append(record(self._event("events", f"E150 {lost} events were not kept before this one")))

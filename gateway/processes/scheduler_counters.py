@@ -1,0 +1,117 @@
+"""Was a silent process not let run, or did it not want to? What the kernel counts for it, read from /proc.
+
+schedstat has two sums in nanoseconds: time on a processor, and time runnable but waiting for one. The wait that still
+lasts is in neither; it is added when the process gets its turn, if only to be killed, so a silence is judged from the
+zombie, before it is reaped. Only the main thread counts: it is the control loop. Standard library only.
+"""
+
+import contextlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from gateway.processes.exit_cause import EndCause, Ending
+
+_STOPPED_STATES: Final = "Tt"
+_CURE: Final = ": the machine is too busy; end other programs, `run --realtime`, or a longer stall_s in the rig"
+
+
+@dataclass(frozen=True, slots=True)
+class Turns:
+    """What a process has had until now, in seconds."""
+
+    on_cpu_s: float = 0.0
+    waited_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Silence:
+    """One silence of the control loop. turns: what it had in it; state: the kernel's letter before the kill, empty where
+    it is not known; was_late: the guardian, which does nothing but watch, was not let run in time either."""
+
+    silent_s: float
+    bound_s: float
+    turns: Turns | None
+    state: str
+    was_late: bool
+
+
+class TurnsOf:
+    """Reads one process's counters. A kernel without them, or a process that is gone, gives None."""
+
+    def __init__(self, pid: int, proc: Path = Path("/proc")) -> None:
+        self._stat = proc / str(pid) / "stat"
+        self._descriptor = -1
+        with contextlib.suppress(OSError):
+            self._descriptor = os.open(proc / str(pid) / "schedstat", os.O_RDONLY | os.O_CLOEXEC)
+
+    def read(self) -> Turns | None:
+        """1.5 us: cheap enough for every heartbeat."""
+        try:
+            on_cpu_ns, waited_ns = os.pread(self._descriptor, 64, 0).split()[:2]
+        except (OSError, ValueError):
+            return None
+        return Turns(int(on_cpu_ns) * 1e-9, int(waited_ns) * 1e-9)
+
+    def waited_s(self) -> float | None:
+        turns = self.read()
+        return turns.waited_s if turns else None
+
+    def state(self) -> str:
+        """R, S, D, T, ...: the letter behind the name, which may hold brackets itself."""
+        try:
+            return self._stat.read_text().rpartition(")")[2].split()[0]
+        except (OSError, IndexError):
+            return ""
+
+    def close(self) -> None:
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+def since(before: Turns | None, now: Turns | None) -> Turns | None:
+    if before is None or now is None:
+        return None
+    return Turns(now.on_cpu_s - before.on_cpu_s, now.waited_s - before.waited_s)
+
+
+def judged(silence: Silence, load: str) -> Ending:
+    """The cause of a silence: what took the largest part of it. load: of the machine, in words."""
+    seen = f"control process stalled: {_ms(silence.silent_s)} without a tick, allowed {_ms(silence.bound_s)} (stall_s)"
+    if silence.state and silence.state in _STOPPED_STATES:
+        return Ending(EndCause.STOPPED, f"{seen}; it was stopped by a signal or a debugger")
+    if silence.turns is None:
+        cause = EndCause.MACHINE_BUSY if silence.was_late else EndCause.STALLED
+        return Ending(cause, f"{seen}; this kernel does not count why; {load}{_CURE if silence.was_late else ''}")
+    ran_s, waited_s = silence.turns.on_cpu_s, silence.turns.waited_s
+    slept_s = max(0.0, silence.silent_s - ran_s - waited_s)
+    parts = f"it waited {_ms(waited_s)} for a processor, ran {_ms(ran_s)} and slept {_ms(slept_s)}; {load}"
+    if waited_s >= max(ran_s, slept_s):
+        return Ending(EndCause.MACHINE_BUSY, f"{seen}; {parts}{_CURE}")
+    where = ", in the kernel, for a disk or a driver" if silence.state == "D" else ""
+    return Ending(EndCause.STALLED, f"{seen}; {parts}: not the machine's load{where}")
+
+
+def load_of_machine(proc: Path = Path("/proc")) -> str:
+    """`load 8.4 on 2 cores, 62 % of the time somebody waited for a processor (10 s)`, as far as the kernel says."""
+    words = []
+    with contextlib.suppress(OSError, IndexError):
+        words.append(f"load {(proc / 'loadavg').read_text().split()[0]} on {_cores()} cores")
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        some = (proc / "pressure" / "cpu").read_text().split()[1]
+        words.append(f"pressure {float(some.removeprefix('avg10=')):.0f} %")
+    return ", ".join(words) or "the load is not known"
+
+
+def _cores() -> int:
+    """Those that we may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except (OSError, AttributeError):
+        return os.cpu_count() or 1
+
+
+def _ms(seconds: float) -> str:
+    return f"{seconds * 1e3:.0f} ms"

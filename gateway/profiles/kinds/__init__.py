@@ -1,0 +1,1 @@
+"""The other kinds of profile: devices, register maps, plants, calibrations, plans."""

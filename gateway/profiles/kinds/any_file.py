@@ -1,0 +1,60 @@
+"""`check` of any profile: what a file is, by its keys, and every fault of it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.profiles.find import FOLDERS, shipped
+from gateway.profiles.kinds.calibrations import read_calibration
+from gateway.profiles.kinds.devices import read_device
+from gateway.profiles.kinds.kinds import kind_of
+from gateway.profiles.kinds.plans import AnyPlan, read_plan
+from gateway.profiles.kinds.plants import read_plant
+from gateway.profiles.kinds.registers import read_registers
+from gateway.profiles.load import asked_for, open_file
+from gateway.profiles.rigs.assembly import check_report
+from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
+from gateway.profiles.strict_yaml.text import Document
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """kind: of kinds.CALLED; value: what was read (Rig, DeviceProfile, PlantProfile, Calibration, RegisterMap, a plan), None
+    while there are faults."""
+
+    kind: str
+    value: Any
+    faults: tuple[Fault, ...] = ()
+    warnings: tuple[Fault, ...] = ()
+
+
+def check_file(name: str | Path) -> Checked:
+    """Read and check a profile of any kind, by shipped name (a rig's first) or path. Never raises for what is in a file."""
+    kind = next((kind for kind in FOLDERS if str(name) in shipped(kind)), "rig")
+    findings = Findings()
+    opened = open_file(kind, asked_for(name), findings)
+    kind = (kind_of(opened[0].value, kind) if opened else None) or kind
+    if kind == "rig":
+        report = check_report(name)
+        return Checked("rig", report.rig, report.faults, report.warnings)
+    if opened is None:
+        return Checked(kind, None, tuple(findings.faults))
+    value, faults = _READ[kind](opened[0])
+    return Checked(kind, None if faults else value, tuple(sorted(faults)))
+
+
+def _plan(document: Document) -> tuple[AnyPlan | None, list[Fault]]:
+    try:
+        return read_plan(document), []
+    except ProfileError as error:
+        return None, list(error.faults)
+
+
+_READ: Final[Mapping[str, Callable[[Document], tuple[Any, list[Fault]]]]] = {
+    "device": read_device,
+    "plant": read_plant,
+    "calibration": read_calibration,
+    "registers": read_registers,
+    "plan": _plan,
+}

@@ -1,0 +1,69 @@
+"""Calibration files: coefficients, checked as an upload over Modbus is checked, each fault at its number."""
+
+from typing import Final
+
+from gateway.bsfm.coefficients import (
+    RESPONSE_FROM,
+    STRIDE,
+    CoefficientFault,
+    CoefficientLimits,
+    CoefficientReason,
+    Coefficients,
+)
+from gateway.bsfm.model import Calibration
+from gateway.bsfm.validate import validate_coefficients
+from gateway.profiles.strict_yaml.faults import Fault, Path
+from gateway.profiles.strict_yaml.text import Document
+from gateway.profiles.strict_yaml.typed import build
+
+_LARGEST_CELL_N: Final = 5000.0  # of any rig; each rig has its own cell's range, and checks against that
+_BRANCHES: Final = ("rising_handles_n", "rising_weights", "falling_handles_n", "falling_weights")
+_ARRAYS: Final = (*_BRANCHES, "slip_radii_v", "slip_shares")
+_RESPONSE: Final = ("dead_time_s", "lag_s", "second_lag_s")
+_OF_ALL_STOPS: Final = (CoefficientReason.SLIP_STOPS, CoefficientReason.SLIP_STIFFNESS)
+
+
+def read_calibration(document: Document) -> tuple[Calibration | None, list[Fault]]:
+    """The calibration of a file, or None and every fault."""
+    calibration, faults = build(Calibration, document)
+    if calibration is None:
+        return None, faults
+    faults = _length_faults(calibration, document) or coefficient_faults(calibration, document, _LARGEST_CELL_N)
+    faults = faults or _model_faults(calibration, document)
+    return (None, faults) if faults else (calibration, [])
+
+
+def coefficient_faults(calibration: Calibration, document: Document, cell_range_n: float) -> list[Fault]:
+    """What METHOD demands of coefficients that drive a plant with this load cell."""
+    limits = CoefficientLimits(cell_range_n=cell_range_n)
+    coefficients = Coefficients.of_calibration(calibration)
+    return [document.fault(_place(found), found.text) for found in validate_coefficients(coefficients, limits)]
+
+
+def _length_faults(calibration: Calibration, document: Document) -> list[Fault]:
+    wanted = calibration.order + 1
+    return [
+        document.fault((name,), f"has {len(getattr(calibration, name))} entries: order {wanted - 1} has {wanted}")
+        for name in _BRANCHES
+        if len(getattr(calibration, name)) != wanted
+    ]
+
+
+def _model_faults(calibration: Calibration, document: Document) -> list[Fault]:
+    """What only the whole model shows: force limits that are none."""
+    try:
+        calibration.model()
+    except ValueError as error:
+        return [document.fault(("force_limits_n",) if calibration.force_limits_n else (), str(error))]
+    return []
+
+
+def _place(found: CoefficientFault) -> Path:
+    """Where a coefficient of the upload's numbering stands in the file; () for the set as a whole."""
+    if found.reason in _OF_ALL_STOPS:
+        return ("slip_radii_v",)
+    if found.index < 0:
+        return ()
+    if found.index >= RESPONSE_FROM:
+        return ("response", _RESPONSE[found.index - RESPONSE_FROM])
+    return (_ARRAYS[found.index // STRIDE], found.index % STRIDE)

@@ -1,0 +1,25 @@
+"""Device files: the profile's own rules, the codec that it names, and whether both ends of its wire understand each other."""
+
+from collections.abc import Callable
+from typing import Final
+
+from gateway.devices import DeviceProfile, Role, cell_device, output_host
+from gateway.devices.rehearsal import rehearsed
+from gateway.profiles.strict_yaml.faults import Fault
+from gateway.profiles.strict_yaml.text import Document
+from gateway.profiles.strict_yaml.typed import build
+
+_MAKE: Final[dict[Role, Callable[[DeviceProfile], object]]] = {Role.OUTPUT: output_host, Role.LOAD_CELL: cell_device}
+
+
+def read_device(document: Document) -> tuple[DeviceProfile | None, list[Fault]]:
+    """The device profile of a file, or None and every fault."""
+    device, faults = build(DeviceProfile, document)
+    if device is None:
+        return None, faults
+    try:
+        _MAKE[device.role](device)
+    except ValueError as error:
+        return None, [document.fault(("codec",) if "codec" in str(error) else (), str(error))]
+    faults = [document.fault(place, told) for place, told in rehearsed(device)]
+    return (None, faults) if faults else (device, [])

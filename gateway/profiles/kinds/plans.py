@@ -1,0 +1,118 @@
+"""Plan files of `calibrate --plan`: an experiment (parts of moves), or a ladder whose calibration is fitted and stored.
+
+Which of the two is told by the keys: an experiment has `name`, `parts` and so on at the top, anything else is read as a
+ladder, whose every key may be left out. Both are read strictly, with every fault at its line and column, here and again by
+the gateway that runs them.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part, plan_faults
+from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.profiles.load import asked_for, open_profile
+from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError, printable
+from gateway.profiles.strict_yaml.text import Document
+from gateway.profiles.strict_yaml.typed import build
+
+AnyPlan: TypeAlias = RunPlan | ExperimentPlan
+
+_EXPERIMENT_KEYS: Final = frozenset(entry.name for entry in fields(ExperimentPlan)) - {"tare"}
+_SCHEMA_LINE: Final = "# force-gateway schema plan > plan.json gives editors the schema\n"
+
+
+def load_plan(path: str | Path) -> AnyPlan:
+    """The plan of a file. ProfileError with every fault."""
+    return read_plan(_opened(path))
+
+
+def load_plan_fields(path: str | Path) -> dict[str, Any]:
+    """What a good file says and no more, for options that fill in what it leaves out. ProfileError with every fault."""
+    document = _opened(path)
+    read_plan(document)
+    return dict(document.value)
+
+
+def _opened(path: str | Path) -> Document:
+    findings = Findings()
+    opened = open_profile("plan", asked_for(path), findings)
+    if opened is None:
+        raise ProfileError(findings.faults)
+    return opened[0]
+
+
+def read_plan(document: Document) -> AnyPlan:
+    """ProfileError with every fault, at its place."""
+    plan: AnyPlan | None
+    if _EXPERIMENT_KEYS & set(document.value):
+        plan, faults = _experiment(document)
+    else:
+        plan, faults = build(RunPlan, document)
+    if plan is None or faults:
+        raise ProfileError(faults)
+    return plan
+
+
+def _experiment(document: Document) -> tuple[ExperimentPlan | None, list[Fault]]:
+    plan, faults = build(ExperimentPlan, document)
+    return plan, faults + ([] if plan is None else [document.fault(path, told) for path, told in plan_faults(plan)])
+
+
+def plan_of(fields_: Mapping[str, Any]) -> AnyPlan:
+    """A plan from plain values, as they come over the control socket. ValueError with the first fault's sentence."""
+    try:
+        return read_plan(Document("plan", dict(fields_), {}))
+    except ProfileError as error:
+        fault = error.faults[0]
+        raise ValueError(f"plan: {fault.path} {fault.message}".replace("  ", " ")) from None
+
+
+def plain(plan: AnyPlan) -> dict[str, Any]:
+    """As JSON takes it and `plan_of` reads it back: without what is not given."""
+    document: dict[str, Any] = json.loads(json.dumps(asdict(plan)))
+    for part in document.get("parts", ()):
+        part["moves"] = [{key: value for key, value in move.items() if value is not None} for move in part["moves"]]
+    return document
+
+
+def plan_text(plan: ExperimentPlan, comment: str = "") -> str:
+    """The whole file, which `load_plan` reads back to the same plan. comment: lines to stand at its top."""
+    head = "".join(f"# {printable(line)}\n" for line in comment.splitlines())
+    return head + _SCHEMA_LINE + "".join(_about(plan)) + "parts:\n" + "".join(map(_part, plan.parts))
+
+
+def _about(plan: ExperimentPlan) -> Iterator[str]:
+    for entry in fields(plan):
+        value = getattr(plan, entry.name)
+        if entry.name == "parts" or value == entry.default:
+            continue
+        if isinstance(value, tuple):
+            yield f"{entry.name}:\n" + "".join(f"  - {_scalar(item)}\n" for item in value)
+        else:
+            yield f"{entry.name}: {_scalar(value)}\n"
+
+
+def _part(part: Part) -> str:
+    why = f"    why: {_scalar(part.why)}\n" if part.why else ""
+    moves = "".join(f"      - {{{_move(move)}}}\n" for move in part.moves)
+    return f"  - name: {_scalar(part.name)} # {part.duration_s:.0f} s\n{why}    moves:\n{moves}"
+
+
+def _move(move: Move) -> str:
+    given = ((entry.name, getattr(move, entry.name)) for entry in fields(move))
+    return ", ".join(f"{name}: {_scalar(value)}" for name, value in given if value is not None)
+
+
+def _scalar(value: object) -> str:
+    """Plain for numbers and kinds of moves; a text is double-quoted, for it may hold any sign."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (Do, int)):
+        return str(value)
+    if isinstance(value, float):
+        mantissa, exponent, power = repr(value).partition("e")
+        return f"{mantissa if '.' in mantissa else mantissa + '.0'}{exponent}{power}"
+    return json.dumps(printable(str(value)), ensure_ascii=False)

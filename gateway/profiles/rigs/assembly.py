@@ -1,0 +1,223 @@
+"""From a rig's name to a `Rig`, or to everything that keeps it from being one: what `force-gateway check` prints."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, TypeVar
+
+from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
+from gateway.control.settings import ControlSettings, Defaults, Limits, Supervision, Trim
+from gateway.devices import DeviceProfile
+from gateway.profiles.find import display, root
+from gateway.profiles.kinds.calibrations import read_calibration
+from gateway.profiles.kinds.devices import read_device
+from gateway.profiles.kinds.plants import PlantProfile, read_plant
+from gateway.profiles.kinds.registers import read_registers
+from gateway.profiles.load import asked_for, load_plant, open_profile, read_named, written_at
+from gateway.profiles.rigs import checks, line_checks, network_checks, wire_checks
+from gateway.profiles.rigs.checks import Check, Parts
+from gateway.profiles.rigs.compensation import compensation_of, compensation_words, in_simulation, without_compensable
+from gateway.profiles.rigs.edit_marks import marked
+from gateway.profiles.rigs.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
+from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, RigFile
+from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
+from gateway.profiles.strict_yaml.text import Document
+from gateway.profiles.strict_yaml.typed import build, build_known
+from gateway.registers.map.register_map import RegisterMap
+
+T = TypeVar("T")
+
+STAND_IN_PLANT: Final = "paper-slide"
+"""What `run --sim` simulates for a real rig that names no plant."""
+
+FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *wire_checks.FAULTS, *network_checks.FAULTS)
+WARNINGS: Final = (*checks.WARNINGS, *line_checks.WARNINGS, *wire_checks.WARNINGS, *network_checks.WARNINGS)
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """faults: what must be mended before the rig starts; warnings: what may be meant so; rig: None while there are faults.
+    With `simulated` the faults are those that keep even a simulated run from starting."""
+
+    faults: tuple[Fault, ...]
+    warnings: tuple[Fault, ...]
+    rig: Rig | None
+
+
+def check_report(name: str | Path, *, simulated: bool = False) -> Report:
+    """Read and check a rig, by shipped name or path. Never raises for what is in a file.
+
+    simulated: its devices will be simulated, so no port is needed; rig is `as_simulated` then.
+    """
+    findings = Findings()
+    opened = open_profile("rig", asked_for(name), findings)
+    rig = _rig(opened[0], opened[1], findings) if opened else None
+    faults = findings.faults + ([] if simulated else findings.hardware)
+    if rig and simulated:
+        rig = replace(rig, notes=(*rig.notes, *_left_to_edit(findings))).as_simulated()
+    return Report(_in_order(faults), _in_order(findings.warnings), None if faults else rig)
+
+
+def _left_to_edit(findings: Findings) -> Iterator[str]:
+    """What a simulated run need not mind, and the real one will."""
+    for fault in _in_order(findings.hardware):
+        yield f"to be edited before it runs without --sim: {fault}"
+
+
+def load_rig(name: str | Path, *, simulated: bool = False) -> Rig:
+    """A rig by shipped name or path; ProfileError with every fault. simulated: as in `check_report`."""
+    report = check_report(name, simulated=simulated)
+    if report.rig is None:
+        raise ProfileError(report.faults)
+    return report.rig
+
+
+def _in_order(faults: Iterable[Fault]) -> tuple[Fault, ...]:
+    """File by file as they were read, each from top to bottom, nothing twice."""
+    files = list(dict.fromkeys(fault.file for fault in faults))
+    return tuple(sorted(dict.fromkeys(faults), key=lambda fault: (files.index(fault.file), fault.line, fault.column)))
+
+
+def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
+    """The rig of a document; None, with the faults noted, when a part is missing."""
+    file, faults = build(RigFile, document)
+    findings.faults += faults
+    register_map = read_named(
+        "registers", written_at(document, ("registers",), path.parent, "force-v1"), read_registers, findings
+    )
+    parts = _parts(document, path.parent, findings)
+    findings.faults += _first_of_each_path(_told(document, FAULTS, parts))
+    findings.hardware += _first_of_each_path(_told(document, line_checks.HARDWARE, parts))
+    findings.warnings += _told(document, WARNINGS, parts)
+    marks = _marks(document, path, findings)
+    findings.warnings += marks
+    if file is None or register_map is None or findings.faults:
+        return None
+    rig = _assembled(file, parts, register_map, path, findings)
+    if not marks:
+        return rig
+    lines = ", ".join(str(fault.line) for fault in marks)
+    what = f"lines {lines} are" if len(marks) > 1 else f"line {lines} is"
+    return replace(
+        rig, notes=(*rig.notes, f"{what} still marked EDIT: force-gateway check {display(path)} says what each is")
+    )
+
+
+def _marks(document: Document, path: Path, findings: Findings) -> list[Fault]:
+    """Marks of a rig of the user's own; a placeholder is told already, and a shipped file is there to be copied."""
+    if path.is_relative_to(root()):
+        return []
+    told = {fault.path for fault in (*findings.faults, *findings.hardware)}
+    text = findings.texts[display(path)].decode("utf-8-sig", "replace")
+    return [fault for fault in marked(document, text) if fault.path not in told]
+
+
+def _told(document: Document, found_by: Iterable[Check], parts: Parts) -> list[Fault]:
+    return [document.fault(_steps(path), sentence) for check in found_by for path, sentence in check(parts)]
+
+
+def _first_of_each_path(faults: list[Fault]) -> list[Fault]:
+    """What is wrong at one place in two ways has one cause, usually the first."""
+    return list({fault.path: fault for fault in reversed(faults)}.values())[::-1]
+
+
+def _steps(path: str) -> tuple[str | int, ...]:
+    return tuple(int(step) if step.isdecimal() else step for step in path.split("."))
+
+
+def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
+    """What can be checked together: every part that has no fault of its own."""
+
+    def named(kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]) -> T | None:
+        return read_named(kind, written_at(document, path, folder), read, findings)
+
+    plant = named("plant", ("plant",), read_plant)
+    extended = named("plant", ("compensation",), read_plant)
+    loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else 100.0
+    return Parts(
+        name=str(document.at("name")),
+        simulated=document.at("simulated") is True,
+        names_plant=("plant",) in document.marks,
+        accept_no_device_watchdog=document.at("accept_no_device_watchdog") is True,
+        loop_hz=float(loop_hz) if isinstance(loop_hz, (int, float)) else None,
+        output=_part(document, "output", OutputFile),
+        load_cell=_part(document, "load_cell", CellFile),
+        limits=_part(document, "limits", Limits),
+        defaults=_part(document, "defaults", Defaults),
+        trim=_part(document, "trim", Trim),
+        supervision=_part(document, "supervision", Supervision),
+        network=_part(document, "network", Network),
+        calibration=named("calibration", ("calibration",), read_calibration),
+        output_device=named("device", ("output", "device"), read_device),
+        cell_device=named("device", ("load_cell", "device"), read_device),
+        plant=plant,
+        extended=extended,
+        compensation=_compensation(plant, extended),
+    )
+
+
+def _compensation(plant: PlantProfile | None, extended: PlantProfile | None) -> Compensation | None:
+    """Of what differs from the rig's plant, and of what control could take back of that one, too."""
+    if extended is None:
+        return None
+    base = (plant or load_plant(STAND_IN_PLANT)).plant
+    return compensation_of(without_compensable(base), extended.plant)
+
+
+def _part(document: Document, key: str, kind: type[T]) -> T | None:
+    """One group of the file by itself; its defaults where the file leaves it out."""
+    if (key,) in document.marks:
+        return build_known(kind, document, (key,))
+    try:
+        return kind()
+    except TypeError:  # it has keys without a default
+        return None
+
+
+def _assembled(file: RigFile, parts: Parts, register_map: RegisterMap, path: Path, findings: Findings) -> Rig:
+    assert parts.output_device and parts.cell_device and parts.calibration  # or there were faults
+    compensation = parts.compensation or NO_COMPENSATION
+    compensation = in_simulation(compensation) if file.simulated else compensation
+    return Rig(
+        name=file.name,
+        description=file.description,
+        file=path,
+        simulated=file.simulated,
+        seed=file.seed,
+        loop_hz=file.loop_hz,
+        register_map=register_map,
+        output=OutputLine(device=parts.output_device, port=file.output.port, baud=file.output.baud),
+        load_cell=_cell_line(file.load_cell, parts.cell_device),
+        plant_profile=parts.plant,
+        stand_in=None if parts.plant else load_plant(STAND_IN_PLANT),
+        calibration=parts.calibration,
+        control=ControlSettings(
+            limits=file.limits,
+            defaults=file.defaults,
+            trim=file.trim,
+            lead=file.lead,
+            response=file.response,
+            supervision=file.supervision,
+        ),
+        network=file.network,
+        residual_watch=file.residual_watch,
+        supported_bits=SUPPORTED_BITS,
+        accept_no_device_watchdog=file.accept_no_device_watchdog,
+        texts={name: text.decode("utf-8-sig") for name, text in findings.texts.items()},
+        fingerprint=_fingerprint(findings.texts.values()),
+        notes=compensation_words(compensation) if parts.compensation else (),
+        compensation=compensation,
+    )
+
+
+def _cell_line(cell: CellFile, device: DeviceProfile) -> CellLine:
+    return CellLine(device=device, port=cell.port, baud=cell.baud, sign=cell.sign, unit=cell.unit, range_n=cell.range_n)
+
+
+def _fingerprint(texts: Iterable[bytes]) -> str:
+    """SHA-256 over every text in the order of reading, each with its length before it."""
+    digest = hashlib.sha256()
+    for text in texts:
+        digest.update(len(text).to_bytes(8, "big") + text)
+    return digest.hexdigest()

@@ -1,0 +1,217 @@
+"""What no single field can know: whether the parts of a rig fit together.
+
+Each check is a generator of (path, sentence) and looks at the parts that were read; a part with a fault of its own is None,
+and its checks wait until it is mended. FAULTS keep a rig from starting, WARNINGS do not. The checks of the two serial
+lines are in line_checks, those of the Modbus face in network_checks.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.bsfm.model import Calibration
+from gateway.control.compensation.compensation import Compensation
+from gateway.control.settings import Defaults, Limits, Supervision, Trim
+from gateway.devices import DeviceProfile
+from gateway.profiles.kinds.plants import PlantProfile
+from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile
+from gateway.profiles.strict_yaml.sentences import newton, number, second, volt
+
+Found = Iterator[tuple[str, str]]
+"""(dotted path of the file, sentence)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """A rig file's parts and the profiles that it names, each None when it is absent or has faults."""
+
+    name: str
+    simulated: bool
+    names_plant: bool
+    accept_no_device_watchdog: bool
+    loop_hz: float | None = None
+    output: OutputFile | None = None
+    load_cell: CellFile | None = None
+    limits: Limits | None = None
+    defaults: Defaults | None = None
+    trim: Trim | None = None
+    supervision: Supervision | None = None
+    network: Network | None = None
+    output_device: DeviceProfile | None = None
+    cell_device: DeviceProfile | None = None
+    plant: PlantProfile | None = None
+    calibration: Calibration | None = None
+    extended: PlantProfile | None = None
+    compensation: Compensation | None = None
+
+
+Check = Callable[[Parts], Found]
+
+
+def voltages_fit(parts: Parts) -> Found:
+    if (limits := parts.limits) is None:
+        return
+    low, high, safe = limits.voltage_min_v, limits.voltage_max_v, limits.safe_voltage_v
+    if low >= high:
+        yield "limits.voltage_min_v", f"{volt(low)} is not below voltage_max_v = {volt(high)}"
+    elif not low <= safe <= high:
+        allowed = f"voltage_min_v .. voltage_max_v = {number(low)} .. {volt(high)}"
+        yield "limits.safe_voltage_v", f"{volt(safe)} is outside {allowed}"
+
+
+def forces_fit(parts: Parts) -> Found:
+    if (limits := parts.limits) is None:
+        return
+    most, trip, least = limits.force_max_n, limits.over_force_n, limits.smallest_force_n
+    if trip <= most:
+        yield (
+            "limits.over_force_n",
+            f"{newton(trip)} is not above force_max_n = {newton(most)}: it would trip in normal work",
+        )
+    if least >= most:
+        yield "limits.smallest_force_n", f"{newton(least)} is not below force_max_n = {newton(most)}"
+    if parts.load_cell and trip > parts.load_cell.range_n:
+        cell = f"load_cell.range_n = {newton(parts.load_cell.range_n)}"
+        yield "limits.over_force_n", f"{newton(trip)} is beyond the load cell: {cell}"
+
+
+def saturation_fits(parts: Parts) -> Found:
+    if (supervision := parts.supervision) is None:
+        return
+    path, seen = "supervision.saturation_n", supervision.saturation_n
+    if parts.load_cell and seen > parts.load_cell.range_n:
+        cell = parts.load_cell.range_n
+        yield (
+            path,
+            f"{newton(seen)} is beyond load_cell.range_n = {newton(cell)}; 98 % of it is {newton(round(0.98 * cell, 1))}",
+        )
+    elif parts.limits and seen <= parts.limits.force_max_n:
+        most = newton(parts.limits.force_max_n)
+        yield path, f"{newton(seen)} is not above force_max_n = {most}: it would trip in normal work"
+
+
+def defaults_fit(parts: Parts) -> Found:
+    if (defaults := parts.defaults) is None or (limits := parts.limits) is None:
+        return
+    most, least, precontact = limits.force_max_n, limits.smallest_force_n, defaults.precontact_force_n
+    for key in ("precontact_force_n", "in_band_tolerance_n"):
+        value = getattr(defaults, key)
+        if value > most:
+            yield f"defaults.{key}", f"{newton(value)} is above limits.force_max_n = {newton(most)}"
+    if 0 < precontact < least:
+        floor = f"limits.smallest_force_n = {newton(least)}"
+        yield (
+            "defaults.precontact_force_n",
+            f"{newton(precontact)} is below {floor}: the output stays 0 V, the tool would not move",
+        )
+
+
+def calibration_reaches(parts: Parts) -> Found:
+    """METHOD: a rig whose maximum force exceeds its calibration fails, and the trim needs room above it."""
+    if (limits := parts.limits) is None or (calibration := parts.calibration) is None:
+        return
+    model, most = calibration.model(), limits.force_max_n
+    reach = model.force_range_n[1]
+    if most > reach:
+        end = f"{reach:.1f} N, where calibration {calibration.name} ends ({volt(calibration.x1_v)})"
+        yield "limits.force_max_n", f"{newton(most)} is above {end}"
+        return
+    trim_v = parts.trim.limit_v if parts.trim and parts.trim.gain_v_per_n_s > 0 else 0.0
+    needed_v = model.branches.rising.inverse(most)[0] + trim_v
+    if needed_v > limits.voltage_max_v:
+        needs = f"needs {needed_v:.2f} V" + (f" with the trim's {volt(trim_v)}" if trim_v else "")
+        room_v = limits.voltage_max_v - trim_v
+        possible = f"; {model.branches.rising.value(room_v):.1f} N would fit" if room_v > calibration.x0_v else ""
+        yield (
+            "limits.force_max_n",
+            f"{newton(most)} {needs}, above voltage_max_v = {volt(limits.voltage_max_v)}{possible}",
+        )
+
+
+def calibration_fits_the_cell(parts: Parts) -> Found:
+    if (calibration := parts.calibration) is None:
+        return
+    largest = max(map(abs, (*calibration.rising_handles_n, *calibration.falling_handles_n)))
+    if parts.load_cell and largest > parts.load_cell.range_n:
+        cell = f"load_cell.range_n = {newton(parts.load_cell.range_n)}"
+        yield "calibration", f"{calibration.name} has a handle of {largest:.1f} N, beyond {cell}"
+    if parts.limits and parts.supervision:
+        resting = calibration.model().force_n(_within(calibration, parts.limits.safe_voltage_v), -1.0)
+        if resting >= parts.supervision.stuck_n:
+            told = f"{resting:.1f} N that calibration {calibration.name} expects at the safe voltage"
+            yield (
+                "supervision.stuck_n",
+                f"{newton(parts.supervision.stuck_n)} is not above the {told}: it could never be enabled",
+            )
+
+
+def _within(calibration: Calibration, voltage_v: float) -> float:
+    return min(max(voltage_v, calibration.x0_v), calibration.x1_v)
+
+
+def times_fit(parts: Parts) -> Found:
+    if (supervision := parts.supervision) is None or not parts.loop_hz:
+        return
+    ticks_s = 2.0 / parts.loop_hz
+    for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s"):
+        value = getattr(supervision, key)
+        if value is not None and value < ticks_s:
+            told = f"two ticks of the loop: {second(ticks_s)} at {number(parts.loop_hz)} Hz"
+            yield f"supervision.{key}", f"{second(value)} is shorter than {told}"
+
+
+def a_simulated_rig_has_a_plant(parts: Parts) -> Found:
+    if parts.simulated and not parts.names_plant:
+        yield "plant", "is missing: a simulated rig needs something to simulate, such as `plant: paper-slide`"
+
+
+def a_real_rig_is_wise(parts: Parts) -> Found:
+    if parts.simulated:
+        return
+    if parts.supervision and parts.supervision.lease_s is None:
+        yield "supervision.lease_s", "there is no lease: when the master is lost, the last command lasts; 0.2 is usual"
+    if parts.calibration and parts.calibration.rig != parts.name:
+        made = f'was made on "{parts.calibration.rig}", not on {parts.name}'
+        yield "calibration", f"{made}: its forces are a guess until you run `force-gateway calibrate`"
+
+
+def contact_can_be_felt(parts: Parts) -> Found:
+    if (defaults := parts.defaults) is None:
+        return
+    threshold = defaults.contact_threshold_n
+    if 0 < defaults.precontact_force_n <= threshold:
+        told = f"contact_threshold_n = {newton(threshold)}: contact would never be felt"
+        yield "defaults.precontact_force_n", f"{newton(defaults.precontact_force_n)} is not above {told}"
+
+
+def plant_has_air(parts: Parts) -> Found:
+    if parts.plant is None or parts.limits is None:
+        return
+    regulator, most_v = parts.plant.plant.regulator, parts.limits.voltage_max_v
+    pascal_per_volt = regulator.full_scale_pa / regulator.full_scale_v
+    if most_v * pascal_per_volt > regulator.supply_pa:
+        asked, there = f"{most_v * pascal_per_volt / 1e6:.3g} MPa", f"{regulator.supply_pa / 1e6:.3g} MPa"
+        end = f"above {regulator.supply_pa / pascal_per_volt:.2f} V nothing changes"
+        yield "limits.voltage_max_v", f"{volt(most_v)} asks for {asked}, the plant's supply has {there}: {end}"
+
+
+def compensation_compensates(parts: Parts) -> Found:
+    if parts.extended is None or parts.compensation is None or not parts.compensation.is_null:
+        return
+    limited = parts.compensation.limited
+    why = "; ".join(f"{name}: {reason}" for name, reason in limited) or "it has no effect that control could take back"
+    yield "compensation", f"{parts.extended.name} leaves nothing to compensate ({why}): leave this line out"
+
+
+FAULTS: Final[tuple[Check, ...]] = (
+    voltages_fit,
+    forces_fit,
+    saturation_fits,
+    defaults_fit,
+    calibration_reaches,
+    calibration_fits_the_cell,
+    times_fit,
+    a_simulated_rig_has_a_plant,
+    compensation_compensates,
+)
+WARNINGS: Final[tuple[Check, ...]] = (a_real_rig_is_wise, contact_can_be_felt, plant_has_air)

@@ -1,0 +1,200 @@
+"""From an extended plant to what control compensates of it, and why it leaves the rest.
+
+Compared with the base plant, the one that rig and calibration were made for: an effect counts where one of its numbers
+differs. Each has a treatment; the sentence of one that has none says what would be needed. Inputs are what control is told
+besides the load cell; a part whose input is missing stays off and is listed, not refused.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from math import radians
+from typing import Any, Final
+
+from gateway.control.compensation.command_map import CommandMap
+from gateway.control.compensation.compensation import Compensation, OutsideForce, Timing
+from gateway.control.compensation.load_cell import CellMap
+from gateway.profiles.rigs.uncompensated import REASONS
+from gateway.twin import Plant
+from gateway.twin.plant import with_value
+
+MASTER_INPUTS: Final = ("tilt_deg",)
+"""What a master can tell a running gateway (the command block)."""
+
+ALL_INPUTS: Final = ("tilt_deg", "temperature_c", "feed_mm_s")
+"""What a program that runs the controller itself can tell it (gateway.control.Line)."""
+
+CALIBRATE: Final = "it is the calibration's: `force-gateway calibrate` measures it"
+
+_NOT_SIMULATED: Final = "a simulated rig is not told how the tool is held"
+
+
+class By(StrEnum):
+    """Where an effect is compensated."""
+
+    MODEL = "model"
+    COMMAND = "command"
+    CELL = "cell"
+    OUTSIDE = "outside"
+    TIMING = "timing"
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True, slots=True)
+class Treatment:
+    """One effect of the catalogue: the numbers of a plant that make it, by whom it is compensated, which input that needs."""
+
+    name: str
+    fields: tuple[str, ...]
+    by: By = By.NOTHING
+    needs: str = ""
+
+
+TREATMENTS: Final = (
+    Treatment("transport-delay", ("regulator.delay_s",), By.TIMING),
+    Treatment("extra-lag", ("regulator.lag_s", "regulator.second_lag_s", "cell.filter_s"), By.TIMING),
+    Treatment("command-nonlinearity", ("regulator.command_bow", "regulator.command_s"), By.COMMAND),
+    Treatment("regulator-hysteresis", ("regulator.hysteresis_pa",), By.MODEL),
+    Treatment("coulomb-friction", ("friction.coulomb_n",), By.MODEL),
+    Treatment("presliding", ("friction.presliding_m",), By.MODEL),
+    Treatment("load-dependent-friction", ("friction.load_dependent_n_per_n",), By.MODEL),
+    Treatment("asymmetric-friction", ("friction.asymmetry_n",), By.MODEL),
+    Treatment("contact-nonlinearity", ("contact.hardening",), By.MODEL),
+    Treatment("backlash", ("contact.backlash_n", "contact.lost_n"), By.MODEL),
+    Treatment("tilt-gravity", ("contact.tilt_n", "contact.tilt_zero_deg"), By.OUTSIDE, "tilt_deg"),
+    Treatment(
+        "feed-drag",
+        ("contact.feed_drag_n_s_per_mm", "contact.feed_drag_n", "contact.feed_drag_abs_n_s_per_mm"),
+        By.OUTSIDE,
+        "feed_mm_s",
+    ),
+    Treatment("thermal-zero-drift", ("cell.zero_n_per_k",), By.CELL, "temperature_c"),
+    Treatment("thermal-span-drift", ("cell.span_per_k",), By.CELL, "temperature_c"),
+    Treatment("sensor-quadratic", ("cell.quadratic_per_n",), By.CELL),
+    Treatment("sensor-cubic", ("cell.cubic_per_n2",), By.CELL),
+    Treatment("valve-crosstalk", ("cell.crosstalk_n_per_v",), By.CELL),
+    *(Treatment(name, fields) for name, (fields, _) in REASONS.items()),
+)
+
+
+def number_at(plant: Plant, path: str) -> Any:
+    section, name = path.split(".")
+    return getattr(getattr(plant, section), name)
+
+
+def changed(base: Plant, extended: Plant) -> tuple[Treatment, ...]:
+    """Effects in which the two plants differ, in the catalogue's order of compensation."""
+    return tuple(
+        treatment
+        for treatment in TREATMENTS
+        if any(number_at(base, path) != number_at(extended, path) for path in treatment.fields)
+    )
+
+
+def compensation_of(
+    base: Plant, extended: Plant, inputs: Iterable[str] = MASTER_INPUTS, *, new_model: bool = False
+) -> Compensation:
+    """What control takes back. new_model: the model in use was identified on the extended plant with this compensation, so it
+    speaks straight volts and knows the friction; else what is the model's is left to a calibration.
+
+    An extended plant without any of it gives the null compensation, its effects all in `limited`.
+    """
+    told, acting, limited = frozenset(inputs), [], []
+    for treatment in changed(base, extended):
+        why_not = _why_not(treatment, told, new_model)
+        if why_not:
+            limited.append((treatment.name, why_not))
+        else:
+            acting.append(treatment)
+    names = tuple(treatment.name for treatment in acting)
+    by = {treatment.by for treatment in acting}
+    return Compensation(
+        cell=_cell(extended, names) if By.CELL in by else None,
+        command=_command(extended) if By.COMMAND in by else None,
+        outside=_outside(extended, names) if By.OUTSIDE in by else None,
+        timing=_timing(base, extended) if By.TIMING in by else None,
+        acts=names,
+        limited=tuple(limited),
+    )
+
+
+def without_compensable(plant: Plant) -> Plant:
+    """The same plant with the effects off that a controller without compensation knows nothing of, whatever plant its
+    calibration was made on: those of the cell, of the command map and from outside."""
+    null = Plant()
+    for treatment in TREATMENTS:
+        if treatment.by in (By.CELL, By.COMMAND, By.OUTSIDE):
+            for path in treatment.fields:
+                section, name = path.split(".")
+                plant = with_value(plant, section, name, number_at(null, path))
+    return plant
+
+
+def in_simulation(compensation: Compensation) -> Compensation:
+    """Without the forces from outside: a simulated rig is not told how the tool is held, so its plant does not feel them."""
+    outside = {treatment.name for treatment in TREATMENTS if treatment.by is By.OUTSIDE}
+    off = tuple((name, _NOT_SIMULATED) for name in compensation.acts if name in outside)
+    if not off:
+        return compensation
+    acts = tuple(name for name in compensation.acts if name not in outside)
+    return replace(compensation, outside=None, acts=acts, limited=(*compensation.limited, *off))
+
+
+def compensation_words(compensation: Compensation) -> tuple[str, ...]:
+    """For those who start the rig: what is taken back, and what is not."""
+    acts = f"compensated: {', '.join(compensation.acts) or 'nothing'}"
+    return (acts, *(f"not compensated: {name}: {why}" for name, why in compensation.limited))
+
+
+def _why_not(treatment: Treatment, told: frozenset[str], new_model: bool) -> str:
+    if treatment.by is By.NOTHING:
+        return REASONS[treatment.name][1]
+    if treatment.needs and treatment.needs not in told:
+        return f"needs {treatment.needs}, which nobody tells the controller"
+    return CALIBRATE if treatment.by is By.MODEL and not new_model else ""
+
+
+def _cell(plant: Plant, names: tuple[str, ...]) -> CellMap:
+    """Of the effects that act alone: a warm cell without a thermometer keeps its bend."""
+    cell = plant.cell
+    return CellMap(
+        quadratic_per_n=cell.quadratic_per_n if "sensor-quadratic" in names else 0.0,
+        cubic_per_n2=cell.cubic_per_n2 if "sensor-cubic" in names else 0.0,
+        span_per_k=cell.span_per_k if "thermal-span-drift" in names else 0.0,
+        zero_n_per_k=cell.zero_n_per_k if "thermal-zero-drift" in names else 0.0,
+        reference_c=cell.reference_c,
+        crosstalk_n_per_v=cell.crosstalk_n_per_v if "valve-crosstalk" in names else 0.0,
+        zero_n=cell.zero_n,
+    )
+
+
+def _command(plant: Plant) -> CommandMap:
+    regulator = plant.regulator
+    return CommandMap(bow=regulator.command_bow, s=regulator.command_s, full_scale_v=regulator.full_scale_v)
+
+
+def _outside(plant: Plant, names: tuple[str, ...]) -> OutsideForce:
+    contact, drags = plant.contact, "feed-drag" in names
+    return OutsideForce(
+        tilt_n=contact.tilt_n if "tilt-gravity" in names else 0.0,
+        tilt_zero_rad=radians(contact.tilt_zero_deg),
+        feed_drag_n_s_per_mm=contact.feed_drag_n_s_per_mm if drags else 0.0,
+        feed_drag_n=contact.feed_drag_n if drags else 0.0,
+        feed_drag_abs_n_s_per_mm=contact.feed_drag_abs_n_s_per_mm if drags else 0.0,
+    )
+
+
+def _timing(base: Plant, extended: Plant) -> Timing:
+    before, now = base.regulator, extended.regulator
+    return Timing(
+        delay_s=now.delay_s,
+        lags_s=now.lag_s + now.second_lag_s + extended.cell.filter_s,
+        more_s=_answer_s(extended) - _answer_s(base),
+        more_lag_s=now.lag_s - before.lag_s,
+        more_second_lag_s=now.second_lag_s - before.second_lag_s,
+    )
+
+
+def _answer_s(plant: Plant) -> float:
+    """From command to reading: delay and lags."""
+    return plant.regulator.delay_s + plant.regulator.lag_s + plant.regulator.second_lag_s + plant.cell.filter_s

@@ -1,0 +1,121 @@
+"""Whether the two serial lines of a rig fit: the right device at each end, and stable ports. How fast they are: wire_checks."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from gateway.devices import DeviceProfile, Role, cell_host
+from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.edit_marks import PLACEHOLDER
+from gateway.profiles.rigs.rig_file import CellFile, OutputFile
+from gateway.profiles.strict_yaml.sentences import number, volt
+
+_BY_CHANCE: Final = ("/dev/ttyUSB", "/dev/ttyACM")  # numbered in the order of plugging
+_ROLES: Final = {"output": Role.OUTPUT, "load_cell": Role.LOAD_CELL}
+_ARTICLE: Final = {Role.OUTPUT: "an output", Role.LOAD_CELL: "a load cell"}
+
+
+def lines_of(parts: Parts) -> Iterator[tuple[str, OutputFile | CellFile, DeviceProfile | None]]:
+    """Each line that the file describes: (key, what it says, the device's profile)."""
+    if parts.output:
+        yield "output", parts.output, parts.output_device
+    if parts.load_cell:
+        yield "load_cell", parts.load_cell, parts.cell_device
+
+
+def of_role(device: DeviceProfile | None, role: Role) -> DeviceProfile | None:
+    """A device at the wrong end is told once; other checks leave it alone."""
+    return device if device and device.role is role else None
+
+
+def devices_have_their_role(parts: Parts) -> Found:
+    for key, _, device in lines_of(parts):
+        if device and device.role is not _ROLES[key]:
+            yield f"{key}.device", f"{device.name} is {_ARTICLE[device.role]}, {_ARTICLE[_ROLES[key]]} is needed here"
+
+
+def simulated_lines_have_no_port(parts: Parts) -> Found:
+    for key, line, _ in lines_of(parts):
+        if parts.simulated and line.port is not None:
+            yield f"{key}.port", "a simulated rig has no ports: delete this line, or write `simulated: false`"
+
+
+def ports_are_given(parts: Parts) -> Found:
+    for key, line, _ in [] if parts.simulated else lines_of(parts):
+        if line.port is None:
+            yield (
+                f"{key}.port",
+                "is missing: `force-gateway ports` lists what is plugged in (no hardware: `simulated: true`)",
+            )
+        elif PLACEHOLDER.search(line.port):
+            told = "is the placeholder that init wrote: put your adapter's path here, `force-gateway ports` lists them"
+            yield f"{key}.port", f"{line.port} {told}"
+        elif not line.port.startswith("/"):
+            yield f"{key}.port", f'"{line.port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
+
+
+def ports_differ(parts: Parts) -> Found:
+    output, cell = parts.output, parts.load_cell
+    if output and cell and output.port is not None and output.port == cell.port:
+        yield "load_cell.port", "is the output's port too: each device has its own"
+
+
+def the_unit_is_known(parts: Parts) -> Found:
+    """A frame without a unit needs the rig's, one with a unit must not get a second."""
+    device, line = of_role(parts.cell_device, Role.LOAD_CELL), parts.load_cell
+    if device and line:
+        try:
+            cell_host(device, line.sign, line.unit)
+        except ValueError as error:
+            yield "load_cell.unit", str(error)
+
+
+def the_output_reaches(parts: Parts) -> Found:
+    device, limits = of_role(parts.output_device, Role.OUTPUT), parts.limits
+    if not device or not limits:
+        return
+    low, high = device.voltage_range_v
+    for key in ("voltage_min_v", "voltage_max_v", "safe_voltage_v"):
+        value = getattr(limits, key)
+        if not low <= value <= high:
+            yield f"limits.{key}", f"{volt(value)} is outside {number(low)} .. {volt(high)}, the range of {device.name}"
+
+
+def silence_is_accepted(parts: Parts) -> Found:
+    """DESIGN: without a watchdog in the device, nothing but the rig's own word lets it be enabled."""
+    device = of_role(parts.output_device, Role.OUTPUT)
+    if device and device.watchdog == "none" and not parts.accept_no_device_watchdog:
+        risk = f"{device.name} has no watchdog and keeps its last output when this machine loses power"
+        yield (
+            "accept_no_device_watchdog",
+            f"must be true: {risk}; accept it when something else, such as an air dump valve, helps",
+        )
+
+
+def ports_are_stable(parts: Parts) -> Found:
+    for key, line, _ in lines_of(parts):
+        if line.port is not None and line.port.startswith(_BY_CHANCE):
+            told = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
+            yield f"{key}.port", f"{line.port} {told}"
+
+
+def speeds_agree(parts: Parts) -> Found:
+    for key, line, device in lines_of(parts):
+        if device and line.baud != device.serial.baud:
+            end = "the simulated device speaks" if parts.simulated else f"profile {device.name} says"
+            yield f"{key}.baud", f"{line.baud} differs from the other end: {end} {device.serial}"
+
+
+HARDWARE: Final[tuple[Check, ...]] = (ports_are_given, ports_differ)
+"""Faults that a run with simulated devices does not mind."""
+
+FAULTS: Final[tuple[Check, ...]] = (
+    devices_have_their_role,
+    simulated_lines_have_no_port,
+    the_unit_is_known,
+    the_output_reaches,
+    silence_is_accepted,
+)
+WARNINGS: Final[tuple[Check, ...]] = (
+    ports_are_stable,
+    speeds_agree,
+)

@@ -1,0 +1,145 @@
+"""A rig, read and checked: everything that the service needs to wire one cell, frozen."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Final
+
+from gateway.bsfm.model import Bsfm, Calibration, Response
+from gateway.control.compensation.command_map import sent
+from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
+from gateway.control.settings import ControlSettings
+from gateway.devices import DeviceProfile, SerialSettings
+from gateway.profiles.kinds.plants import PlantProfile
+from gateway.profiles.rigs.compensation import in_simulation
+from gateway.profiles.rigs.rig_file import Network, ResidualWatch
+from gateway.registers.map.register_map import RegisterMap
+from gateway.registers.words import ControlBit
+from gateway.twin import Plant
+
+SUPPORTED_BITS: Final = (
+    ControlBit.ENABLE
+    | ControlBit.RESET_FAULT
+    | ControlBit.TARE
+    | ControlBit.TAKE_OWNERSHIP
+    | ControlBit.START_CALIBRATION
+)
+"""Control bits that act; the others are refused (no rig has a valve or a self-test behind them yet)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputLine:
+    """The wire to the DAC or regulator; port None in a simulated rig."""
+
+    device: DeviceProfile
+    port: str | None
+    baud: int
+
+    @property
+    def settings(self) -> SerialSettings:
+        """The device's frame at the rig's speed."""
+        return self.device.serial.at(self.baud)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellLine:
+    """The wire from the load-cell amplifier; sign and unit are the rig's, range_n is the cell's rated force."""
+
+    device: DeviceProfile
+    port: str | None
+    baud: int
+    sign: int
+    unit: str | None
+    range_n: float
+
+    @property
+    def settings(self) -> SerialSettings:
+        """The device's frame at the rig's speed."""
+        return self.device.serial.at(self.baud)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rig:
+    """One cell. texts: every file it was read from, as it was; fingerprint: their SHA-256; notes: what was decided in the
+    user's stead."""
+
+    name: str
+    description: str
+    file: Path
+    simulated: bool
+    seed: int
+    loop_hz: float
+    register_map: RegisterMap
+    output: OutputLine
+    load_cell: CellLine
+    plant_profile: PlantProfile | None
+    stand_in: PlantProfile | None  # what `run --sim` simulates where the rig names no plant
+    calibration: Calibration
+    control: ControlSettings
+    network: Network
+    residual_watch: ResidualWatch
+    supported_bits: ControlBit
+    accept_no_device_watchdog: bool
+    texts: Mapping[str, str]
+    fingerprint: str
+    notes: tuple[str, ...] = ()
+    compensation: Compensation = NO_COMPENSATION
+
+    @property
+    def plant(self) -> Plant | None:
+        """What is simulated; None for a real rig that names no plant."""
+        return self.plant_profile.plant if self.plant_profile else None
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether a residual watch runs beside the gateway: there is a plant, and it is (said to be) this machine's."""
+        enabled = self.residual_watch.enabled
+        return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
+
+    def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
+        """The calibration's model as control uses it here: a bent command map is straightened, but for a calibration that was
+        made on this very rig, for that has measured it."""
+        return model if calibration.rig == self.name else sent(model, self.compensation.command)
+
+    def response_of(self, calibration: Calibration) -> Response | None:
+        """How this rig follows, as the calibration measured it; None for one that another rig was measured with."""
+        here = [
+            self.name,
+            *([f"twin of plant {self.plant_profile.name}"] if self.simulated and self.plant_profile else []),
+        ]
+        return calibration.response if calibration.rig in here else None
+
+    def ports(self) -> dict[str, str]:
+        """The serial ports of a real rig, by line; empty for a simulated one."""
+        ports = {"output": self.output.port, "load_cell": self.load_cell.port}
+        return {name: port for name, port in ports.items() if port is not None}
+
+    def as_simulated(self) -> "Rig":
+        """The same rig with its devices simulated, set as the rig says that the real ones are, on loopback. What was decided in
+        the user's stead is in `notes`."""
+        if self.simulated:
+            return self
+        notes, network = self.notes, self.network
+        if self.plant_profile is None and self.stand_in is not None:
+            notes = (*notes, f"rig {self.name} names no plant: {self.stand_in.name} is simulated in its place")
+        compensation = in_simulation(self.compensation)
+        if compensation.outside is not self.compensation.outside:
+            notes = (*notes, "no force from outside is simulated, so none is compensated")
+        if not ip_address(network.bind).is_loopback:
+            notes = (*notes, f"bound to 127.0.0.1: a simulated rig does not take the cell's address {network.bind}")
+            network = replace(network, bind="127.0.0.1")
+        return replace(
+            self,
+            simulated=True,
+            output=replace(self.output, port=None, device=_set_to(self.output.device, self.output.baud)),
+            load_cell=replace(self.load_cell, port=None, device=_set_to(self.load_cell.device, self.load_cell.baud)),
+            plant_profile=self.plant_profile or self.stand_in,
+            network=network,
+            notes=notes,
+            compensation=compensation,
+        )
+
+
+def _set_to(device: DeviceProfile, baud: int) -> DeviceProfile:
+    return replace(device, serial=device.serial.at(baud))

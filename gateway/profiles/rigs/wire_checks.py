@@ -1,0 +1,247 @@
+"""Whether the wires of a rig are fast enough, and their numbers fine enough, for what the rig asks of them.
+
+Bytes and bits are counted, so each finding says what is possible at this speed; the device's own time to think comes on top
+and is nowhere known.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.devices import CellHost, DeviceProfile, Role, cell_device, cell_host, output_device, output_host
+from gateway.devices.messages import (
+    Accepted,
+    OutputReply,
+    OutputRequest,
+    Pressure,
+    ReadPressure,
+    ReadVoltage,
+    SetVoltage,
+)
+from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.line_checks import of_role
+from gateway.profiles.strict_yaml.sentences import newton, number, second
+
+_SLOWEST_HZ: Final = 20.0  # DEVICES: the pneumatics settle in 0.27-0.49 s and need 20-50 Hz
+
+
+def _output_talks_s(device: DeviceProfile, character_s: float) -> dict[str, float]:
+    """What question and answer take on the wire, s, of every exchange that the gateway has with an output."""
+    high_v = device.voltage_range_v[1]
+    talks: dict[str, tuple[OutputRequest, OutputReply]] = {"set_voltage": (SetVoltage(high_v), Accepted(high_v))}
+    if device.read_voltage:
+        talks["read_voltage"] = ReadVoltage(), Accepted(high_v)
+    if device.read_pressure:
+        talks["read_pressure"] = ReadPressure(), Pressure(device.read_pressure.range.pressure_pa[1])
+    return {name: character_s * _characters(device, *talk) for name, talk in talks.items()}
+
+
+def _characters(device: DeviceProfile, question: OutputRequest, answer: OutputReply) -> int:
+    asked, far = output_host(device).request(question), output_device(device)
+    understood = (one for one in far.receive(asked, 0.0) if isinstance(one, OutputRequest))
+    return len(asked) + sum(len(far.reply(answer, to=one)) for one in understood)
+
+
+@dataclass(frozen=True, slots=True)
+class _Readings:
+    """A load cell on its wire. period_s: between two readings; wire_s: what one takes, its question with it."""
+
+    device: DeviceProfile
+    host: CellHost
+    baud: int
+    wire_s: float
+
+    @property
+    def period_s(self) -> float:
+        rate_hz = self.device.reading.rate_hz
+        return max(self.wire_s, 1.0 / rate_hz if rate_hz else 0.0)
+
+    @property
+    def is_asked(self) -> bool:
+        return bool(self.device.read_force)
+
+
+def _readings(parts: Parts) -> Iterator[_Readings]:
+    """The rig's load cell, where it can be read at all (else told by the_unit_is_known)."""
+    device, line = of_role(parts.cell_device, Role.LOAD_CELL), parts.load_cell
+    if not device or not line:
+        return
+    try:
+        host = cell_host(device, line.sign, line.unit)
+    except ValueError:
+        return
+    characters = len(host.poll()) + len(cell_device(device, line.unit).frame(0.0))
+    yield _Readings(device, host, line.baud, characters * device.serial.at(line.baud).character_s)
+
+
+def _talks(parts: Parts) -> Iterator[tuple[str, float]]:
+    """(exchange, time on the wire in s) of the rig's output."""
+    device, line = of_role(parts.output_device, Role.OUTPUT), parts.output
+    if device and line:
+        yield from _output_talks_s(device, device.serial.at(line.baud).character_s).items()
+
+
+def answers_fit_into_their_time(parts: Parts) -> Found:
+    """A device that is given up before its answer can be through the wire is never heard."""
+    if parts.output_device and parts.output:
+        for name, took_s in _talks(parts):
+            yield from _given_up("output.baud", parts.output_device, parts.output.baud, (name, took_s))
+    for reading in _readings(parts):
+        if reading.is_asked:
+            yield from _given_up("load_cell.baud", reading.device, reading.baud, ("read_force", reading.wire_s))
+
+
+def _given_up(path: str, device: DeviceProfile, baud: int, talk: tuple[str, float]) -> Found:
+    if talk[1] > device.reply_timeout_s:
+        told = f"question and answer of {talk[0]} take {talk[1]:.3f} s on the wire"
+        bound = f"{device.name} gives up after reply_timeout_s = {second(device.reply_timeout_s)}"
+        yield path, f"{baud}: {told}, {bound}: raise it in the profile, or set the device to a higher speed"
+
+
+def output_faults_are_no_accident(parts: Parts) -> Found:
+    took_s = max((took_s for _, took_s in _talks(parts)), default=0.0)
+    if parts.supervision and parts.supervision.output_timeout_s <= took_s:
+        timeout = second(parts.supervision.output_timeout_s)
+        yield (
+            "supervision.output_timeout_s",
+            f"{timeout} is over before an answer can be there: {took_s:.3f} s on the wire",
+        )
+
+
+def the_wires_follow_the_rig(parts: Parts) -> Found:
+    """Beyond the rig's own lag a wire decides when a force is seen, and supervision would take it for a wrong gain."""
+    if parts.supervision is None:
+        return
+    bound_s = parts.supervision.response_lag_s
+    late = f"longer than supervision.response_lag_s = {second(bound_s)}: a force that is seen so late looks like a wrong gain"
+    if (cycle_s := _cycle_s(parts)) > bound_s:
+        yield "output.baud", f"a setting and a reading take {cycle_s:.2f} s on the wire, {late}"
+    for reading in _readings(parts):
+        if reading.period_s > bound_s:
+            yield "load_cell.baud", f"a reading of {reading.device.name} takes {reading.period_s:.2f} s, {late}"
+
+
+def _cycle_s(parts: Parts) -> float:
+    """A setting and the question that keeps the line alive; 0 without an output."""
+    took_s = dict(_talks(parts))
+    return took_s.get("set_voltage", 0.0) + took_s.get("read_pressure", took_s.get("read_voltage", 0.0))
+
+
+def samples_come_in_time(parts: Parts) -> Found:
+    for reading in _readings(parts):
+        if parts.supervision and parts.supervision.sample_timeout_s < 2.0 * reading.period_s:
+            bound, rate = second(parts.supervision.sample_timeout_s), f"{1.0 / reading.period_s:.3g} readings/s"
+            told = f"two readings of {reading.device.name} take {2.0 * reading.period_s:.3g} s ({rate} at {reading.baud} baud)"
+            yield "supervision.sample_timeout_s", f"{bound} is too short: {told}"
+
+
+def the_display_shows_enough(parts: Parts) -> Found:
+    """A display that ends below the bound on force would show its last number for ever."""
+    if (limits := parts.limits) is None or parts.load_cell is None:
+        return
+    for reading in _readings(parts):
+        said = reading.device.reading
+        per_count = reading.host.resolution_n / said.step
+        says_overload = said.blank_is_overload or "overload" in said.quality.values()
+        key = "force_max_n" if says_overload else "over_force_n"
+        wanted_n, end_n = getattr(limits, key), said.largest_shown * per_count
+        if wanted_n > end_n:
+            yield f"limits.{key}", f"{newton(wanted_n)} is beyond what {reading.device.name} can show: {end_n:.4g} N"
+
+
+def counts_are_fine_enough(parts: Parts) -> Found:
+    """supervision.sample_quantum_n decides when a reading counts as frozen, the band whether the force is held."""
+    for reading in _readings(parts):
+        count_n = reading.host.resolution_n
+        one = f"one count of {reading.device.name}, {count_n:.3g} N"
+        if parts.supervision and parts.supervision.sample_quantum_n < 0.5 * count_n:
+            quantum = newton(parts.supervision.sample_quantum_n)
+            yield (
+                "supervision.sample_quantum_n",
+                f"{quantum} is less than {one}: a held force would look like a frozen reading; write {count_n:.3g}",
+            )
+        if parts.defaults and parts.defaults.in_band_tolerance_n < count_n:
+            band = newton(parts.defaults.in_band_tolerance_n)
+            yield (
+                "defaults.in_band_tolerance_n",
+                f"{band} is less than {one}: nobody could tell whether the force is in band",
+            )
+
+
+def settings_are_fine_enough(parts: Parts) -> Found:
+    """Half a step of the output, as the calibration's mean slope makes newtons of it, must fit into the band."""
+    device, calibration, defaults = of_role(parts.output_device, Role.OUTPUT), parts.calibration, parts.defaults
+    if not device or not calibration or not defaults:
+        return
+    low_n, high_n = calibration.model().force_range_n
+    step_v = output_host(device).resolution_v
+    step_n = step_v * (high_n - low_n) / (calibration.x1_v - calibration.x0_v)
+    if 0.5 * step_n > defaults.in_band_tolerance_n:
+        told = f"sets in steps of {step_v:.3g} V, about {step_n:.2g} N"
+        band = f"defaults.in_band_tolerance_n = {newton(defaults.in_band_tolerance_n)}"
+        yield (
+            "output.device",
+            f"{device.name} {told}: {band} cannot be held; more decimals in the template, or a wider band",
+        )
+
+
+def the_output_wire_is_fast_enough(parts: Parts) -> Found:
+    cycle_s = _cycle_s(parts)
+    if cycle_s > 1.0 / _SLOWEST_HZ:
+        told = f"a setting and a reading take {cycle_s * 1e3:.0f} ms on the wire, {1 / cycle_s:.0f} Hz"
+        yield "output.baud", f"{told}; the pneumatics need {number(_SLOWEST_HZ)} Hz"
+    if parts.supervision and parts.supervision.output_timeout_s < 3 * cycle_s:
+        timeout = second(parts.supervision.output_timeout_s)
+        yield (
+            "supervision.output_timeout_s",
+            f"{timeout} is less than three settings with readings on the wire: {3 * cycle_s:.2f} s",
+        )
+
+
+def the_cell_wire_is_fast_enough(parts: Parts) -> Found:
+    for reading in _readings(parts):
+        rate_hz, possible_hz = reading.device.rate_hz, 1.0 / reading.wire_s
+        if rate_hz > possible_hz:
+            yield (
+                "load_cell.baud",
+                f"{reading.baud} carries {possible_hz:.0f} readings/s, {reading.device.name} sends {number(rate_hz)}",
+            )
+        elif reading.period_s > 1.0 / _SLOWEST_HZ:
+            told = f"{reading.device.name} gives {1.0 / reading.period_s:.3g} readings/s"
+            yield "load_cell.baud", f"{reading.baud}: {told}; the pneumatics need {number(_SLOWEST_HZ)}"
+
+
+def a_lost_answer_is_survived(parts: Parts) -> Found:
+    for reading in _readings(parts):
+        gap_s = reading.device.reply_timeout_s + reading.period_s
+        if reading.is_asked and parts.supervision and parts.supervision.sample_timeout_s < gap_s:
+            bound = second(parts.supervision.sample_timeout_s)
+            told = (
+                f"one lost answer leaves a gap of {gap_s:.3g} s ({reading.device.name}: reply_timeout_s and a reading)"
+            )
+            yield "supervision.sample_timeout_s", f"{bound}: {told}, and that is a fault"
+
+
+def the_quantum_is_the_amplifiers(parts: Parts) -> Found:
+    for reading in _readings(parts):
+        count_n = reading.host.resolution_n
+        if parts.supervision and parts.supervision.sample_quantum_n > 2.0 * count_n:
+            told = f"is far from one count of {reading.device.name}, {count_n:.3g} N"
+            yield "supervision.sample_quantum_n", f"{newton(parts.supervision.sample_quantum_n)} {told}"
+
+
+FAULTS: Final[tuple[Check, ...]] = (
+    answers_fit_into_their_time,
+    output_faults_are_no_accident,
+    the_wires_follow_the_rig,
+    samples_come_in_time,
+    the_display_shows_enough,
+    counts_are_fine_enough,
+    settings_are_fine_enough,
+)
+WARNINGS: Final[tuple[Check, ...]] = (
+    the_output_wire_is_fast_enough,
+    the_cell_wire_is_fast_enough,
+    a_lost_answer_is_survived,
+    the_quantum_is_the_amplifiers,
+)

@@ -1,0 +1,215 @@
+"""pydantic's findings in the user's words: what was seen, what is allowed, and what was probably meant."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final
+
+from gateway.profiles.strict_yaml.faults import closest, one_of
+
+_UNITS: Final = {
+    "n": "N", "v": "V", "s": "s", "ms": "ms", "us": "us", "hz": "Hz", "kg": "kg", "g": "g", "pa": "Pa", "kpa": "kPa",
+    "mpa": "MPa", "bar": "bar", "m": "m", "mm": "mm", "m2": "m2", "mm2": "mm2", "n_per_v": "N/V", "n_per_s": "N/s",
+    "v_per_s": "V/s", "n_per_m": "N/m", "v_per_n_s": "V/(N s)", "pa_per_v": "Pa/V", "n_s_per_m": "N s/m", "mv": "mV",
+    "kn": "kN", "kgf": "kgf", "khz": "kHz", "min": "min",
+}  # fmt: skip
+_SCALES: Final = (
+    {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    {"v": 1.0, "mv": 1e-3},
+    {"n": 1.0, "kn": 1e3, "kgf": 9.80665},
+    {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "bar": 1e5},
+    {"kg": 1.0, "g": 1e-3},
+    {"m": 1.0, "mm": 1e-3},
+    {"m2": 1.0, "mm2": 1e-6},
+    {"hz": 1.0, "khz": 1e3},
+)
+_DECIMAL: Final = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+
+def _unit_start(key: str) -> int | None:
+    """Index of the word where the unit begins that ends a key; None when it has none."""
+    words = key.split("_")
+    return next((start for start in range(1, len(words)) if "_".join(words[start:]) in _UNITS), None)
+
+
+def unit_of(key: object) -> str:
+    """The unit that ends a key, as it is printed: ` N/s` for `force_ramp_n_per_s`; empty when it has none."""
+    start = _unit_start(str(key))
+    return f" {_UNITS['_'.join(str(key).split('_')[start:])]}" if start else ""
+
+
+def without_unit(key: str) -> str:
+    """`force_ramp` of `force_ramp_n_per_s`."""
+    return "_".join(key.split("_")[: _unit_start(key)])
+
+
+def number(value: float) -> str:
+    """A number as people write it: without a trailing `.0`, with at most ten digits."""
+    return str(value) if isinstance(value, int) else f"{value:.10g}"
+
+
+def newton(value: float) -> str:
+    return f"{number(value)} N"
+
+
+def volt(value: float) -> str:
+    return f"{number(value)} V"
+
+
+def second(value: float) -> str:
+    return f"{number(value)} s"
+
+
+def shown(value: object) -> str:
+    """A value as the file has it, short."""
+    if value is None:
+        return "empty"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return number(value)
+    if isinstance(value, str):
+        return f'"{value if len(value) <= 40 else value[:37] + "..."}"'
+    return "a list" if isinstance(value, list) else "a group of keys"
+
+
+def unknown_key(key: str, group: Mapping[Any, Any], known: Iterable[str], elsewhere: Mapping[str, str]) -> str:
+    """The sentence for a key that its group does not have. group: what stands there; elsewhere: key -> where it belongs.
+
+    A key that the group has already cannot have been meant.
+    """
+    known = list(known)
+    free = [name for name in known if name not in group]
+    if (scaled := _other_unit(key, group.get(key), free)) is not None:
+        return f"is not a known key; this quantity is given as {scaled}"
+    for name in free:
+        if name != key and without_unit(name) == key:
+            return f"is not a known key; did you mean {name}? (a key ends with its unit)"
+    if key in elsewhere:
+        return f"is not a known key here; it belongs under {elsewhere[key]}"
+    if (near := closest(key, free)) is not None:
+        return f"is not a known key; did you mean {near}?"
+    return f"is not a known key; known are {one_of(known)}"
+
+
+def meant_key(sentence: str) -> str | None:
+    """The key that an `unknown_key` sentence proposes."""
+    found = re.search(r"did you mean (\w+)\?|is given as (\w+)", sentence)
+    return (found[1] or found[2]) if found and sentence.startswith("is not a known key") else None
+
+
+def is_stranger(sentence: str) -> bool:
+    """True for an `unknown_key` sentence that knows no key that was meant."""
+    return sentence.startswith("is not a known key") and meant_key(sentence) is None
+
+
+def _other_unit(key: str, value: object, known: list[str]) -> str | None:
+    """`lease_ms: 200` -> `lease_s: 0.2`: the same stem with another unit of the same kind."""
+    stem, _, unit = key.rpartition("_")
+    for scale in _SCALES:
+        if unit not in scale:
+            continue
+        for other in scale:
+            if other != unit and f"{stem}_{other}" in known:
+                is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+                amount = f": {float(value) * scale[unit] / scale[other]:.6g}" if is_number else ""  # type: ignore[arg-type]
+                return f"{stem}_{other}{amount}"
+    return None
+
+
+def _expected(what: str) -> Callable[[Any, dict[str, Any], str], str]:
+    def sentence(value: Any, context: dict[str, Any], unit: str) -> str:
+        hint = _hint(value, what)
+        seen = str(value) if isinstance(value, float) and hint else shown(value)
+        return f"{seen} is not {what}{hint}"
+
+    return sentence
+
+
+def _hint(value: Any, what: str) -> str:
+    """Why a value that looks right is not: quotes, decimal comma, YAML 1.1's booleans."""
+    if isinstance(value, float) and value.is_integer() and what == "a whole number":
+        return f": write {int(value)}"
+    if isinstance(value, bool) and what == "text":
+        return f': write "{str(value).lower()}" in quotes'
+    if isinstance(value, (int, float)) and what == "text":
+        return f': write "{number(value)}" in quotes'
+    if not isinstance(value, str):
+        return ""
+    if what == "true or false" and value.lower() in ("yes", "on", "y", "no", "off", "n", "true", "false"):
+        return f": write {'true' if value.lower() in ('yes', 'on', 'y', 'true') else 'false'}"
+    if "number" in what:
+        return _number_hint(value)
+    return ""
+
+
+def _number_hint(text: str) -> str:
+    repairs = (
+        (text, "take the quotes away"),
+        (text.replace("_", ""), "digits are not grouped"),
+        (text.replace(",", "."), "decimals take a point"),
+        (text.partition(" ")[0], "the unit stands in the key"),
+    )
+    return next((f": write {new} ({reason})" for new, reason in repairs if _DECIMAL.fullmatch(new)), "")
+
+
+def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
+    """`expected` is pydantic's list: `'fault', 'hold' or 'ramp'`."""
+    choices = [word.strip(" '") for word in str(context["expected"]).replace(" or ", ",").split(",")]
+    seen = value if isinstance(value, str) else shown(value)
+    near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
+    if len(choices) == 1:
+        return f"{seen} is not {choices[0]}, the only choice"
+    return f"{seen} is not one of {one_of(choices)}" + (f"; did you mean {near}?" if near else "")
+
+
+def _nearest(value: Any, choices: list[str]) -> str | None:
+    """The number among the choices that a slip of the finger makes this one of."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    near = [choice for choice in choices if choice.isdecimal() and abs(value - int(choice)) <= 0.1 * int(choice)]
+    return min(near, key=lambda choice: abs(value - int(choice)), default=None)
+
+
+_BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
+    "literal_error": _choice,
+    "enum": _choice,
+    "float_type": _expected("a number"),
+    "float_parsing": _expected("a number"),
+    "int_type": _expected("a whole number"),
+    "int_parsing": _expected("a whole number"),
+    "int_from_float": _expected("a whole number"),
+    "int_parsing_size": _expected("a whole number of usual size"),
+    "bool_type": _expected("true or false"),
+    "bool_parsing": _expected("true or false"),
+    "string_type": _expected("text"),
+    "tuple_type": _expected("a list"),
+    "list_type": _expected("a list"),
+    "set_type": _expected("a list"),
+    "frozen_set_type": _expected("a list"),
+    "dict_type": _expected("a group of keys"),
+    "dataclass_type": _expected("a group of keys"),
+    "model_type": _expected("a group of keys"),
+    "greater_than": lambda v, c, u: f"{shown(v)}{u} is not above {number(c['gt'])}{u}",
+    "greater_than_equal": lambda v, c, u: f"{shown(v)}{u} is below {number(c['ge'])}{u}, the least allowed",
+    "less_than": lambda v, c, u: f"{shown(v)}{u} is not below {number(c['lt'])}{u}",
+    "less_than_equal": lambda v, c, u: f"{shown(v)}{u} is above {number(c['le'])}{u}, the most allowed",
+    "multiple_of": lambda v, c, u: f"{shown(v)}{u} is not a multiple of {number(c['multiple_of'])}{u}",
+    "too_short": lambda v, c, u: f"has {c['actual_length']} entries, at least {c['min_length']} are needed",
+    "too_long": lambda v, c, u: f"has more than {c['max_length']} entries, the most allowed",
+    "string_too_short": lambda v, c, u: (
+        "is empty" if not v else f"{shown(v)} is shorter than {c['min_length']} characters"
+    ),
+    "string_too_long": lambda v, c, u: f"{shown(v)} is longer than {c['max_length']} characters",
+    "string_pattern_mismatch": lambda v, c, u: f"{shown(v)} does not have the form {c['pattern']}",
+    "value_error": lambda v, c, u: str(c["error"]),
+    "finite_number": lambda v, c, u: f"{shown(v)} is not a finite number",
+}
+
+
+def type_sentence(error: Mapping[str, Any], value: Any, key: object) -> str:
+    """The sentence for one pydantic error about a value that is there; value as the file has it."""
+    context: dict[str, Any] = error.get("ctx") or {}
+    if value is None and error["type"] != "value_error":
+        return "has no value"
+    words = _BY_TYPE.get(error["type"])
+    return words(value, context, unit_of(key)) if words else f"{shown(value)}: {error['msg']}"

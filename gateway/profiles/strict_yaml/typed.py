@@ -1,0 +1,140 @@
+"""Plain YAML values -> frozen dataclasses, by pydantic, with its findings told at their place in the file.
+
+Values go through JSON: there pydantic's strict mode takes a mapping for a dataclass, a list for a tuple and a name for an
+enum, but never "5" for 5 or 5.0 for a count, which is what a profile needs. Bounds, defaults and unknown keys come from the
+dataclasses themselves (`Annotated[float, Gt(0)]`, `__pydantic_config__ = {"extra": "forbid"}`): the rooms own their settings.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from functools import cache
+from types import UnionType
+from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
+
+from gateway.profiles.strict_yaml.faults import Fault, Path, path_text
+from gateway.profiles.strict_yaml.sentences import is_stranger, meant_key, type_sentence, unit_of, unknown_key
+from gateway.profiles.strict_yaml.text import Document
+
+T = TypeVar("T")
+_MOST_FINDINGS: Final = 50
+
+
+@cache
+def adapter(kind: type) -> TypeAdapter[Any]:
+    """pydantic's view of one dataclass; built once, it costs milliseconds."""
+    return TypeAdapter(kind)
+
+
+def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None, list[Fault]]:
+    """The dataclass at `path` of the document, or None and every fault."""
+    try:
+        value: T = adapter(cast("Any", kind)).validate_json(json.dumps(document.at(*path)), strict=True)
+        return value, []
+    except ValidationError as error:
+        findings = _told_once(error)
+    faults = [_fault(kind, document, path, found) for found in findings]
+    return None, sorted(_without_echoes(faults))
+
+
+def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
+    """The dataclass at `path`, for cross-checks: keys that mean nothing there are left out, any other fault gives None."""
+    value, faults = build(kind, document, path)
+    strangers = {fault.path for fault in faults if is_stranger(fault.message)}
+    group = document.at(*path)
+    if value is not None or not isinstance(group, dict) or len(strangers) < len(faults):
+        return value
+    known = {key: group[key] for key in group if path_text((*path, key)) not in strangers}
+    return build(kind, Document(document.file, known, document.marks))[0]
+
+
+def _told_once(error: ValidationError) -> list[Any]:
+    """A union reports each of its members; one finding per place is enough, the first. No more than a person reads: a sentence
+    takes half a millisecond, and a hostile document may have thousands."""
+    first = error.errors(include_url=False)[:_MOST_FINDINGS]
+    return list({_steps(found["loc"]): found for found in reversed(first)}.values())[::-1]
+
+
+def _without_echoes(faults: list[Fault]) -> list[Fault]:
+    """A misspelt key is also a missing one: the second finding goes, for the first tells what was meant."""
+    meant = {
+        f"{fault.path.rpartition('.')[0]}.{key}".lstrip(".") for fault in faults if (key := meant_key(fault.message))
+    }
+    return [fault for fault in faults if not (fault.path in meant and fault.message.startswith("is missing"))]
+
+
+def _steps(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    return tuple(step for step in location if not (isinstance(step, str) and any(sign in step for sign in "[(-")))
+
+
+def _fault(kind: type, document: Document, path: Path, found: Mapping[str, Any]) -> Fault:
+    place = _place(document, path, found["loc"])
+    key = place[-1] if place else ""
+    if found["type"] == "missing":
+        return document.fault(place, f"is missing{_what_it_is(kind, place[len(path) :])}", at_key=True)
+    if found["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        known = names(kind_at(kind, place[len(path) : -1]) or kind)
+        sentence = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
+        return document.fault(place, sentence, at_key=True)
+    return document.fault(place, type_sentence(found, document.at(*place), key))
+
+
+def _place(document: Document, path: Path, location: tuple[int | str, ...]) -> Path:
+    """pydantic's location as a path of the document: names of union members are left out, keys keep the file's type."""
+    place = path
+    for index, step in enumerate(location):
+        here = document.at(*place)
+        if isinstance(here, dict):
+            match = next((key for key in here if str(key) == str(step)), None)
+            if match is None and index + 1 < len(location):
+                continue
+            place = (*place, step if match is None else match)
+        elif isinstance(here, list) and isinstance(step, int):
+            place = (*place, step)
+    return place
+
+
+def _what_it_is(kind: type, place: Path) -> str:
+    unit = unit_of(place[-1]) if place else ""
+    return f" (a value in{unit})" if unit else ""
+
+
+def names(kind: type) -> list[str]:
+    """The keys that a group may have."""
+    return [field.name for field in fields(kind)] if is_dataclass(kind) else []
+
+
+def kind_at(kind: type, path: Path) -> type | None:
+    """The dataclass that describes the group at `path` below `kind`, None when it is no dataclass."""
+    found: type | None = kind
+    for step in path:
+        if isinstance(step, int):
+            continue
+        if found is None or not is_dataclass(found):
+            return None
+        found = next((inner for name, inner in groups(found) if name == step), None)
+    return found
+
+
+def groups(kind: type) -> Iterator[tuple[str, type]]:
+    """(key, dataclass) for each field of a dataclass that is one itself, also as `X | None` or `tuple[X, ...]`."""
+    hints = get_type_hints(kind)
+    for field in fields(kind):
+        for candidate in _members(hints[field.name]):
+            if is_dataclass(candidate) and isinstance(candidate, type):
+                yield field.name, candidate
+
+
+def _members(hint: Any) -> Iterator[Any]:
+    if get_origin(hint) in (Union, UnionType, tuple):
+        for member in get_args(hint):
+            yield from _members(member)
+    else:
+        yield hint
+
+
+def groups_by_key(kind: type) -> dict[str, str]:
+    """Where each key of a nested group belongs: {"force_max_n": "limits"}."""
+    return {name: group for group, inner in groups(kind) for name in names(inner)}

@@ -1,0 +1,41 @@
+"""Any recording that a user may have, by its first bytes: our own format, Parquet, else CSV."""
+
+from pathlib import Path
+
+from gateway.recording.errors import RecordingError
+from gateway.recording.layout import MAGIC
+from gateway.recording.reader import Recording, read_recording
+from gateway.recording.tables.column_mapping import ColumnMapping, picked
+from gateway.recording.tables.csv_table import read_csv
+from gateway.recording.tables.parquet_table import MAGIC as PARQUET_MAGIC
+from gateway.recording.tables.parquet_table import read_parquet
+
+
+def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool = False) -> Recording:
+    """The columns of any table, renamed and converted by `mapping`; float64, NaN where nothing was measured.
+
+    lenient: rows and cells of a CSV that cannot be read are told in `notes` and left out; else they are a
+    RecordingError that names row and column. OSError as usual.
+    """
+    if path.is_dir():
+        raise RecordingError(f"{path} is a directory: name the recording in it")
+    with path.open("rb") as stream:
+        start = stream.read(len(MAGIC))
+    if start == MAGIC or (path.suffix == ".fgr" and start):
+        return _renamed(read_recording(path), mapping)
+    if start.startswith(PARQUET_MAGIC):
+        return read_parquet(path, mapping)
+    if not start:
+        raise RecordingError(f"{path} is empty")
+    return read_csv(path, mapping, lenient=lenient)
+
+
+def _renamed(recording: Recording, mapping: ColumnMapping | None) -> Recording:
+    if mapping is None:
+        return recording
+    names = list(recording.columns)
+    columns = {
+        pick.name: recording.columns[names[pick.index]] * pick.factor + pick.offset
+        for pick in picked(names, mapping, str(recording.path))
+    }
+    return Recording(recording.path, recording.header, columns, recording.rows, recording.truncated, recording.notes)

@@ -1,0 +1,250 @@
+"""Reads a CSV of the recording contract: UTF-8, `# key: value` lines, one header row or a column mapping, numbers.
+
+Two ways to the same numbers: pyarrow reads a clean table at hundreds of megabytes per second; the first thing that it
+does not understand (a word, a row too short, a comment or a blank line between rows) sends the file down the exact way,
+line by line, which knows every rule and names row and column.
+
+strict (the diagnosis): a cell of a contract column that is no number, or a row with too few or too many cells, is a
+RecordingError. lenient (the fit, which needs stairs and not every row): it is told in the notes, and left out.
+"""
+
+import mmap
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.recording.errors import RecordingError
+from gateway.recording.reader import Recording
+from gateway.recording.tables.column_mapping import EXAMPLE, ColumnMapping, Picked, listed, picked
+from gateway.recording.tables.csv_form import MISSING, CsvForm, csv_form, rows_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+LARGEST_CELLS: Final = 64_000_000  # half a gigabyte as float64
+_MOST_NOTES: Final = 3
+_CELLS_AT_ONCE: Final = 1 << 18
+_QUALITY_WORDS: Final = {
+    "ok": 0.0,
+    "good": 0.0,
+    "valid": 0.0,
+    "unstable": 1.0,
+    "overload": 2.0,
+    "bad": 2.0,
+    "invalid": 2.0,
+}
+
+
+def read_csv(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool = False) -> Recording:
+    """Header facts and columns of a CSV; RecordingError with what was seen when it is none, OSError as usual."""
+    form = csv_form(path)
+    if mapping is None and not form.has_header:
+        raise RecordingError(
+            f"{path}:{form.skip + 1}: no header row; it names the columns, such as time_s,command_v,force_n. "
+            f"Or say which is which: {EXAMPLE} (the table has {len(form.names)} columns)"
+        )
+    asked = picked(form.names, mapping, str(path))
+    chosen = [pick for pick in asked if pick.is_contract or not form.is_words(pick.index)]
+    words = [pick.name for pick in asked if pick not in chosen]
+    if not chosen:
+        raise RecordingError(
+            f"{path}: no column of numbers; a recording is a table with a header such as time_s,command_v,force_n"
+        )
+    table = _fast(form, chosen) or _Exact(form, chosen, lenient).read()
+    notes = [*table.notes, *([f"columns of words, not numbers: {listed(words)}"] if words else [])]
+    columns = {pick.name: _converted(table.columns[k], pick) for k, pick in enumerate(chosen) if k in table.columns}
+    rows = len(table.lines)
+    return Recording(path, dict(table.facts), columns, rows, table.dropped, tuple(notes), lines=table.lines)
+
+
+@dataclass(slots=True)
+class Table:
+    """Numbers as they stand, by the place of the column in what was chosen; lines: line number of each row."""
+
+    facts: dict[str, str]
+    columns: "dict[int, NDArray[np.float64]]"
+    lines: "Sequence[int] | NDArray[np.int64]"
+    notes: list[str] = field(default_factory=list)
+    dropped: bool = False
+
+
+def _converted(values: "NDArray[np.float64]", pick: Picked) -> "NDArray[np.float64]":
+    return values if (pick.factor, pick.offset) == (1.0, 0.0) else values * pick.factor + pick.offset
+
+
+def _fast(form: CsvForm, chosen: Sequence[Picked]) -> Table | None:
+    """All rows at once; None when there is anything between them that is no row of numbers."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    if not chosen or not form.sample:
+        return None
+    pa.enable_signal_handlers(False)  # they would hold a pipe open from now on, and Ctrl-C is Python's
+    names = [str(k) for k in range(len(form.names))]
+    kept = [names[pick.index] for pick in chosen]
+    with form.path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        _check_size(form, data, len(chosen))
+        if data.find(b"\n#", 1) >= 0 and _is_comment_between(form, data):
+            return None
+        try:
+            found = csv.read_csv(
+                pa.BufferReader(pa.memory_map(str(form.path)).read_buffer().slice(0, _end(data))),
+                read_options=csv.ReadOptions(skip_rows=form.skip, column_names=names, block_size=8 << 20),
+                parse_options=csv.ParseOptions(delimiter=form.separator, ignore_empty_lines=False),
+                convert_options=csv.ConvertOptions(
+                    column_types=dict.fromkeys(kept, pa.float64()),
+                    include_columns=list(dict.fromkeys(kept)),
+                    null_values=[word for given in MISSING for word in (given, given.upper(), given.title(), "NaN")],
+                    decimal_point=form.decimal,
+                ),
+            )
+        except pa.ArrowInvalid:
+            return None
+        columns = {k: _floats(found[name]) for k, name in enumerate(kept)}
+    first = form.skip + 1
+    return Table(form.facts, columns, range(first, first + found.num_rows))
+
+
+def _floats(column: Any) -> "NDArray[np.float64]":
+    """A float64 array that owns its numbers; NaN for null."""
+    import numpy as np
+
+    return np.array(column.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _is_comment_between(form: CsvForm, data: mmap.mmap) -> bool:
+    """A comment after the first row: pyarrow could take it for data where its first cell is not asked for."""
+    at = 0
+    for _ in range(form.skip):
+        at = data.find(b"\n", at) + 1
+    return data.find(b"\n#", at) >= 0
+
+
+def _end(data: mmap.mmap) -> int:
+    """Where the last row ends: blank lines after it are no rows."""
+    end = len(data)
+    while end > 0 and data[end - 1] in b"\r\n":
+        end -= 1
+    return end
+
+
+def _check_size(form: CsvForm, data: mmap.mmap, columns: int) -> None:
+    if len(data) < LARGEST_CELLS:  # every cell takes two bytes at least
+        return
+    step = 1 << 24
+    rows = sum(data[at : at + step].count(b"\n") for at in range(0, len(data), step))
+    refuse_too_large(form.path, rows, columns)
+
+
+def refuse_too_large(path: Path, rows: int, columns: int) -> None:
+    if rows * columns > LARGEST_CELLS:
+        raise RecordingError(
+            f"{path}: {rows} rows of {columns} columns are more than {LARGEST_CELLS} numbers: "
+            "take a part of the rows, or leave columns out"
+        )
+
+
+class _Exact:
+    """One line after the other."""
+
+    def __init__(self, form: CsvForm, chosen: Sequence[Picked], lenient: bool) -> None:
+        self._form = form
+        self._chosen = chosen
+        self._lenient = lenient
+        self._told: list[str] = []
+        self._ragged: tuple[int, int] | None = None  # (line, cells) of a row that may be the torn last one
+        self._wrong: dict[int, int] = {}  # column -> cells that were no number
+        self._first_wrong: dict[int, str] = {}
+
+    def read(self) -> Table:
+        import numpy as np
+
+        facts: dict[str, str] = {}
+        lines: list[int] = []
+        blocks: list[Any] = []
+        rows: list[list[float]] = []
+        with self._form.path.open(encoding="utf-8-sig", errors="replace") as stream:
+            for at, line in rows_of(stream, facts):
+                values = self._values(at, line) if at > self._form.skip else None
+                if values is not None:
+                    lines.append(at)
+                    rows.append(values)
+                if len(rows) * len(self._chosen) >= _CELLS_AT_ONCE:
+                    blocks.append(np.array(rows, dtype=np.float64))
+                    rows = []
+        blocks.append(np.array(rows, dtype=np.float64).reshape(-1, len(self._chosen)))
+        self._end_of_file()
+        table = np.concatenate(blocks)
+        columns = {k: table[:, k].copy() for k in range(len(self._chosen)) if not self._is_words(k, len(table))}
+        notes = self._notes(columns)
+        return Table(facts, columns, np.array(lines, dtype=np.int64), notes, dropped=bool(self._told))
+
+    def _values(self, at: int, line: str) -> list[float] | None:
+        """The chosen numbers of a row; None when it is left out."""
+        form = self._form
+        cells = form.cells(line)
+        if self._ragged:
+            self._refuse_ragged(*self._ragged)
+        if len(cells) != len(form.names):
+            self._ragged = (at, len(cells))
+            return None
+        try:
+            if form.decimal == "." and "_" not in line:
+                return [float(cells[pick.index]) for pick in self._chosen]
+        except ValueError:
+            pass
+        return [self._value(at, k, cells[pick.index]) for k, pick in enumerate(self._chosen)]
+
+    def _value(self, at: int, k: int, cell: str) -> float:
+        value = self._form.number(cell)
+        if value is None and self._chosen[k].name == "quality":
+            value = _QUALITY_WORDS.get(cell.strip().lower())
+        return self._no_number(at, k, cell.strip()) if value is None else value
+
+    def _no_number(self, at: int, k: int, cell: str) -> float:
+        pick = self._chosen[k]
+        if pick.is_contract and not self._lenient:
+            raise RecordingError(
+                f"{self._form.path}:{at}, column {pick.name} (the {pick.index + 1}. of the table): {cell[:20]!r} is no number"
+            )
+        if pick.is_contract:
+            self._told.append(f"line {at}, {pick.name}: {cell[:20]!r} is no number")
+        self._wrong[k] = self._wrong.get(k, 0) + 1
+        self._first_wrong.setdefault(k, f"line {at}, {pick.name}: {cell[:20]!r} is no number")
+        return nan
+
+    def _refuse_ragged(self, at: int, cells: int) -> None:
+        self._ragged = None
+        width = f"{len(self._form.names)}" if self._form.has_header else f"{len(self._form.names)} as in the first row"
+        sentence = f"{cells} cells, {'the header' if self._form.has_header else 'expected'} {width}"
+        if not self._lenient:
+            raise RecordingError(f"{self._form.path}:{at}: {sentence}")
+        self._told.append(f"line {at} has {sentence}: left out")
+
+    def _end_of_file(self) -> None:
+        if self._ragged:
+            at, cells = self._ragged
+            self._told.append(
+                f"line {at}, the last, is torn: {cells} of {len(self._form.names)} cells; it was left out"
+            )
+
+    def _is_words(self, k: int, rows: int) -> bool:
+        return not self._chosen[k].is_contract and self._wrong.get(k, 0) > 0.5 * rows
+
+    def _notes(self, columns: "dict[int, NDArray[np.float64]]") -> list[str]:
+        mixed = [k for k in self._first_wrong if k in columns and not self._chosen[k].is_contract]
+        words = [pick.name for k, pick in enumerate(self._chosen) if k not in columns]
+        notes = shortened(self._told, "such lines")
+        notes += shortened(
+            [f"{self._first_wrong[k]} ({self._wrong[k]} such cells): not known there" for k in mixed], "such columns"
+        )
+        return notes + ([f"columns of words, not numbers: {listed(words)}"] if words else [])
+
+
+def shortened(notes: Sequence[str], noun: str, most: int = _MOST_NOTES) -> list[str]:
+    """The first few, and how many more there were."""
+    more = len(notes) - most
+    return [*notes[:most], f"and {more} more {noun}"] if more > 0 else list(notes)

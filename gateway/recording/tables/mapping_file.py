@@ -1,0 +1,46 @@
+"""A column mapping as a YAML file: `time_s: 1:ms`, one line for each column; the keys are those of `--columns`."""
+
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.profiles.strict_yaml.faults import ProfileError
+from gateway.profiles.strict_yaml.text import Document, parse
+from gateway.recording.errors import RecordingError
+from gateway.recording.tables.column_mapping import ColumnMapping
+
+_SUFFIXES: Final = (".yaml", ".yml")
+_KEYS: Final = {"column", "unit"}
+
+
+def column_mapping(text: str | None) -> ColumnMapping | None:
+    """The mapping of an option's value: a YAML file's name, else `NAME=COLUMN:UNIT,...`; None for None.
+
+    RecordingError in the user's words, for a file with its line and column.
+    """
+    if text is None:
+        return None
+    return read_mapping(Path(text)) if text.lower().endswith(_SUFFIXES) else ColumnMapping.parse(text)
+
+
+def read_mapping(path: Path) -> ColumnMapping:
+    """The mapping in a file. A value is a number, a header, either with `:unit`, or `{column: 7, unit: n}`."""
+    try:
+        document = parse(path.read_bytes(), str(path))
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+    except ProfileError as error:
+        raise RecordingError(str(error)) from None
+    try:
+        return ColumnMapping.of({str(key): _entry(document, key) for key in document.value})
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {str(error).removeprefix('--columns: ')}") from None
+
+
+def _entry(document: Document, key: Any) -> int | str:
+    value = document.at(key)
+    if isinstance(value, dict) and "column" in value and set(value) <= _KEYS:
+        unit = value.get("unit")
+        value = f"{value['column']}:{unit}" if unit is not None else value["column"]
+    if isinstance(value, (int, str)) and not isinstance(value, bool):
+        return value
+    raise RecordingError(str(document.fault((key,), "is no column: 7, 7:n, a header, or {column: 7, unit: n}")))

@@ -1,0 +1,178 @@
+"""The Modbus map as data: blocks of registers, each with name, address, type, scale, unit, access, limits and text.
+
+Built from profiles/registers/*.yaml by `RegisterMap.from_document` (see map_reader.py). Addresses are 0-based. A name is unique
+within its block; a bare NAME means the int16 register, `NAME@BLOCK` any other.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cached_property
+from json import dumps
+from typing import Any
+from zlib import crc32
+
+from gateway.registers.values import WordOrder, pack_number, unpack_number, words_of
+
+PLAIN_BLOCKS = ("command", "status")
+"""Blocks whose registers a bare NAME means."""
+
+_DECIMALS = {"N": 2, "N/s": 1, "deg": 1, "V": 3, "s": 4}
+
+
+class UnknownRegister(LookupError):  # noqa: N818  reads as what it is
+    """No register of that name; the message proposes one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One value of the map. address: 0-based, of the first word; minimum, maximum: in `unit`, None where the type decides.
+
+    scale: unit per count (0.01 N); values: names of an enumeration's numbers; bits: names of a word's bits;
+    constant: what a proof register always reads.
+    """
+
+    name: str
+    block: str
+    address: int
+    words: int
+    type: str
+    scale: float
+    unit: str
+    access: str  # "R" or "RW"
+    minimum: float | None
+    maximum: float | None
+    text: str
+    values: Mapping[int, str] = field(default_factory=dict)
+    bits: Mapping[int, str] = field(default_factory=dict)
+    word_order: WordOrder = WordOrder.ABCD
+    constant: float | None = None
+
+    @property
+    def is_writable(self) -> bool:
+        return self.access == "RW"
+
+    @property
+    def counts_per_unit(self) -> int:
+        """1 / scale, a whole number: dividing by it rounds correctly where multiplying by 0.01 does not."""
+        return round(1.0 / self.scale)
+
+    @property
+    def decimals(self) -> int:
+        """Digits after the point that people want to see of this quantity, the same in all blocks."""
+        return _DECIMALS.get(self.unit, 0)
+
+    def decode(self, data: bytes) -> float | int:
+        """The value of these words in `unit`; NaN when unavailable. ValueError on a wrong length."""
+        number = unpack_number(self.type, self.word_order, data)
+        return number if self.scale == 1.0 else number / self.counts_per_unit
+
+    def encode(self, value: float) -> bytes:
+        """The words of a value in `unit`, rounded to the register's resolution. ValueError when the type cannot carry it."""
+        return pack_number(self.type, self.word_order, value if self.scale == 1.0 else value * self.counts_per_unit)
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A contiguous range of addresses, first..last. repeats: {block: base address} shown again here as float32."""
+
+    name: str
+    first: int
+    last: int
+    text: str = ""
+    word_order: WordOrder = WordOrder.ABCD
+    repeats: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def words(self) -> int:
+        return self.last - self.first + 1
+
+
+def repeated(register: Register, source: Block, block: Block) -> Register | None:
+    """The same quantity as float32 in a float block: word k of the source at base + 2k. None if float32 cannot carry it."""
+    if register.type in ("int32", "uint32"):
+        return None
+    return Register(
+        name=register.name,
+        block=block.name,
+        address=block.repeats[source.name] + 2 * (register.address - source.first),
+        words=words_of("float32"),
+        type="float32",
+        scale=1.0,
+        unit=register.unit,
+        access=register.access,
+        minimum=register.minimum,
+        maximum=register.maximum,
+        text=register.text,
+        values=register.values,
+        bits=register.bits,
+        word_order=block.word_order,
+    )
+
+
+@dataclass(frozen=True)
+class RegisterMap:
+    """One version of the map. Numbers are frozen within a version."""
+
+    name: str
+    version: int
+    blocks: tuple[Block, ...]
+    registers: tuple[Register, ...]
+    text: str = ""
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> "RegisterMap":
+        """A map from the content of its YAML file. MapError (a ValueError) lists every fault with its place in the file."""
+        from gateway.registers.map.map_reader import read_map  # the reader builds these classes
+
+        return read_map(document)
+
+    def block(self, name: str) -> Block:
+        """LookupError for a block that is not there."""
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        raise LookupError(f"map {self.name} has no block {name}")
+
+    def registers_of(self, block: str) -> tuple[Register, ...]:
+        """By address."""
+        return tuple(register for register in self.registers if register.block == block)
+
+    def find(self, name: str) -> Register:
+        """`NAME` or `NAME@BLOCK`. UnknownRegister, with "did you mean", for anything else."""
+        if (register := self._by_name.get(name)) is not None:
+            return register
+        bare, _, block = name.partition("@")
+        matches = [register for register in self.registers if register.name == bare]
+        if len(matches) == 1 and not block:
+            return matches[0]
+        if matches:
+            choices = " or ".join(f"{bare}@{register.block}" for register in matches)
+            raise UnknownRegister(f"{name} is not a register; did you mean {choices}?")
+        raise UnknownRegister(f"{name} is not a register{self._meant(name)}")
+
+    def _meant(self, name: str) -> str:
+        near = get_close_matches(
+            name.lower(), [*self._by_name, *(register.name for register in self.registers)], 1, 0.6
+        )
+        return f"; did you mean {near[0]}?" if near else "; force-gateway registers lists them"
+
+    @cached_property
+    def _by_name(self) -> dict[str, Register]:
+        names = {f"{register.name}@{register.block}": register for register in self.registers}
+        plain = {register.name: register for register in self.registers if register.block in PLAIN_BLOCKS}
+        return plain | names
+
+    @cached_property
+    def map_hash(self) -> int:
+        """CRC-32 of everything that a master relies on; texts may be improved without a change of it."""
+        content = [self.name, self.version, *([b.name, b.first, b.last] for b in self.blocks)]
+        content += [_essence(register) for register in self.registers]
+        return crc32(dumps(content, sort_keys=True, separators=(",", ":")).encode())
+
+
+def _essence(register: Register) -> list[Any]:
+    limits = [register.minimum, register.maximum, register.constant]
+    names = [{str(number): name for number, name in group.items()} for group in (register.values, register.bits)]
+    place = [register.name, register.block, register.address, register.words, register.type, str(register.word_order)]
+    return [*place, register.scale, register.unit, register.access, *limits, *names]

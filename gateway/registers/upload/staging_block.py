@@ -1,0 +1,128 @@
+"""The staging block of the coefficient upload and the read-back of the active set.
+
+Staging takes words one at a time, for masters that have only FC06; nothing there is judged until the commit word is
+written. commit and slot_select act when written and are passed on; who serves them reports with `show_commit`. While a
+commit is under way staging writes are refused (06). An upload needs no ownership of the setpoint, but the calibration
+role, which plain TCP has only where the rig allows it.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from gateway.bsfm.model import Calibration
+from gateway.modbus import Peer
+from gateway.registers.command_block import check_zeros
+from gateway.registers.image import RegisterImage
+from gateway.registers.map.register_map import RegisterMap
+from gateway.registers.refusal import Refusal
+from gateway.registers.rules import BankRules
+from gateway.registers.upload.coefficients import (
+    BLOCK_BYTES,
+    HEAD_BYTES,
+    SET_WORDS,
+    TAIL_FROM,
+    CoefficientSet,
+    model_hash,
+)
+from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus, RefusalReason
+
+NO_SLOT: Final = 0xFFFF
+
+OnCommit = Callable[[CommitAction, bytes, Peer], None]
+"""on_commit(action, words of the staging block, peer); raises Refusal to refuse."""
+OnSelect = Callable[[int, Peer], None]
+
+
+class StagingBlock:
+    """ValueError for a map without the staging or the active block."""
+
+    def __init__(self, register_map: RegisterMap, rules: BankRules, image: RegisterImage) -> None:
+        self.on_commit: OnCommit | None = None
+        self.on_select: OnSelect | None = None
+        self._image = image
+        self._rules = rules
+        self._first = register_map.find("order@staging").address
+        self._commit = register_map.find("commit").address
+        self._select = register_map.find("slot_select").address
+        self._shown = [register_map.find(name) for name in ("commit_status", "failing_index", "failing_reason")]
+        self._notice = register_map.find("commit_notice")
+        self._active = [
+            register_map.find(name) for name in ("length@active", "crc32@active", "model_hash", "active_slot")
+        ]
+        self._active_first = register_map.find("order@active").address
+        self._status = CommitStatus.IDLE
+
+    def write(self, address: int, data: bytes, peer: Peer) -> None:
+        """Store these words, then act on commit and slot_select if they are among them. Refusal: 01, 03, 06."""
+        if not self._rules.allow_plain_upload:
+            text = (
+                f"rig {self._rules.rig_name} takes no coefficients over plain TCP: network.allow_plain_upload is false"
+            )
+            raise Refusal(RefusalReason.ROLE, address, text)
+        if self._status in (CommitStatus.CHECKING, CommitStatus.WRITING):
+            text = f"a commit is {self._status.name.lower()}: wait until commit_status is committed or failed"
+            raise Refusal(RefusalReason.BUSY, address, text)
+        self._check_reserved(address, data)
+        self._store(address, data, peer)
+
+    def show_commit(
+        self,
+        status: CommitStatus,
+        failing_index: int = 0,
+        failing_reason: int = 0,
+        notice: CommitNotice = NO_NOTICE,
+    ) -> None:
+        """How far a commit is, from whoever serves it; checking and writing lock the block."""
+        self._status = status
+        self._image.put(self._notice, notice)
+        for register, value in zip(self._shown, (status, failing_index, failing_reason), strict=True):
+            self._image.put(register, value)
+
+    def show_active(self, calibration: Calibration, slot: int) -> None:
+        """The set in use, with its model_hash; the same number is crc32."""
+        words = CoefficientSet.of_calibration(calibration).to_words()
+        self._image.write(self._active_first, words[:HEAD_BYTES])
+        self._image.write(self._active_first + TAIL_FROM, words[HEAD_BYTES:])
+        crc = model_hash(calibration)
+        for register, value in zip(self._active, (SET_WORDS, crc, crc, slot), strict=True):
+            self._image.put(register, value)
+
+    def _check_reserved(self, address: int, data: bytes) -> None:
+        for k in range(len(data) // 2):
+            if address + k not in self._image.register_at:
+                check_zeros(address + k, data[2 * k : 2 * k + 2])
+
+    def _store(self, address: int, data: bytes, peer: Peer) -> None:
+        """All or nothing, also when the commit is refused."""
+        before = self._image.read(address, len(data) // 2)
+        self._image.write(address, data)
+        try:
+            if address <= self._commit < address + len(data) // 2:
+                self._act(peer)
+            if address <= self._select < address + len(data) // 2:
+                self._choose(peer)
+        except Refusal:
+            self._image.write(address, before)
+            raise
+
+    def _act(self, peer: Peer) -> None:
+        word = self._image.word(self._commit)
+        if word > max(CommitAction):
+            text = f"commit = {word}, known are 0 none, 1 commit, 2 dry_run, 3 rollback"
+            raise Refusal(RefusalReason.OUT_OF_RANGE, self._commit, text, value=word)
+        if word and self.on_commit is None:
+            text = "nobody takes coefficients here: the active set is unchanged"
+            raise Refusal(RefusalReason.COEFFICIENTS, self._commit, text, value=word)
+        self._image.write(self._commit, b"\0\0")
+        if word and self.on_commit is not None:
+            staged = self._image.read(self._first, BLOCK_BYTES // 2)
+            self.on_commit(CommitAction(word), staged, peer)
+
+    def _choose(self, peer: Peer) -> None:
+        slot = self._image.word(self._select)
+        if slot > 7:
+            raise Refusal(RefusalReason.OUT_OF_RANGE, self._select, f"slot_select = {slot}, allowed 0 .. 7", value=slot)
+        if self.on_select is None:
+            text = "nobody keeps slots here: the active set is unchanged"
+            raise Refusal(RefusalReason.COEFFICIENTS, self._select, text, value=slot)
+        self.on_select(slot, peer)

@@ -1,0 +1,179 @@
+"""The charts of a diagnosis: measured and simulated, the residual against whatever it may depend on, spectrum, loop.
+
+`before` is the refitted base model, `after` the extended one, in the same colours everywhere.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.result import Trace
+from gateway.reports.diagnosis import series
+from gateway.reports.diagnosis.series import FALLING, RISING, Left, Rows
+from gateway.reports.diagnosis.svg import SeriesChart, limits
+from gateway.reports.svg import Axis
+
+_WIDE, _NARROW, _WIDE_HIGH, _HIGH = 1140, 560, 250, 300
+_COLUMNS: Final = 260  # of a full-width picture: bands of 4 pixels
+_UNITS: Final = {
+    "temperature_c": "temperature (°C)",
+    "supply_kpa": "supply (kPa)",
+    "spindle_rpm": "spindle (rpm)",
+    "feed_mm_s": "feed (mm/s)",
+    "tilt_deg": "tilt (°)",
+    "position_mm": "position (mm)",
+    "distance_m": "distance (m)",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A chart and its legend, as HTML."""
+
+    svg: str
+    key: str
+
+    def __bool__(self) -> bool:
+        return bool(self.svg)
+
+
+NOTHING: Final = Drawing("", "")
+
+
+def _drawing(chart: SeriesChart) -> Drawing:
+    return Drawing(chart.svg(), chart.key)
+
+
+def axis_name(quantity: str) -> str:
+    """What stands at an axis; a covariate that nobody knows has its own name."""
+    return _UNITS.get(quantity, quantity)
+
+
+def _width(wide: bool) -> int:
+    """Across both columns of the page, or one."""
+    return _WIDE if wide else _NARROW
+
+
+def followed(trace: Trace, after: bool, window: tuple[float, float] | None = None, *, wide: bool = True) -> Drawing:
+    """Measured and simulated force over time; window: (start, end), s, of a closer look."""
+    left = Left.of(trace)
+    start, end = window or (float(left.time_s[0]), float(left.time_s[-1]))
+    shown = (left.time_s >= start) & (left.time_s <= end)
+    time_s, measured_n = left.time_s[shown], left.measured_n[shown]
+    both = [measured_n - left_n[shown] for left_n in (left.before_n, left.after_n)]
+    chart = SeriesChart(
+        Axis(start, max(end, start + 1e-9), "time (s)"),
+        Axis(*limits(measured_n, *both), "force (N)"),
+        f"Measured and simulated force over time, {'after' if after else 'before'}",
+        width=_WIDE if wide else _WIDE // 2,
+        height=_WIDE_HIGH,
+    )
+    columns = _COLUMNS if wide else _COLUMNS // 2
+    name = "after" if after else "before"
+    chart.envelope(series.envelope(time_s, measured_n, columns), "measured", "measured")
+    chart.envelope(series.envelope(time_s, both[int(after)], columns), name, f"simulated, {name}")
+    return _drawing(chart)
+
+
+def residual_over_time(trace: Trace) -> Drawing:
+    left = Left.of(trace)
+    chart = SeriesChart(
+        Axis(0.0, max(trace.measurement.duration_s, 1e-9), "time (s)"),
+        Axis(*limits(left.before_n, left.after_n, around=0.0), "measured − simulated (N)"),
+        "Residual over time, before and after",
+        width=_WIDE,
+        height=_WIDE_HIGH,
+    )
+    for left_n, name in ((left.before_n, "before"), (left.after_n, "after")):
+        chart.envelope(series.envelope(left.time_s, left_n, _COLUMNS), name, name)
+    chart.level(0.0)
+    return _drawing(chart)
+
+
+def residual_against(rows: Rows, quantity: str, *, wide: bool = False) -> Drawing:
+    """Clouds before and after, with the means over bins."""
+    x = rows.quantities[quantity]
+    held = np.isfinite(x)
+    chart = _residual_chart(x[held], rows, quantity, wide)
+    for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
+        chart.cloud(x[held], left_n[held], name)
+    for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
+        means = series.binned(x, left_n)
+        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} halo")
+        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", name)
+    chart.level(0.0)
+    return _drawing(chart)
+
+
+def residual_by_direction(rows: Rows, quantity: str, after: bool, *, wide: bool = False) -> Drawing:
+    """Against the drive, rows of rising and of falling motion apart."""
+    x, left_n = rows.quantities[quantity], rows.after_n if after else rows.before_n
+    ways = ((RISING, "rising"), (FALLING, "falling"))
+    chart = _residual_chart(x, rows, quantity, wide)
+    for way, name in ways:
+        mask = rows.direction == way
+        chart.cloud(x[mask], left_n[mask], name)
+    for way, name in ways:
+        means = series.binned(x[rows.direction == way], left_n[rows.direction == way])
+        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} halo")
+        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", name)
+    chart.level(0.0)
+    return _drawing(chart)
+
+
+def _residual_chart(x: Floats, rows: Rows, quantity: str, wide: bool) -> SeriesChart:
+    """Before and after on one scale, so that they can be compared."""
+    return SeriesChart(
+        Axis(*limits(x, margin=0.02), axis_name(quantity)),
+        Axis(*limits(rows.before_n, rows.after_n, around=0.0), "measured − simulated (N)"),
+        f"Residual against {axis_name(quantity)}",
+        width=_width(wide),
+        height=_HIGH,
+    )
+
+
+def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing:
+    """Force against the drive, measured and simulated."""
+    label = series.drive(traces[0].measurement)[0]
+    alike = [trace for trace in traces if series.drive(trace.measurement)[0] == label]
+    x = np.concatenate([series.drive(trace.measurement)[1][trace.measurement.usable] for trace in alike])
+    parts = [Left.of(trace) for trace in alike]
+    measured_n = np.concatenate([part.measured_n for part in parts])
+    left = [np.concatenate([getattr(part, name) for part in parts]) for name in ("before_n", "after_n")]
+    name = "after" if after else "before"
+    chart = SeriesChart(
+        Axis(*limits(x, margin=0.02), label),
+        Axis(*limits(measured_n, measured_n - left[0], measured_n - left[1]), "force (N)"),
+        f"Force against {label}, {name}",
+        width=_width(wide),
+        height=_HIGH,
+        cell_px=2.0,
+    )
+    chart.cloud(x, measured_n, "measured wider", "measured")
+    chart.cloud(x, measured_n - left[int(after)], f"{name} strong", f"simulated, {name}")
+    return _drawing(chart)
+
+
+def spectra(trace: Trace, *, wide: bool = False) -> Drawing:
+    """Amplitude density of the residual, before and after; NOTHING for a recording that is too short."""
+    left = Left.of(trace)
+    both = [series.spectrum(left.time_s, left_n) for left_n in (left.before_n, left.after_n)]
+    frequency_hz, before = both[0]
+    densities = np.concatenate([before, both[1][1]])
+    densities = densities[densities > 0.0]
+    if frequency_hz.size < 4 or densities.size == 0:
+        return NOTHING
+    top = float(densities.max()) * 1.5
+    chart = SeriesChart(
+        Axis(float(frequency_hz[0]), float(frequency_hz[-1]), "frequency (Hz)", logarithmic=True),
+        Axis(max(float(densities.min()) / 1.5, top * 1e-5), top, "residual (N/√Hz)", logarithmic=True),
+        "Spectrum of the residual, before and after",
+        width=_width(wide),
+        height=_HIGH,
+    )
+    for (hertz, density), name in zip(both, ("before", "after"), strict=True):
+        chart.line(hertz.tolist(), np.maximum(density, chart.y.low).tolist(), f"{name} thick", name)
+    return _drawing(chart)

@@ -1,0 +1,85 @@
+"""A diagnosis as plain values: the JSON contract of `diagnose --json`, format 1. Programs read it: no field may change."""
+
+from math import isfinite
+from typing import Any, Final
+
+from gateway.diagnosis.result import Cause, Diagnosis, Interval
+from gateway.reports.diagnosis.wording import noticed
+
+FORMAT: Final = 1
+Document = dict[str, Any]
+
+
+def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
+    """Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1. A number that is not finite is null.
+
+    suspects (columns that are not what they say) and notes stand beside the contract's fields.
+    """
+    return {
+        "format": FORMAT,
+        "verdict": str(diagnosis.verdict),
+        "baseline": {
+            "rms_n": _number(diagnosis.baseline.rms_n),
+            "noise_floor_n": _number(diagnosis.baseline.noise_floor_n),
+            "samples": int(diagnosis.baseline.samples),
+            "duration_s": _number(diagnosis.baseline.duration_s),
+        },
+        "causes": [_cause(cause) for cause in diagnosis.causes],
+        "leftover": [
+            {"depends_on": rest.depends_on, "shape": rest.shape, "share": _number(rest.share)}
+            for rest in diagnosis.leftover
+        ],
+        "not_identifiable": [
+            {"name": unseen.name, "why": unseen.why, "experiment": unseen.experiment}
+            for unseen in diagnosis.not_identifiable
+        ],
+        "rejected": [{"name": lost.name, "gain": _number(lost.gain)} for lost in diagnosis.rejected],
+        "extended": {
+            "held_out_rms_n": _number(diagnosis.extended.held_out_rms_n),
+            "reaches_noise_floor": bool(diagnosis.extended.reaches_noise_floor),
+        },
+        "runtime_s": _number(runtime_s),
+        "suspects": [
+            {
+                "code": each.code,
+                "recording": each.recording,
+                "column": each.column,
+                "swapped_with": each.other or None,
+                "unit": each.unit or None,
+                "factor": _number(each.factor),
+                "is_sure": each.is_sure,
+                "option": each.option,
+                "sentence": each.sentence,
+            }
+            for each in diagnosis.suspects
+        ],
+        "notes": noticed(diagnosis),
+    }
+
+
+def _cause(cause: Cause) -> Document:
+    gain = cause.gain
+    return {
+        "name": cause.name,
+        "group": list(cause.group),
+        "confidence": _number(cause.confidence),
+        "parameters": {
+            name: {"value": _number(found.value), "unit": found.unit, "ci95": _interval(found.ci95)}
+            for name, found in cause.parameters.items()
+        },
+        "gain": {
+            "held_out_rms_before_n": _number(gain.held_out_rms_before_n),
+            "held_out_rms_after_n": _number(gain.held_out_rms_after_n),
+            "ci95": _interval(gain.ci95),
+            "share_of_excess": _number(gain.share_of_excess),
+        },
+    }
+
+
+def _interval(interval: Interval) -> list[float | None]:
+    return [_number(end) for end in interval]
+
+
+def _number(value: float) -> float | None:
+    """JSON has no NaN; a numpy scalar becomes a float."""
+    return float(value) if isfinite(value) else None

@@ -1,0 +1,42 @@
+"""Figures of a report, two to a row, and none beside an empty place: of an odd number the last one is drawn across."""
+
+from dataclasses import dataclass
+from html import escape
+from typing import Protocol
+
+from gateway.reports.diagnosis.charts import Drawing
+
+
+class Draw(Protocol):
+    """A chart, across both columns or in one."""
+
+    def __call__(self, *, wide: bool) -> Drawing: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One figure of a grid."""
+
+    title: str
+    draw: Draw
+    caption: str = ""
+
+
+def figure(title: str, drawing: Drawing, caption: str = "", style: str = "") -> str:
+    """Empty where there is nothing to draw."""
+    if not drawing:
+        return ""
+    told = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    return f"<figure class='{style}'><h3>{escape(title)}</h3>{drawing.key}{drawing.svg}{told}</figure>"
+
+
+def grid(*panels: Panel) -> str:
+    """Empty without panels; those that draw nothing take no place."""
+    drawn = [(panel, drawing) for panel in panels if (drawing := panel.draw(wide=False))]
+    if not drawn:
+        return ""
+    figures = [figure(panel.title, drawing, panel.caption) for panel, drawing in drawn]
+    if len(drawn) % 2:
+        last = drawn[-1][0]
+        figures[-1] = figure(last.title, last.draw(wide=True), last.caption, "across")
+    return f"<div class='pair'>{''.join(figures)}</div>"

@@ -1,0 +1,116 @@
+"""The tables of a diagnosis' report: causes with their gains, what is left, what lost, what cannot be seen, directions."""
+
+from collections.abc import Iterable, Mapping
+from html import escape
+from math import sqrt
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.result import Cause, Diagnosis, Estimate
+from gateway.reports.diagnosis import wording as words
+from gateway.reports.diagnosis.series import FALLING, RISING, Rows
+
+_MOST_REJECTED: Final = 12
+
+
+def table(heads: Iterable[str], rows: Iterable[Iterable[str]], style: str = "") -> str:
+    """Cells are HTML; the first of each row is its heading. Empty without rows."""
+    body = "".join(_row(list(row)) for row in rows)
+    head = "".join(f"<th>{name}</th>" for name in heads)
+    return f"<div class='wide'><table class='{style}'><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+
+
+def _row(cells: list[str]) -> str:
+    return f"<tr><th>{cells[0]}</th>" + "".join(f"<td>{cell}</td>" for cell in cells[1:]) + "</tr>"
+
+
+def causes(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
+    """Strongest first. about: what each effect is, by name."""
+    if not diagnosis.causes:
+        return ""
+    heads = ("cause", "confidence", "held-out RMS", "gain", "of the excess", "parameters [95 %]")
+    return table(heads, (_cause(diagnosis, cause, about) for cause in diagnosis.causes), "causes")
+
+
+def _cause(diagnosis: Diagnosis, cause: Cause, about: Mapping[str, str]) -> tuple[str, ...]:
+    gain = cause.gain
+    won_n = gain.held_out_rms_before_n - gain.held_out_rms_after_n
+    low_n, high_n = gain.ci95
+    share = min(1.0, max(0.0, gain.share_of_excess)) if np.isfinite(gain.share_of_excess) else 0.0
+    return (
+        _name(cause, about),
+        words.percent(cause.confidence),
+        words.gained(cause),
+        f"{words.force(won_n)} N<br><small>[{words.force(low_n)}, {words.force(high_n)}]</small>",
+        f"<span class='meter'><i style='width:{100.0 * share:.0f}%'></i></span> {words.percent(gain.share_of_excess)}",
+        "<br>".join(
+            escape(f"{name} {words.estimate(found)}{words.was(diagnosis, name, found)}")
+            for name, found in cause.parameters.items()
+        ),
+    )
+
+
+def _name(cause: Cause, about: Mapping[str, str]) -> str:
+    group = words.others(cause)
+    what = f"<br><small>{escape(about[cause.name])}</small>" if about.get(cause.name) else ""
+    alike = f"<br><small class='alike'>or {escape(', or '.join(group))}: not told apart here</small>" if group else ""
+    return f"<b>{escape(cause.name)}</b>{alike}{what}"
+
+
+def leftover(diagnosis: Diagnosis) -> str:
+    rows = ((escape(rest.depends_on), escape(rest.shape), words.percent(rest.share)) for rest in diagnosis.leftover)
+    return table(("depends on", "shape", "of the excess"), rows) if diagnosis.leftover else ""
+
+
+def rejected(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
+    """Those that competed and lost, the nearest first."""
+    ranked = sorted(diagnosis.rejected, key=lambda lost: -lost.gain)
+    rows = (
+        (escape(lost.name), f"{words.force(lost.gain)} N", escape(about.get(lost.name, "")))
+        for lost in ranked[:_MOST_REJECTED]
+    )
+    more = len(ranked) - _MOST_REJECTED
+    rest = f"<p class='small'>{more} more gain less than these.</p>" if more > 0 else ""
+    return table(("alternative", "held-out gain", "what it is"), rows) + rest if ranked else ""
+
+
+def unseen(diagnosis: Diagnosis) -> str:
+    rows = ((escape(item.name), escape(item.why), escape(item.experiment)) for item in diagnosis.not_identifiable)
+    heads = ("effect", "why it cannot be seen here", "what would show it")
+    return table(heads, rows, "unseen") if diagnosis.not_identifiable else ""
+
+
+def base(parameters: Mapping[str, Estimate]) -> str:
+    """The base model's refitted parameters."""
+    rows = (
+        (escape(f"{found.section}.{name}" if found.section else name), escape(words.estimate(found)))
+        for name, found in parameters.items()
+    )
+    return table(("parameter of the base model", "refitted [95 %]"), rows, "facts") if parameters else ""
+
+
+def directions(rows: Rows) -> str:
+    """Mean and RMS of the residual by the direction of motion."""
+    ways = (
+        ("rising", rows.direction == RISING),
+        ("falling", rows.direction == FALLING),
+        ("not yet moved", rows.direction == 0),
+    )
+    lines = [
+        (
+            name,
+            f"{int(mask.sum()):,}".replace(",", " "),
+            *_mean_and_rms(rows.before_n[mask]),
+            *_mean_and_rms(rows.after_n[mask]),
+        )
+        for name, mask in ways
+        if mask.any()
+    ]
+    heads = ("direction", "rows", "mean before", "RMS before", "mean after", "RMS after")
+    return table(heads, lines, "numbers")
+
+
+def _mean_and_rms(left_n: Floats) -> tuple[str, str]:
+    return f"{words.force(float(left_n.mean()))} N", f"{words.force(sqrt(float(np.mean(left_n * left_n))))} N"

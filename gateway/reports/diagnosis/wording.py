@@ -1,0 +1,190 @@
+"""A diagnosis in words and rounded numbers, for the terminal and the page alike."""
+
+from collections.abc import Iterable
+from math import floor, isfinite, log10, sqrt
+from typing import Final
+
+from gateway.diagnosis import notes
+from gateway.diagnosis.result import Cause, Diagnosis, Estimate, Interval, Verdict
+from gateway.twin.plant import Plant
+
+_SENTENCES: Final = {
+    Verdict.NOTHING_FOUND: "Nothing is missing that this recording could show.",
+    Verdict.CONFIRMED: "The cause is found, and nothing is left above the noise floor.",
+    Verdict.UNKNOWN: "The simulation is off, and no effect of the catalogue explains it.",
+}
+_TITLES: Final = {
+    Verdict.NOTHING_FOUND: "Nothing found",
+    Verdict.CONFIRMED: "Confirmed",
+    Verdict.PARTIAL: "Partial",
+    Verdict.UNKNOWN: "Unknown",
+}
+_PLURAL: Final = {
+    "The cause is": "The causes are",
+    "A cause is": "Causes are",
+    "that explains": "that explain",
+    "it does": "they do",
+    " it ": " them ",
+}
+_NO_AREA_M2: Final = 5.0e-6
+"""What is left of the model's area where no force answers; a small signal leaves it whole."""
+_PARTIAL: Final = (
+    "A cause is found, but this recording cannot tell it from others that look alike.",
+    "A cause is found that explains the error; to confirm it, repeat a cycle or give the noise floor.",
+    "A cause is found, but it does not explain everything.",
+)
+"""Where a group is named, where nothing is left but the noise floor is a guess, and else."""
+
+
+def title(diagnosis: Diagnosis) -> str:
+    """`Partial: creep or warm-up; mains-hum`."""
+    names = "; ".join(label(cause) for cause in diagnosis.causes)
+    word = "Nothing can be told" if blind(diagnosis) else _TITLES[diagnosis.verdict]
+    return f"{word}: {names}" if names else word
+
+
+def sentence(diagnosis: Diagnosis) -> str:
+    """The verdict, and for `partial` what it lacks."""
+    if any(suspect.is_sure for suspect in diagnosis.suspects):
+        return "The columns are not what their names say: no cause was looked for. First mend this, then ask again."
+    if why := blind(diagnosis):
+        return f"{why}."
+    told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_lack(diagnosis)]
+    return _as_several(told) if len(diagnosis.causes) > 1 else told
+
+
+def blind(diagnosis: Diagnosis) -> str:
+    """Why the recordings say nothing, where they do not and nothing else was found."""
+    found = (
+        diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
+    )
+    return "" if found else notes.blind([trace.measurement for trace in diagnosis.traces])
+
+
+def _lack(diagnosis: Diagnosis) -> int:
+    if diagnosis.leftover or not diagnosis.extended.reaches_noise_floor:
+        return 2
+    return 0 if any(others(cause) for cause in diagnosis.causes) else 1
+
+
+def _as_several(told: str) -> str:
+    """The same of several causes."""
+    for one, several in _PLURAL.items():
+        told = told.replace(one, several)
+    return told
+
+
+def label(cause: Cause) -> str:
+    """The name, or all names that the recording cannot tell apart."""
+    return " or ".join((cause.name, *others(cause)))
+
+
+def others(cause: Cause) -> list[str]:
+    return [name for name in cause.group if name != cause.name]
+
+
+def number(value: float, digits: int = 3) -> str:
+    """`0.031`, `−12.4`, `1 250 000`, `4.1e-06`: so many digits that count, none that are made up."""
+    if not isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    power = floor(log10(abs(value)))
+    if not -4 <= power < 7:
+        return f"{value:.{digits - 1}e}".replace("-", "−", 1 if value < 0 else 0)
+    text = f"{value:,.{max(0, digits - 1 - power)}f}".replace(",", " ")
+    return text.replace("-", "−")
+
+
+def force(value_n: float) -> str:
+    """A force without its unit; as many decimals as tell forces of this size apart."""
+    if not isfinite(value_n):
+        return "–"
+    return f"{value_n:.{2 if abs(value_n) >= 10.0 else 3}f}".replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """A whole percentage that never says 100 % or 0 % of what is not."""
+    if not isfinite(share):
+        return "–"
+    if 0.0 < share < 0.01:
+        return "< 1 %"
+    return "> 99 %" if 0.99 < share < 1.0 else f"{100.0 * share:.0f} %"
+
+
+def interval(ends: Interval) -> str:
+    low, high = ends
+    digits = 3 if low == high or not isfinite(high - low) else _digits(max(abs(low), abs(high)), abs(high - low))
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def _digits(size: float, width: float) -> int:
+    """So many that the two ends of an interval differ in their last two."""
+    return min(8, max(3, 2 + floor(log10(size / width)))) if size > 0.0 else 3
+
+
+def estimate(found: Estimate) -> str:
+    """`0.031 N/N [0.029, 0.033]`."""
+    unit = f" {found.unit}" if found.unit not in ("", "1") else ""
+    low, high = found.ci95
+    wide = isfinite(high - low) and high > low
+    digits = _digits(max(abs(low), abs(high)), high - low) if wide else 3
+    return f"{number(found.value, digits)}{unit} {interval(found.ci95)}"
+
+
+def was(diagnosis: Diagnosis, name: str, found: Estimate) -> str:
+    """` (0.08 before)`, where the plant that was given has the effect already, in another size."""
+    before = getattr(getattr(diagnosis.base, found.section), name) if found.section else 0.0
+    null = getattr(getattr(Plant(), found.section), name) if found.section else 0.0
+    return "" if before == null else f" ({number(before)} before)"
+
+
+def gained(cause: Cause) -> str:
+    """`0.830 → 0.310 N`."""
+    return f"{force(cause.gain.held_out_rms_before_n)} → {force(cause.gain.held_out_rms_after_n)} N"
+
+
+def explained(diagnosis: Diagnosis) -> float:
+    """Share of the squared error above the noise floor that the causes take away, 0..1; nan where there is none.
+
+    The model's share, or that of the strongest cause: spikes are taken out of the readings before any model is fitted.
+    """
+    floor_n2 = diagnosis.baseline.noise_floor_n**2
+    excess_n2 = diagnosis.baseline.rms_n**2 - floor_n2
+    left_n2 = diagnosis.extended.held_out_rms_n**2 - floor_n2
+    strongest = max((cause.gain.share_of_excess for cause in diagnosis.causes), default=0.0)
+    if excess_n2 <= 0.0:
+        return strongest if diagnosis.causes else float("nan")
+    return min(1.0, max(strongest, 1.0 - left_n2 / excess_n2))
+
+
+def excess_n(diagnosis: Diagnosis) -> float:
+    """What stands above the noise in the base model's error, N RMS."""
+    return sqrt(max(0.0, diagnosis.baseline.rms_n**2 - diagnosis.baseline.noise_floor_n**2))
+
+
+def next_recordings(diagnosis: Diagnosis) -> list[tuple[str, tuple[str, ...]]]:
+    """(what to record, the effects that it would show), the diagnosis' own proposals first; no proposal twice."""
+    by_experiment: dict[str, list[str]] = {proposal: [] for proposal in diagnosis.experiments}
+    for unseen in diagnosis.not_identifiable:
+        by_experiment.setdefault(unseen.experiment, []).append(unseen.name)
+    return [(proposal, tuple(names)) for proposal, names in by_experiment.items() if proposal]
+
+
+def noticed(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
+    """Every note once: those that came before, the diagnosis' own, and the reader's with their recording's name."""
+    measurements = [trace.measurement for trace in diagnosis.traces]
+    read = {note for measurement in measurements for note in measurement.notes}
+    named = [
+        f"{measurement.name}: {note}" if len(measurements) > 1 else note
+        for measurement in measurements
+        for note in measurement.notes
+    ]
+    suspected = [suspect.sentence for suspect in diagnosis.suspects]
+    return list(dict.fromkeys([*suspected, *before, *(note for note in diagnosis.notes if note not in read), *named]))
+
+
+def listed(words: Iterable[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    *most, last = list(words) or [""]
+    return f"{', '.join(most)} and {last}" if most else last

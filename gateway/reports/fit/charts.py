@@ -1,0 +1,121 @@
+"""The charts of a fit: the loop, what it leaves by branch, the order sweep, the minor loops."""
+
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from gateway.bsfm.fit.blend_span import command_error_n
+from gateway.bsfm.fit.evaluation import Evaluation
+from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
+from gateway.reports.fit.document import Document, residual_of
+from gateway.reports.svg import Axis, Chart, spread
+
+_WAYS = ((RISING, "rising"), (FALLING, "falling"))
+_CURVE_POINTS = 200
+
+
+def loop(evaluation: Evaluation) -> str:
+    """Measured dots over the chosen model's two branches."""
+    ladder, result = evaluation.checked.ladder, evaluation.chosen.result
+    rising, falling = result.branches.rising, result.branches.falling
+    volts = np.linspace(rising.x0, rising.x1, _CURVE_POINTS)
+    chart = Chart(
+        Axis(rising.x0, rising.x1, "command (V)"),
+        Axis(*spread(ladder.force_n.tolist()), "force (N)"),
+        "Force against command, measured and model",
+    )
+    for way, name in _WAYS:
+        mask = ladder.direction == way
+        chart.dots(ladder.voltage_v[mask].tolist(), ladder.force_n[mask].tolist(), name, f"measured, {name}")
+    for curve, name in ((rising, "rising"), (falling, "falling")):
+        chart.line(volts.tolist(), np.asarray(curve.value(volts)).tolist(), name)
+    return chart.svg()
+
+
+def residuals(evaluation: Evaluation) -> str:
+    ladder, left_n = evaluation.checked.ladder, residual_of(evaluation)
+    low_v, high_v = float(ladder.voltage_v.min()), float(ladder.voltage_v.max())
+    chart = Chart(
+        Axis(low_v, high_v, "command (V)"),
+        Axis(*spread(left_n.tolist(), around=0.0), "measured − model (N)"),
+        "Residual of the chosen model against command, by branch",
+    )
+    chart.level(0.0)
+    for way, name in _WAYS:
+        mask = ladder.direction == way
+        chart.dots(ladder.voltage_v[mask].tolist(), left_n[mask].tolist(), name, name)
+    return chart.svg()
+
+
+def order_sweep(document: Document) -> str:
+    """Held-out RMS by order, one line per model; a hollow mark is a fit that may not drive a plant."""
+    fits = [fit for fit in document["fits"] if fit["heldout_rms_n"]]
+    orders = sorted({fit["order"] for fit in fits})
+    heights = [fit["heldout_rms_n"] for fit in fits]
+    chart = Chart(
+        Axis(orders[0] - 0.4, orders[-1] + 0.4, "order", whole=True),
+        Axis(0.7 * min(heights), 8.0 * max(heights), "held-out RMS (N)", logarithmic=True),
+        "Held-out error by model and order",
+        key_at=0.78,
+    )
+    for model, same in groupby(fits, key=lambda fit: str(fit["model"])):
+        line = list(same)
+        chart.line([fit["order"] for fit in line], [fit["heldout_rms_n"] for fit in line], model, model.upper())
+        _marks(chart, line, model)
+    return chart.svg()
+
+
+def _marks(chart: Chart, fits: list[Document], model: str) -> None:
+    for fit in fits:
+        height, error = fit["heldout_rms_n"], fit["heldout_error_n"] or 0.0
+        if error > 0.01 * height:
+            chart.bar(fit["order"], max(chart.y.low, height - error), height + error, model)
+        chart.dots([fit["order"]], [height], model if fit["usable"] else f"{model} hollow", radius=3.2)
+        if fit["chosen"]:
+            chart.ring(fit["order"], height)
+
+
+def minor_loops(evaluation: Evaluation) -> str:
+    """The walk of partial reversals within the loop; empty where there was none."""
+    volts, newtons = evaluation.checked.minor_v, evaluation.checked.minor_n
+    if len(volts) < 2:
+        return ""
+    branches = evaluation.chosen.result.branches
+    grid = np.linspace(branches.rising.x0, branches.rising.x1, _CURVE_POINTS)
+    chart = Chart(
+        Axis(branches.rising.x0, branches.rising.x1, "command (V)"),
+        Axis(*spread(evaluation.checked.ladder.force_n.tolist()), "force (N)"),
+        "Partial reversals inside the loop",
+    )
+    for curve, name in ((branches.rising, "rising"), (branches.falling, "falling")):
+        chart.line(grid.tolist(), np.asarray(curve.value(grid)).tolist(), f"{name} faint", f"{name} branch")
+    chart.line(volts.tolist(), newtons.tolist(), "walk thin")
+    chart.dots(volts.tolist(), newtons.tolist(), "walk", "measured")
+    return chart.svg()
+
+
+def minor_errors(evaluation: Evaluation) -> str:
+    """What control would get wrong along the walk: with the chosen reversal, and with branches switched at once."""
+    checked, reversal = evaluation.checked, evaluation.reversal
+    if reversal is None:
+        return ""
+    chosen = command_error_n(evaluation.model, checked.minor_v, checked.minor_n)
+    switched = command_error_n(evaluation.chosen.result.bsfm(0.0), checked.minor_v, checked.minor_n)
+    policy = (
+        f"{len(reversal.slip.stops.radii_v)} slip stops" if reversal.slip else f"blend over {evaluation.span_n:g} N"
+    )
+    steps = list(range(1, len(chosen) + 1))
+    chart = Chart(
+        Axis(0, len(steps) + 1, "step of the walk"),
+        Axis(*spread([*chosen.tolist(), *switched.tolist()], margin=0.25, around=0.0), "error of the command (N)"),
+        "Command error along the partial reversals",
+    )
+    chart.level(0.0)
+    chart.line(steps, switched.tolist(), "faint switched", f"branches switched: {_rms(switched):.2f} N RMS")
+    chart.line(steps, chosen.tolist(), "walk", f"{policy}: {_rms(chosen):.2f} N RMS")
+    return chart.svg()
+
+
+def _rms(values: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+    return float(np.sqrt(np.mean(values * values)))

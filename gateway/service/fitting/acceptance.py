@@ -1,0 +1,75 @@
+"""May a fit be offered for use? Judged by its error on all that was measured: against the rig's band, and what is in use.
+
+Two bounds. The band: beyond an RMS error of in_band_tolerance_n a settled force is out of band about as often as in it, before
+the trim has done anything. The calibration in use, on the same data: a fit that is worse by more than a tenth, and by more than
+a twentieth of the band (below that nobody feels it), would be a step back. A fit that fails is kept with the reason, for data
+and figures are of use, but it is not offered.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from gateway.bsfm import Calibration
+from gateway.bsfm.fit.evaluation import Evaluation
+from gateway.bsfm.fit.model_error import Error, measured_error_n
+
+WORSE_BY: Final = 1.1
+WORSE_SHARE: Final = 0.05  # of the band: a smaller difference is none
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """error: on all measured points; allowed_n: of its RMS, None where the rig is not known; in_use: the same data by the
+    calibration in use, None where there is none for this rig; rejected: why it is not offered, empty where it is; has_walk:
+    partial reversals are among the points."""
+
+    error: Error
+    allowed_n: float | None
+    in_use: Error | None
+    in_use_number: int
+    rejected: str
+    has_walk: bool
+
+    def facts(self) -> dict[str, Any]:
+        """For the document."""
+        return {
+            "rms_n": self.error.rms_n,
+            "max_n": self.error.max_n,
+            "points": self.error.points,
+            "reversals": self.has_walk,
+            "allowed_rms_n": self.allowed_n,
+            "in_use": self.in_use_number if self.in_use else None,
+            "in_use_rms_n": self.in_use.rms_n if self.in_use else None,
+            "rejected": self.rejected,
+        }
+
+
+def verdict_on(evaluation: Evaluation, tolerance_n: float | None, in_use: Calibration | None) -> Verdict:
+    """tolerance_n: the rig's in_band_tolerance_n, None where nobody knows the rig; in_use: what is active on it."""
+    error = Error.of(measured_error_n(evaluation.model, evaluation.checked))
+    other = Error.of(measured_error_n(in_use.model(), evaluation.checked)) if in_use else None
+    number, has_walk = in_use.number if in_use else 0, len(evaluation.checked.minor_v) > 1
+    if tolerance_n is None:
+        return Verdict(error, None, other, number, "", has_walk)
+    bounds = (*_beyond_band(error, tolerance_n), *(_worse(error, other, number, tolerance_n) if other else ()))
+    return Verdict(error, tolerance_n, other, number, _sentence(error, bounds), has_walk)
+
+
+def _sentence(error: Error, bounds: tuple[str, ...]) -> str:
+    """Why a fit that misses these bounds is rejected; empty where it misses none."""
+    if not bounds:
+        return ""
+    return (
+        f"{error.rms_n:.3f} N RMS on all {error.points} measured points, {' and '.join(bounds)}; finer stairs, more groups or "
+        "a reversal part describe the rig better"
+    )
+
+
+def _beyond_band(error: Error, tolerance_n: float) -> tuple[str, ...]:
+    return () if error.rms_n <= tolerance_n else (f"allowed {tolerance_n:.3f} N (in_band_tolerance_n of the rig)",)
+
+
+def _worse(error: Error, other: Error, number: int, tolerance_n: float) -> tuple[str, ...]:
+    bound_n = max(WORSE_BY * other.rms_n, other.rms_n + WORSE_SHARE * tolerance_n)
+    said = f"{other.rms_n:.3f} N by calibration {number} in use on the same data"
+    return () if error.rms_n <= bound_n else (said,)

@@ -1,0 +1,80 @@
+"""The fit of a recorded ladder, in a process of its own: `python -m gateway.service.fitting.fit_process '{"recording": ...}'`.
+
+Reads the recording, checks, fits, chooses, validates, judges, stores a numbered calibration and its report, and prints one
+JSON line. It activates nothing. A second fit of the same data stores nothing new: the number is told again, so that whoever
+was interrupted in this moment may ask again. It runs at the lowest ordinary priority, whatever its parent had: control must
+not feel it.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gateway.calibrations.store import CalibrationStore
+    from gateway.service.fitting.ladder_fit import LadderFit
+
+from gateway.processes import priority
+
+
+def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]:
+    """{"stored": number, "report": path, "document": path}, the same with "rejected" and a sentence in "refused" for a fit that
+    is kept but not offered, or {"refused": sentence}."""
+    from gateway.bsfm.fit.evaluation import Question
+    from gateway.bsfm.ladder.fault import LadderError
+    from gateway.calibrations.store import CalibrationStore, StoreError
+    from gateway.profiles import ProfileError, load_rig
+    from gateway.recording import RecordingError
+    from gateway.service.fitting.ladder_fit import calibration_of, fit_recording
+    from gateway.service.fitting.ladder_source import Background, read_source
+
+    try:
+        rig = load_rig(rig_name)
+        store = CalibrationStore(state, rig.calibration)
+        standing = store.standing().calibration or rig.calibration
+        question = Question(reference_span_n=standing.blend_span_n)
+        fit = fit_recording(read_source(recording), question, Background(rig=rig_name, state=state))
+        fresh = calibration_of(fit, rig.load_cell.range_n)
+        number = store.number_of(fresh.data_sha256)
+        return _told(fit, store, number) if number else _told(fit, store, store.add(fresh), is_new=True)
+    except LadderError as error:
+        return {"refused": f"E421 {recording}: {error}"}
+    except RecordingError as error:
+        return {"refused": f"E403 {error}"}
+    except (ProfileError, StoreError) as error:
+        return {"refused": str(error)}
+    except OSError as error:
+        return {"refused": f"E106 {error.filename or recording}: {error.strerror}"}
+
+
+def _told(fit: "LadderFit", store: "CalibrationStore", number: int, *, is_new: bool = False) -> dict[str, Any]:
+    """What the calibration of this number is called, and whether it is offered. is_new: its report is still to be written."""
+    from gateway.service.fitting.ladder_fit import write_report, write_whole
+
+    report, document = (store.directory / f"{number:04d}.{suffix}" for suffix in ("html", "json"))
+    if is_new or not document.exists():
+        fit.document.update(calibration=number, report=str(report))
+        write_report(fit, report)
+        write_whole(document, json.dumps(fit.document, indent=1))
+    paths = {"report": str(report), "document": str(document)}
+    rejected = store.load(number).rejected
+    if rejected:
+        return {"rejected": number, "refused": rejected_sentence(number, rejected)} | paths
+    return {"stored": number} | paths
+
+
+def rejected_sentence(number: int, why: str) -> str:
+    return f"E435 calibration {number} is stored as rejected and not offered: {why}"
+
+
+def main(arguments: list[str]) -> int:
+    priority.run_behind_others()
+    asked = json.loads(arguments[0])
+    result = fit_and_store(Path(asked["recording"]), asked["rig"], Path(asked["state"]))
+    sys.stdout.write(json.dumps(result) + "\n")
+    return 0 if "stored" in result else 65
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

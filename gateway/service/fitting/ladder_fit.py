@@ -1,0 +1,125 @@
+"""From a recording to a fit, a report and, where asked for, a numbered calibration. Imports numpy and scipy.
+
+Everything is worked out before anything is written; the report is written beside its name and renamed, the calibration
+as the store does it. So a refused ladder, a full disk or a kill leaves no half of either.
+"""
+
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+
+from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, validate_coefficients
+from gateway.bsfm.fit.evaluation import Evaluation, Question, evaluate
+from gateway.bsfm.fit.response_fit import Measured
+from gateway.bsfm.ladder.check import CheckedLadder
+from gateway.bsfm.ladder.fault import Flaw, LadderError
+from gateway.recording import Recording
+from gateway.reports.fit.document import Document, document_of
+from gateway.reports.fit.page import fit_page
+from gateway.service.fitting.acceptance import Verdict, verdict_on
+from gateway.service.fitting.ladder_source import Background, bounds_on, checked_source
+from gateway.service.fitting.measured_response import response_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LadderFit:
+    """A fit that may be reported and stored. measured: how the plant follows, or why that is not known."""
+
+    recording: Recording
+    evaluation: Evaluation
+    document: Document
+    verdict: Verdict
+    measured: Measured
+
+
+def fit_recording(recording: Recording, question: Question, background: Background, name: str = "") -> LadderFit:
+    """Check, fit, hold out, choose, judge. name: the user's, empty for the one given when it was recorded. LadderError with a
+    sentence where the data must not be fitted."""
+    evaluation = evaluate(checked_source(recording, background), question)
+    verdict = verdict_on(evaluation, *bounds_on(recording, background))
+    document = document_of(evaluation, recording.path, recording.header)
+    document["data_sha256"] = data_sha256(evaluation.checked)
+    response = response_of(recording, evaluation)
+    document["response"] = asdict(response.response) if response.response else None
+    document["notes"].append(response.told)
+    document["name"] = name or str(recording.header.get("name") or "") or default_name(document)
+    document["measured"] = verdict.facts()
+    return LadderFit(recording, evaluation, document, verdict, response)
+
+
+def default_name(document: Document) -> str:
+    """Of a calibration that nobody has named: model and order."""
+    return f"{document['chosen']['model']}-{document['chosen']['order']}"
+
+
+def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
+    """The chosen model as a calibration without a number. LadderError where its coefficients may not drive the rig."""
+    model = fit.document["model"]
+    coefficients = Coefficients.of(fit.evaluation.model.branches, fit.evaluation.span_n)
+    faults = validate_coefficients(coefficients, CoefficientLimits(cell_range_n=cell_range_n))
+    if faults:
+        raise LadderError(Flaw.NO_FIT, f"E401 the chosen model may not drive the rig: {faults[0].text}")
+    return Calibration(
+        number=0,
+        name=fit.document["name"],
+        order=len(coefficients.rising_weights) - 1,
+        x0_v=coefficients.x0_v,
+        x1_v=coefficients.x1_v,
+        rising_handles_n=_plain(coefficients.rising_handles_n),
+        rising_weights=_plain(coefficients.rising_weights),
+        falling_handles_n=_plain(coefficients.falling_handles_n),
+        falling_weights=_plain(coefficients.falling_weights),
+        blend_span_n=float(fit.evaluation.span_n),
+        rms_n=fit.verdict.error.rms_n,
+        max_n=fit.verdict.error.max_n,
+        date_utc=datetime.now(UTC).strftime("%Y-%m-%d"),
+        source=_source(fit),
+        rig=str(fit.document["rig"] or ""),
+        data_sha256=fit.document["data_sha256"],
+        slip_radii_v=_plain(model["slip_radii_v"]),
+        slip_shares=_plain(model["slip_shares"]),
+        response=fit.measured.response,
+        rejected=fit.verdict.rejected,
+    )
+
+
+def _plain(values: Iterable[float]) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _source(fit: LadderFit) -> str:
+    ladder, fingerprint = fit.document["ladder"], str(fit.document["rig_fingerprint"] or "unknown")[:12]
+    low_v, high_v = ladder["voltage_v"]
+    return (
+        f"recording {fit.recording.path.name}: {ladder['points']} stairs {low_v:g}-{high_v:g}-{low_v:g} V, {ladder['groups']} "
+        f"groups, {ladder['minor_points']} minor-loop points; rig fingerprint {fingerprint}"
+    )
+
+
+def write_report(fit: LadderFit, target: Path) -> None:
+    """The HTML report, whole or not at all."""
+    write_whole(target, fit_page(fit.evaluation, fit.document))
+
+
+def write_whole(target: Path, text: str) -> None:
+    """Beside its name, then renamed. OSError, and what was there before stays."""
+    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def data_sha256(checked: CheckedLadder) -> str:
+    """Of every settled point that the fit has used, as text with fixed digits."""
+    ladder = checked.ladder
+    rows = zip(ladder.voltage_v, ladder.force_n, ladder.direction, ladder.group, strict=True)
+    text = "".join(f"{volts:.4f},{newtons:.6f},{way},{group}\n" for volts, newtons, way, group in rows)
+    text += "".join(
+        f"{volts:.4f},{newtons:.6f}\n" for volts, newtons in zip(checked.minor_v, checked.minor_n, strict=True)
+    )
+    return sha256(text.encode()).hexdigest()

@@ -1,0 +1,132 @@
+"""Where a ladder comes from, and what is known about the rig that it was recorded on."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from gateway.bsfm import Calibration
+from gateway.bsfm.ladder.check import CheckedLadder, Expectation, checked_ladder, joined
+from gateway.calibrations.store import CalibrationStore
+from gateway.profiles import ProfileError, Rig, load_rig
+from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
+from gateway.recording.layout import SUFFIX
+
+_STAND_IN: Final = "demo"  # whose calibration a table without a known rig is compared with
+_MM2_PER_M2: Final = 1.0e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Background:
+    """rig: the one asked for, None for the recording's own; state: whose calibration in use is the reference, None for
+    the rig's built-in one; force_unit: as the user says, None as the table says."""
+
+    rig: str | None = None
+    state: Path | None = None
+    force_unit: str | None = None
+
+
+def read_source(path: Path, mapping: ColumnMapping | None = None) -> Recording:
+    """A recording of ours, Parquet or a CSV, by its first bytes. RecordingError and OSError as the readers.
+
+    Cells that are no number are told and left out: a fit takes stairs, not every row. A force whose unit the mapping says
+    is in newtons from here on, and known to be.
+    """
+    recording = read_table(path, mapping, lenient=True)
+    says_unit = mapping and any(source.name == "force_n" and source.unit for source in mapping.sources)
+    return replace(recording, header=recording.header | {"force_unit": "N"}) if says_unit else recording
+
+
+def find_source(name: str, state: Path) -> Path:
+    """The file of a recording's number, or the path itself. RecordingError for a number that is not there."""
+    return find_recording(state, int(name)) if name.isdecimal() and not Path(name).exists() else Path(name)
+
+
+def with_earlier(recording: Recording) -> list[Recording]:
+    """The recordings that a resumed run goes on from, oldest first, and itself. An exported table stands alone."""
+    numbers = recording.header.get("continues", ()) if recording.path.suffix == SUFFIX else ()
+    earlier = numbers if isinstance(numbers, list) else ()
+    beside = recording.path.parent
+    parts = [*(read_recording(beside / f"{int(number):04d}{recording.path.suffix}") for number in earlier), recording]
+    return [_from_zero(part, float(parts[0].header.get("zero_n", 0.0))) for part in parts]
+
+
+def _from_zero(part: Recording, zero_n: float) -> Recording:
+    """Its forces from this zero of the cell: a restart of the gateway has lost the tare that the first part was made with."""
+    moved_n = float(part.header.get("zero_n", zero_n)) - zero_n
+    if moved_n == 0.0 or "force_n" not in part.columns:
+        return part
+    said = f"{part.path.name} was recorded from another zero, {moved_n:+.2f} N: its forces were moved to that of the first part"
+    columns = part.columns | {"force_n": part.columns["force_n"] + moved_n}
+    return replace(part, columns=columns, notes=(*part.notes, said))
+
+
+def checked_source(recording: Recording, background: Background) -> CheckedLadder:
+    """The ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
+    expected, said = expectation(recording, background)
+    recordings = with_earlier(recording)
+    checked = joined([checked_ladder(part.columns, part.header, expected) for part in recordings])
+    told = dict.fromkeys(note for part in recordings for note in part.notes)
+    return replace(checked, notes=(*told, *said, *checked.notes))
+
+
+def expectation(recording: Recording, background: Background) -> tuple[Expectation, list[str]]:
+    """What to compare the data with, and sentences about what could not be compared."""
+    recorded = str(recording.header.get("rig", "")).strip()
+    asked = background.rig or rig_of_state(background.state)
+    rig, said = known_rig(asked or recorded, str(recording.header.get("rig_file", "")))
+    reference = _reference(rig, background.state)
+    fingerprint = recording.header.get("rig_fingerprint")
+    if rig is not None and fingerprint and fingerprint != rig.fingerprint and recorded == rig.name:
+        said.append(f"the files of rig {rig.name} have changed since the recording was made")
+    stand_in = rig or load_rig(_STAND_IN)
+    plant = rig.plant if rig else None
+    expected = Expectation(
+        reference=reference.model() if reference else stand_in.calibration.model(),
+        named=f"{reference.number} ({reference.name})" if reference else f"{stand_in.calibration.name} (a stand-in)",
+        area_mm2=plant.cylinder.area_m2 * _MM2_PER_M2 if plant else None,
+        rig=rig.name if rig and asked else asked,
+        saturation_n=rig.control.supervision.saturation_n if rig else None,
+        force_unit=background.force_unit,
+    )
+    return expected, said
+
+
+def bounds_on(recording: Recording, background: Background) -> tuple[float | None, Calibration | None]:
+    """What a fit of it must not miss: the rig's in-band tolerance, N, and the calibration in use. None: not known."""
+    asked = background.rig or rig_of_state(background.state)
+    rig, _ = known_rig(asked or str(recording.header.get("rig", "")), str(recording.header.get("rig_file", "")))
+    tolerance_n = rig.control.defaults.in_band_tolerance_n if rig else None
+    return tolerance_n, _reference(rig, background.state)
+
+
+def rig_of_state(state: Path | None) -> str | None:
+    """The rig whose recordings a state directory holds; None where it holds none."""
+    entries = list_recordings(state) if state else []
+    return next((str(entry.header["rig"]) for entry in reversed(entries) if entry.header.get("rig")), None)
+
+
+def known_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
+    """By name, else by the file that the recording names, if that is (still) the one."""
+    if not name:
+        return None, []
+    try:
+        return load_rig(name), []
+    except ProfileError:
+        if file and (rig := _from_file(file)) and rig.name == name:
+            return rig, []
+        return None, [f"rig {name} is not known here: its limits and its plant could not be compared with the data"]
+
+
+def _from_file(file: str) -> Rig | None:
+    try:
+        return load_rig(file)
+    except ProfileError:
+        return None
+
+
+def _reference(rig: Rig | None, state: Path | None) -> Calibration | None:
+    """The calibration in use, else the rig's built-in one."""
+    if rig is None:
+        return None
+    standing = CalibrationStore(state, rig.calibration).standing() if state else None
+    return (standing.calibration if standing else None) or rig.calibration

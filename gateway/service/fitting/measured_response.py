@@ -1,0 +1,31 @@
+"""The response of the plant from the recording of a calibration run: whose rows, which rig's slew, and how it is told."""
+
+from math import inf
+
+from gateway.bsfm.fit.evaluation import Evaluation
+from gateway.bsfm.fit.response_fit import Measured, measured_response
+from gateway.bsfm.ladder.fault import LadderError
+from gateway.bsfm.ladder.rows import usable_rows
+from gateway.recording import Recording
+from gateway.service.fitting.ladder_source import known_rig
+
+NOT_OURS = (
+    "the response was not measured: this table is no run of the gateway, so nobody knows when its commands went out"
+)
+
+
+def response_of(recording: Recording, evaluation: Evaluation) -> Measured:
+    """Dead time and lags by the steps of a run; without a response, and with the reason, where they do not show. A calibration
+    is as good without."""
+    header = recording.header
+    if "ladder" not in header:
+        return Measured(None, NOT_OURS)
+    rig, _ = known_rig(str(header.get("rig", "")), str(header.get("rig_file", "")))
+    slew_v_per_s = rig.control.limits.voltage_slew_v_per_s if rig else inf
+    try:
+        rows = usable_rows(recording.columns, header)
+    except LadderError as error:
+        return Measured(None, f"the response was not measured: {error}")
+    day = str(header.get("started_utc", ""))[:10]
+    when = f" on {day}" if day else ""
+    return measured_response(rows.time_s, rows.command_v, rows.force_n, evaluation.model, slew_v_per_s, when)

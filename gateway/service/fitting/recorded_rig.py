@@ -1,0 +1,63 @@
+"""The rig that a recording was made on, and its plant, as the recording itself has them.
+
+A recording carries the texts of its rig's files (`rig_texts`), so that it can be judged on another machine and after the
+files have changed. A table without them is taken by its rig's name, if that is known here.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import PurePath
+
+from gateway.profiles import PlantProfile, ProfileError, Rig
+from gateway.profiles.kinds.plants import read_plant
+from gateway.profiles.strict_yaml.text import Document, parse
+from gateway.recording import Recording
+from gateway.service.fitting.ladder_source import known_rig
+
+
+def rig_of(recording: Recording) -> Rig | None:
+    """The rig that the recording names, from the files that are here now; None where none is named or known."""
+    return known_rig(str(recording.header.get("rig", "")).strip(), str(recording.header.get("rig_file", "")))[0]
+
+
+def plant_of(recording: Recording) -> PlantProfile | None:
+    """The plant as it was recorded, else that of the rig of the same name; None where no plant is known.
+
+    ProfileError, with its place in the recorded text, when this version cannot read it.
+    """
+    texts = rig_texts(recording)
+    if texts:
+        return _recorded_plant(texts)
+    rig = rig_of(recording)
+    return rig.plant_profile if rig else None
+
+
+def rig_texts(recording: Recording) -> dict[str, str]:
+    """The recorded files by name, the rig's own first; empty for a table without them. A CSV holds them as JSON."""
+    texts = recording.header.get("rig_texts", {})
+    try:
+        texts = json.loads(texts) if isinstance(texts, str) else texts
+    except ValueError:
+        return {}
+    return {str(file): str(text) for file, text in texts.items()} if isinstance(texts, Mapping) else {}
+
+
+def _recorded_plant(texts: Mapping[str, str]) -> PlantProfile | None:
+    rig_file, *others = texts
+    named = str(_document(rig_file, texts).at("plant") or "")
+    for file in others:
+        if named and PurePath(named).name in (PurePath(file).name, PurePath(file).stem) and _is_plant(file, texts):
+            plant, faults = read_plant(_document(file, texts))
+            if plant is None:
+                raise ProfileError(faults)
+            return plant
+    return None
+
+
+def _is_plant(file: str, texts: Mapping[str, str]) -> bool:
+    """A device or a calibration may have the plant's name."""
+    return _document(file, texts).at("cylinder") is not None
+
+
+def _document(file: str, texts: Mapping[str, str]) -> Document:
+    return parse(texts[file].encode(), file)

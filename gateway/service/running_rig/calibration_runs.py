@@ -1,0 +1,270 @@
+"""Keeps a calibration run or experiment: starts it for this machine, records it, and has a ladder fitted when it is done.
+
+The recording is one of its own, beside whatever else is recorded, with the plan in its header and, of a ladder, the stair in
+each row; it stays whatever becomes of the run. One more row after the last stair says that this one was finished, too. A run
+that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S: a closed terminal
+must not leave a tool climbing stairs.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.control import Controller
+from gateway.control.inputs import Output
+from gateway.control.runs.active_run import AnyPlan, AnyRun
+from gateway.control.runs.experiment_plan import ExperimentPlan
+from gateway.control.runs.experiment_run import ExperimentRun
+from gateway.devices.messages import ForceSample
+from gateway.profiles import Rig
+from gateway.profiles.kinds.plans import plain, plan_of
+from gateway.recording import Recorder
+from gateway.recording.tables.columns import LADDER
+from gateway.registers.words import CalibrationPhase
+from gateway.service.running_rig.fit_launcher import FitChild, Result
+from gateway.service.running_rig.output_line import LineState
+from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
+from gateway.service.socket_requests import CalibrateRequest, read
+
+FOLLOWED_S: Final = 3.0
+_CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
+Answer = dict[str, Any]
+
+
+class LadderKeeper:
+    """stored: number of the calibration that the last run gave, 0 for none. Called from the loop only."""
+
+    def __init__(
+        self, controller: Controller, rig: Rig, state: Path, clock: Callable[[], float], log: Callable[[str, str], None]
+    ) -> None:
+        self.stored = 0
+        self._controller = controller
+        self._calibrating = controller.calibrating
+        self._rig = rig
+        self._state = state
+        self._clock = clock
+        self._log = log
+        self._continues: tuple[int, ...] = ()
+        self._name = ""
+        self._stairs = 0
+        self._closing_s: float | None = None
+        self._payload_n = 0.0
+        self._recording: RunRecording | None = None
+        self._path: Path | None = None
+        self._child: FitChild | None = None
+        self._result: Result = {}
+        self._ended = ""
+        self._decision: Output | None = None
+        self._followed_s = 0.0
+
+    # -- asked by this machine
+
+    def answer(self, request: Answer) -> Answer:
+        """{"plan": {...}, "continues": [numbers], "name": text} starts, with "dry_run": true it is only tried; {"stop": true}
+        stops; neither tells how it is. ValueError refuses."""
+        asked = read(CalibrateRequest, request)
+        self._followed_s = self._clock()
+        if asked.dry_run:
+            return self._tried(_plan_of(asked.plan))
+        if asked.stop:
+            self._calibrating.ask_stop("info calibration stopped at this machine")
+        elif asked.plan is not None:
+            self._start(asked.plan, asked.continues)
+            self._name = asked.name
+        if refused := self._calibrating.take_refused():
+            raise ValueError(refused)
+        return self.status()
+
+    def _tried(self, plan: AnyPlan) -> Answer:
+        """What a plan would do; ValueError where the rig does not allow it."""
+        run = self._calibrating.tried(plan)
+        top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)
+        top_n = self._calibrating.model.force_n(top_v, 1.0)
+        return {
+            "stairs": 0 if isinstance(run, ExperimentRun) else len(run.stairs),
+            "eta_s": run.eta_s,
+            "v_max_v": top_v,
+            "force_max_n": top_n,
+            "simulated": self._rig.simulated,
+            "rig": self._rig.name,
+            "rig_fingerprint": self._rig.fingerprint,
+            **_asks(plan),
+        }
+
+    def _start(self, fields: Any, continues: tuple[int, ...]) -> None:
+        plan = _plan_of(fields)
+        if refused := self._controller.refusal_of_run(self._clock(), plan):
+            raise ValueError(refused)
+        self._calibrating.ask(plan)
+        self._continues, self._ended, self._result = continues, "", {}
+
+    def status(self) -> Answer:
+        calibrating, decision = self._calibrating, self._decision
+        run = calibrating.run
+        return {
+            "running": calibrating.running,
+            "phase": calibrating.phase.name.lower(),
+            "progress": calibrating.progress,
+            "eta_s": round(calibrating.eta_s, 1),
+            **_where(run),
+            "noise_n": run.noise_n if run else None,
+            "voltage_v": decision.voltage_v if decision else None,
+            "force_n": decision.force_measured_n
+            if decision and decision.force_measured_n == decision.force_measured_n
+            else None,
+            "recording": str(self._path) if self._path else None,
+            "ended": self._ended,
+            "result": self._result,
+        }
+
+    # -- from the loop
+
+    def follow(self, decision: Output) -> None:
+        """After each step of the controller."""
+        self._decision = decision
+        calibrating = self._calibrating
+        if calibrating.running and self._recording is None:
+            self._begin()
+        elif self._closing_s is not None:
+            if self._clock() - self._closing_s > _CLOSING_S:
+                self._close_ladder()
+        elif self._recording is not None and not calibrating.running:
+            self._end(decision)
+        elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
+            calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
+
+    def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
+        """The cell's own force, without the payload's weight: that is what the model speaks."""
+        if self._recording and self._calibrating.running:
+            self._payload_n = decision.force_measured_n - self._calibrating.cell_n
+            row = replace(decision, force_measured_n=self._calibrating.cell_n)
+            self._recording.append(sample, row, line, *self._labels())
+        elif self._recording and self._closing_s is not None:
+            row = replace(decision, force_measured_n=decision.force_measured_n - self._payload_n)
+            self._recording.append(sample, row, line, float(self._calibrating.phase), -1.0, float(self._stairs))
+            self._close_ladder()
+
+    def _labels(self) -> tuple[float, ...]:
+        """Where a ladder is, in the columns LADDER."""
+        run = self._calibrating.run
+        if run is None or isinstance(run, ExperimentRun):
+            return ()
+        group = run.stairs[min(run.done, len(run.stairs) - 1)].group
+        self._stairs = len(run.stairs)  # some may have been left out by now
+        return float(self._calibrating.phase), float(group), float(run.done)
+
+    def flush(self, now_s: float) -> None:
+        if self._recording:
+            self._recording.recorder.flush(now_s)
+
+    def close(self) -> None:
+        if self._recording:
+            self._recording.recorder.close()
+        if self._child:
+            self._child.close()
+
+    def _begin(self) -> None:
+        """A disk that takes no recording ends the run: a ladder without data is wear for nothing."""
+        run, rig = self._calibrating.run, self._rig
+        assert run
+        header = {
+            "rig": rig.name,
+            "rig_fingerprint": rig.fingerprint,
+            "rig_file": str(rig.file),
+            "rig_texts": dict(rig.texts),
+            "calibration": self._controller.calibration_id,
+            "simulated": rig.simulated,
+            "seed": rig.seed,
+            **_planned(run),
+            "continues": list(self._continues),
+            "name": self._name,
+            "zero_n": self._controller.zero_n,
+        }
+        columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LADDER)
+        try:
+            recorder = Recorder(self._state / "recordings", header, columns)
+        except OSError as error:
+            self._calibrating.ask_stop(f"A330 calibration stopped: the recording cannot be written: {error.strerror}")
+            return
+        self._recording, self._path = RunRecording(recorder), recorder.path
+        self._continues, self._name = (), ""
+
+    def _end(self, decision: Output) -> None:
+        assert self._recording
+        if self._calibrating.phase is CalibrationPhase.FITTING:
+            self._closing_s = self._clock()
+            self._ended = decision.events[0] if decision.events else ""
+            return
+        recorder, self._recording = self._recording.recorder, None
+        recorder.close()
+        self._ended = decision.events[0] if decision.events else ""
+        if recorder.failure:
+            self._ended = recorder.failure
+            self._calibrating.phase = CalibrationPhase.STOPPED
+        elif self._calibrating.phase is CalibrationPhase.RECORDED:
+            self._log("calibration", f"info experiment recorded in {recorder.path}; force-gateway diagnose takes it")
+
+    def _close_ladder(self) -> None:
+        """A finished ladder is fitted, if the disk took all of it."""
+        assert self._recording
+        recorder, self._recording, self._closing_s = self._recording.recorder, None, None
+        recorder.close()
+        if recorder.failure:
+            self._ended = recorder.failure
+            self._calibrating.phase = CalibrationPhase.STOPPED
+        else:
+            self._child = FitChild(recorder.path, self._rig.file, self._state, self._on_result)
+
+    def _on_result(self, result: Result) -> None:
+        self._child, self._result = None, result
+        if "stored" in result:
+            self.stored = int(result["stored"])
+            self._calibrating.phase = CalibrationPhase.STORED
+            self._log("calibration", f"info calibration {self.stored} stored, not active; report {result['report']}")
+        else:
+            self._calibrating.phase = CalibrationPhase.REFUSED
+            told = f"; report {result['report']}" if "report" in result else ""
+            self._log("calibration", f"{result.get('refused')}{told}")
+
+
+def _asks(plan: AnyPlan) -> Answer:
+    """What a person should know and do before an experiment."""
+    if not isinstance(plan, ExperimentPlan):
+        return {"experiment": "", "check": True, "notes": [], "questions": []}
+    missing = [name for name in plan.columns if name not in COLUMNS]
+    told = f"this gateway does not record {' and '.join(missing)}: record it beside, and join the tables by time"
+    return {
+        "experiment": f"experiment {plan.name}, {len(plan.parts)} parts ({', '.join(part.name for part in plan.parts)})",
+        "check": plan.check,
+        "notes": [told] if missing else [],
+        "questions": [f"Ready to do this while it runs: {text}?" for text in plan.by_hand],
+    }
+
+
+def _where(run: AnyRun | None) -> Answer:
+    """How far a run is, in its own terms."""
+    told: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
+    if isinstance(run, ExperimentRun):
+        part = run.part
+        return told | {"part": part + 1, "parts": len(run.plan.parts), "part_name": run.plan.parts[part].name}
+    if run is None:
+        return told
+    stair = run.stairs[min(run.done, len(run.stairs) - 1)]
+    groups = run.plan.groups
+    return told | {"stair": run.done, "stairs": len(run.stairs), "group": stair.group + 1, "groups": groups}
+
+
+def _planned(run: AnyRun) -> Answer:
+    """For the recording's header: a ladder is what `fit` and --resume look for."""
+    if isinstance(run, ExperimentRun):
+        return {"experiment": plain(run.plan)}
+    top_v = max(stair.voltage_v for stair in run.stairs)
+    return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
+
+
+def _plan_of(fields: Any) -> AnyPlan:
+    """A plan from JSON; ValueError for a name or a type that it does not have."""
+    if not isinstance(fields, dict):
+        raise ValueError("plan: a JSON object is expected")
+    return plan_of(fields)

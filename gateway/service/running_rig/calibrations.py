@@ -1,0 +1,39 @@
+"""The calibrations of the rig that runs: which one it starts with, and who serves uploads while it runs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from gateway.bsfm import CoefficientLimits
+from gateway.calibrations.activation import Activation, InUse
+from gateway.calibrations.store import CalibrationStore
+from gateway.calibrations.upload import Upload, UploadRules
+from gateway.profiles import Rig
+from gateway.registers import RegisterBank
+
+
+class RigCalibrations:
+    """rig: as its file says, but with the calibration that was last in use, if any; notes: what people should know of it."""
+
+    def __init__(self, rig: Rig, state: Path) -> None:
+        store = CalibrationStore(state, rig.calibration)
+        self._activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n))
+        self._standing = standing = store.standing(self._activation.why_not)
+        calibration = standing.calibration or rig.calibration
+        self.rig = replace(rig, calibration=calibration)
+        number = standing.selection.number
+        chosen = () if number is None else (f"calibration {number} of {calibration.date_utc} from {store.directory}",)
+        self.notes = (*standing.notes, *chosen)
+
+    def serve(self, bank: RegisterBank, on_use: Callable[[InUse], None], log: Callable[[str, str], None]) -> Upload:
+        """Show the calibration in use in the bank, and take uploads from now on."""
+        bank.set_active_model(self.rig.calibration, self._standing.selection.slot_word)
+        rules = UploadRules.of(self.rig.name, self.rig.register_map, _today)
+        upload = Upload(bank.staging, self._activation, self._standing, rules, log)
+        upload.on_use = on_use
+        return upload
+
+
+def _today() -> str:
+    return datetime.now(UTC).strftime("%Y-%m-%d")

@@ -1,0 +1,72 @@
+"""Starts the fit of a recorded ladder as a process of its own and hears its one-line result.
+
+Control never waits for it: the child is spawned (a millisecond or two, with the output off), its pipe is read when it
+speaks, and it goes on to its end should control die meanwhile. It sets its own priority down
+(gateway.service.fitting.fit_process).
+"""
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Result = dict[str, Any]
+_LONGEST = 1 << 16
+_REAP_S = 0.1
+
+
+class FitChild:
+    """on_result gets {"stored": number, ...} or {"refused": sentence}; exactly once."""
+
+    def __init__(self, recording: Path, rig_file: Path, state: Path, on_result: Callable[[Result], None]) -> None:
+        arguments = json.dumps({"recording": str(recording), "rig": str(rig_file), "state": str(state)})
+        command = [sys.executable, "-m", "gateway.service.fitting.fit_process", arguments]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, start_new_session=True
+        )
+        assert self._process.stdout
+        self._descriptor = self._process.stdout.fileno()
+        os.set_blocking(self._descriptor, False)
+        self._said = b""
+        self._on_result = on_result
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(self._descriptor, self._read)
+
+    def _read(self) -> None:
+        try:
+            chunk = os.read(self._descriptor, _LONGEST)
+        except BlockingIOError:
+            return
+        if chunk:
+            self._said += chunk
+            return
+        self._forget()
+        self._reap()
+        self._on_result(self._result())
+
+    def _reap(self) -> None:
+        """The pipe's end comes a moment before the process's: no waiting for it, and no zombie either."""
+        if self._process.poll() is None:
+            self._loop.call_later(_REAP_S, self._reap)
+
+    def _result(self) -> Result:
+        try:
+            result: Result = json.loads(self._said)
+        except ValueError:
+            return {"refused": "A331 the fit process ended without a result; force-gateway fit RECORDING shows why"}
+        return result
+
+    def close(self) -> None:
+        """Stop listening. The child is not ended: what it stores is of use whoever listens."""
+        self._forget()
+        if self._process.poll() is None:
+            self._process.returncode = 0  # its end is not ours to wait for
+
+    def _forget(self) -> None:
+        if self._process.stdout and not self._process.stdout.closed:
+            self._loop.remove_reader(self._descriptor)
+            self._process.stdout.close()

@@ -1,0 +1,186 @@
+"""One rig, wired: the way of one setpoint through the house, and the way of a measured force back.
+
+A master's write calls `on_asked` and, where control can take it, `on_command` inside the bank's write: so the answer is
+control's own, and the voltage is on its way before the master has it.
+The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Clock and ports come in as arguments; the
+same class runs behind ptys, behind real ports and in virtual time. No exception of ours may leave the last voltage
+standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
+"""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+
+from gateway.control import Controller
+from gateway.control.inputs import Line, Output
+from gateway.devices.messages import ForceSample
+from gateway.recording.ring import SampleRing
+from gateway.registers import RegisterBank
+from gateway.registers.command import Command
+from gateway.registers.edge_questions import Asked, EdgeRefusal
+from gateway.registers.residual_cause import ResidualCause
+from gateway.registers.words import FaultCode, WarningBit
+from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.load_cell_line import CellExchange
+from gateway.service.running_rig.output_line import OutputExchange
+from gateway.service.running_rig.published_status import Known, LoopHealth, status_of
+from gateway.service.running_rig.recorded_row import row_of
+from gateway.service.running_rig.recordings import Recordings
+
+Log = Callable[[str, str], None]
+"""log(cause, sentence): the cause groups lines for rate limits, the sentence is for people."""
+
+
+class Gateway:
+    """Joins bank, controller, output line and load cell; owns no file and no socket."""
+
+    def __init__(
+        self,
+        bank: RegisterBank,
+        controller: Controller,
+        output: OutputExchange,
+        cell: CellExchange,
+        *,
+        clock: Callable[[], float],
+        log: Log,
+    ) -> None:
+        self.bank = bank
+        self.controller = controller
+        self.output = output
+        self.recordings: Recordings | None = None
+        self.ladder: LadderKeeper | None = None
+        self.ring: SampleRing | None = None
+        self.health = LoopHealth()
+        self.decision: Output | None = None
+        self.sample: ForceSample | None = None
+        self.samples = 0
+        self.cell_garbage_bytes = 0
+        self.pressure_pa_per_v = nan  # of the output device, by its profile
+        self.output_lost = FaultCode.NONE
+        self.cell_lost = False
+        self.owner_connected = True
+        self.warnings = WarningBit(0)
+        self.restart_cause = FaultCode.NONE
+        self.residual_cause = ResidualCause.NONE
+        self._cell = cell
+        self._clock = clock
+        self._log = log
+        self.waited_s: Callable[[], float | None] = lambda: None
+        """Seconds that this process has waited for a processor until now, where the machine counts that."""
+        self._last_tick_s: float | None = None
+        self._last_waited_s: float | None = None
+        bank.on_command = self._on_command
+        bank.on_asked = self._on_asked
+
+    def _on_asked(self, asked: Asked) -> EdgeRefusal | None:
+        """Before the bank stores a write: whether control can take it at this moment."""
+        now_s = self._clock()
+        return self.controller.refusal_of(now_s, asked, self._line(now_s))
+
+    def _on_command(self, command: Command) -> None:
+        self.owner_connected = True
+        self._step(self._clock())
+
+    def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
+        fresh = False
+        for message in self._cell.receive(chunk, now_s):
+            if isinstance(message, ForceSample):
+                self.sample, fresh = message, True
+                self.samples += 1
+            else:
+                self.cell_garbage_bytes += len(message.data)
+        if fresh:
+            self._step(now_s)
+            self._record()
+
+    def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.output.on_bytes(chunk, now_s)
+
+    def on_tick(self, expirations: int, late_s: float) -> None:
+        """expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
+        self.health.count(expirations, late_s)
+        now_s = self._clock()
+        self.output.tick(now_s)
+        self._cell.tick(now_s)
+        self._step(now_s)
+        self._last_tick_s, self._last_waited_s = now_s, self.waited_s()
+
+    def output_opened(self) -> None:
+        self.output.opened()
+        self.output_lost = FaultCode.NONE
+
+    def output_closed(self) -> None:
+        """Decided at once: it may be open again before the next tick, and another device may be behind it then."""
+        self.output.opened()
+        self.output_lost = FaultCode.OUTPUT_LOST
+        self._step(self._clock())
+
+    def refresh(self) -> None:
+        """Decide and publish now: something besides command and sample has changed."""
+        self._step(self._clock())
+
+    def cell_opened(self) -> None:
+        self._cell.opened()
+        self.cell_lost = False
+
+    def _late_s(self, now_s: float) -> float:
+        """How long the loop has not come by: what arrived meanwhile is executed late (SAFETY: stall)."""
+        return 0.0 if self._last_tick_s is None else now_s - self._last_tick_s
+
+    def _waited_s(self) -> float | None:
+        """Of the lateness: so much the machine is to blame for."""
+        if self._last_waited_s is None or (waited_s := self.waited_s()) is None:
+            return None
+        return waited_s - self._last_waited_s
+
+    def _line(self, now_s: float) -> Line:
+        return Line(
+            acknowledged_v=self.output.acknowledged_v,
+            unanswered_since_s=self.output.unanswered_since_s,
+            fault=self.output_lost or self.output.fault,
+            cell_lost=self.cell_lost,
+            pressure_pa=self.output.pressure_pa,
+            pressure_pa_per_v=self.pressure_pa_per_v,
+            owner_connected=self.owner_connected,
+            late_s=self._late_s(now_s),
+            waited_s=self._waited_s(),
+            warnings=self.warnings,
+            sent_v=self.output.sent_v,
+            wire_s=self.output.round_trip_s,
+        )
+
+    def _decide(self, now_s: float) -> Output:
+        try:
+            return self.controller.step(now_s, self.bank.command, self.sample, self._line(now_s))
+        except Exception:
+            self._log("internal", "A499 a defect of ours, safe voltage written:\n" + traceback.format_exc())
+            return self.controller.safe_output(FaultCode.INTERNAL)
+
+    def _step(self, now_s: float) -> None:
+        decision = self._decide(now_s)
+        self.output.want(decision.voltage_v, now_s)
+        self.decision = decision
+        if self.ladder:
+            self.ladder.follow(decision)
+        if decision.clear_command:
+            self.bank.clear_command()
+        if decision.release_owner:
+            self.bank.release_owner()
+        self.health.loop_time_s = self._clock() - now_s
+        stored = self.ladder.stored if self.ladder else 0
+        known = Known(self.controller.calibration_id, stored, self.residual_cause)
+        status = status_of(decision, self.health, self.output.pressure_pa, known)
+        if decision.warnings & WarningBit.RESTARTED and not decision.fault:
+            status = replace(status, fault_code=self.restart_cause)
+        self.bank.publish(status)
+        for event in decision.events:
+            self._log("control", event)
+
+    def _record(self) -> None:
+        if self.recordings and self.sample and self.decision:
+            self.recordings.append(self.sample, self.decision, self.output.line)
+        if self.ladder and self.sample and self.decision:
+            self.ladder.append(self.sample, self.decision, self.output.line)
+        if self.ring and self.sample and self.decision:
+            self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.line))

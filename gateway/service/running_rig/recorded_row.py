@@ -1,0 +1,58 @@
+"""What a run records: one row per load-cell sample, in the columns of the recording contract.
+
+`command_v` is what is wanted from this row on; `force_n` was read before it acts. A wire at 9600 baud takes 20 ms for a
+setting and its echo, so not every command is sent, and none at once: `sent_v` is the last one that was, `sent_age_s` before
+this row.
+"""
+
+from gateway.control.inputs import Output
+from gateway.devices.messages import ForceSample, Quality
+from gateway.recording import Recorder
+from gateway.recording.tables.columns import DERIVED, SENT
+from gateway.service.running_rig.output_line import LineState
+from gateway.units import kilopascal_from_pascal
+
+COLUMNS = ("time_s", "command_v", "force_n", "pressure_kpa", "quality", *DERIVED, *SENT)
+
+_QUALITY_NUMBER = {Quality.OK: 0.0, Quality.UNSTABLE: 1.0, Quality.OVERLOAD: 2.0}
+
+
+def row_of(time_s: float, sample: ForceSample, decision: Output, line: LineState) -> tuple[float, ...]:
+    """One row in the order of COLUMNS; time_s counts from wherever the taker's begins."""
+    return (
+        time_s,
+        decision.voltage_v,
+        decision.force_measured_n,
+        kilopascal_from_pascal(line.pressure_pa),
+        _QUALITY_NUMBER[sample.quality],
+        decision.force_requested_n,
+        decision.force_applied_n,
+        decision.feedforward_v,
+        decision.trim_v,
+        float(decision.state),
+        float(decision.fault),
+        float(decision.limited_by),
+        decision.model_residual_n,
+        line.sent_v,
+        sample.time_s - line.sent_s,
+    )
+
+
+class RunRecording:
+    """One open recording; time_s counts from its first row."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._start_s: float | None = None
+        self.rows = 0
+
+    @property
+    def recorder(self) -> Recorder:
+        return self._recorder
+
+    def append(self, sample: ForceSample, decision: Output, line: LineState, *labels: float) -> None:
+        """labels: of the columns that a run adds."""
+        if self._start_s is None:
+            self._start_s = sample.time_s
+        self.rows += 1
+        self._recorder.append(row_of(sample.time_s - self._start_s, sample, decision, line) + labels)

@@ -1,0 +1,62 @@
+"""The running gateway's recording: at most one, started and stopped on command; a full disk ends it, not the control."""
+
+from pathlib import Path
+from typing import Any
+
+from gateway.control.inputs import Output
+from gateway.devices.messages import ForceSample
+from gateway.processes.event_log import EventLog
+from gateway.profiles import Rig
+from gateway.recording import Recorder
+from gateway.service.running_rig.output_line import LineState
+from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
+
+
+class Recordings:
+    def __init__(self, directory: Path, rig: Rig, log: EventLog) -> None:
+        self._directory = directory
+        self._rig = rig
+        self._log = log
+        self._current: RunRecording | None = None
+        self.calibration_number = rig.calibration.number
+
+    def start(self) -> dict[str, Any]:
+        """Begin a recording; ValueError when one is running."""
+        if self._current:
+            raise ValueError(f"already recording to {self._current.recorder.path}")
+        rig = self._rig
+        header = {
+            "rig": rig.name,
+            "rig_fingerprint": rig.fingerprint,
+            "rig_texts": dict(rig.texts),
+            "calibration": self.calibration_number,
+            "simulated": rig.simulated,
+            "seed": rig.seed,
+        }
+        self._current = RunRecording(Recorder(self._directory, header, COLUMNS))
+        return self.status()
+
+    def stop(self) -> dict[str, Any]:
+        if not self._current:
+            return {"recording": None}
+        ended, self._current = self._current, None
+        ended.recorder.close()
+        return {"recording": None, "written": str(ended.recorder.path), "rows": ended.rows}
+
+    def status(self) -> dict[str, Any]:
+        if not self._current:
+            return {"recording": None}
+        return {"recording": str(self._current.recorder.path), "rows": self._current.rows}
+
+    def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
+        if self._current:
+            self._current.append(sample, decision, line)
+
+    def flush(self, now_s: float) -> None:
+        """Once a tick; a recorder that has stopped by itself (disk full) is said once and let go."""
+        if self._current:
+            recorder = self._current.recorder
+            recorder.flush(now_s)
+            if recorder.failure:
+                self._log("recording", recorder.failure)
+                self._current = None

@@ -1,0 +1,326 @@
+"""One running cell: the wired gateway with its real edges (two ports, the Modbus server, tick, recorder, control socket)."""
+
+import asyncio
+import contextlib
+import os
+import time
+import traceback
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.calibrations.activation import InUse
+from gateway.control import Controller
+from gateway.devices import cell_host, output_host
+from gateway.fieldbus import BindError, ModbusTcpServer
+from gateway.modbus import Peer
+from gateway.ports import PortError, SerialPort
+from gateway.processes.clock_tick import Tick
+from gateway.processes.event_log import EventLog
+from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.scheduler_counters import TurnsOf
+from gateway.profiles import CellLine, OutputLine, Rig
+from gateway.recording.ring import SampleRing
+from gateway.registers import RegisterBank
+from gateway.registers.words import FaultCode, WarningBit
+from gateway.service import banner
+from gateway.service.clean_shutdown_marker import RunFlag
+from gateway.service.control_socket import Asked, ControlSocket
+from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig.bank_rules import bank_rules, server_settings
+from gateway.service.running_rig.baud_probe import why_no_words
+from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.calibrations import RigCalibrations
+from gateway.service.running_rig.gateway_core import Gateway
+from gateway.service.running_rig.load_cell_line import CellExchange
+from gateway.service.running_rig.output_line import OutputExchange
+from gateway.service.running_rig.recordings import Recordings
+from gateway.service.watch_reports import WatchDesk
+
+_FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
+_WORDS_AGAIN_S = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
+_STOP_BOUND_S = 4.5  # the guardian waits 5 s
+
+
+class StartError(Exception):
+    """The gateway can't start; the sentence says why, exit_code how the process ends."""
+
+    def __init__(self, sentence: str, exit_code: int) -> None:
+        super().__init__(sentence)
+        self.exit_code = exit_code
+
+
+_FAULTS: Final = {
+    EndCause.MACHINE_BUSY: FaultCode.MACHINE_BUSY,
+    EndCause.STALLED: FaultCode.LOOP_STALLED,
+    EndCause.STOPPED: FaultCode.LOOP_STALLED,
+}
+
+
+def _cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCode:
+    """What the fault_code register says after an unclean end: the guardian's cause, or a run that never ended."""
+    if restarted:
+        return _FAULTS.get(restarted.cause, FaultCode.INTERNAL)
+    return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
+
+
+class Cell:
+    """Wires one rig's gateway to its edges. `failed` is set when a defect of ours left the loop in an unknown state."""
+
+    def __init__(self, rig: Rig, ports: dict[str, str], state: Path, guardian: GuardianLine, log: EventLog) -> None:
+        self._calibrations = RigCalibrations(rig, state)
+        self._rig = rig = self._calibrations.rig
+        self._state = state
+        self._guardian = guardian
+        self._log = log
+        self._flag = RunFlag(state)
+        self._closing = False
+        self._spoke = asyncio.Event()
+        self.ring: SampleRing | None = None
+        self.failed = asyncio.Event()
+        asyncio.get_running_loop().set_exception_handler(self._on_defect)
+        host = output_host(rig.output.device)
+        self._safe_frame = host.safe_frame(rig.control.limits.safe_voltage_v)
+        self._safe_reply = host.safe_reply
+        self._output_port = SerialPort(
+            ports["output"],
+            rig.output.settings,
+            on_bytes=self._on_output_bytes,
+            on_lost=self._on_output_lost,
+            on_open=self._on_output_open,
+        )
+        self._cell_port = SerialPort(
+            ports["load_cell"],
+            rig.load_cell.settings,
+            on_bytes=self._on_cell_bytes,
+            on_lost=self._on_cell_lost,
+            on_open=self._on_cell_open,
+        )
+        self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
+        self._turns = TurnsOf(os.getpid())
+        cell = rig.load_cell
+        self._cell_line = CellExchange(cell_host(cell.device, cell.sign, cell.unit), self._write_cell, cell.device)
+        self._tick = Tick(1.0 / rig.loop_hz, self._on_tick)
+        self._recordings = Recordings(state / "recordings", rig, log)
+
+    def _wire(self, cause: FaultCode) -> None:
+        """Bank and controller, the gateway between them, and who serves both."""
+        self._wire_gateway(cause)
+        rig = self._rig
+        self._ladder = LadderKeeper(self.controller, rig, self._state, time.monotonic, self._log)
+        self.gateway.ladder = self._ladder
+        self._server = ModbusTcpServer(
+            self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
+        )
+        self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
+        self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log.speaking_for("watch"))
+        self._control_socket = ControlSocket(
+            self._state,
+            Asked(
+                bank=self.bank,
+                recordings=self._recordings,
+                health=self.gateway.health,
+                upload=self._upload,
+                ladder=self._ladder,
+                watch=self.watch_desk,
+            ),
+            self._log,
+        )
+
+    def _wire_gateway(self, cause: FaultCode) -> None:
+        rig = self._rig
+        self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
+        self.bank.on_refusal = lambda refusal, peer: self._log(
+            f"refusal {peer.host} {refusal.reason.name.lower()}", f"{refusal.sentence}   ({peer})"
+        )
+        self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer.host}", f"{sentence}   ({peer})")
+        self.controller = Controller(
+            rig.control,
+            rig.model_of(rig.calibration, rig.calibration.model()),
+            calibration_id=rig.calibration.number,
+            unclean_restart=bool(cause),
+            compensation=rig.compensation,
+            response=rig.response_of(rig.calibration),
+        )
+        self.gateway = Gateway(
+            self.bank,
+            self.controller,
+            self._line,
+            self._cell_line,
+            clock=time.monotonic,
+            log=self._log,
+        )
+        self.gateway.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
+        self.gateway.recordings = self._recordings
+        self.gateway.ring = self.ring
+        self.gateway.restart_cause = cause
+        self.gateway.waited_s = self._turns.waited_s
+        if self._tick.is_fallback:
+            self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
+
+    async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
+        """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
+        self._wire(_cause_of_restart(restarted, was_unclean=self._flag.raise_flag()))
+        await self._output_port.open()
+        await self._cell_port.open()
+        self._tick.start()
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
+        notes = await self._notes(restarted)
+        if record:
+            notes += self._record_from_the_start()
+        if unserved := await self._control_socket.start():
+            notes += (f"E152 {unserved}",)
+        for note in notes:
+            self._log.note("start", note)
+        modbus = await self._listen(bind)
+        return banner.Ready(
+            rig=self._rig,
+            modbus=modbus,
+            output_port=self._output_port.path,
+            cell_port=self._cell_port.path,
+            voltage_v=self._line.acknowledged_v,
+            force_n=self.gateway.sample.force_n if self.gateway.sample else None,
+            notes=notes,
+        )
+
+    def move_ports(self, ports: dict[str, str]) -> None:
+        """The simulated rig has been started again, elsewhere: what was lost is opened there."""
+        self._output_port.move(ports["output"])
+        self._cell_port.move(ports["load_cell"])
+
+    def _record_from_the_start(self) -> tuple[str, ...]:
+        """A disk that takes no recording is no reason not to control."""
+        try:
+            self._recordings.start()
+        except OSError as error:
+            return (f"not recording: {error}",)
+        return ()
+
+    async def _notes(self, restarted: Ending | None) -> tuple[str, ...]:
+        notes = [*self._rig.notes, *self._calibrations.notes]
+        if restarted:
+            notes.append(f"restarted in OFF after: {restarted.sentence}")
+        if self._line.acknowledged_v is None:
+            notes.append(await self._why_silent(self._output_port, self._rig.output, restarted))
+        if self.gateway.sample is None:
+            notes.append(await self._why_silent(self._cell_port, self._rig.load_cell, restarted))
+        return tuple(notes)
+
+    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, restarted: Ending | None) -> str:
+        """The port is ours alone: it is closed while the probe listens at other speeds, and opened again.
+
+        Not after a restart: seconds of listening would tell what the start has told already.
+        """
+        if restarted:
+            return f"E111 {port.path}: nothing heard within {_WORDS_AGAIN_S:g} s of the restart; power, wires?"
+        port.close()
+        sentence = await why_no_words(line, port.path)
+        await port.open()
+        return sentence
+
+    async def _listen(self, bind: list[Any] | None) -> tuple[str, int]:
+        host, port = bind or (self._rig.network.bind, self._rig.network.port)
+        try:
+            return await self._server.start(str(host), int(port))
+        except PermissionError as error:
+            raise StartError(
+                f"E120 port {port} needs the capability net_bind_service; use --bind {host}:5020 (force-gateway explain E120)",
+                77,
+            ) from error
+        except BindError as error:
+            raise StartError(str(error), 78) from error
+        except OSError as error:
+            raise StartError(f"E121 cannot listen on {host}:{port}: {error}; another --bind HOST:PORT?", 69) from error
+
+    async def ramp_down(self) -> None:
+        """Force to 0 along the ramp, then the safe voltage (at most 4.5 s)."""
+        self.controller.stop()
+        deadline_s = time.monotonic() + _STOP_BOUND_S
+        while not self.controller.stopped and time.monotonic() < deadline_s:
+            await asyncio.sleep(self._tick.period_s)
+
+    async def close(self) -> None:
+        """Safe voltage on the wire, then everything closed; the clean-run flag goes last."""
+        self._closing = True
+        self._tick.close()
+        with contextlib.suppress(PortError):
+            await self._output_port.write_last(self._safe_frame)
+        await self._server.close()
+        await self._control_socket.close()
+        self._recordings.stop()
+        self._ladder.close()
+        self._output_port.close()
+        self._cell_port.close()
+        self._upload.close()
+        self._turns.close()
+        self._flag.lower()
+
+    def _on_defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """An exception that nobody expected: the process ends with the safe voltage, the guardian starts it again in OFF."""
+        error = context.get("exception")
+        trace = "".join(traceback.format_exception(error)) if isinstance(error, BaseException) else ""
+        self._log("internal", f"A499 a defect of ours: {context['message']}\n{trace}")
+        self._guardian.first_cause(
+            f"a defect of ours: {error!r}" if error else f"a defect of ours: {context['message']}"
+        )
+        self.failed.set()
+
+    def _on_tick(self, expirations: int, late_s: float) -> None:
+        self.gateway.on_tick(expirations, late_s)
+        self._guardian.heartbeat()
+        self._recordings.flush(time.monotonic())
+        self._ladder.flush(time.monotonic())
+        if self._line.acknowledged_v is not None and self.gateway.sample is not None:
+            self._spoke.set()
+
+    def _on_calibration(self, taken: InUse) -> None:
+        """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
+        rig, calibration = self._rig, taken.calibration
+        model, response = rig.model_of(calibration, taken.model), rig.response_of(calibration)
+        self.controller.use(model, calibration.number, response)
+        self._recordings.calibration_number = taken.calibration.number
+        lowered = self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
+        if lowered:
+            self._log("calibration", lowered)
+        self.gateway.refresh()
+
+    def _write_output(self, data: bytes) -> None:
+        if not self._closing:
+            self._output_port.flush_input()  # at most one question is out: whatever is there answers none of ours
+            self._output_port.write(data)
+
+    def _write_cell(self, data: bytes) -> None:
+        if not self._closing:
+            self._cell_port.flush_input()
+            self._cell_port.write(data)
+
+    def _on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.gateway.on_output_bytes(chunk, now_s)
+
+    def _on_output_open(self, descriptor: int) -> None:
+        self._guardian.hand_over(descriptor, self._safe_frame, self._safe_reply)
+        self.gateway.output_opened()
+        self._warn_of_latency(self._output_port)
+
+    def _on_output_lost(self, error: PortError) -> None:
+        self._log("port", str(error))
+        self.gateway.output_closed()
+
+    def _on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.gateway.on_cell_bytes(chunk, now_s)
+
+    def _on_cell_open(self, descriptor: int) -> None:
+        self.gateway.cell_opened()
+        self._warn_of_latency(self._cell_port)
+
+    def _warn_of_latency(self, port: SerialPort) -> None:
+        if port.warning:
+            self._log("port", port.warning)
+
+    def _on_cell_lost(self, error: PortError) -> None:
+        self._log("port", str(error))
+        self.gateway.cell_lost = True
+
+    def _on_peer_closed(self, peer: Peer) -> None:
+        if peer.host == self.bank.owner:
+            self.gateway.owner_connected = False

@@ -1,0 +1,105 @@
+"""What each verb of control.sock and rig.sock takes: one frozen dataclass per verb, read strictly.
+
+An unknown key, a wrong type, NaN, a number out of range: a sentence, before any handler sees a value. Defaults stand for keys
+that are left out; null is no way to leave one out. The views of pydantic are made with this module, not with the first
+request: they take milliseconds, which the control loop does not have.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Final, TypeVar
+
+from annotated_types import Ge, Le, MaxLen
+
+from gateway.control.runs.experiment_plan import ExperimentPlan
+from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.profiles.strict_yaml.text import Document
+from gateway.profiles.strict_yaml.typed import adapter, build
+
+Shape = TypeVar("Shape")
+Number = Annotated[int, Ge(0), Le(999_999)]
+
+_STRICT: Final = {"extra": "forbid", "allow_inf_nan": False}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """Nothing but the verb."""
+
+    __pydantic_config__ = _STRICT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordRequest:
+    """on left out: how it is."""
+
+    __pydantic_config__ = _STRICT
+    on: bool | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationRequest:
+    """Neither: what is in use. force: a rejected one, too."""
+
+    __pydantic_config__ = _STRICT
+    use: Number | None = None
+    force: bool = False
+    rollback: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrateRequest:
+    """plan: as a plan file has it; its own reader judges it. continues: recordings of the run that is resumed. name: of the
+    calibration that comes of it; empty for one made up."""
+
+    __pydantic_config__ = _STRICT
+    plan: dict[str, Any] | None = None
+    continues: Annotated[tuple[Number, ...], MaxLen(1000)] = ()
+    name: Annotated[str, MaxLen(200)] = ""
+    dry_run: bool = False
+    stop: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResidualRequest:
+    """What the residual watch tells; without a cause it is asked."""
+
+    __pydantic_config__ = _STRICT
+    cause: Number | None = None
+    sentence: str = ""
+    counters: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultRequest:
+    """A fault of the simulated rig. values: of its plant, by section.field."""
+
+    __pydantic_config__ = _STRICT
+    name: str
+    on: bool = True
+    values: dict[str, float] = field(default_factory=dict)
+
+
+for _shape in (
+    Ask,
+    RecordRequest,
+    CalibrationRequest,
+    CalibrateRequest,
+    ResidualRequest,
+    FaultRequest,
+    RunPlan,
+    ExperimentPlan,
+):
+    adapter(_shape)
+
+
+def read(shape: type[Shape], request: Mapping[str, Any]) -> Shape:
+    """The request without its verb as `shape`. ValueError names the first key that does not fit."""
+    asked = {key: value for key, value in request.items() if key != "do"}
+    for key, value in asked.items():
+        if value is None:
+            raise ValueError(f"{key} is null: leave it out instead")
+    found, faults = build(shape, Document("request", asked, {}))
+    if found is None or faults:
+        raise ValueError(f"{faults[0].path} {faults[0].message}".strip())
+    return found

@@ -1,0 +1,145 @@
+"""Starting, watching and ending the guardian's children: every system call of the guardian that talks to a child.
+
+Each may fail at any point, because a child may die at any point: a death is an answer here, never an exception. Only a
+child that the machine has no process for is an OSError. No call waits longer than its bound. Standard library only.
+"""
+
+import contextlib
+import json
+import os
+import select
+import signal
+import socket
+import sys
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from gateway.processes import message_link as guardian_link
+from gateway.processes.scheduler_counters import TurnsOf
+
+_END_BOUND_S: Final = 1.0
+_REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
+LOST: Final = -1000
+"""The exit code of a child that nobody could ask: it does not go, or somebody else has reaped it."""
+
+
+@dataclass
+class Child:
+    """A child process. link: our end of its line; pid 0: asked for and not born yet; died: its pidfd, readable once it
+    is gone, -1 before its birth; turns: what the kernel gives it."""
+
+    link: socket.socket
+    pid: int = 0
+    died: int = -1
+    turns: TurnsOf | None = None
+    _code: int | None = field(default=None, repr=False)
+
+    def born(self, pid: int) -> None:
+        """Follow this process from now on; OSError when it has died already."""
+        self.died = os.pidfd_open(pid)
+        self.pid, self.turns = pid, TurnsOf(pid)
+
+    def kill(self) -> None:
+        if self.pid and self._code is None:
+            with contextlib.suppress(OSError):
+                os.kill(self.pid, signal.SIGKILL)
+
+    def wait(self, bound_s: float = _REAP_BOUND_S) -> int:
+        """Its exit code (-9: by SIGKILL), LOST when there is none to be had within the bound."""
+        if self._code is None and self.pid:
+            if self.died >= 0:
+                _readable(self.died, bound_s)
+            self._code = _reaped(self.pid)
+        return LOST if self._code is None else self._code
+
+    def end(self) -> None:
+        """Ask, then insist; leaves nothing behind."""
+        if self.pid and self._code is None:
+            with contextlib.suppress(OSError):
+                os.kill(self.pid, signal.SIGTERM)
+            if self.wait(_END_BOUND_S) == LOST:
+                self.kill()
+                self.wait()
+        self.close()
+
+    def close(self) -> None:
+        self.link.close()
+        if self.turns:
+            self.turns.close()
+        if self.died >= 0:
+            os.close(self.died)
+            self.died = -1
+
+
+def exit_word(code: int) -> str:
+    if code == LOST:
+        return "no exit code"
+    if code >= 0:
+        return f"exit {code}"
+    try:
+        return signal.Signals(-code).name
+    except ValueError:
+        return f"signal {-code}"
+
+
+def spawn(module: str, arguments: dict[str, Any], *shared: int, room: int = 0) -> Child:
+    """`python -m MODULE LINK ARGUMENTS` in a session of its own: the terminal's Ctrl-C reaches the guardian alone.
+
+    shared: descriptors that it inherits under their numbers; room: bytes that the arguments take at least, for a
+    process that will show other ones. OSError when there is no process for it.
+    """
+    ours, theirs = guardian_link.pair()
+    try:
+        with theirs:
+            words = [str(theirs.fileno()), json.dumps(arguments).ljust(room)]
+            pid = _spawned([sys.executable, "-m", module, *words], (theirs.fileno(), *shared))
+        child = Child(ours, pid)
+    except OSError:
+        ours.close()
+        raise
+    try:
+        child.born(pid)
+    except OSError:
+        child.end()
+        raise
+    return child
+
+
+def _spawned(command: list[str], passed: tuple[int, ...]) -> int:
+    for descriptor in passed:
+        os.set_inheritable(descriptor, True)
+    try:
+        null = [(os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0)]
+        return os.posix_spawn(command[0], command, os.environ, file_actions=null, setsid=True, setsigmask=())
+    finally:
+        for descriptor in passed:
+            os.set_inheritable(descriptor, False)
+
+
+def reap_strangers(known: set[int]) -> None:
+    """Orphans of our children come to us, their subreaper: let them go, but none that somebody still asks for."""
+    with contextlib.suppress(OSError):
+        while (ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)) and ended.si_pid not in known:
+            os.waitpid(ended.si_pid, os.WNOHANG)
+
+
+def shared_memory() -> int | None:
+    """Memory without a name and without a disk, for the sample ring; None where the kernel has none to give."""
+    try:
+        return os.memfd_create("force-gateway-samples")
+    except (OSError, AttributeError):
+        return None
+
+
+def _readable(descriptor: int, bound_s: float) -> bool:
+    poll = select.poll()
+    poll.register(descriptor, select.POLLIN)
+    return bool(poll.poll(bound_s * 1e3))
+
+
+def _reaped(pid: int) -> int | None:
+    try:
+        reaped, status = os.waitpid(pid, os.WNOHANG)
+    except ChildProcessError:  # not ours: a fork server that could not hand it over
+        return LOST
+    return os.waitstatus_to_exitcode(status) if reaped else None

@@ -1,0 +1,121 @@
+"""How the guardian comes by its children: forked from a prepared process where that serves, else started from nothing.
+
+Nothing here may cost a restart: a fork server that dies, hangs or cannot fork is dropped and the child is started the long
+way; it is started again after a while, and given up when it keeps dying. Standard library only.
+"""
+
+from collections.abc import Callable
+from math import inf
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.service.supervisor import fork_server
+from gateway.service.supervisor.child_process import Child, exit_word, spawn
+
+PAUSES_S: Final = (5.0, 30.0, 120.0)
+"""Before the fork server is started again; it dies once more, and that is it."""
+_BIRTH_S: Final = 5.0  # from asking a prepared server: a busy machine is no reason to import everything again
+_FIRST_BIRTH_S: Final = 30.0  # imports on a slow machine
+_COMMAND_ROOM: Final = 1024
+WATCH: Final = "gateway.watch.watch_process"
+
+
+class Nursery:
+    """rig, simulate: what the fork server reads once in advance. Times are monotonic seconds."""
+
+    def __init__(self, rig: str, *, simulate: bool, state: Path, say: Callable[[str], None]) -> None:
+        self._options = {"rig": rig, "simulate": simulate}
+        self._state = state
+        self._say = say
+        self._server: Child | None = None
+        self._is_proven = False
+        self._is_doubted = False  # the last child came to nothing: the next one is started the long way
+        self._deaths = 0
+        self._due_s = inf
+
+    @property
+    def sources(self) -> list[int]:
+        return [self._server.died] if self._server else []
+
+    @property
+    def due_s(self) -> float:
+        return self._due_s
+
+    @property
+    def server_pid(self) -> int | None:
+        return self._server.pid if self._server else None
+
+    @property
+    def birth_bound_s(self) -> float:
+        """How long a child that was asked for may take to be born."""
+        return _BIRTH_S if self._is_proven else _FIRST_BIRTH_S
+
+    def open(self) -> None:
+        """Start the fork server; without one everything works, and takes longer."""
+        self._due_s = inf
+        if not fork_server.become_subreaper():
+            return
+        try:
+            self._server = spawn("gateway.service.supervisor.fork_server", self._options, room=_COMMAND_ROOM)
+        except OSError:
+            self._server = None
+
+    def control(self, arguments: dict[str, Any]) -> Child:
+        """OSError when there is no process for it. So the two below."""
+        return self._child(fork_server.CONTROL, arguments)
+
+    def rig(self, *, prepared: bool) -> Child:
+        """The simulated rig outlives a kill of control, as a real rig does; it ends when its link does.
+
+        prepared: not for a second try, which avoids whatever went wrong with the first.
+        """
+        arguments = {"rig": self._options["rig"], "state": str(self._state)}
+        return self._child(fork_server.RIG, arguments) if prepared else spawn(fork_server.RIG, arguments)
+
+    def watch(self, arguments: dict[str, Any]) -> Child:
+        """The residual watch: what it finds it tells control, through the control socket."""
+        return spawn(WATCH, arguments, arguments["ring"])
+
+    def was_born(self) -> None:
+        self._is_proven = True
+
+    def was_not_born(self) -> None:
+        """A child that was asked for ended before its first word."""
+        self._is_doubted = True
+
+    def drop_server(self, how: str, now_s: float) -> None:
+        """It does not do its work: children are started the long way until it has been started again."""
+        if self._server is None:
+            return
+        self._server.kill()
+        self._server.wait()
+        self._server.close()
+        self._server, self._is_proven = None, False
+        self._deaths += 1
+        is_last = self._deaths > len(PAUSES_S)
+        self._due_s = inf if is_last else now_s + PAUSES_S[self._deaths - 1]
+        then = "it stays off" if is_last else f"another one in {PAUSES_S[self._deaths - 1]:g} s"
+        self._say(f"A407 the prepared process {how}: {then}; a restart takes longer without it")
+
+    def follow(self, readable: set[int], now_s: float) -> None:
+        """After each wait: has the server died, is it time for another one?"""
+        if self._server and self._server.died in readable:
+            self.drop_server(f"ended ({exit_word(self._server.wait())})", now_s)
+        elif now_s >= self._due_s:
+            self.open()
+
+    def end(self) -> None:
+        if self._server:
+            self._server.end()
+            self._server = None
+
+    def _child(self, module: str, arguments: dict[str, Any]) -> Child:
+        ring = arguments.get("ring")
+        shared = () if ring is None else (int(ring),)
+        if self._server and not self._is_doubted:
+            try:
+                return Child(fork_server.ask(self._server.link, module, arguments, *shared))
+            except OSError:
+                pass  # it is about to be found dead
+        self._is_doubted = False
+        return spawn(module, arguments, *shared)

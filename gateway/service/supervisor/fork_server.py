@@ -1,0 +1,150 @@
+"""A process that has imported everything and waits: control and the simulated rig are forked from it.
+
+Importing takes half a second of processor, and seconds on a machine that has none to spare; a fork takes milliseconds. So
+the first start imports once instead of twice, and a control process that died is back as soon as its devices have
+spoken. The pages are shared with the children, which costs less memory than two separate processes.
+
+    guardian -> FORK {"module", "arguments"} + the child's end of its line, then what else it inherits
+    child -> guardian: BORN {"pid"}, on its own line
+
+Forked twice, so that the child becomes the guardian's own (the guardian is a subreaper): its exit code and its last
+counters are the guardian's to read. This process has one thread and opens nothing, so there is nothing that a fork could
+break. Rejected: a spare control process that waits (one restart only, and the first start gains nothing).
+"""
+
+import contextlib
+import gc
+import json
+import os
+import select
+import socket
+import sys
+import time
+import traceback
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.processes import message_link as guardian_link
+from gateway.processes import priority
+
+CONTROL: Final = "gateway.service.control_process"
+RIG: Final = "gateway.service.simulated_rig"
+_SUBREAPER: Final = 36
+_MOMENT_S: Final = 0.0002
+_ONE_THREAD: Final = "OPENBLAS_NUM_THREADS"  # a process with threads must not fork
+_NAME_BYTES: Final = 15  # of a process's name, which top and ps -c show
+
+
+def become_subreaper() -> bool:
+    """Orphans of our children become ours; False where the kernel cannot."""
+    import ctypes
+
+    try:
+        return bool(ctypes.CDLL(None).prctl(_SUBREAPER, 1, 0, 0, 0) == 0)
+    except (OSError, AttributeError):
+        return False
+
+
+def ask(server: socket.socket, module: str, arguments: dict[str, Any], *shared: int) -> socket.socket:
+    """The guardian's side: our end of the new child's line. OSError when the server is gone or does not listen."""
+    ours, theirs = guardian_link.pair()
+    with theirs:
+        try:
+            guardian_link.send(
+                server, guardian_link.FORK, {"module": module, "arguments": arguments}, theirs.fileno(), *shared
+            )
+        except OSError:
+            ours.close()
+            raise
+    return ours
+
+
+def prepare(options: dict[str, Any]) -> None:
+    """Import what the children need and read the rig once, so that nothing is left to build. Faults are theirs to tell."""
+    was = os.environ.setdefault(_ONE_THREAD, "1")
+    import_module(RIG)
+    import_module(CONTROL).prepare(options)
+    if was == "1":
+        del os.environ[_ONE_THREAD]  # what control starts later may have more
+    gc.collect()
+    gc.freeze()  # a collection in a child would write to every page and so unshare it
+
+
+def serve(link: socket.socket) -> None:
+    """Fork for whatever is asked, until the guardian is gone."""
+    asked = select.poll()
+    asked.register(link, select.POLLIN)
+    while True:
+        asked.poll()
+        message = guardian_link.receive(link)
+        if message is None:
+            return
+        with contextlib.suppress(OSError):  # no process to be had: the closed line tells the guardian
+            _fork(link, message)
+        message.drop_descriptors()
+
+
+def _fork(link: socket.socket, message: guardian_link.Message) -> None:
+    between = os.fork()
+    if between:
+        os.waitpid(between, 0)
+        return
+    code, parent = 1, os.getpid()
+    try:
+        if os.fork() == 0:
+            link.close()
+            code = _child(message, parent)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        with contextlib.suppress(Exception):
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(code)
+
+
+def _child(message: guardian_link.Message, parent: int) -> int:
+    """The new process: a session of its own, its name, its first word, and then as if it had been started by itself."""
+    while os.getppid() == parent:  # it ends at once; from then on we are the guardian's, who may ask for our end
+        time.sleep(_MOMENT_S)
+    os.setsid()
+    module, arguments = str(message.body["module"]), message.body["arguments"]
+    theirs, *shared = message.descriptors
+    if shared:
+        arguments["ring"] = shared[0]
+    words = [str(theirs), json.dumps(arguments)]
+    show_command([sys.executable, "-m", module, *words])
+    line = socket.socket(fileno=theirs)
+    try:
+        guardian_link.send(line, guardian_link.BORN, {"pid": os.getpid()})
+    except OSError:
+        return 0  # nobody waits for us any more
+    line.detach()
+    code: int = import_module(module).main(words)
+    return code
+
+
+def show_command(command: list[str]) -> None:
+    """Let ps, pgrep and top show this command as ours: the kernel shows what stands where the first arguments stood."""
+    import ctypes
+
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        Path("/proc/self/comm").write_text(command[2].rpartition(".")[2][:_NAME_BYTES])
+        fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+        start, end = int(fields[45]), int(fields[46])  # arg_start and arg_end; field 3 of proc(5) is our first
+        room = end - start - 1
+        text = "\0".join(command).encode()[:room].ljust(room)  # blanks: a nul would be another, empty argument
+        if start and room > 0:
+            ctypes.memmove(start, text + b"\0", room + 1)
+
+
+def main(arguments: list[str]) -> int:
+    priority.take(0)
+    prepare(json.loads(arguments[1]))
+    serve(socket.socket(fileno=int(arguments[0])))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

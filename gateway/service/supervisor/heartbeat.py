@@ -1,0 +1,58 @@
+"""The heartbeat of the control loop: when it is overdue, and what a silence was. Standard library only."""
+
+from collections.abc import Callable
+from typing import Final
+
+from gateway.processes.exit_cause import Ending
+from gateway.processes.scheduler_counters import Silence, Turns, judged, load_of_machine, since
+from gateway.service.supervisor.child_process import Child
+
+_LATE_S: Final = 0.02
+
+
+class Pulse:
+    """stall_s: the longest silence, which READY tells. Times are monotonic seconds."""
+
+    def __init__(self) -> None:
+        self.stall_s = 0.1
+        self._beat_s: float | None = None  # later than it was where we were late ourselves
+        self._heard_s = 0.0
+        self._turns: Turns | None = None  # at the last heartbeat
+        self._was_late = False
+
+    @property
+    def is_up(self) -> bool:
+        """Whether there is a loop that beats: from READY on."""
+        return self._beat_s is not None
+
+    @property
+    def due_s(self) -> float:
+        return (self._beat_s or 0.0) + self.stall_s
+
+    def forget(self) -> None:
+        self._beat_s, self._turns, self._was_late = None, None, False
+
+    def heard(self, control: Child, now_s: float) -> None:
+        self._beat_s = self._heard_s = now_s
+        self._was_late = False
+        self._turns = control.turns.read() if control.turns else None
+
+    def is_overdue(self, now_s: float) -> bool:
+        """True after stall_s of silence. Where we woke late ourselves the machine stood still: one more chance."""
+        late_s = now_s - self.due_s
+        if late_s > _LATE_S and not self._was_late:
+            self._was_late, self._beat_s = True, now_s - self.stall_s + _LATE_S
+            return False
+        return late_s >= 0.0
+
+    def why_silent(self, control: Child, now_s: float) -> Callable[[], Ending]:
+        """How to find the cause of the silence until now; to be asked behind the kill, when the kernel's counters are
+        complete and nothing waits for them any more."""
+        state = control.turns.state() if control.turns else ""
+        silent_s, before, was_late = now_s - self._heard_s, self._turns, self._was_late
+
+        def why() -> Ending:
+            turns = since(before, control.turns.read() if control.turns else None)
+            return judged(Silence(silent_s, self.stall_s, turns, state, was_late), load_of_machine())
+
+        return why

@@ -1,0 +1,49 @@
+"""What the guardian says, and how: it never waits for a terminal, and no closed pipe ends it. Standard library only."""
+
+import contextlib
+import json
+import os
+import select
+import sys
+from collections import Counter
+from typing import Any, Final
+
+from gateway.processes.exit_cause import EndCause, Ending
+from gateway.service.supervisor.restart_policy import WINDOW_S
+
+_PATIENCE_S: Final = 0.1
+
+
+def complain(sentence: str) -> None:
+    """To stderr. A paused terminal gets nothing: the guardian has other work than to wait for it."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        if select.select([], [sys.stderr], [], _PATIENCE_S)[1]:
+            sys.stderr.write(sentence + "\n")
+            sys.stderr.flush()
+
+
+def announce(what: str | dict[str, Any]) -> None:
+    """To stdout: READY, for people or for a program. A reader that is gone (`| head -1`) is no reason to end."""
+    try:
+        sys.stdout.write((what if isinstance(what, str) else json.dumps(what)) + "\n")
+        sys.stdout.flush()
+    except (OSError, ValueError, AttributeError):
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the flush at our own end fails as well
+
+
+def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str:
+    return f"A401 {ending.sentence}; {how}; safe voltage {wire_of(acknowledged)}: restarted in OFF"
+
+
+def wire_of(acknowledged: bool | None) -> str:
+    """How the last word on the wire went; None: there was no line."""
+    return {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]
+
+
+def too_many_sentence(causes: Counter[EndCause]) -> str:
+    counted = ", ".join(f"{count} {cause.value}" for cause, count in causes.most_common())
+    sentence = f"A402 five restarts in {WINDOW_S:.0f} s ({counted}): the safe voltage is held, the gateway stops"
+    if causes.most_common(1)[0][0] is EndCause.MACHINE_BUSY:
+        sentence += "; the machine is too busy for it (A403)"
+    return sentence

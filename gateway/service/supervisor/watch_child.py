@@ -1,0 +1,80 @@
+"""The guardian's part in the residual watch: start it, start it again when it dies, each time later, and give up in time.
+
+The watch is a luxury: nothing here may keep the guardian from its work. It is started between two heartbeats (a spawn
+takes a few milliseconds), its death is read like any other event, and a start that fails counts as a death. Standard
+library only.
+"""
+
+from collections.abc import Callable
+from math import inf
+from typing import Final
+
+from gateway.service.supervisor.child_process import LOST, Child, exit_word
+
+PAUSES_S: Final = (5.0, 30.0, 120.0)
+"""Waiting times before it is started again; it dies once more, and that is it."""
+_LONG_LIFE_S: Final = 900.0  # a watch that lived this long begins to count anew
+
+
+class WatchKeeper:
+    """spawn: starts the process, OSError when that fails; say: a sentence for people. Times are monotonic seconds."""
+
+    def __init__(self, spawn: Callable[[], Child], say: Callable[[str], None]) -> None:
+        self._spawn = spawn
+        self._say = say
+        self._child: Child | None = None
+        self._due_s = inf
+        self._began_s = 0.0
+        self._deaths = 0
+
+    @property
+    def pid(self) -> int | None:
+        return self._child.pid if self._child else None
+
+    @property
+    def due_s(self) -> float:
+        """When `follow` has something to do without an event; infinite where nothing is planned."""
+        return self._due_s
+
+    @property
+    def sources(self) -> list[int]:
+        """What becomes readable when the watch has died."""
+        return [self._child.died] if self._child else []
+
+    def start(self, now_s: float) -> None:
+        """The first start; a watch that runs goes on."""
+        if self._child is None and self._deaths == 0:
+            self._begin(now_s)
+
+    def follow(self, readable: set[int], now_s: float) -> None:
+        """After each wait: has it died, is it time to start it again?"""
+        if self._child is not None and self._child.died in readable:
+            code = self._child.wait()
+            self._child.close()
+            self._child = None
+            self._died(f"ended ({f'signal {-code}' if LOST < code < 0 else exit_word(code)})", now_s)
+        elif now_s >= self._due_s:
+            self._begin(now_s)
+
+    def end(self) -> None:
+        if self._child is not None:
+            self._child.end()
+            self._child = None
+
+    def _begin(self, now_s: float) -> None:
+        self._due_s, self._began_s = inf, now_s
+        try:
+            self._child = self._spawn()
+        except OSError as error:
+            self._died(f"did not start ({error.strerror or error})", now_s)
+
+    def _died(self, how: str, now_s: float) -> None:
+        if now_s - self._began_s >= _LONG_LIFE_S:
+            self._deaths = 0
+        self._deaths += 1
+        if self._deaths > len(PAUSES_S):
+            self._say(f"A346 the residual watch {how} {self._deaths} times: it stays off, control goes on without it")
+            return
+        pause_s = PAUSES_S[self._deaths - 1]
+        self._due_s = now_s + pause_s
+        self._say(f"A346 the residual watch {how}: it is started again in {pause_s:g} s, control goes on")

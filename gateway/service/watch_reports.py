@@ -1,0 +1,77 @@
+"""Where control hears from the residual watch: a cause as a number, a sentence, and counters.
+
+The watch is another process and may be wrong about everything: what it says is checked, changes one warning bit and one
+status register, and never the control. What it said last stands until it says otherwise, and its age is readable.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from gateway.registers.residual_cause import ResidualCause
+from gateway.registers.words import WarningBit
+from gateway.service.running_rig.gateway_core import Gateway, Log
+from gateway.service.socket_requests import ResidualRequest, read
+
+Answer = dict[str, Any]
+COUNTERS: Final = ("looks", "judged", "skipped", "cpu_s", "rms_n", "floor_n", "pause_s")
+"""Numbers that the watch may tell about itself; others are not kept."""
+_LONGEST_SENTENCE: Final = 500
+_LARGEST_COUNT: Final = 1.0e15
+
+
+class WatchDesk:
+    """Called from the loop only. clock: monotonic seconds."""
+
+    def __init__(self, gateway: Gateway, clock: Callable[[], float], log: Log) -> None:
+        self._gateway = gateway
+        self._clock = clock
+        self._log = log
+        self._sentence = ""
+        self._counters: dict[str, float] = {}
+        self._warnings = 0
+        self._heard_s: float | None = None
+
+    def answer(self, request: Answer) -> Answer:
+        """{"cause": number, "sentence": text, "counters": {...}} tells; without a cause it is asked. ValueError refuses."""
+        told = read(ResidualRequest, request)
+        if told.cause is not None:
+            self._hear(told.cause, told)
+        return self.figures() | {"sentence": self._sentence}
+
+    def figures(self) -> Answer:
+        """Cause by number and name, how often a warning rose, the watch's own counters, and how old all of it is."""
+        cause = self._gateway.residual_cause
+        age_s = None if self._heard_s is None else round(self._clock() - self._heard_s, 3)
+        return {"cause": int(cause), "name": cause.effect, "warnings": self._warnings, "age_s": age_s} | self._counters
+
+    def _hear(self, number: int, told: ResidualRequest) -> None:
+        if number not in set(ResidualCause):
+            raise ValueError(f"cause = {number}: a number of residual_cause is expected")
+        self._counters = _numbers(told.counters)
+        self._heard_s = self._clock()
+        cause, before = ResidualCause(number), self._gateway.residual_cause
+        self._sentence = told.sentence[:_LONGEST_SENTENCE]
+        if cause is not before:
+            self._change(cause)
+
+    def _change(self, cause: ResidualCause) -> None:
+        gateway = self._gateway
+        was_none, gateway.residual_cause = gateway.residual_cause is ResidualCause.NONE, cause
+        if cause is ResidualCause.NONE:
+            gateway.warnings &= ~WarningBit.MODEL_DIFFERS
+            self._log("residual", f"info {self._sentence or 'the model agrees with the measurements again'}")
+        else:
+            gateway.warnings |= WarningBit.MODEL_DIFFERS
+            self._warnings += was_none
+            self._log("residual", f"A345 {self._sentence or cause.effect}")
+        gateway.refresh()
+
+
+def _numbers(told: dict[str, Any]) -> dict[str, float]:
+    """The known counters that are finite numbers."""
+    return {name: told[name] for name in COUNTERS if _is_number(told.get(name))}
+
+
+def _is_number(value: Any) -> bool:
+    """No bool, and no integer beyond what a float carries, which isfinite does not take."""
+    return type(value) in (int, float) and abs(value) < _LARGEST_COUNT

@@ -1,0 +1,1 @@
+"""The formulas of the effects that a plant may have beyond its plain physics."""

@@ -1,0 +1,107 @@
+"""A slide whose motion was measured: friction follows the position, and the force is thrust - friction, without a pad.
+
+Without noise, elements are moved by the position's own increments. With noise, rigid friction takes its direction from
+the speed, tanh(v / v0) with v0 a quarter of the usual speed and the slope over a twelfth of a stroke: in a real cylinder
+the friction falls before the rod stands (Zillen's data: 0.50 and 0.25 N left, against 0.81 and 0.44 N by the sign of the
+travel). At rest nobody knows where between its limits friction stands; 0 is the middle. Presliding elements are at
+least four standard deviations wide. The speed, for drag and Stribeck's curve, is the slope over 50 ms.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from gateway.twin.friction import BREAKAWAY_M, ELEMENTS, RIGID_M, drags, moved, rested
+from gateway.twin.replay.cache import Cache
+from gateway.twin.replay.drive import Drive, Floats
+from gateway.twin.replay.grid import Grid
+from gateway.twin.replay.load import Load
+from gateway.twin.sections import Friction
+
+NOISE_WIDTHS: Final = 4.0
+_SLOPE_S: Final = 0.025  # to either side
+_DIRECTION_STROKES: Final = 1.0 / 24.0  # to either side
+_LONGEST_S: Final = 0.25
+_SOFT_SHARE: Final = 0.25  # of the usual speed
+
+
+class Motions:
+    """The measured motion on the grid, and the strains that it makes."""
+
+    def __init__(self, drive: Drive, grid: Grid) -> None:
+        assert drive.position_m is not None
+        self._grid, self._sign = grid, 1.0 if drive.motion == "measured" else -1.0
+        self._noise_m = drive.position_noise_m
+        self._position_m = self._sign * grid.from_rows(drive.position_m)
+        self._speed_m_per_s = self._slope(_SLOPE_S)
+        self._strains = Cache()
+
+    def force_n(self, load: Load) -> Floats:
+        """Force of one load on the grid, N: thrust - friction outward, seen from the position's own direction."""
+        friction = load.plant.friction
+        limit, strain = self._limit_n(friction, load.limit_n), self._mean_strain(friction.presliding_m)
+        out, back = drags(friction)
+        speed = self._speed_m_per_s
+        return load.drive_n - limit * strain - np.where(speed > 0.0, out, back) * speed
+
+    def _limit_n(self, friction: Friction, limit: Floats) -> Floats:
+        """The limit with what the motion makes of it: Stribeck's curve and stiction after a rest."""
+        if friction.stribeck_n != 0.0:
+            ratio = self._speed_m_per_s / friction.stribeck_speed_m_per_s
+            limit = limit + friction.stribeck_n / (1.0 + ratio * ratio)
+        return limit + self._stiction_n(friction) if friction.dwell_stiction_n != 0.0 else limit
+
+    def _stiction_n(self, friction: Friction) -> Floats:
+        breakaway_m = max(friction.presliding_m, BREAKAWAY_M, NOISE_WIDTHS * self._noise_m)
+        shares = 1.0 - np.exp(-np.diff(self._grid.time_s) / friction.dwell_stiction_s)
+        travels = self._quiet_travels_m(breakaway_m)
+        stiction, found = 0.0, [0.0]
+        for kept, share in zip(moved(1.0, travels, breakaway_m).tolist(), shares.tolist(), strict=True):
+            stiction = rested(stiction, friction.dwell_stiction_n, share) * kept
+            found.append(stiction)
+        return np.array(found)
+
+    def _quiet_travels_m(self, breakaway_m: float) -> Floats:
+        """Travel of each step, without the noise of a position at rest (a play of four deviations takes it out)."""
+        if self._noise_m == 0.0:
+            return np.diff(self._position_m)
+        return np.diff(_dragged(self._position_m, 0.5 * NOISE_WIDTHS * self._noise_m))
+
+    def _mean_strain(self, presliding_m: float) -> Floats:
+        found = self._strains.get(presliding_m)
+        if found is not None:
+            return found
+        if presliding_m == 0.0 and self._noise_m > 0.0:
+            return self._strains.put(presliding_m, self._direction())
+        count = ELEMENTS if presliding_m > 0.0 else 1
+        least_m = max(RIGID_M, NOISE_WIDTHS * self._noise_m)
+        widths = [max(presliding_m * (j + 1) / count, least_m) for j in range(count)]
+        strains = [(self._position_m - _dragged(self._position_m, width)) / width for width in widths]
+        return self._strains.put(presliding_m, np.clip(sum(strains[1:], start=strains[0]) / count, -1.0, 1.0))
+
+    def _direction(self) -> Floats:
+        """-1 .. 1: the way of the motion, by a speed smooth enough to be sure of it."""
+        steady, duration_s = np.abs(self._slope(0.1)), float(self._grid.time_s[-1]) + self._grid.step_s
+        strokes = float(np.mean(steady)) * duration_s / max(float(np.ptp(self._position_m)), RIGID_M)
+        stroke_s = duration_s / max(strokes, 1.0)
+        reach_s = min(max(_DIRECTION_STROKES * stroke_s, _SLOPE_S), _LONGEST_S)
+        usual = float(np.median(steady[steady > 0.1 * float(np.max(steady))]))
+        return np.asarray(np.tanh(self._slope(reach_s) / max(_SOFT_SHARE * usual, RIGID_M)))
+
+    def _slope(self, reach_s: float) -> Floats:
+        grid, position = self._grid, self._position_m
+        reach = max(1, round(reach_s / grid.step_s)) if self._noise_m > 0.0 else 1
+        point = np.arange(grid.points)
+        before, behind = np.maximum(point - reach, 0), np.minimum(point + reach, grid.points - 1)
+        slope: Floats = (position[behind] - position[before]) / (grid.time_s[behind] - grid.time_s[before])
+        return slope
+
+
+def _dragged(position_m: Floats, width_m: float) -> Floats:
+    """The far end of an element of this width: the position drags it along."""
+    end = float(position_m[0])
+    found = []
+    for low, high in zip((position_m - width_m).tolist(), (position_m + width_m).tolist(), strict=True):
+        end = low if end < low else high if end > high else end
+        found.append(end)
+    return np.array(found)

@@ -1,0 +1,114 @@
+"""The residual watch itself: look at the newest window, cheaply; search for the cause where that shows an excess.
+
+A look replays the reference plant (a few tenths of a second) and compares the residual with the floor of such windows.
+Only an excess, or a kind of window that was never judged, is worth the whole search, which takes seconds, and only in rows
+that are younger than the last healthy look: a window that is half old and half new gets a wrong name (a longer delay
+was called a longer lag). A cause that stands is searched for again less and less often; what clears it is the cheap look.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from typing import Final
+
+from gateway.recording.ring import RingReader
+from gateway.registers.residual_cause import ResidualCause
+from gateway.watch.reference import Reference
+from gateway.watch.warning_filter import Finding, Opinion
+from gateway.watch.window import Window, window_of
+from gateway.watch.window_verdict import Diagnose, finding_of
+
+_LEAST_EXCITATION_V: Final = 0.2
+_LEAST_MOVES: Final = 4
+"""What the first window that is judged must have: later ones are compared with it."""
+_FRESH: Final = 0.6
+"""Share of a window that must be younger than the last healthy one: half old and half new has a wrong name."""
+_ALL: Final = 1 << 30
+_LONGEST_PAUSE_S: Final = 600.0
+_CERTAIN: Final = 2
+"""So many windows in a row that say the same: more of them add nothing."""
+_OF_TOLERANCE: Final = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """window_s, every_s: of the rig file. tolerance_n: the rig's band, of which a quarter matters."""
+
+    window_s: float
+    every_s: float
+    tolerance_n: float
+
+
+class Watch:
+    """clock: monotonic seconds, for the pauses between searches."""
+
+    def __init__(
+        self, ring: RingReader, reference: Reference, setup: Setup, diagnose: Diagnose, clock: Callable[[], float]
+    ) -> None:
+        self._ring = ring
+        self._reference = reference
+        self._setup = setup
+        self._diagnose = diagnose
+        self._clock = clock
+        self._opinion = Opinion()
+        self._search_s = 0.0
+        self._healthy_s = -inf
+        self.why_skipped = ""
+        self.counters: dict[str, float] = {"looks": 0, "judged": 0, "skipped": 0}
+
+    @property
+    def standing(self) -> Finding:
+        """What is to be published."""
+        return self._opinion.standing
+
+    def look(self) -> None:
+        """Look once; `standing` and `counters` tell."""
+        self.counters["looks"] += 1
+        window = self._window(self._setup.window_s)
+        self.why_skipped = window if isinstance(window, str) else self._unfit(window)
+        if self.why_skipped or isinstance(window, str):
+            self.counters["skipped"] += 1
+            return
+        rms_n = self._reference.rms_n(window)
+        self.counters["rms_n"] = rms_n
+        if not self._reference.is_exceeded(window, rms_n):
+            self._healthy(window)
+        elif self._clock() >= self._search_s:
+            self._search(window)
+        if (floor_n := self._reference.floor_n(window)) is not None:
+            self.counters["floor_n"] = floor_n
+
+    def _window(self, window_s: float) -> Window | str:
+        return window_of(self._ring.newest(_ALL), self._ring.columns, window_s)
+
+    def _healthy(self, window: Window) -> None:
+        self._healthy_s = window.end_s
+        self._opinion.hear(Finding(excitation_v=window.excitation_v))
+
+    def _search(self, window: Window) -> None:
+        """In what is younger than the last healthy window, once that is half a window."""
+        fresh_s = min(self._setup.window_s, window.end_s - self._healthy_s)
+        if fresh_s < _FRESH * self._setup.window_s:
+            return
+        fresh = window if fresh_s == self._setup.window_s else self._window(fresh_s)
+        if not isinstance(fresh, str):
+            self._judge(fresh)
+
+    def _unfit(self, window: Window) -> str:
+        """Why this window may not be the first; empty when it may, or when it is not."""
+        enough = window.excitation_v >= _LEAST_EXCITATION_V and window.moves >= _LEAST_MOVES
+        return "" if self._reference.is_settled or enough else "too little was commanded to begin with"
+
+    def _judge(self, window: Window) -> None:
+        self.counters["judged"] += 1
+        found = self._diagnose([window.measurement], self._reference.plant)
+        if not self._reference.is_settled:
+            self._reference.settle(found)
+        finding = finding_of(window, found, self._reference, _OF_TOLERANCE * self._setup.tolerance_n)
+        if finding.cause is ResidualCause.NONE:
+            self._reference.learn(window, self._reference.rms_n(window))
+            self._healthy_s = window.end_s
+        self._opinion.hear(finding)
+        if self._opinion.convictions > _CERTAIN:
+            pause_s = self._setup.every_s * 2.0 ** (self._opinion.convictions - _CERTAIN)
+            self._search_s = self._clock() + min(_LONGEST_PAUSE_S, pause_s)

@@ -1,0 +1,115 @@
+"""The residual watch as a process: `python -m gateway.watch.watch_process LINK '{"rig": ..., "ring": descriptor, ...}'`.
+
+It must never be felt. It runs in the kernel's idle class, uses one thread, a quarter of one core at most on average, is
+the first to go when memory runs out, and shares with control nothing but memory that it can only read, and a socket that
+it speaks to for a millisecond. Everything heavy is imported when there is a window to judge: a gateway that runs for
+less, as in most tests, never pays for it. It ends with the guardian: the end of its link ends it, whatever it is doing.
+"""
+
+import contextlib
+import json
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.processes import priority
+from gateway.recording.ring import RingReader
+
+if TYPE_CHECKING:
+    from gateway.diagnosis import Diagnosis, Measurement
+    from gateway.twin.plant import Plant
+    from gateway.watch.residual_watch import Watch
+
+SHARE: Final = 0.25
+"""Of one core, on average."""
+_ANSWER_S: Final = 5.0
+_LONGEST_ANSWER: Final = 1 << 16
+_FIRST_AMONG_THE_KILLED: Final = "900"
+
+
+def lower_priority() -> None:
+    """Behind everybody else in processor time and memory; one thread for the mathematics."""
+    priority.run_behind_others()
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text(_FIRST_AMONG_THE_KILLED)
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+
+
+def end_with(link: socket.socket) -> None:
+    """A thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does."""
+
+    def wait() -> None:
+        with contextlib.suppress(OSError):
+            link.recv(1)
+        os._exit(0)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def tell(state: Path, message: dict[str, Any]) -> None:
+    """Say it to control; a control that is being restarted hears it the next time."""
+    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as control:
+        control.settimeout(_ANSWER_S)
+        control.connect(str(state / "control.sock"))
+        control.sendall(json.dumps({"do": "residual"} | message).encode() + b"\n")
+        control.recv(_LONGEST_ANSWER)
+
+
+def watch_of(ring: RingReader, options: dict[str, Any]) -> "Watch":
+    """The watch over the rig's plant. Everything heavy is imported here."""
+    from gateway.profiles import load_rig
+    from gateway.watch.reference import Reference
+    from gateway.watch.residual_watch import Setup, Watch
+
+    rig = load_rig(options["rig"], simulated=options["simulated"])
+    assert rig.plant is not None  # or nobody had started us
+    setup = Setup(options["window_s"], options["every_s"], rig.control.defaults.in_band_tolerance_n)
+    return Watch(ring, Reference(rig.plant), setup, diagnosed, time.monotonic)
+
+
+def diagnosed(measurements: "Sequence[Measurement]", plant: "Plant") -> "Diagnosis":
+    from gateway.diagnosis import Options, diagnose
+
+    return diagnose(measurements, plant, Options(is_own=True))
+
+
+def pause_s(every_s: float, spent_s: float) -> float:
+    """From the end of a look to the next one. spent_s: of processor time, by the look."""
+    return max(every_s, spent_s / SHARE) - min(spent_s, every_s)
+
+
+def run(options: dict[str, Any]) -> None:
+    """Look, tell, sleep; for ever."""
+    ring, state, every_s = RingReader(options["ring"]), Path(options["state"]), options["every_s"]
+    time.sleep(options["window_s"])
+    watch = watch_of(ring, options)
+    while True:
+        began_s = time.process_time()
+        watch.look()
+        spent_s = time.process_time() - began_s
+        rest_s = pause_s(every_s, spent_s)
+        counters = watch.counters | {"cpu_s": time.process_time(), "pause_s": rest_s}
+        counters = {name: value for name, value in counters.items() if isfinite(value)}  # JSON has no NaN
+        standing = watch.standing
+        tell(state, {"cause": int(standing.cause), "sentence": standing.sentence, "counters": counters})
+        time.sleep(rest_s)
+
+
+def main(arguments: list[str]) -> int:
+    lower_priority()
+    end_with(socket.socket(fileno=int(arguments[0])))
+    run(json.loads(arguments[1]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,109 @@
+"""What is damaged is named and passed over; what was whole before it is used."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from gateway.calibrations.selection import BUILT_IN
+from gateway.calibrations.store import CalibrationStore, StoreError
+from gateway.processes.durable_file import sealed, unsealed
+from tests.calibrations.coefficients import calibration, mark_of
+from tests.calibrations.store_bench import OWN, active_mark, used_store
+
+
+@pytest.fixture
+def used(tmp_path: Path) -> CalibrationStore:
+    return used_store(tmp_path / "state")
+
+
+def damages(data: bytes, rng: Random) -> Iterator[bytes]:
+    """Torn, grown, altered in one bit, emptied, foreign."""
+    yield from (data[:length] for length in sorted({0, 1, 9, len(data) // 2, len(data) - 1}))
+    yield data + b"\n"
+    for _ in range(12):
+        altered = bytearray(data)
+        altered[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        yield bytes(altered)
+    yield bytes(len(data))
+    yield sealed("number: [\n")
+    yield sealed("\xff\udcff".encode("utf-8", "replace").decode())
+    yield sealed("[]")
+    yield sealed(json.dumps({"generation": 2, "active": {"number": 2}}))
+
+
+def test_a_damaged_calibration_in_use_gives_way_to_the_one_before_it(used):
+    path = used.directory / "0003.yaml"
+    whole = path.read_bytes()
+    for damaged in damages(whole, Random(1)):
+        path.write_bytes(damaged)
+        standing = used.standing()
+        assert standing.calibration is not None
+        assert mark_of(standing.calibration) == 2, damaged
+        assert "E432" in standing.notes[0] and "0003.yaml" in standing.notes[0]
+        assert used.list()[1].calibration is None and "E432" in used.list()[1].fault
+        with pytest.raises(StoreError, match="E432"):
+            used.use(3)
+    path.write_bytes(whole)
+    assert active_mark(used) == 3
+
+
+def test_both_damaged_is_the_built_in_one(used):
+    for name in ("0002.yaml", "0003.yaml"):
+        (used.directory / name).write_bytes(b"number: 2\n")
+    standing = used.standing()
+    assert standing.calibration == OWN
+    assert standing.selection == BUILT_IN
+    assert len(standing.notes) == 2
+    with pytest.raises(StoreError, match="0002"):
+        used.rollback()
+
+
+def test_a_damaged_selection_gives_way_to_the_generation_before_it(used):
+    path = used.directory / "active.000002"
+    for damaged in damages(path.read_bytes(), Random(2)):
+        path.write_bytes(damaged)
+        standing = used.standing()
+        assert standing.calibration is not None and mark_of(standing.calibration) == 2, damaged
+        assert "E432" in standing.notes[0] and "active.000002" in standing.notes[0]
+
+
+def test_no_whole_selection_is_the_built_in_one_and_a_change_mends_it(used):
+    for name in ("active.000001", "active.000002"):
+        (used.directory / name).write_bytes(b"")
+    standing = used.standing()
+    assert standing.calibration == OWN
+    assert len(standing.notes) == 2
+    assert used.use(3).generation == 3
+    assert active_mark(used) == 3
+    assert used.standing().notes == ()
+
+
+def test_after_damage_a_rollback_does_not_lead_to_the_damaged_one(used):
+    used.use(used.add(calibration(4)))
+    (used.directory / "0004.yaml").write_bytes(b"")
+    used.use(2)
+    assert used.rollback().active.number == 3
+
+
+def test_a_calibration_that_does_not_fit_the_rig_gives_way_too(used):
+    standing = used.standing(lambda given: "E401 handle 2" if given.number == 3 else "")
+    assert standing.calibration is not None and mark_of(standing.calibration) == 2
+    assert standing.notes == ("E401 handle 2; the one before it is used instead of calibration 3",)
+
+
+def test_a_file_under_another_number_is_no_calibration(used):
+    (used.directory / "0007.yaml").write_bytes((used.directory / "0002.yaml").read_bytes())
+    with pytest.raises(StoreError, match="says that it is calibration 2"):
+        used.load(7)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"a", b"# crc32 00000000 of all that follows\n", b"\n\n", Random(3).randbytes(64)]
+)
+def test_only_what_was_sealed_is_unsealed(data):
+    with pytest.raises(ValueError, match=r"crc32|empty"):
+        unsealed(data + b"x" if data.startswith(b"# crc32") else data)
+    assert unsealed(sealed("é\n")) == "é\n".encode()

@@ -1,0 +1,305 @@
+"""Reading the active set back and committing it changes nothing; what it cannot carry, it says."""
+
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, Response, validate_coefficients
+from gateway.calibrations.activation import uploaded
+from gateway.calibrations.store import StoreError
+from gateway.profiles import load_calibration
+from gateway.registers import RegisterMap
+from gateway.registers.upload.coefficients import HEAD_WORDS, CoefficientSet, model_hash, set_crc, words_of_block
+from gateway.registers.upload.staging import Staged, check_staged
+from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
+from tests.calibrations.coefficients import calibration, requests_of, staged
+from tests.calibrations.upload_bench import COMMIT, DRY_RUN, OWN, PEER, Bench
+
+COMMITTED = (CommitStatus.COMMITTED, 0, 0)
+DEMO = load_calibration("demo")
+RESPONSE = Response(dead_time_s=0.0803, lag_s=0.0721, second_lag_s=0.031, source="from 12 steps")
+
+
+def stops(count: int) -> dict[str, tuple[float, ...]]:
+    shares = [1.0 / count] * (count - 1)
+    return {"slip_radii_v": tuple(0.31 * (k + 1) for k in range(count)), "slip_shares": (*shares, 1.0 - sum(shares))}
+
+
+GIVEN = {
+    "shipped": DEMO,
+    "blend": calibration(8),
+    "own limits": replace(DEMO, force_limits_n=(2.5, 25.3)),
+    "limits beyond the branches": replace(DEMO, force_limits_n=(0.0, 90.0)),
+    "order 15": calibration(8, order=15),
+    "ten stops": calibration(8, order=3, **stops(10)),
+    "response": replace(DEMO, response=RESPONSE),
+}
+
+
+def read_back(bench: Bench, register_map: RegisterMap, slot: int = 0) -> None:
+    """Every register of the staging block that the active block has under the same name, word by word."""
+    names = {register.name for register in register_map.registers_of("active")}
+    for register in register_map.registers_of("staging"):
+        if register.is_writable and register.name in names:
+            source = register_map.find(f"{register.name}@active").address
+            words = struct.unpack(f">{register.words}H", bench.bank.read_registers(source, register.words))
+            bench.write(register.address, *words)
+    bench.write(1144, slot)
+
+
+def made(name: str, where: str, state: Path, register_map: RegisterMap) -> Bench:
+    """A gateway whose calibration in use is this one: the rig's own, or one of the store, with or without a slot."""
+    if where == "the rig's own":
+        return Bench(state, register_map, GIVEN[name])
+    store = Bench(state, register_map).store
+    store.use(store.add(calibration(3)))
+    store.use(store.add(GIVEN[name]), 3 if where == "in a slot" else None)
+    return Bench(state, register_map)
+
+
+@pytest.mark.parametrize("where", ["the rig's own", "of the store", "in a slot"])
+@pytest.mark.parametrize("name", GIVEN)
+def test_committing_the_read_back_of_the_active_set_changes_nothing(name, where, tmp_path, register_map):
+    bench = made(name, where, tmp_path, register_map)
+    before, block, hashed = bench.upload.status(), bench.active_block, bench.model_hash
+    files = sorted(path.name for path in bench.store.directory.glob("*.yaml"))
+    read_back(bench, register_map, slot=3)
+    assert hashed == int.from_bytes(bench.bank.read_registers(1142, 2), "big"), "the active crc32 is that of the words"
+    bench.write(1145, COMMIT)
+    bench.run()
+    assert bench.outcome == COMMITTED
+    assert bench.notice is CommitNotice.KNOWN_SET
+    after = bench.upload.status()
+    assert [after[key] for key in ("active", "name", "built_in")] == [
+        before[key] for key in ("active", "name", "built_in")
+    ]
+    for there in (bench, bench.restarted()):
+        assert (there.model_hash, words_of_block(there.active_block)) == (hashed, words_of_block(block))
+        assert there.active_slot == 3
+    assert replace(bench.used[-1].calibration, number=GIVEN[name].number) == GIVEN[name]
+    assert sorted(path.name for path in bench.store.directory.glob("*.yaml")) == files
+    assert "; known here, it keeps number and name" in bench.log[-1]
+
+
+@pytest.mark.parametrize("name", GIVEN)
+def test_a_set_sent_by_a_master_is_the_same_model_but_for_float32(name, tmp_path, register_map):
+    """Into a gateway that has never seen it."""
+    bench, given = Bench(tmp_path, register_map), GIVEN[name]
+    assert bench.upload_of(given, 2) == COMMITTED
+    found = bench.used[-1].calibration
+    assert bench.notice == (CommitNotice.KNOWN_SET if name == "blend" else 0)
+    assert (bench.model_hash, len(found.slip_radii_v)) == (model_hash(given), len(given.slip_radii_v))
+    memory, last_n = given.model().reversal.start(), 5.0
+    stored_memory = found.model().reversal.start()
+    for force_n in (20.0, 12.0, 18.0, 6.0, 24.0):
+        memory = given.model().moved(memory, last_n, force_n)
+        stored_memory = found.model().moved(stored_memory, last_n, force_n)
+        wanted_v = given.model().voltage_v(force_n, given.model().share(memory))[0]
+        assert found.model().voltage_v(force_n, found.model().share(stored_memory))[0] == pytest.approx(
+            wanted_v, abs=1e-5
+        )
+        last_n = force_n
+    if given.response:
+        assert found.response == replace(given.response, source=f"upload over Modbus by {PEER.host}"), (
+            "the decimals that were meant"
+        )
+        assert bench.store.load(2).response == found.response
+
+
+def test_a_set_anywhere_in_the_store_is_known_and_a_damaged_one_is_not(tmp_path, register_map):
+    bench = Bench(tmp_path, register_map)
+    named = {
+        name: replace(each, name=name)
+        for name, each in GIVEN.items()
+        if name not in ("blend", "limits beyond the branches")
+    }
+    numbers = {name: bench.store.add(each) for name, each in named.items()}
+    for name, number in numbers.items():
+        assert bench.upload_of(GIVEN[name], 1) == COMMITTED
+        status = bench.upload.status()
+        assert (status["active"], status["name"], bench.notice) == (number, name, CommitNotice.KNOWN_SET)
+    path = bench.store.directory / f"{numbers['shipped']:04d}.yaml"
+    path.write_text(path.read_text().replace('name: "shipped"', 'name: "another"'))
+    assert bench.upload_of(DEMO, 1) == COMMITTED
+    assert (bench.upload.status()["name"], bench.notice) == ("slot-1", 0)
+
+
+def test_a_search_through_the_store_reads_few_files_whole(tmp_path, register_map, monkeypatch):
+    """Reading one whole takes milliseconds of processor, during which the loop waits for its turn."""
+    bench = Bench(tmp_path, register_map)
+    for mark in range(20, 40):
+        bench.store.add(calibration(mark))
+    (bench.store.directory / "0007.yaml").write_bytes(b"# crc32 0\nnumber: [\n")
+    loaded: list[int] = []
+    load = bench.store.load
+    monkeypatch.setattr(bench.store, "load", lambda number: loaded.append(number) or load(number))
+    assert bench.upload_of(calibration(27), 1) == COMMITTED
+    assert (bench.upload.status()["name"], bench.notice) == ("mark 27", CommitNotice.KNOWN_SET)
+    assert set(loaded) == {9}
+    assert bench.upload_of(calibration(50), 1) == COMMITTED
+    assert set(loaded) == {9, 22}, "what is in use, and the new one"
+
+
+def test_a_set_that_was_in_use_before_or_that_the_rig_names_is_known_too(tmp_path, register_map):
+    bench = Bench(tmp_path, register_map, DEMO)
+    assert bench.upload_of(calibration(5), 0) == COMMITTED
+    assert (bench.upload.status()["active"], bench.notice) == (2, 0)
+    assert bench.upload_of(DEMO, 1) == COMMITTED
+    status = bench.upload.status()
+    assert (status["active"], status["name"], status["slot"], bench.notice) == (1, "demo", 1, CommitNotice.KNOWN_SET)
+    assert bench.upload_of(replace(DEMO, name="another name"), 1) == COMMITTED
+    assert bench.upload.status()["name"] == "demo", "a name is not carried"
+
+
+@st.composite
+def calibrations(draw: st.DrawFn) -> Calibration:
+    """Any order, reversal, limits and response, in doubles that no float32 carries."""
+    third = draw(st.floats(0.9, 1.1))
+    order, count = draw(st.sampled_from((1, 2, 3, 5, 15))), draw(st.integers(0, 10))
+    given = calibration(draw(st.integers(0, 400)), order=order, blend_span_n=9.0 * third)
+    weights = [1.0, *draw(st.lists(st.floats(0.7, 1.4), min_size=order, max_size=order))]
+    given = replace(given, rising_weights=tuple(weights), falling_weights=tuple(weights))
+    if count:
+        parts = draw(st.lists(st.floats(0.05, 1.0), min_size=count, max_size=count))
+        radii = tuple(third * (0.9 + k / 3.0) for k in range(count))
+        given = replace(given, slip_radii_v=radii, slip_shares=tuple(part / sum(parts) for part in parts))
+    if draw(st.booleans()):
+        given = replace(given, force_limits_n=(third, 30.0 * third))
+    if draw(st.booleans()):
+        seconds = draw(st.tuples(st.floats(0.0, 1.0), st.floats(0.001, 2.0), st.floats(0.0, 2.0)))
+        given = replace(given, response=Response(dead_time_s=seconds[0], lag_s=seconds[1], second_lag_s=seconds[2]))
+    return given
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(calibrations())
+def test_whatever_a_calibration_is_its_words_make_the_same_words_again(given_set):
+    limits = CoefficientLimits(cell_range_n=150.0)
+    assume(not validate_coefficients(Coefficients.of_calibration(given_set), limits))
+    found = check_staged(staged(CoefficientSet.of_calibration(given_set), slot=1), limits)
+    assert isinstance(found, Staged), found
+    again = uploaded(found, name="x", rig="", date_utc="", source="")
+    assert CoefficientSet.of_calibration(again).to_words() == CoefficientSet.of_calibration(given_set).to_words()
+    assert model_hash(again) == model_hash(given_set)
+    again.model()
+
+
+CHANGES = {
+    "a handle": {"rising_handles_n": (0.965065713935, 1.2546, 65.2318728635)},
+    "a weight": {"falling_weights": (1.0, 0.76985, 0.565741917759)},
+    "the range": {"x1_v": 7.9},
+    "a limit": {"force_limits_n": (2.5, 25.3)},
+    "the blend span": {"blend_span_n": 13.5},
+    "a radius": {"slip_radii_v": (0.144, *DEMO.slip_radii_v[1:])},
+    "a share": {"slip_shares": (DEMO.slip_shares[0] - 1e-5, *DEMO.slip_shares[1:-1], DEMO.slip_shares[-1] + 1e-5)},
+    "no stops": {"slip_radii_v": (), "slip_shares": ()},
+    "a response": {"response": RESPONSE},
+}
+
+
+def test_the_model_hash_covers_all_that_changes_a_voltage():
+    changed = {model_hash(replace(DEMO, **change)) for change in ({}, *CHANGES.values())}
+    slower = replace(RESPONSE, second_lag_s=0.032)
+    changed |= {
+        model_hash(replace(DEMO, response=slower)),
+        model_hash(replace(DEMO, response=replace(slower, dead_time_s=0.0))),
+    }
+    assert len(changed) == len(CHANGES) + 3
+    assert model_hash(replace(DEMO, name="x", number=7, source="y", rms_n=1.0)) == model_hash(DEMO)
+
+
+# -- more stops than the registers carry
+
+
+MANY = calibration(8, number=1, **stops(12))
+
+
+def test_of_a_set_with_more_stops_the_registers_show_the_number_and_what_fits(tmp_path, register_map):
+    bench = Bench(tmp_path, register_map, MANY)
+    shown = CoefficientSet.from_words(bench.active_words)
+    assert (shown.stops, len(shown.slip_radii_v)) == (12, 10)
+    assert shown.slip_shares == pytest.approx(MANY.slip_shares[:10])
+    last = replace(MANY, slip_radii_v=(*MANY.slip_radii_v[:-1], 4.0))
+    assert len({bench.model_hash, model_hash(last), set_crc(bench.active_words)}) == 3, (
+        "the hash covers the others, too"
+    )
+
+
+@pytest.mark.parametrize("own_crc", [True, False])
+@pytest.mark.parametrize("action", [COMMIT, DRY_RUN])
+def test_a_read_back_that_lost_stops_is_refused_for_that_reason(action, own_crc, tmp_path, register_map):
+    bench = Bench(tmp_path, register_map, MANY)
+    read_back(bench, register_map)
+    if own_crc:
+        crc = set_crc(bench.active_words)
+        bench.write(1142, crc >> 16, crc & 0xFFFF)
+    bench.write(1145, action)
+    bench.run()
+    assert bench.outcome == (CommitStatus.FAILED, -1, UploadReason.STOPS_CUT)
+    assert bench.log[-1] == (
+        "E401 stops_cut: 12 slip stops, the registers carry 10: a read-back that has lost the others; active set 1 unchanged"
+    )
+    assert (bench.model_hash, bench.store.list()) == (model_hash(MANY), [])
+
+
+def test_a_set_with_more_stops_is_stored_used_and_selected_all_the_same(tmp_path, register_map):
+    bench = Bench(tmp_path, register_map)
+    number = bench.store.add(MANY)
+    bench.upload.use(number)
+    bench.run()
+    assert bench.used[-1].calibration == replace(MANY, number=number)
+    with pytest.raises(StoreError, match="slip stops: 17 radii"):
+        bench.store.add(calibration(1, **stops(17)))
+
+
+# -- masters of map version 1
+
+
+def old_requests(given: Calibration, slot: int) -> list[tuple[int, bytes]]:
+    """Byte for byte what such a master sends: 145 words from 1000 on, nothing above 1145."""
+    return [
+        (address, data)
+        for address, data in requests_of(staged(CoefficientSet.of_calibration(given), length=HEAD_WORDS, slot=slot))
+        if address < 1145
+    ]
+
+
+@pytest.mark.parametrize("action", [COMMIT, DRY_RUN])
+def test_a_set_of_140_words_is_taken_as_one_without_stops_and_says_so(action, tmp_path, register_map):
+    bench = Bench(tmp_path, register_map, DEMO)
+    bench.write(1150, 7)  # whatever another master has left there
+    for address, data in old_requests(DEMO, 5):
+        bench.bank.write_registers(address, data, PEER)
+    bench.write(1145, action)
+    bench.run()
+    assert bench.notice is CommitNotice.WITHOUT_STOPS
+    assert bench.log[-1].startswith(f"W330 {'dry run' if action == DRY_RUN else 'upload'} by {PEER}: ")
+    assert bench.log[-1].endswith("; length 140, as of map version 1: no slip stops, no response")
+    if action == DRY_RUN:
+        assert (bench.outcome, bench.model_hash) == ((CommitStatus.IDLE, 0, 0), model_hash(DEMO))
+        return
+    found = bench.used[-1].calibration
+    assert (bench.outcome, found.number, found.name) == (COMMITTED, 2, "slot-5")
+    assert (found.reversal_kind, found.response) == ("blend 14 N", None)
+    assert (
+        bench.model_hash
+        == model_hash(replace(DEMO, slip_radii_v=(), slip_shares=(), response=None))
+        != model_hash(DEMO)
+    )
+    assert "bsfm n=2, blend 14 N" in bench.log[-1]
+
+
+def test_the_same_140_words_again_keep_their_number_and_still_say_so(tmp_path, register_map):
+    bench = Bench(tmp_path, register_map, DEMO)
+    for _ in range(2):
+        for address, data in old_requests(DEMO, 5):
+            bench.bank.write_registers(address, data, PEER)
+        bench.write(1145, COMMIT)
+        bench.run()
+    assert (bench.upload.status()["active"], bench.notice) == (2, CommitNotice.WITHOUT_STOPS | CommitNotice.KNOWN_SET)
+    assert bench.upload_of(OWN, 1) == COMMITTED
+    assert bench.notice == 0, "a notice is of the last commit"

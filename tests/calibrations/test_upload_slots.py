@@ -1,0 +1,168 @@
+"""Recipes in slots, going back, and what a tool of this machine may ask for."""
+
+import pytest
+
+from gateway.registers.words import CommitStatus, RefusalReason, UploadReason
+from tests.calibrations.coefficients import calibration
+from tests.calibrations.upload_bench import OWN, PEER, Bench
+
+COMMITTED = (CommitStatus.COMMITTED, 0, 0)
+NO_SLOT = 0xFFFF
+
+
+@pytest.fixture
+def filled(bench):
+    """Marks 10, 20, 30 as calibrations 2, 3, 4 in slots 1, 2, 3; the last one in use."""
+    for slot in (1, 2, 3):
+        assert bench.upload_of(calibration(10 * slot), slot) == COMMITTED
+    return bench
+
+
+def top_n(bench) -> float:
+    found = bench.used[-1].calibration
+    return float(found.rising_handles_n[-1])
+
+
+def test_a_selected_slot_is_in_use_now_and_after_a_restart(filled):
+    filled.write(1149, 1)
+    assert filled.status is CommitStatus.WRITING
+    filled.run()
+    assert (filled.outcome, filled.active_slot, top_n(filled)) == (COMMITTED, 1, 51.25)
+    assert filled.log[-1].startswith(f"info slot 1 selected by {PEER}: calibration 2 (slot-1) in use, slot 1")
+    again = filled.restarted()
+    assert (again.active_words, again.active_slot) == (filled.active_words, 1)
+    again.write(1149, 3)
+    again.run()
+    assert (again.active_slot, top_n(again)) == (3, 53.75)
+
+
+@pytest.mark.parametrize("slot", [0, 4, 7])
+def test_an_empty_slot_is_refused_at_once(filled, slot):
+    before = filled.active_words
+    refusal = filled.refused(1149, slot)
+    assert (refusal.code, refusal.reason, refusal.address) == (3, RefusalReason.EMPTY_SLOT, 1149)
+    assert refusal.sentence == f"W331 slot {slot} is empty, filled: 1, 2, 3; active set 4 unchanged"
+    assert refusal.value == slot
+    assert (filled.active_words, filled.work) == (before, [])
+
+
+def test_a_slot_whose_file_is_damaged_fails_and_the_active_set_stays(filled):
+    (filled.store.directory / "0002.yaml").write_bytes(b"")
+    before = filled.active_words
+    filled.write(1149, 1)
+    filled.run()
+    assert filled.outcome == (CommitStatus.FAILED, -1, UploadReason.NOT_STORED)
+    assert filled.log[-1].startswith("E432 ") and filled.log[-1].endswith("active set 4 unchanged")
+    assert filled.active_words == before
+
+
+def test_a_slot_filled_again_holds_the_new_set_and_the_old_one_is_kept_for_going_back(filled):
+    filled.upload_of(calibration(40), 1)
+    assert (filled.active_slot, top_n(filled), filled.store.slot(1)) == (1, 55.0, 5)
+    assert filled.store.load(2).rising_handles_n[-1] == 51.25
+    filled.upload.rollback()
+    filled.run()
+    assert (filled.active_slot, top_n(filled)) == (3, 53.75)
+
+
+def test_the_same_set_again_keeps_its_number_and_fills_no_disk(filled):
+    for _ in range(3):
+        for slot in (1, 2, 3):
+            assert filled.upload_of(calibration(10 * slot), slot) == COMMITTED
+    assert [entry.number for entry in filled.store.list()] == [2, 3, 4]
+    filled.upload_of(calibration(10), 6)
+    assert (filled.store.slot(6), filled.active_slot) == (2, 6)
+    filled.upload_of(calibration(50), 3)
+    assert filled.store.slot(3) == 5
+
+
+def test_a_slot_may_hold_the_built_in_set_under_its_own_number(filled):
+    assert filled.upload_of(OWN, 6) == COMMITTED
+    assert (filled.store.slot(6), filled.active_slot, filled.used[-1].calibration) == (1, 6, OWN)
+    assert filled.upload.status()["built_in"]
+    filled.write(1149, 3)
+    filled.run()
+    for again in (filled, filled.restarted()):
+        again.write(1149, 6)
+        again.run()
+        assert (again.outcome, again.active_slot, again.used[-1].calibration) == (COMMITTED, 6, OWN)
+        assert again.restarted().active_slot == 6
+    assert [entry.number for entry in filled.store.list()] == [2, 3, 4]
+    filled.upload_of(calibration(40), 6)
+    filled.upload.rollback()
+    filled.run()
+    assert (filled.active_slot, filled.used[-1].calibration) == (NO_SLOT, OWN), "slot 6 holds another one now"
+
+
+def test_a_slot_with_the_built_in_set_means_what_the_rig_says_and_never_a_number_of_the_store(bench, register_map):
+    """The rig's file may name another calibration one day, even one with a number that the store has."""
+    bench.upload_of(calibration(10), 1)
+    bench.upload_of(OWN, 2)
+    other = Bench(bench.state, register_map, calibration(77, number=2))
+    other.write(1149, 2)
+    other.run()
+    assert other.used[-1].calibration == calibration(77, number=2)
+
+
+def test_going_back_twice_goes_forth_again(filled):
+    for expected in (53.75 - 1.25, 53.75, 53.75 - 1.25):
+        answer = filled.upload.rollback()
+        assert answer["busy"]
+        filled.run()
+        assert top_n(filled) == expected
+    assert filled.restarted().active_words == filled.active_words
+
+
+def test_going_back_from_the_first_upload_leads_to_the_rigs_own(bench):
+    bench.upload_of(calibration(10), 1)
+    bench.upload.rollback()
+    bench.run()
+    assert (bench.used[-1].calibration, bench.active_slot) == (OWN, NO_SLOT)
+    assert bench.upload.status()["built_in"]
+
+
+def test_going_back_from_nowhere_says_so(bench):
+    bench.upload.rollback()
+    bench.run()
+    status = bench.upload.status()
+    assert status["failed"]
+    assert status["said"] == (
+        "E433 no calibration was in use before this one: there is nothing to go back to; active set 1 unchanged"
+    )
+
+
+def test_a_tool_uses_a_calibration_by_its_number(filled):
+    job = filled.upload.use(2)["job"]
+    filled.run()
+    status = filled.upload.status()
+    assert (status["job"], status["busy"], status["failed"]) == (job, False, False)
+    assert (status["active"], status["slot"], filled.active_slot) == (2, None, NO_SLOT)
+    filled.upload.use(99)
+    filled.run()
+    assert filled.upload.status()["failed"]
+    assert "there is no calibration 99" in filled.upload.status()["said"]
+    assert filled.upload.status()["active"] == 2
+
+
+def test_a_calibration_beyond_the_rigs_cell_is_not_used_and_not_started_with(filled):
+    wide = calibration(4, rising_handles_n=(0.0, 25.0, 120.0), falling_handles_n=(0.0, 60.0, 120.0))
+    number = filled.store.add(wide)
+    filled.upload.use(number)
+    filled.run()
+    assert filled.upload.status()["said"].startswith("E401 index 2, handle_range: ")
+    filled.store.use(number)
+    again = filled.restarted()
+    assert again.active_words == filled.active_words
+    assert "E401 calibration 5" in again.standing.notes[0]
+
+
+def test_a_master_goes_back_to_what_was_in_use_before(filled):
+    before = filled.active_words
+    filled.write(1149, 1)
+    filled.run()
+    filled.write(1145, 3)
+    assert filled.status is CommitStatus.WRITING
+    filled.run()
+    assert filled.outcome == COMMITTED
+    assert (filled.active_words, filled.active_slot) == (before, 3)
+    assert filled.restarted().active_words == before

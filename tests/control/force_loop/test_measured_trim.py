@@ -1,0 +1,104 @@
+"""The trim of a measured rig: rests within its zone, finishes what it began, remembers by direction, stops hunting."""
+
+from random import Random
+
+import pytest
+
+from gateway.control import Trim
+from gateway.control.force_loop.measured_trim import MOST_TURNS, NEW_TARGET_N, MeasuredTrim
+from gateway.control.settings import Timing
+from gateway.registers.words import LimitedBy
+
+TIMING = Timing(dead_time_s=0.08, lag_s=0.07, second_lag_s=0.07, landing_s=0.07, integral_per_s=3.0, patience_s=0.1)
+SLOPE_N_PER_V = 8.0
+SAMPLE_S = 0.01
+
+
+def trim(**settings: float) -> MeasuredTrim:
+    return MeasuredTrim(Trim(**{"gain_v_per_n_s": 0.3, "limit_v": 0.5, **settings}), TIMING)
+
+
+def held(one: MeasuredTrim, error_n: float, seconds: float, noise_n: float = 0.0, seed: int = 1) -> float:
+    """A plant that answers at once to what the trim adds; returns the error at the end."""
+    rng, start_v = Random(seed), one.value_v
+    left_n = error_n
+    for _ in range(round(seconds / SAMPLE_S)):
+        left_n = error_n - (one.value_v - start_v) * SLOPE_N_PER_V
+        one.integrate(left_n + rng.gauss(0.0, noise_n), SLOPE_N_PER_V, SAMPLE_S)
+    return left_n
+
+
+def test_an_error_is_corrected_beyond_the_edge_of_the_zone():
+    assert abs(held(trim(), 1.0, 3.0)) < 0.07
+
+
+def test_errors_within_the_zone_are_left_to_stiction():
+    one = trim()
+    held(one, 0.14, 5.0)
+    assert one.value_v == 0.0
+
+
+@pytest.mark.parametrize("noise_n", [0.02, 0.1, 0.3])
+def test_noise_alone_moves_nothing(noise_n):
+    one = trim()
+    held(one, 0.0, 30.0, noise_n)
+    assert abs(one.value_v) * SLOPE_N_PER_V < 0.06
+
+
+def test_the_pace_is_in_newtons_whatever_the_slope():
+    flat, steep = trim(), trim()
+    for one, slope in ((flat, 4.0), (steep, 8.0)):
+        for _ in range(40):
+            one.integrate(0.5, slope, SAMPLE_S)
+    assert flat.value_v == pytest.approx(2.0 * steep.value_v)
+
+
+def test_what_was_learned_stays_for_chatter_fades_on_the_way_and_is_not_turned_over():
+    one = trim()
+    one.travel(20.0)
+    held(one, 1.0, 3.0)
+    learned_v = one.value_v
+    for _ in range(200):
+        one.travel(0.05)
+        one.travel(-0.05)
+    assert one.value_v == pytest.approx(learned_v, abs=1.0e-9)
+    one.travel(-3.0)
+    assert abs(one.value_v) < 0.06 * learned_v
+    one.travel(3.0)
+    assert one.value_v == pytest.approx(learned_v, abs=0.06 * learned_v)
+    one.travel(5.0)
+    assert one.value_v < 0.4 * learned_v
+
+
+def test_what_both_directions_agree_on_outlives_a_turn():
+    one, way = trim(), 1.0
+    one.travel(20.0)
+    for _ in range(4):
+        one.travel(3.0 * way)
+        held(one, 1.0 - one.value_v * SLOPE_N_PER_V, 3.0)
+        way = -way
+    one.travel(1.5 * way)
+    assert one.value_v * SLOPE_N_PER_V > 0.6
+    one.travel(20.0 * way)
+    assert abs(one.value_v) * SLOPE_N_PER_V < 0.05
+
+
+def test_hunting_slows_it_down_and_stops_it_until_there_is_a_new_target():
+    one, way = trim(), 1.0
+    for _ in range(MOST_TURNS + 1):
+        for _ in range(200):
+            one.integrate(3.0 * way, SLOPE_N_PER_V, SAMPLE_S)
+        way = -way
+    assert one.hunted
+    stood_v = one.value_v
+    held(one, 2.0, 1.0)
+    assert one.value_v == stood_v
+    one.travel(NEW_TARGET_N + 0.1)
+    assert not one.hunted
+
+
+def test_it_stays_within_its_limit_and_says_so():
+    one = trim(limit_v=0.2)
+    held(one, 10.0, 2.0)
+    assert one.value_v == 0.2
+    assert one.limited_by is LimitedBy.TRIM_RANGE

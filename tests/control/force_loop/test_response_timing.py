@@ -1,0 +1,104 @@
+"""What control derives from a measured response: margins that hold for errors of every number, and who rules."""
+
+from cmath import exp, phase
+from dataclasses import replace
+from itertools import product
+from math import pi
+
+import pytest
+
+from gateway.bsfm.model import Response
+from gateway.control import Trim
+from gateway.control.force_loop.lag_inverse import Push
+from gateway.control.force_loop.response_timing import timing_of
+from gateway.control.settings import LeadSettings, ResponseSource
+from tests.control.bench import Bench, bsfm, settings
+
+RESPONSES = [
+    Response(dead_time_s=d, lag_s=a, second_lag_s=b)
+    for d, a, b in product((0.02, 0.08, 0.15), (0.03, 0.1, 0.3), (0.0, 0.03))
+]
+HELD_S = 0.02  # a tick and a sample, as further dead time
+
+
+def margin(response: Response, off: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> float:
+    """Gain margin of the trim's loop on a plant whose gain, dead time and lags are off by these factors."""
+    timing = timing_of(response, settings()).timing
+    assert timing
+    push = Push(LeadSettings(lag_s=timing.lag_s, second_lag_s=timing.second_lag_s), settings().limits)
+
+    def loop(w: float) -> complex:
+        s = 1j * w
+        led = (
+            1.0 / (s * s * push.horizon_s**2 + s * push.landing_s + 1.0)
+            if timing.second_lag_s
+            else 1.0 / (s * push.landing_s + 1.0)
+        )
+        for lag_s in (timing.lag_s, timing.second_lag_s):
+            led *= (lag_s * s + 1.0) / (off[2] * lag_s * s + 1.0)
+        return off[0] * timing.integral_per_s * led * exp(-s * (off[1] * response.dead_time_s + HELD_S)) / s
+
+    low, high = 1.0e-2, 1.0e-2
+    while -0.5 * pi + phase(loop(high) * 1j) > -pi and high < 1.0e3:  # of what is behind the integral
+        low, high = high, high * 1.01
+    return 1.0 / abs(loop(0.5 * (low + high)))
+
+
+@pytest.mark.parametrize("response", RESPONSES)
+def test_the_loop_of_the_trim_has_a_gain_margin_of_three(response):
+    assert margin(response) >= 3.0
+
+
+@pytest.mark.parametrize("response", RESPONSES)
+def test_it_keeps_a_margin_when_everything_is_off_by_thirty_percent(response):
+    assert min(margin(response, off) for off in product((0.7, 1.3), repeat=3)) >= 1.5
+
+
+def test_everything_follows_from_the_response():
+    slow = timing_of(Response(dead_time_s=0.12, lag_s=0.2, second_lag_s=0.1), settings())
+    quick = timing_of(Response(dead_time_s=0.03, lag_s=0.05), settings())
+    assert slow.timing
+    assert quick.timing
+    assert slow.timing.integral_per_s < 0.6 * quick.timing.integral_per_s
+    assert slow.supervision.response_lag_s == pytest.approx(0.42)
+    assert slow.supervision.unreachable_s == pytest.approx(2.1)
+    assert (slow.lead.lag_s, slow.lead.second_lag_s) == (0.2, 0.1)
+    assert slow.limits == settings().limits
+    assert slow.trim == settings().trim
+
+
+def test_without_a_response_or_by_the_rigs_word_nothing_changes():
+    response, rig = Response(dead_time_s=0.1, lag_s=0.1), replace(settings(), response=ResponseSource.RIG)
+    assert timing_of(None, settings()) == settings()
+    assert timing_of(response, rig) == rig
+
+
+def pressing(response: Response | None, **plant: float) -> Bench:
+    bench = Bench(settings(), **plant)
+    bench.controller.use(bsfm(), 1, response)
+    bench.run(0.1)
+    bench.enable(20.0)
+    bench.run(2.0)
+    return bench
+
+
+def test_a_response_is_taken_into_use_and_out_of_it_without_a_bump():
+    own = Response(dead_time_s=0.03, lag_s=0.08, second_lag_s=0.015)
+    bench = pressing(None, gain_n_per_v=7.0)
+    for response in (own, None, own):
+        before_v = bench.last.voltage_v
+        bench.controller.use(bsfm(), 2, response)
+        assert bench.step().voltage_v == pytest.approx(before_v, abs=0.03)
+        first = len(bench.history)
+        bench.run(1.5)
+        assert max(abs(record.force_n - 20.0) for record in bench.history[first:]) < 0.8
+
+
+def test_a_trim_of_gain_nothing_stays_off():
+    off = replace(settings(), trim=Trim())
+    bench = Bench(off, gain_n_per_v=6.8)
+    bench.controller.use(bsfm(), 1, Response(dead_time_s=0.03, lag_s=0.08))
+    bench.run(0.1)
+    bench.enable(20.0)
+    bench.run(3.0)
+    assert all(record.output.trim_v == 0.0 for record in bench.history)

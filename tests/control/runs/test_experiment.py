@@ -1,0 +1,150 @@
+"""An experiment: its moves become the voltages that it says, within the rig's limits, under the same supervision."""
+
+import pytest
+
+from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part, plan_faults
+from gateway.control.runs.experiment_schedule import Schedule, segments_of
+from gateway.control.runs.ladder_stairs import highest_voltage_v
+from gateway.registers.words import CalibrationPhase, FaultCode, State
+from tests.control.bench import Bench, bsfm, settings
+
+LIMITS = settings().limits
+TOP_V = highest_voltage_v(LIMITS, bsfm())
+
+
+def plan(*moves: Move, check: bool = False) -> ExperimentPlan:
+    return ExperimentPlan(name="a plan", check=check, parts=(Part(name="one", moves=moves),))
+
+
+def schedule(*moves: Move) -> Schedule:
+    return Schedule(segments_of(plan(*moves), LIMITS, bsfm()), 0.0)
+
+
+SHORT = plan(
+    Move(do=Do.STEP, to_v=3.0, hold_s=0.5),
+    Move(do=Do.RAMP, to_v=5.0, over_s=1.0, hold_s=0.3),
+    Move(do=Do.LADDER, to_v=4.0, stairs=4, hold_s=0.2),
+    Move(do=Do.REVERSALS, size_v=1.0, times=2, over_s=0.4, hold_s=0.1),
+)
+
+
+def test_moves_put_out_what_they_say() -> None:
+    moved = Schedule(segments_of(SHORT, LIMITS, bsfm()), 0.0)
+    volts = [moved.voltage_v(at_s) for at_s in (0.0, 0.49, 1.0, 1.6, 1.85, 2.45, 2.7, 2.85)]
+    assert volts == pytest.approx([3.0, 3.0, 4.0, 5.0, 4.75, 4.0, 4.25, 4.5])
+    assert moved.voltage_v(moved.duration_s + 1.0) == 4.0
+    assert [moved.direction(at_s) for at_s in (0.1, 1.0, 2.0, 2.7, 3.0)] == [1, 1, -1, 1, -1]
+
+
+def test_the_time_of_a_plan_is_known_without_a_rig() -> None:
+    assert Schedule(segments_of(SHORT, LIMITS, bsfm()), 0.0).duration_s == pytest.approx(SHORT.duration_s)
+
+
+def test_a_dwell_stays_where_the_move_before_has_ended() -> None:
+    moved = schedule(Move(do=Do.STEP, to_share=0.5, hold_s=1.0), Move(do=Do.DWELL, hold_s=2.0))
+    assert moved.voltage_v(2.5) == pytest.approx(0.5 * TOP_V)
+
+
+def test_newtons_are_those_of_the_rising_branch() -> None:
+    moved = schedule(Move(do=Do.STEP, to_n=20.0, hold_s=1.0))
+    assert bsfm().branches.rising.value(moved.voltage_v(0.5)) == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize(
+    ("moves", "sentence"),
+    [
+        ((Move(do=Do.STEP, to_v=9.5),), "move 1 (step): 9.5 V, allowed 0 .. 6.98 V (about 0 .. 49 N)"),
+        ((Move(do=Do.STEP, to_n=70.0),), "70 N, allowed up to"),
+        ((Move(do=Do.STEP, to_v=6.5), Move(do=Do.REVERSALS, size_v=2.0, times=1, hold_s=1.0)), "2 V around 6.5 V"),
+        ((Move(do=Do.STEP, to_v=0.2), Move(do=Do.REVERSALS, size_v=1.0, times=1, hold_s=1.0)), "1 V around 0.2 V"),
+    ],
+)
+def test_beyond_the_rigs_limits_a_plan_is_refused_and_never_clipped(moves: tuple[Move, ...], sentence: str) -> None:
+    with pytest.raises(ValueError, match="plan a plan, part one, move") as refused:
+        segments_of(plan(*moves, Move(do=Do.DWELL, hold_s=1.0)), LIMITS, bsfm())
+    assert sentence in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("move", "key", "sentence"),
+    [
+        (Move(do=Do.STEP), "", "needs to_share or to_n or to_v"),
+        (Move(do=Do.STEP, to_v=1.0, to_n=2.0, hold_s=1.0), "to_v", "to_n is given already"),
+        (Move(do=Do.RAMP, to_v=1.0), "", "needs over_s"),
+        (Move(do=Do.DWELL, hold_s=1.0, times=2), "times", "means nothing in a dwell"),
+        (Move(do=Do.REVERSALS, size_v=1.0, times=2), "", "take no time"),
+    ],
+)
+def test_a_move_without_its_sense_is_told_with_its_place(move: Move, key: str, sentence: str) -> None:
+    path, told = next(plan_faults(plan(move, Move(do=Do.DWELL, hold_s=1.0))))
+    assert path == ("parts", 0, "moves", 0, *((key,) if key else ()))
+    assert sentence in told
+
+
+def test_an_empty_plan_and_an_endless_one_are_refused() -> None:
+    assert [path for path, _ in plan_faults(ExperimentPlan(name="x", parts=()))] == [("parts",)]
+    endless = plan(Move(do=Do.REVERSALS, size_share=0.1, times=1000, hold_s=3600.0))
+    assert "allowed up to 7200 s" in next(plan_faults(endless))[1]
+
+
+def begun(bench: Bench, asked: ExperimentPlan) -> Bench:
+    bench.run(0.5)
+    bench.controller.calibrating.ask(asked)
+    bench.run(0.05)
+    return bench
+
+
+def test_a_run_goes_through_zero_and_check_and_then_by_the_clock_to_its_end_at_zero_volts() -> None:
+    bench = begun(Bench(seed=3), ExperimentPlan(name="short", parts=SHORT.parts))
+    phases, began = [], len(bench.history)
+    while bench.controller.calibrating.running:
+        bench.run(0.01)
+        phases.append(CalibrationPhase(bench.last.calibration_phase))
+    assert list(dict.fromkeys(phases)) == [
+        CalibrationPhase.ZERO, CalibrationPhase.CHECK, CalibrationPhase.EXPERIMENT, CalibrationPhase.RECORDED,
+    ]  # fmt: skip
+    ran = [record for record in bench.history[began:] if record.output.calibration_phase == CalibrationPhase.EXPERIMENT]
+    assert ran[-1].time_s - ran[0].time_s == pytest.approx(SHORT.duration_s, abs=0.03)
+    moved = Schedule(segments_of(SHORT, LIMITS, bsfm()), 0.0)
+    for record in ran:
+        assert record.output.voltage_v == pytest.approx(moved.voltage_v(record.time_s - ran[0].time_s), abs=0.03) or (
+            record.time_s - ran[0].time_s < 0.1  # the slew limit of the first step
+        )
+    assert bench.last.state is State.CALIBRATING, "the force goes to 0 along the ramp"
+    bench.run(0.5)
+    assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
+    assert any(event.startswith("info experiment short done") for event in bench.events)
+
+
+def test_without_the_check_it_begins_after_the_zero() -> None:
+    bench = begun(Bench(seed=4), SHORT)
+    bench.run(0.9)
+    assert bench.last.calibration_phase == CalibrationPhase.EXPERIMENT
+    assert bench.last.voltage_v == pytest.approx(3.0)
+
+
+def test_the_check_stops_an_inverted_cell_before_the_plan_begins() -> None:
+    bench = begun(Bench(seed=5, sign=-1.0), ExperimentPlan(name="short", parts=SHORT.parts))
+    bench.run(5.0)
+    assert bench.last.fault is FaultCode.SIGN_INVERTED
+    assert bench.last.voltage_v == 0.0
+    assert not any(record.output.calibration_phase == CalibrationPhase.EXPERIMENT for record in bench.history)
+
+
+def test_a_stop_ends_it_at_zero_volts() -> None:
+    bench = begun(Bench(seed=6), SHORT)
+    bench.run(1.5)
+    assert bench.last.voltage_v > 2.0
+    bench.controller.calibrating.ask_stop("info calibration stopped at this machine")
+    bench.run(0.4)
+    assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
+    assert bench.last.calibration_phase == CalibrationPhase.STOPPED
+
+
+def test_a_silent_cell_is_a_fault_here_too() -> None:
+    bench = begun(Bench(seed=7), SHORT)
+    bench.run(1.5)
+    bench.cell_silent = True
+    bench.run(0.5)
+    assert bench.last.fault is FaultCode.SAMPLE_STALE
+    assert bench.last.voltage_v == 0.0

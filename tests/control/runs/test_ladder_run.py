@@ -1,0 +1,308 @@
+"""The calibration run: stairs end by the data, what a ladder alone can see stops it, and supervision goes on watching."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from gateway.control import ControlSettings
+from gateway.control.runs.ladder_run import GUESSED_DWELL_S, MOST_DWELL_S, LadderRow, LadderRun
+from gateway.control.runs.ladder_stairs import QUICK, RunPlan, highest_voltage_v, stairs_of
+from gateway.control.sample_conditioning import Reading
+from gateway.registers.words import CalibrationPhase, ControlBit, FaultCode, State
+from tests.control.bench import Bench, bsfm, settings
+
+SHORT = RunPlan(step_v=2.0, groups=2, minor_points=13, response_steps=3)
+LONG_S = 120.0
+
+
+def begun(bench: Bench, plan: RunPlan = SHORT) -> Bench:
+    bench.run(0.5)
+    bench.controller.calibrating.ask(plan)
+    bench.run(0.05)
+    return bench
+
+
+def finished(bench: Bench) -> Bench:
+    """Until the run has ended, one way or another, and the output is off."""
+    ended = bench.seconds_until(
+        lambda output: (
+            output.calibration_phase > CalibrationPhase.MINOR_LOOPS and output.state in (State.OFF, State.FAULT)
+        ),
+        LONG_S,
+    )
+    assert ended < LONG_S
+    return bench
+
+
+def rows_of(bench: Bench, plan: RunPlan) -> list[LadderRow]:
+    begun(bench, plan)
+    rows: list[LadderRow] = []
+    while bench.controller.calibrating.running:
+        bench.run(0.01)
+        row = bench.controller.calibrating.last_row
+        if row and row not in rows[-1:]:
+            rows.append(row)
+    bench.run(0.5)
+    return rows
+
+
+def roomy() -> ControlSettings:
+    """Of a rig whose plant stays below its largest force all the way up."""
+    control = settings()
+    return replace(control, limits=replace(control.limits, force_max_n=54.0, over_force_n=55.0))
+
+
+def test_a_whole_run_visits_every_stair_and_ends_off_at_the_safe_voltage() -> None:
+    bench = Bench(roomy(), seed=3)
+    rows = rows_of(bench, SHORT)
+    assert [row.stair for row in rows] == list(stairs_of(SHORT, bench.settings.limits, bsfm()))
+    assert all(row.settled for row in rows)
+    assert bench.last.calibration_phase == CalibrationPhase.FITTING
+    assert bench.last.calibration_progress == 1.0
+    assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
+    assert any(event.startswith("info calibration ladder done") for event in bench.events)
+
+
+def test_forces_are_those_of_the_plant_at_rest() -> None:
+    rows = rows_of(Bench(seed=4, noise_n=0.05), SHORT)
+    for row in rows:
+        drive_n = 7.4 * row.stair.voltage_v
+        friction_n = min(2.0, 0.25 * drive_n)
+        assert drive_n - friction_n - 0.35 <= row.force_n <= drive_n + friction_n + 0.35
+
+
+def test_a_slower_plant_gets_longer_dwells() -> None:
+    quick, slow = (rows_of(Bench(seed=5, lag_s=lag_s), SHORT) for lag_s in (0.03, 0.2))
+    mean_s = [sum(row.dwell_s for row in rows) / len(rows) for rows in (quick, slow)]
+    assert mean_s[0] < 0.5 < 0.9 < mean_s[1] < MOST_DWELL_S
+
+
+def test_a_stair_that_never_settles_is_left_after_its_time_and_counted() -> None:
+    run, k = LadderRun(SHORT, settings(), bsfm()), 0
+    while not run.is_done:
+        k += 1
+        rest = run.stairs[run.done].voltage_v * 7.0 if k > 100 else 0.0
+        drifting_n = rest + (0.05 * (k % 200) if k > 100 else 0.0)
+        step = run.step(0.01 * k, Reading(drifting_n, drifting_n, 0.0, 0.01, True, True, True))
+        if step.row and not step.row.settled:
+            assert step.row.dwell_s == pytest.approx(MOST_DWELL_S, abs=0.02)
+    assert run.unsettled >= len(run.stairs) - 5
+
+
+def test_progress_never_falls_and_the_eta_reaches_the_end() -> None:
+    bench = begun(Bench(seed=6))
+    calibrating, began_s = bench.controller.calibrating, bench.now_s
+    progress, etas = [], []
+    while calibrating.running:
+        bench.run(0.1)
+        progress.append(bench.last.calibration_progress)
+        etas.append((bench.now_s - began_s, calibrating.eta_s))
+    total_s = bench.now_s - began_s
+    assert progress == sorted(progress)
+    at_s, eta_s = etas[len(etas) // 2]
+    assert at_s + eta_s == pytest.approx(total_s, rel=0.15)
+
+
+def test_bit_5_starts_it_and_clearing_it_ends_it_along_the_ramp() -> None:
+    bench = Bench(seed=7)
+    bench.run(0.5)
+    bench.write(control_word=ControlBit.START_CALIBRATION)
+    bench.run(4.0)
+    assert bench.last.state is State.CALIBRATING
+    standing_v, standing_n = bench.last.voltage_v, bench.last.force_applied_n
+    assert standing_v > 1.5
+    output = bench.write(control_word=ControlBit(0))
+    assert output.calibration_phase == CalibrationPhase.STOPPED
+    assert (output.state, output.voltage_v) == (State.CALIBRATING, pytest.approx(standing_v, abs=0.35))
+    took_s = bench.seconds_until(lambda output: output.state is State.OFF, 2.0)
+    assert took_s == pytest.approx(standing_n / bench.settings.defaults.force_ramp_n_per_s, abs=0.02)
+    assert bench.last.voltage_v == 0.0
+
+
+def test_disable_ends_it_too() -> None:
+    bench = Bench(seed=8)
+    bench.run(0.5)
+    bench.write(control_word=ControlBit.ENABLE | ControlBit.START_CALIBRATION)
+    bench.run(4.0)
+    assert bench.last.state is State.CALIBRATING
+    output = bench.write(control_word=ControlBit.START_CALIBRATION)
+    assert (output.state, output.voltage_v) == (State.OFF, 0.0)
+
+
+def test_the_end_clears_the_command_so_that_the_master_sees_the_bit_fall() -> None:
+    bench = Bench(seed=9)
+    bench.run(0.5)
+    bench.controller.calibrating.ask(SHORT)
+    finished(bench)
+    bench.run(0.1)
+    assert bench.command.control_word == ControlBit(0)
+
+
+def test_while_holding_a_force_it_is_refused_and_the_force_stays() -> None:
+    bench = Bench(seed=10)
+    bench.run(0.5)
+    bench.enable(20.0)
+    bench.run(2.0)
+    held_v = bench.voltage_v
+    bench.write(control_word=ControlBit.ENABLE | ControlBit.START_CALIBRATION)
+    assert bench.refused
+    assert bench.refused.text.startswith("calibration refused: ")
+    bench.run(3.0)
+    assert bench.last.state is State.HOLDING
+    assert not bench.controller.calibrating.running
+    assert bench.voltage_v == pytest.approx(held_v, abs=0.2)
+
+
+def test_a_latched_fault_refuses_it() -> None:
+    bench = begun(Bench(seed=11))
+    bench.run(2.0)
+    bench.cell_silent = True
+    bench.run(0.5)
+    assert bench.last.fault is FaultCode.SAMPLE_STALE
+    bench.write(control_word=ControlBit(0))
+    bench.write(control_word=ControlBit.START_CALIBRATION)
+    assert not bench.controller.calibrating.running
+    assert bench.last.state is State.FAULT
+
+
+@pytest.mark.parametrize(
+    ("plant", "fault", "code"),
+    [
+        ({"sign": -1.0}, FaultCode.SIGN_INVERTED, "A302"),
+        ({"unit": 5.0}, FaultCode.GAIN_WRONG, "A303"),
+        ({"unit": 0.2}, FaultCode.GAIN_WRONG, "A303"),
+        ({"air": False}, FaultCode.NONE, "A301"),
+        ({"contact": False}, FaultCode.NONE, "A301"),
+    ],
+)
+def test_wrong_sign_wrong_scale_and_no_answer_stop_it_in_the_check(plant, fault, code) -> None:
+    bench = finished(begun(Bench(seed=12, **plant)))
+    assert bench.last.fault is fault
+    assert bench.last.calibration_phase == CalibrationPhase.STOPPED
+    assert bench.last.voltage_v == 0.0
+    assert any(event.startswith(code) for event in bench.events)
+    assert max(volts for _, volts in bench.voltages()) < 4.1
+
+
+def test_over_force_acts_during_the_run() -> None:
+    bench = begun(Bench(seed=13))
+    bench.run(5.0)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 60.0)
+    finished(bench)
+    assert bench.last.fault is FaultCode.OVER_FORCE
+    assert bench.last.state is State.FAULT
+
+
+def test_the_rise_of_the_voltage_keeps_the_slew_limit() -> None:
+    control = settings()
+    bench = Bench(replace(control, limits=replace(control.limits, voltage_slew_v_per_s=20.0)), seed=14)
+    finished(begun(bench))
+    for (earlier_s, earlier_v), (later_s, later_v) in zip(history := list(bench.voltages()), history[1:], strict=False):
+        assert later_v - earlier_v <= 20.0 * (later_s - earlier_s + 0.01) + 1e-9
+
+
+def test_a_local_run_needs_no_heartbeat_but_the_masters_own_does() -> None:
+    leased = settings(lease_s=0.2)
+    local = finished(begun(Bench(leased, seed=15)))
+    assert local.last.fault is FaultCode.NONE
+    masters = Bench(leased, seed=15)
+    masters.run(0.5)
+    masters.write(control_word=ControlBit.START_CALIBRATION, heartbeat=1)
+    masters.run(1.0)
+    assert masters.last.fault is FaultCode.MASTER_LOST
+
+
+def test_a_stop_of_the_service_ends_it() -> None:
+    bench = begun(Bench(seed=16))
+    bench.run(3.0)
+    bench.controller.stop()
+    bench.run(0.4)
+    assert bench.controller.stopped
+    assert bench.last.voltage_v == 0.0
+
+
+@pytest.mark.parametrize("tare", [True, False])
+def test_a_tare_is_taken_before_the_ladder_where_it_is_asked_for(tare: bool) -> None:
+    bench = Bench(seed=3)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.7)
+    begun(bench, replace(SHORT, tare=tare))
+    assert (bench.last.calibration_phase, bench.last.voltage_v) == (CalibrationPhase.ZERO, 0.0)
+    assert bench.controller.calibrating.cell_n == pytest.approx(0.0 if tare else 1.7, abs=0.2)
+    assert any(event.startswith("info tare") for event in bench.events) == tare
+
+
+def test_an_asked_stop_keeps_what_was_learned_and_says_so() -> None:
+    bench = begun(Bench(seed=17))
+    bench.run(3.0)
+    bench.controller.calibrating.ask_stop("info calibration stopped by a person")
+    bench.run(0.4)
+    assert bench.last.calibration_phase == CalibrationPhase.STOPPED
+    assert bench.last.state is State.OFF
+    assert "info calibration stopped by a person" in bench.events
+
+
+def test_a_resumed_run_leaves_out_the_groups_that_are_done() -> None:
+    whole = stairs_of(SHORT, settings().limits, bsfm())
+    rest = stairs_of(replace(SHORT, first_group=1), settings().limits, bsfm())
+    assert [stair.group for stair in whole if stair.group >= 0].count(1) == 9
+    assert {stair.group for stair in rest} == {-1, 1}
+    assert len(whole) - len(rest) == 9
+
+
+def test_a_resumed_run_may_have_only_the_reversal_part_left() -> None:
+    rest = stairs_of(replace(SHORT, first_group=2), settings().limits, bsfm())
+    assert {stair.phase for stair in rest} == {CalibrationPhase.CHECK, CalibrationPhase.MINOR_LOOPS}
+    with pytest.raises(ValueError, match="groups = 2 from 2"):
+        stairs_of(replace(SHORT, first_group=2, minor_points=0), settings().limits, bsfm())
+
+
+def test_the_top_stays_below_the_over_force_trip() -> None:
+    limits, model = settings().limits, bsfm()
+    top_v = highest_voltage_v(limits, model)
+    assert model.force_n(top_v, -1.0) <= 0.93 * limits.over_force_n + 0.5
+    with pytest.raises(ValueError, match=r"over-force trips at 45 N"):
+        stairs_of(RunPlan(v_max_v=8.0), replace(limits, over_force_n=45.0), model)
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        (RunPlan(step_v=0.0), "step = 0 V, allowed"),
+        (RunPlan(step_v=float("nan")), "step = nan V"),
+        (RunPlan(v_max_v=12.0), "allowed up to 9 V"),
+        (RunPlan(groups=0), "groups = 0"),
+        (RunPlan(minor_points=-1), "minor_points = -1"),
+        (RunPlan(step_v=0.01, groups=50), "at most 20000"),
+    ],
+)
+def test_a_plan_that_the_rig_does_not_allow_is_refused_in_words(plan: RunPlan, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        stairs_of(plan, settings().limits, bsfm())
+
+
+def test_the_minor_walk_never_spans_the_loop_and_has_the_points_asked_for() -> None:
+    stairs = [
+        s
+        for s in stairs_of(RunPlan(response_steps=0), settings().limits, bsfm())
+        if s.phase is CalibrationPhase.MINOR_LOOPS
+    ]
+    assert len(stairs) == pytest.approx(150, abs=5)
+    assert max(stair.voltage_v for stair in stairs) < 0.9 * highest_voltage_v(settings().limits, bsfm())
+
+
+def test_a_quick_run_is_shorter_than_a_minute() -> None:
+    assert GUESSED_DWELL_S * len(stairs_of(QUICK, settings().limits, bsfm())) < 60.0
+
+
+def test_control_still_imports_no_numpy() -> None:
+    code = "import sys, gateway.control; assert 'numpy' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_beyond_the_calibrations_own_range_the_force_is_expected_to_go_on_rising() -> None:
+    limits = replace(settings().limits, over_force_n=60.0)
+    assert bsfm().voltage_range_v[1] == 8.0
+    with pytest.raises(ValueError, match="makes 63 N"):
+        stairs_of(RunPlan(v_max_v=8.9), limits, bsfm())

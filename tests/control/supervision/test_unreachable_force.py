@@ -1,0 +1,110 @@
+"""A force that is not reached: no air, another unit of force and no contact are told apart, where somebody can know."""
+
+from dataclasses import replace
+from math import nan
+
+import pytest
+
+from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
+from gateway.registers.words import State, StatusBit
+from tests.control.bench import Bench, settings
+
+PASCAL_PER_V = 0.09e6
+
+
+class Measured(Bench):
+    """A bench whose output device measures its pressure: where there is air, in proportion to the voltage."""
+
+    by_profile_pa_per_v = PASCAL_PER_V
+
+    def _measure(self) -> None:
+        super()._measure()
+        pressure_pa = self.plant._pressure * PASCAL_PER_V
+        self.line = replace(self.line, pressure_pa=pressure_pa, pressure_pa_per_v=self.by_profile_pa_per_v)
+
+
+def holding(bench: Bench, force_n: float = 12.0) -> Bench:
+    bench.run(0.3)
+    bench.enable(force_n)
+    bench.run(2.0)
+    assert bench.last.state is State.HOLDING
+    return bench
+
+
+def told(bench: Bench) -> str:
+    bench.seconds_until(lambda output: bool(output.status & StatusBit.TARGET_UNREACHABLE), 8.0)
+    (sentence,) = (event for event in bench.events if event.startswith("A301"))
+    return sentence
+
+
+def test_air_that_fails_while_holding_is_told_by_the_pressure() -> None:
+    bench = holding(Measured(seed=1))
+    bench.plant.air = False
+    said = told(bench)
+    assert " V out, " in said
+    assert "0 kPa measured" in said
+    assert "no air, or a closed valve" in said
+    assert "contact" not in said
+
+
+def test_contact_that_is_lost_while_holding_is_told_by_the_pressure() -> None:
+    bench = holding(Measured(seed=2))
+    bench.plant.contact = False
+    said = told(bench)
+    assert "kPa measured" in said
+    assert "air is there, so no contact" in said
+
+
+def test_kgf_in_place_of_newton_while_holding_is_told_by_the_factor() -> None:
+    for bench in (Measured(seed=3), Bench(seed=3)):
+        holding(bench)
+        bench.plant.unit = 1.0 / 9.80665
+        said = told(bench)
+        assert "is what kgf read as N looks like (A303)" in said
+        assert ("air is there" in said) == isinstance(bench, Measured)
+
+
+def test_newton_in_place_of_kgf_while_holding_is_told_by_the_factor() -> None:
+    bench = holding(Measured(replace(settings(), limits=replace(settings().limits, over_force_n=90.0)), seed=4), 7.0)
+    bench.plant.unit = 9.80665
+    said = told(bench)
+    assert "is what N read as kgf looks like (A303)" in said
+
+
+def test_without_a_pressure_what_was_right_before_counts_and_no_more_is_claimed() -> None:
+    bench = holding(Bench(seed=5))
+    bench.plant.air = False
+    assert "the force was right before in this enable: contact lost or air gone" in told(bench)
+    never = Bench(seed=5, contact=False)
+    never.run(0.3)
+    never.enable(12.0)
+    assert told(never).endswith("no air, valve closed or no contact")
+
+
+@pytest.mark.parametrize(("contact", "words"), [(False, "so no contact"), (True, "no air, or a closed valve")])
+def test_before_anything_was_right_the_ranges_of_the_device_say_it(contact: bool, words: str) -> None:
+    bench = Measured(seed=6, contact=contact, air=not contact)
+    bench.run(0.3)
+    bench.enable(12.0)
+    assert words in told(bench)
+
+
+def test_a_ratio_that_was_seen_counts_more_than_the_profiles() -> None:
+    """A sensor of another range than the regulator's: by the profile half of the pressure is always missing."""
+    bench = Measured(seed=7)
+    bench.by_profile_pa_per_v = 6.0 * PASCAL_PER_V
+    holding(bench)
+    bench.plant.contact = False
+    assert "air is there, so no contact" in told(bench)
+
+
+@pytest.mark.parametrize(
+    ("pressure_pa", "learned", "words"),
+    [(nan, False, "no air, valve closed or no contact"), (60e3, True, "no air, valve closed or no contact")],
+)
+def test_between_the_bounds_nothing_is_claimed(pressure_pa: float, learned: bool, words: str) -> None:
+    seen = Evidence(
+        voltage_v=1.0, measured_n=0.1, expected_n=8.0, pressure_pa=pressure_pa, expected_pa=100e3, learned=learned
+    )
+    assert words in unreachable_words(seen)
+    assert ("60 kPa measured, 100 kPa expected" in unreachable_words(seen)) == learned

@@ -1,0 +1,358 @@
+"""What is said to people: limited per cause, graded by its code, and nobody who does not take it holds up the loop."""
+
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.cli.codes import CATALOGUE, FAULT_CODES, WARNING_CODES
+from gateway.processes import event_file
+from gateway.processes.event import WARNING_ALARMS, Event, event_in, event_of, line_of, record, severity_of
+from gateway.processes.event_file import KEPT, EventFile, EventReader
+from gateway.processes.event_log import Drain, EventLog
+
+NOON_S = 1_795_348_800.25
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+class BlockedTerminal:
+    """A terminal that takes nothing until it is released."""
+
+    def __init__(self) -> None:
+        self.release = threading.Event()
+        self.lines: list[str] = []
+
+    def write(self, line: str) -> None:
+        self.release.wait(10)
+        self.lines.append(line)
+
+
+def texts(lines: list[str]) -> list[str]:
+    """The sentences alone: `TIME severity cause SENTENCE`."""
+    return [line.rstrip("\n").split(maxsplit=3)[3] for line in lines]
+
+
+def said(clock: Clock, *events: tuple[float, str, str]) -> list[str]:
+    lines: list[str] = []
+    with EventLog(lines.append, clock, wall=lambda: NOON_S) as log:
+        for at_s, cause, sentence in events:
+            clock.now_s = at_s
+            log(cause, sentence)
+    return lines
+
+
+def test_a_line_has_its_time_in_utc_one_severity_its_cause_its_code_and_the_sentence() -> None:
+    lines = said(Clock(), (0.0, "refusal 10.0.0.5 out_of_range", "W204 force_setpoint = 65.00 N"))
+    assert lines == ["2026-11-22T12:00:00.250Z warning refusal W204 force_setpoint = 65.00 N\n"]
+
+
+def test_what_is_said_is_written_in_order() -> None:
+    assert texts(said(Clock(), (0.0, "a", "one"), (0.0, "b", "two"), (0.1, "a", "three"))) == ["one", "two", "three"]
+
+
+def test_ten_lines_a_second_of_a_cause_and_the_rest_is_counted() -> None:
+    flood = ((0.001 * index, "flood x", f"W204 line {index}") for index in range(500))
+    lines = texts(said(Clock(), *flood, (1.2, "flood x", "W204 after")))
+    assert lines[:10] == [f"W204 line {index}" for index in range(10)]
+    assert lines[10:] == ["W204 490 more lines of 'flood x' left out", "W204 after"]
+
+
+def test_a_flood_that_has_ended_is_counted_too() -> None:
+    assert texts(said(Clock(), *((0.0, "flood", "x") for _ in range(25))))[10:] == ["15 more lines of 'flood' left out"]
+
+
+def test_a_flood_of_one_cause_does_not_hide_another() -> None:
+    lines = texts(said(Clock(), *((0.0, "flood", "x") for _ in range(100)), (0.0, "fault", "A303 three times")))
+    assert lines[10] == "A303 three times"
+
+
+def test_eleven_lines_in_eleven_tenths_of_a_second_are_all_written() -> None:
+    assert len(said(Clock(), *((0.11 * index, "calm", "x") for index in range(11)))) == 11
+
+
+def test_ever_new_causes_need_no_more_memory() -> None:
+    """I12: a client that comes back with a new port for each refusal is still one client with one memory."""
+    clock, log = Clock(), EventLog(lambda line: None)
+    log._clock = clock
+    for index in range(20_000):
+        clock.now_s = 0.01 * index
+        log(f"refusal 10.0.0.1:{index}", "W204")
+    assert len(log._windows) <= 2000
+    with log:
+        pass
+
+
+def flooded(log: EventLog, terminal: BlockedTerminal) -> tuple[bool, bool]:
+    """Says more than the queue holds, in a thread of its own: whether saying it came to an end, and leaving the log."""
+    said, left = threading.Event(), threading.Event()
+
+    def scene() -> None:
+        with log:
+            for index in range(5000):
+                log(f"cause {index}", "sentence")
+            said.set()
+        left.set()
+
+    thread = threading.Thread(target=scene, daemon=True)
+    thread.start()
+    found = said.wait(3), left.wait(3)
+    terminal.release.set()
+    thread.join(3)
+    try:
+        log._terminal._events.put(None, timeout=1.0)  # the writer was left behind: it ends now
+    except queue.Full:
+        pass
+    log._terminal._thread.join(3)
+    return found
+
+
+def test_a_terminal_that_takes_nothing_holds_up_neither_the_caller_nor_the_end_nor_the_file(tmp_path: Path) -> None:
+    terminal = BlockedTerminal()
+    said, left = flooded(EventLog(terminal.write, file=EventFile(tmp_path)), terminal)
+    assert said, "the caller waits for the terminal"
+    assert left, "leaving the log waits for the terminal"
+    assert 1 <= len(terminal.lines) <= 1001
+    assert len(kept(tmp_path)) >= 1000
+
+
+@pytest.mark.parametrize("error", [BrokenPipeError(), ValueError("I/O operation on closed file")])
+def test_a_terminal_that_went_away_stops_nothing(error: Exception) -> None:
+    tried: list[str] = []
+
+    def gone(line: str) -> None:
+        tried.append(line)
+        raise error
+
+    with EventLog(gone) as log:
+        for index in range(3000):
+            log(f"cause {index}", "sentence")
+    assert len(tried) > 1, "the writer ended with the first error"
+    assert not log._terminal.is_alive
+
+
+# -- severity
+
+
+@pytest.mark.parametrize(
+    ("sentence", "severity", "code", "text"),
+    [
+        ("W204 too much", "warning", "W204", "too much"),
+        ("A313 too much force", "error", "A313", "too much force"),
+        ("E402 the disk is full", "error", "E402", "the disk is full"),
+        ("A345 friction", "warning", "A345", "friction"),
+        ("info enabled by 10.0.0.5", "info", None, "enabled by 10.0.0.5"),
+        ("enabled by 10.0.0.5, error, fault", "info", None, "enabled by 10.0.0.5, error, fault"),
+        ("A31 and W2040 are no codes", "info", None, "A31 and W2040 are no codes"),
+        ("", "info", None, ""),
+    ],
+)
+def test_the_code_alone_decides_the_severity(sentence: str, severity: str, code: str | None, text: str) -> None:
+    assert event_of(NOON_S, "control", "x y", sentence)[1:] == (severity, code, "x", text, "control")
+
+
+def test_every_fault_is_an_error_and_every_refusal_a_warning() -> None:
+    assert {severity_of(code) for code in FAULT_CODES.values()} == {"error"}
+    assert {severity_of(code) for code in CATALOGUE if code[0] == "W"} == {"warning"}
+    assert {severity_of(code) for code in CATALOGUE if code[0] == "E"} == {"error"}
+
+
+def test_alarms_that_are_only_warnings_are_those_of_the_catalogue() -> None:
+    only_warnings = set(WARNING_CODES.values()) - set(FAULT_CODES.values()) - {"A401"}
+    assert only_warnings <= WARNING_ALARMS <= set(CATALOGUE)
+
+
+# -- the file
+
+
+def kept(directory: Path) -> list[Event]:
+    with EventReader(directory) as reader:
+        return list(reader.kept())
+
+
+def event(text: str, source: str = "control") -> Event:
+    return event_of(NOON_S, source, "test", text)
+
+
+def test_the_file_has_one_json_object_per_line(tmp_path: Path) -> None:
+    with EventLog(lambda line: None, source="guardian", file=EventFile(tmp_path), wall=lambda: NOON_S) as log:
+        log("restart", "A401 control died:\n  Traceback \x1b[2J ü\ud800")
+        log.speaking_for("watch")("residual", "A345 friction")
+        log.note("start", "ready")
+    lines = (tmp_path / "events.jsonl").read_text("ascii").splitlines()
+    assert [json.loads(line)["source"] for line in lines] == ["guardian", "watch", "guardian"]
+    assert json.loads(lines[0]) == {
+        "time": "2026-11-22T12:00:00.250Z",
+        "severity": "error",
+        "code": "A401",
+        "cause": "restart",
+        "text": "control died:\n  Traceback \x1b[2J ü\ud800",
+        "source": "guardian",
+    }
+    assert (tmp_path / "events.jsonl").stat().st_mode & 0o777 == 0o600
+
+
+def test_what_is_noted_is_not_on_the_terminal(tmp_path: Path) -> None:
+    lines: list[str] = []
+    with EventLog(lines.append, file=EventFile(tmp_path)) as log:
+        log.note("start", "ready")
+    assert (lines, len(kept(tmp_path))) == ([], 1)
+
+
+def test_a_line_for_people_moves_no_cursor_and_stays_one_event() -> None:
+    line = line_of(event("E150 one\ntwo \x1b[2J\r\x9b\u2028"))
+    assert line.endswith("E150 one\n    two \\x1b[2J\\x0d\\x9b\\x2028")
+
+
+def test_a_sentence_without_end_is_cut() -> None:
+    assert len(record(event("W204 " + "x" * 10_000_000))) < 20_000
+
+
+def torn_forms() -> Iterator[bytes]:
+    whole = record(event("W204 whole"))
+    yield from (whole[:cut] for cut in range(len(whole) - 1))
+    yield from (b"\x00" * 100, b"[" * 100_000, b'{"time": "x"}', b'{"time": "x", "severity": 1}', b"\xff\xfe", b"7")
+
+
+def test_whatever_a_killed_writer_leaves_costs_no_other_line(tmp_path: Path) -> None:
+    """The next writer's line begins where the torn one ends."""
+    for torn in torn_forms():
+        path = tmp_path / "events.jsonl"
+        path.write_bytes(record(event("one")) + torn + record(event("two")) + torn)
+        assert [found.text for found in kept(tmp_path)] == ["one", "two"], torn
+
+
+def test_a_record_in_a_sentence_is_no_record() -> None:
+    nested = event("W204 " + record(event("inner")).decode())
+    assert event_in(record(nested)) == nested
+    assert event_in(record(nested)[:-3]) is None
+
+
+def test_size_and_number_of_files_are_bounded_and_the_newest_lines_stay(tmp_path: Path) -> None:
+    file = EventFile(tmp_path, longest_bytes=2000)
+    for number in range(500):
+        file.append(record(event(f"line {number}")))
+    file.close()
+    sizes = [path.stat().st_size for path in tmp_path.iterdir()]
+    assert len(sizes) <= KEPT + 1 and max(sizes) < 2200
+    numbers = [int(found.text.split()[1]) for found in kept(tmp_path)]
+    assert numbers == list(range(numbers[0], 500))
+    assert len(numbers) > 30
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from gateway.processes.event import event_of, record
+from gateway.processes.event_file import EventFile
+file = EventFile(Path(sys.argv[1]), longest_bytes=40_000)
+for number in range(400):
+    file.append(record(event_of(0.0, sys.argv[2], "test", f"{number} " + "x" * 300)))
+"""
+
+
+def test_two_processes_that_write_and_rotate_at_once_lose_and_tear_nothing(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(event_file, "KEPT", 60)
+    writer = WRITER.replace("file =", "from gateway.processes import event_file\nevent_file.KEPT = 60\nfile =")
+    command = [sys.executable, "-c", writer, str(tmp_path)]
+    processes = [subprocess.Popen([*command, name]) for name in ("control", "guardian")]
+    assert [process.wait(30) for process in processes] == [0, 0]
+    found = kept(tmp_path)
+    for source in ("control", "guardian"):
+        assert [int(each.text.split()[0]) for each in found if each.source == source] == list(range(400))
+    raw = b"".join(path.read_bytes() for path in tmp_path.iterdir())
+    assert len(raw.splitlines()) == 800
+    assert len(list(tmp_path.iterdir())) > 3
+
+
+def test_a_reader_that_follows_sees_each_line_once_through_rotations(tmp_path: Path) -> None:
+    file, reader = EventFile(tmp_path, longest_bytes=1500), EventReader(tmp_path)
+    file.append(record(event("0")))
+    found = list(reader.kept())
+    for number in range(1, 60):
+        file.append(record(event(str(number))))
+        found += reader.more()
+    with (tmp_path / "events.jsonl").open("ab") as stream:
+        line = record(event("late"))
+        stream.write(line[:40])
+        stream.flush()
+        found += reader.more()
+        stream.write(line[40:])
+    found += reader.more()
+    assert [each.text for each in found] == [*map(str, range(60)), "late"]
+    reader.close()
+    file.close()
+
+
+def test_following_begins_before_there_is_a_file(tmp_path: Path) -> None:
+    reader = EventReader(tmp_path)
+    assert list(reader.kept()) == []
+    file = EventFile(tmp_path)
+    file.append(record(event("first")))
+    assert [each.text for each in reader.more()] == ["first"]
+    reader.close()
+    file.close()
+
+
+class FullDisk(EventFile):
+    """A disk that takes nothing while it is full."""
+
+    is_full = True
+
+    def append(self, line: bytes) -> None:
+        if self.is_full:
+            raise OSError(28, "No space left on device")
+        super().append(line)
+
+
+def test_a_full_disk_is_one_alarm_and_its_end_says_what_is_missing(tmp_path: Path) -> None:
+    lines: list[str] = []
+    alarmed = threading.Event()
+
+    def write(line: str) -> None:
+        lines.append(line)
+        if "E150" in line:
+            alarmed.set()
+
+    file = FullDisk(tmp_path)
+    with EventLog(write, file=file) as log:
+        for number in range(7):
+            log(f"cause {number}", "sentence")
+        assert alarmed.wait(5)
+        log._disk.end()  # type: ignore[union-attr]
+        file.is_full = False
+        log._disk = Drain("events", log._disk._write)  # type: ignore[union-attr]
+        log._disk.start()
+        log("cause", "again")
+    assert sum("E150" in line for line in lines) == 1
+    assert "No space left on device" in next(line for line in lines if "E150" in line)
+    assert [each.text for each in kept(tmp_path)] == ["again", "7 events were not kept before this one"]
+
+
+def test_a_line_that_the_disk_takes_half_of_does_not_spoil_the_next(tmp_path: Path, monkeypatch) -> None:
+    file, write = EventFile(tmp_path), os.write
+    monkeypatch.setattr(event_file.os, "write", lambda descriptor, data: write(descriptor, data[: len(data) // 2]))
+    with pytest.raises(OSError, match="No space"):
+        file.append(record(event("half")))
+    monkeypatch.undo()
+    file.append(record(event("whole")))
+    file.close()
+    assert [each.text for each in kept(tmp_path)] == ["whole"]
+
+
+def test_a_state_directory_that_was_removed_is_an_error_of_the_system_and_no_more(tmp_path: Path) -> None:
+    file = EventFile(tmp_path / "gone")
+    with pytest.raises(FileNotFoundError):
+        file.append(record(event("x")))

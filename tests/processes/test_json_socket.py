@@ -1,0 +1,371 @@
+"""A local socket with one JSON object per line: whatever is sent, the loop behind it goes on."""
+
+import asyncio
+import json
+import random
+import socket
+import stat
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.processes.json_socket import JsonLineServer, Limits
+
+
+def refuse(request: dict[str, Any]) -> dict[str, Any]:
+    raise ValueError("already recording")
+
+
+def no_space(request: dict[str, Any]) -> dict[str, Any]:
+    raise OSError(28, "No space left on device")
+
+
+HANDLERS = {"echo": lambda request: {"said": request.get("say")}, "refuse": refuse, "record": no_space}
+Scene = Callable[[Path], Awaitable[None]]
+
+
+def with_server(directory: Path, scene: Scene, limits: Limits | None = None) -> list[dict[str, Any]]:
+    """Run the scene beside a server; what reached the loop's exception handler, which would restart the gateway."""
+    defects: list[dict[str, Any]] = []
+
+    async def play() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda loop, context: defects.append(context))
+        server = JsonLineServer(directory / "control.sock", HANDLERS, limits=limits)
+        await server.start()
+        async with asyncio.timeout(10):
+            await scene(directory / "control.sock")
+        async with asyncio.timeout(2):
+            await server.close()
+
+    asyncio.run(play())
+    assert not (directory / "control.sock").exists()
+    return defects
+
+
+def answers(directory: Path, *lines: bytes) -> list[Any]:
+    found: list[Any] = []
+
+    async def scene(path: Path) -> None:
+        reader, writer = await asyncio.open_unix_connection(str(path))
+        for line in lines:
+            writer.write(line + b"\n")
+            answer = await reader.readline()
+            found.append(json.loads(answer) if answer else None)
+        writer.close()
+        await writer.wait_closed()
+
+    assert with_server(directory, scene) == []
+    return found
+
+
+def test_each_line_is_answered_in_order(tmp_path: Path) -> None:
+    first, second = answers(tmp_path, b'{"do": "echo", "say": 1}', b'{"do": "echo", "say": "zwei"}')
+    assert (first, second) == ({"ok": True, "said": 1}, {"ok": True, "said": "zwei"})
+
+
+def test_a_refusal_and_a_full_disk_are_sentences(tmp_path: Path) -> None:
+    refused, full = answers(tmp_path, b'{"do": "refuse"}', b'{"do": "record"}')
+    assert refused == {"ok": False, "error": "already recording"}
+    assert full["ok"] is False
+    assert "No space left" in full["error"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"hello",
+        b"",
+        b"[]",
+        b"7",
+        b'"echo"',
+        b"{}",
+        b'{"do": 7}',
+        b'{"do": ["echo"]}',
+        b'{"do": "recrod"}',
+        b"\xff\xfe\x00",
+        b"[" * 60_000,
+        b'{"do":' * 10_000,
+    ],
+)
+def test_what_is_no_request_is_told_what_was_expected(tmp_path: Path, line: bytes) -> None:
+    wrong, right = answers(tmp_path, line, b'{"do": "echo", "say": 2}')
+    assert wrong["ok"] is False
+    assert "echo, record, refuse" in wrong["error"]
+    assert right == {"ok": True, "said": 2}
+
+
+def test_an_overlong_line_ends_its_connection_and_no_other(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        other_reader, other = await asyncio.open_unix_connection(str(path))
+        reader, writer = await asyncio.open_unix_connection(str(path))
+        writer.write(b"x" * 200_000)
+        told = json.loads(await reader.read())
+        assert (told["ok"], "65536 bytes" in told["error"]) == (False, True)
+        other.write(b'{"do": "echo"}\n')
+        assert json.loads(await other_reader.readline())["ok"]
+        for each in (other, writer):
+            each.close()
+            try:
+                await each.wait_closed()
+            except ConnectionError:
+                pass
+
+    assert with_server(tmp_path, scene) == []
+
+
+def test_a_caller_that_leaves_in_the_middle_is_nobody_s_trouble(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        for rest in (b"", b'{"do": "ec', b'{"do": "echo"}\n' * 50):
+            _, writer = await asyncio.open_unix_connection(str(path))
+            writer.write(rest)
+            writer.transport.abort()
+        reader, writer = await asyncio.open_unix_connection(str(path))
+        writer.write(b'{"do": "echo"}\n')
+        assert json.loads(await reader.readline())["ok"]
+        writer.close()
+        await writer.wait_closed()
+
+    assert with_server(tmp_path, scene) == []
+
+
+def test_a_caller_that_reads_nothing_does_not_hold_up_the_end(tmp_path: Path) -> None:
+    caller = socket.socket(socket.AF_UNIX)
+    caller.setblocking(False)
+
+    async def scene(path: Path) -> None:
+        caller.connect(str(path))
+        question = json.dumps({"do": "echo", "say": "x" * 30_000}).encode() + b"\n"
+        loop = asyncio.get_running_loop()
+        try:
+            async with asyncio.timeout(0.3):
+                while True:
+                    await loop.sock_sendall(caller, question)
+        except TimeoutError:
+            pass
+
+    assert with_server(tmp_path, scene) == []
+    caller.close()
+
+
+def test_only_the_user_who_runs_the_gateway_may_ask(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+    with_server(tmp_path, scene)
+
+
+def test_a_socket_left_by_a_killed_gateway_is_replaced(tmp_path: Path) -> None:
+    left = socket.socket(socket.AF_UNIX)
+    left.bind(str(tmp_path / "control.sock"))
+    left.close()
+    assert answers(tmp_path, b'{"do": "echo", "say": 3}') == [{"ok": True, "said": 3}]
+
+
+def test_a_path_that_no_socket_can_have_is_a_sentence_and_not_an_end(tmp_path: Path) -> None:
+    """Unix sockets take 107 bytes; a state directory may be deeper than that."""
+    deep = tmp_path / ("d" * 60) / ("e" * 60)
+    deep.mkdir(parents=True)
+
+    async def scene() -> str:
+        server = JsonLineServer(deep / "control.sock", HANDLERS)
+        sentence = await server.start()
+        await server.close()
+        return sentence
+
+    sentence = asyncio.run(scene())
+    assert "control.sock" in sentence
+    assert "107" in sentence
+    assert "--state" in sentence
+
+
+def test_a_socket_that_can_be_made_says_nothing(tmp_path: Path) -> None:
+    async def scene() -> str:
+        server = JsonLineServer(tmp_path / "control.sock", HANDLERS)
+        sentence = await server.start()
+        await server.close()
+        return sentence
+
+    assert asyncio.run(scene()) == ""
+
+
+# -- limits
+
+
+def talk(path: Path, data: bytes = b"") -> socket.socket:
+    """A connection from this very thread: non-blocking, so that the loop under test goes on."""
+    caller = socket.socket(socket.AF_UNIX)
+    caller.setblocking(False)
+    try:
+        caller.connect(str(path))
+        caller.send(data)
+    except OSError:  # the kernel's queue is full
+        caller.close()
+        raise
+    return caller
+
+
+async def patiently(path: Path, data: bytes) -> socket.socket:
+    """As `talk`, as often as the kernel's queue is full."""
+    while True:
+        try:
+            return talk(path, data)
+        except BlockingIOError:
+            await asyncio.sleep(0.002)
+
+
+async def heard(caller: socket.socket) -> bytes:
+    """Everything up to the end of the connection."""
+    loop, found = asyncio.get_running_loop(), b""
+    try:
+        while chunk := await loop.sock_recv(caller, 65536):
+            found += chunk
+    except ConnectionError:
+        pass
+    caller.close()
+    return found
+
+
+async def line_from(caller: socket.socket) -> Any:
+    loop, found = asyncio.get_running_loop(), b""
+    while not found.endswith(b"\n"):
+        chunk = await loop.sock_recv(caller, 65536)
+        assert chunk, "closed without a line"
+        found += chunk
+    return json.loads(found)
+
+
+def descriptors() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+ECHO = b'{"do": "echo", "say": 1}\n'
+
+
+def test_more_callers_than_allowed_are_told_so_and_closed(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        served = [talk(path, ECHO) for _ in range(32)]
+        assert all([(await line_from(caller))["ok"] for caller in served])
+        surplus = [talk(path, ECHO) for _ in range(40)]
+        told = [json.loads(await heard(caller)) for caller in surplus]
+        assert all("32 connections are open" in answer["error"] for answer in told)
+        served[0].close()
+        await asyncio.sleep(0.02)
+        fresh = talk(path, ECHO)
+        assert (await line_from(fresh))["ok"]
+        for caller in (*served, fresh):
+            caller.close()
+
+    assert with_server(tmp_path, scene) == []
+
+
+def test_callers_that_say_nothing_make_room_for_one_that_does(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        silent = [talk(path) for _ in range(32)]
+        await asyncio.sleep(0.15)
+        fresh = talk(path, ECHO)
+        assert (await line_from(fresh))["ok"]
+        assert b"others are waiting" in await heard(silent[0])
+        for caller in (*silent, fresh):
+            caller.close()
+
+    assert with_server(tmp_path, scene, Limits(spared_s=0.02)) == []
+
+
+def test_who_says_nothing_half_a_line_or_reads_nothing_is_closed_in_time(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        callers = [
+            talk(path),
+            talk(path, b'{"do": "ec'),
+            talk(path, b'{"do": "echo", "say": "' + b"x" * 60_000 + b'"}\n' * 2),
+        ]
+        left = [await heard(caller) for caller in callers[:2]]
+        assert all(b"no whole request for 0.2 s" in said for said in left)
+        deaf = callers[2]
+        while True:
+            try:
+                deaf.send(ECHO)
+            except BlockingIOError:
+                await asyncio.sleep(0.01)
+            except OSError:
+                break
+        deaf.close()
+
+    assert with_server(tmp_path, scene, Limits(idle_s=0.2)) == []
+
+
+def test_a_request_without_its_newline_is_one_when_the_caller_has_ended(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        caller = talk(path, ECHO + ECHO.rstrip())
+        caller.shutdown(socket.SHUT_WR)
+        assert (await heard(caller)).count(b'"ok": true') == 2
+
+    assert with_server(tmp_path, scene) == []
+
+
+def test_two_hundred_callers_of_all_kinds_leave_no_descriptor_and_no_caller_behind(tmp_path: Path) -> None:
+    chance = random.Random(5)
+    kinds = (b"", ECHO, ECHO * 30, b"{", b"\x00\xff\n", b"x" * 70_000, b"[" * 900 + b"\n")
+    before = descriptors()
+
+    async def scene(path: Path) -> None:
+        for _ in range(200):
+            caller = await patiently(path, chance.choice(kinds))
+            if chance.random() < 0.3:
+                await asyncio.sleep(0)
+            caller.close()
+        fresh = await patiently(path, ECHO)
+        assert (await line_from(fresh))["ok"]
+        fresh.close()
+
+    assert with_server(tmp_path, scene) == []
+    assert descriptors() <= before + 1
+
+
+def test_a_flood_of_requests_leaves_nine_tenths_of_the_loop(tmp_path: Path) -> None:
+    """However many ask: each turn rests nine times as long as it took. A busy machine makes it fewer, never more."""
+    served = 0
+
+    def costly(request: dict[str, Any]) -> dict[str, Any]:
+        nonlocal served
+        served += 1
+        end_s = time.thread_time() + 0.002
+        while time.thread_time() < end_s:
+            pass
+        return {}
+
+    async def play() -> None:
+        server = JsonLineServer(tmp_path / "control.sock", {"costly": costly})
+        await server.start()
+        flood = [talk(tmp_path / "control.sock", b'{"do": "costly"}\n' * 500) for _ in range(20)]
+        began_s = time.monotonic()
+        await asyncio.sleep(0.4)
+        took_s = time.monotonic() - began_s
+        assert 1 <= served <= 1 + took_s / 0.02
+        for caller in flood:
+            caller.close()
+        await server.close()
+
+    asyncio.run(play())
+
+
+def test_a_defect_in_a_handler_is_an_answer_and_a_line_in_the_log(tmp_path: Path) -> None:
+    said: list[tuple[str, str]] = []
+
+    def broken(request: dict[str, Any]) -> dict[str, Any]:
+        raise ZeroDivisionError("x" * 10_000)
+
+    server = JsonLineServer(
+        tmp_path / "x.sock",
+        {"broken": broken, "odd": lambda request: {"a": object()}, "nan": lambda request: {"a": [float("nan"), 1.5]}},
+        lambda cause, sentence: said.append((cause, sentence)),
+    )
+    for verb in ("broken", "odd"):
+        answer = json.loads(server.answer(json.dumps({"do": verb}).encode()))
+        assert answer["ok"] is False and "internal error, please report" in answer["error"]
+        assert len(answer["error"]) < 600
+    assert [cause for cause, _ in said] == ["internal", "internal"]
+    assert all(sentence.startswith("A499 ") and "Traceback" in sentence for _, sentence in said)
+    assert json.loads(server.answer(b'{"do": "nan"}')) == {"ok": True, "a": [None, 1.5]}

@@ -1,0 +1,85 @@
+"""The JSON of a diagnosis is a contract: exactly these fields, numbers that JSON has, the same values as the answer."""
+
+import json
+from dataclasses import replace
+
+import jsonschema
+import pytest
+
+from gateway.diagnosis.result import Extended, Gain, Verdict
+from gateway.reports.diagnosis.document import diagnosis_document
+from tests.reports.fake_diagnosis import FRICTION, WARMTH, diagnosis
+
+NUMBER = {"type": ["number", "null"]}
+INTERVAL = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}
+TEXT = {"type": "string"}
+
+
+def exactly(**properties: object) -> dict[str, object]:
+    return {"type": "object", "properties": properties, "required": list(properties), "additionalProperties": False}
+
+
+def several(**properties: object) -> dict[str, object]:
+    return {"type": "array", "items": exactly(**properties)}
+
+
+CONTRACT = exactly(
+    format={"const": 1},
+    verdict={"enum": ["nothing-found", "confirmed", "partial", "unknown"]},
+    baseline=exactly(rms_n=NUMBER, noise_floor_n=NUMBER, samples={"type": "integer"}, duration_s=NUMBER),
+    causes=several(
+        name=TEXT,
+        group={"type": "array", "items": TEXT},
+        confidence=NUMBER,
+        parameters={"type": "object", "additionalProperties": exactly(value=NUMBER, unit=TEXT, ci95=INTERVAL)},
+        gain=exactly(held_out_rms_before_n=NUMBER, held_out_rms_after_n=NUMBER, ci95=INTERVAL, share_of_excess=NUMBER),
+    ),
+    leftover=several(depends_on=TEXT, shape=TEXT, share=NUMBER),
+    not_identifiable=several(name=TEXT, why=TEXT, experiment=TEXT),
+    rejected=several(name=TEXT, gain=NUMBER),
+    extended=exactly(held_out_rms_n=NUMBER, reaches_noise_floor={"type": "boolean"}),
+    runtime_s=NUMBER,
+    suspects=several(
+        code=TEXT,
+        recording=TEXT,
+        column=TEXT,
+        swapped_with={"type": ["string", "null"]},
+        unit={"type": ["string", "null"]},
+        factor=NUMBER,
+        is_sure={"type": "boolean"},
+        option=TEXT,
+        sentence=TEXT,
+    ),
+    notes={"type": "array", "items": TEXT},
+)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        diagnosis(),
+        diagnosis(causes=(FRICTION, WARMTH), verdict=Verdict.CONFIRMED),
+        diagnosis(causes=(), leftover=(), rejected=(), not_identifiable=(), verdict=Verdict.NOTHING_FOUND),
+    ],
+)
+def test_exactly_the_fields_of_the_contract_stand_in_the_json(answer) -> None:
+    document = json.loads(json.dumps(diagnosis_document(answer, 1.5), allow_nan=False))
+    assert list(jsonschema.Draft202012Validator(CONTRACT).iter_errors(document)) == []
+
+
+def test_values_are_those_of_the_answer_and_causes_keep_their_order() -> None:
+    document = diagnosis_document(diagnosis(causes=(FRICTION, WARMTH)), 1.5)
+    assert [cause["name"] for cause in document["causes"]] == ["load-dependent-friction", "thermal-zero-drift"]
+    found = document["causes"][0]["parameters"]["load_dependent_n_per_n"]
+    assert found == {"value": 0.0497, "unit": "N/N", "ci95": [0.0482, 0.0511]}
+    assert document["causes"][1]["group"] == ["thermal-zero-drift", "warm-up", "linear-drift"]
+    assert document["runtime_s"] == 1.5
+
+
+def test_what_is_no_number_is_null() -> None:
+    nan = float("nan")
+    cause = replace(FRICTION, gain=Gain(1.0, 0.5, (nan, float("inf")), nan))
+    answer = diagnosis_document(diagnosis(causes=(cause,), extended=Extended(nan, False)), 1.0)
+    assert answer["causes"][0]["gain"]["ci95"] == [None, None]
+    assert answer["extended"]["held_out_rms_n"] is None
+    jsonschema.validate(json.loads(json.dumps(answer, allow_nan=False)), CONTRACT)

@@ -1,0 +1,140 @@
+"""What the pictures of a diagnosis show is what was measured: no spike, gap or line is lost when rows are many."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gateway.reports.diagnosis.series import (
+    Left,
+    binned,
+    dependence,
+    direction,
+    envelope,
+    joined,
+    most_telling_window,
+    occupied,
+    spectrum,
+)
+from tests.reports.fake_diagnosis import trace
+
+
+def test_a_spike_of_one_row_in_a_million_is_in_the_envelope() -> None:
+    time_s = np.arange(1_000_000) / 1000.0
+    force_n = np.zeros(time_s.size)
+    force_n[654_321] = 9.0
+    found = envelope(time_s, force_n, 260)
+    assert found.high.max() == 9.0 and found.low.min() == 0.0
+    assert found.x.size <= 260
+    assert abs(found.x[np.argmax(found.high)] - 654.321) < 1000.0 / 260
+
+
+def test_few_rows_are_drawn_as_they_are() -> None:
+    found = envelope(np.arange(5.0), np.array([1.0, 3.0, 2.0, 5.0, 4.0]), 260)
+    assert found.low.tolist() == found.high.tolist() == [1.0, 3.0, 2.0, 5.0, 4.0]
+
+
+@pytest.mark.parametrize("rows", [100, 100_000])
+def test_a_gap_is_not_drawn_over(rows: int) -> None:
+    time_s = np.arange(rows) * (100.0 / rows)
+    kept = (time_s < 40.0) | (time_s > 60.0)
+    found = envelope(time_s[kept], np.ones(int(kept.sum())), 260)
+    assert len(found.pieces) == 2
+    assert found.x[found.pieces[0]].max() <= 40.0 and found.x[found.pieces[1]].min() >= 60.0
+
+
+def test_uneven_sampling_is_no_gap() -> None:
+    rng = np.random.default_rng(1)
+    time_s = np.cumsum(rng.uniform(0.004, 0.006, 20_000))
+    assert len(envelope(time_s, np.ones(20_000), 260).pieces) == 1
+
+
+def test_every_point_is_in_a_cell_that_is_drawn() -> None:
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(0, 10, 5000), rng.normal(size=5000)
+    cells = {tuple(cell) for cell in occupied(x, y, (50, 30), (0.0, 10.0, -5.0, 5.0)).tolist()}
+    places = zip((x / 10 * 50).astype(int).tolist(), ((y + 5) / 10 * 30).astype(int).tolist(), strict=True)
+    assert all(place in cells for place in places)
+
+
+def test_noise_on_a_pressure_is_no_change_of_direction() -> None:
+    rng = np.random.default_rng(3)
+    up = np.linspace(0.0, 5e5, 3000)
+    pressure_pa = np.concatenate([up, up[::-1]]) + rng.normal(0.0, 500.0, 6000)
+    measurement = replace(trace(rows=6000).measurement, command_v=None, pressure_pa=pressure_pa)
+    ways = direction(measurement)
+    assert (ways[200:2900] == 1.0).all() and (ways[3300:] == -1.0).all()
+
+
+def test_on_a_stair_the_direction_is_that_of_the_last_step() -> None:
+    volts = np.repeat([0.0, 1.0, 2.0, 1.0], 100)
+    ways = direction(replace(trace(rows=400).measurement, command_v=volts))
+    assert ways[:100].tolist() == [0.0] * 100
+    assert set(ways[100:300]) == {1.0} and set(ways[300:]) == {-1.0}
+
+
+def test_a_measured_position_tells_the_direction_better_than_the_command() -> None:
+    measurement = replace(trace(rows=400).measurement, position_m=np.linspace(0.01, 0.0, 400))
+    assert set(direction(measurement)[20:]) == {-1.0}
+
+
+def test_the_way_of_the_tool_along_the_workpiece_is_no_direction_of_the_slide() -> None:
+    volts = 3.0 + np.sin(np.linspace(0.0, 12.0 * np.pi, 1200))
+    plain = replace(trace(rows=1200).measurement, command_v=volts, position_m=None)
+    along_m = np.sin(np.linspace(0.0, 7.0 * np.pi, 1200) + 0.4)
+    assert np.array_equal(direction(replace(plain, position_m=along_m)), direction(plain))
+
+
+def test_mains_hum_stands_at_its_frequency_though_rows_are_uneven_and_missing() -> None:
+    rng = np.random.default_rng(4)
+    time_s = np.cumsum(rng.uniform(0.0045, 0.0055, 12_000))
+    kept = (time_s < 20.0) | (time_s > 23.0)
+    values = 0.3 * np.sin(2 * np.pi * 50.0 * time_s) + rng.normal(0.0, 0.1, time_s.size)
+    hertz, density = spectrum(time_s[kept], values[kept])
+    assert abs(hertz[np.argmax(density)] - 50.0) < 0.5
+    assert density.max() > 5.0 * np.median(density)
+
+
+def test_white_noise_has_the_density_that_its_power_says() -> None:
+    values = np.random.default_rng(5).normal(0.0, 0.2, 40_000)
+    hertz, density = spectrum(np.arange(values.size) / 200.0, values)
+    assert np.median(density[hertz < 20.0]) == pytest.approx(0.2 / np.sqrt(100.0), rel=0.15)
+
+
+def test_three_rows_have_no_spectrum() -> None:
+    assert spectrum(np.arange(3.0), np.ones(3))[0].size == 0
+
+
+def test_dependence_is_the_share_of_the_variance_that_the_means_carry() -> None:
+    rng = np.random.default_rng(6)
+    x = rng.uniform(-1, 1, 50_000)
+    y = x + rng.normal(0.0, np.sqrt(1 / 3), x.size)
+    assert dependence(x, y) == pytest.approx(0.5, abs=0.02)
+    assert dependence(np.ones(x.size), y) == 0.0
+    assert dependence(rng.normal(size=x.size), y) < 0.01
+
+
+def test_means_over_bins_follow_the_shape() -> None:
+    x = np.linspace(0.0, 1.0, 3000)
+    found = binned(x, x**2)
+    assert np.allclose(found.mean, found.x**2, atol=1e-3)
+
+
+def test_residuals_are_measured_minus_simulated_of_judged_rows() -> None:
+    one = trace(rows=400)
+    rows = joined([one, one])
+    usable = one.measurement.usable
+    expected = (one.measurement.force_n - one.before_n)[usable]
+    assert np.array_equal(rows.before_n, np.concatenate([expected, expected]))
+
+
+def test_a_column_that_only_one_recording_has_is_nan_for_the_other() -> None:
+    rows = joined([trace(rows=400, odd=np.ones(400)), trace(rows=400)])
+    assert np.isfinite(rows.quantities["odd"]).sum() == trace(rows=400).measurement.usable.sum()
+
+
+def test_the_closer_look_is_where_the_gain_is() -> None:
+    time_s = np.arange(10_000) / 100.0
+    before = np.where((time_s > 70.0) & (time_s < 75.0), 2.0, 0.1)
+    start, end = most_telling_window(Left(time_s, before, before, np.full(time_s.size, 0.1)))
+    assert start <= 71.0 and end >= 74.0

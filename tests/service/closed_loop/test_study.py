@@ -1,0 +1,157 @@
+"""The loop closes: what an extended plant is worth in commanded force, effect by effect, on the twin.
+
+Each effect alone on the paper's slide, large enough to be felt; the ratios are printed (`pytest -rP`). One seed each, for time;
+the last tests run several.
+"""
+
+from functools import reduce
+
+import pytest
+
+from gateway.control import NO_COMPENSATION, CellMap
+from gateway.profiles import load_plant, load_rig
+from gateway.profiles.rigs.compensation import ALL_INPUTS, compensation_of
+from gateway.service.closed_loop.identified_model import at_rest, identified
+from gateway.service.closed_loop.study import ClosedLoop, closed_loop_gain, lines
+from gateway.twin import Plant, Twin
+from gateway.twin.plant import with_value
+from gateway.twin.surroundings import Surroundings
+
+BASE = load_plant("paper-slide").plant
+
+
+def plant_with(**values: float) -> Plant:
+    """Keys are section__field."""
+    return reduce(lambda plant, item: with_value(plant, *item[0].split("__"), item[1]), values.items(), BASE)
+
+
+def gain(extended: Plant, **options: object) -> ClosedLoop:
+    return closed_loop_gain(BASE, extended, seeds=1, **options)  # type: ignore[arg-type]
+
+
+# effect, its numbers, largest allowed ratio of the error after to before
+EFFECTS = [
+    ("tilt-gravity", {"contact__tilt_n": 4.0}, 0.5),
+    ("feed-drag", {"contact__feed_drag_n": 1.5}, 0.8),  # each turn of the feed is felt before the pressure can follow
+    ("thermal-zero-drift", {"cell__zero_n_per_k": 0.15}, 0.3),
+    ("thermal-span-drift", {"cell__span_per_k": 0.005}, 0.4),
+    ("sensor-quadratic", {"cell__quadratic_per_n": 0.002}, 0.4),
+    ("sensor-cubic", {"cell__cubic_per_n2": 5.0e-5}, 0.45),
+    ("valve-crosstalk", {"cell__crosstalk_n_per_v": 0.4}, 0.4),
+    ("command-nonlinearity", {"regulator__command_bow": 0.06}, 0.5),
+    ("command-nonlinearity", {"regulator__command_s": 0.05}, 0.65),
+    ("load-dependent-friction", {"friction__load_dependent_n_per_n": 0.12}, 0.5),
+    ("presliding", {"friction__presliding_m": 5.0e-5}, 0.8),  # the model's stops are softer than such a seal
+    ("coulomb-friction", {"friction__coulomb_n": 3.0}, 0.5),
+    ("transport-delay", {"regulator__delay_s": 0.25}, 0.3),
+    ("extra-lag", {"regulator__second_lag_s": 0.25}, 0.3),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "largest"), EFFECTS, ids=[f"{name} {next(iter(n))}" for name, n, _ in EFFECTS]
+)
+def test_a_known_effect_costs_less_force(name, numbers, largest):
+    found = gain(plant_with(**numbers))
+    print(f"{name}: {found.before_rms_n:.3f} -> {found.after_rms_n:.3f} N RMS, ratio {found.rms_ratio:.2f}")
+    assert found.compensated == (name,)
+    assert found.not_compensated == ()
+    assert found.after_faults == ()
+    assert found.rms_ratio < largest
+
+
+def test_what_cannot_be_compensated_is_listed_with_its_reason_and_changes_nothing():
+    found = gain(plant_with(contact__spindle_n=1.0))
+    ((name, why),) = found.not_compensated
+    assert name == "spindle-vibration"
+    assert "faster than the regulator" in why
+    assert found.before_rms_n == found.after_rms_n
+    assert found.rms_ratio_ci95 == (1.0, 1.0)
+
+
+def test_the_same_plant_gives_the_same_error_twice():
+    found = gain(BASE)
+    assert (found.compensated, found.not_compensated) == ((), ())
+    assert (found.before_rms_n, found.before_max_n) == (found.after_rms_n, found.after_max_n)
+    assert found.before_rms_n < 0.4
+
+
+def test_an_input_that_nobody_gives_leaves_its_effect_and_says_so():
+    extended = plant_with(cell__zero_n_per_k=0.15)
+    without = gain(extended, inputs=("tilt_deg",))
+    assert without.not_compensated == (
+        ("thermal-zero-drift", "needs temperature_c, which nobody tells the controller"),
+    )
+    assert without.after_rms_n == pytest.approx(without.before_rms_n, rel=1e-9)
+
+
+def test_several_at_once_with_an_interval_over_seeds():
+    extended = plant_with(contact__tilt_n=3.0, cell__quadratic_per_n=0.0015, friction__load_dependent_n_per_n=0.1)
+    found = closed_loop_gain(BASE, extended, load_rig("demo"), 7, seeds=2)
+    assert set(found.compensated) == {"tilt-gravity", "sensor-quadratic", "load-dependent-friction"}
+    assert found.seeds == (7, 8)
+    low, high = found.rms_ratio_ci95
+    assert low <= found.rms_ratio <= high < 0.7
+    told = lines(found)
+    assert told[0] == "error in commanded force on the twin, 2 seeds"
+    assert f"{found.before_rms_n:.2f} -> {found.after_rms_n:.2f}" in told[1]
+    assert "tilt-gravity" in "\n".join(told)
+
+
+def test_a_plant_without_a_model_keeps_the_one_before_and_says_so():
+    """No air: nothing a ladder could identify."""
+    found = gain(plant_with(regulator__supply_pa=5.0e4, friction__coulomb_n=1.5))
+    told = dict(found.not_compensated)
+    assert "the extended plant gives no model" in told["coulomb-friction"]
+    assert "no more pressure" in told["supply-saturation"]
+
+
+def test_plants_that_rest_alike_share_one_model():
+    assert identified(plant_with(contact__tilt_n=3.0, cell__noise_n=0.5, regulator__delay_s=0.2), 8.0) is identified(
+        BASE, 8.0
+    )
+    assert at_rest(BASE) == at_rest(at_rest(BASE))
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"cell__quadratic_per_n": 0.003, "cell__cubic_per_n2": 2.0e-5},
+        {"cell__span_per_k": 0.01, "cell__zero_n_per_k": 0.2},
+        {"cell__crosstalk_n_per_v": 0.4},
+    ],
+)
+def test_the_inverse_of_the_cell_undoes_what_the_twins_cell_does(numbers):
+    """Forward by the twin, backward by control: the two know nothing of each other."""
+    extended = plant_with(cell__noise_n=0.0, cell__filter_s=0.0, cell__quantum_n=0.0, **numbers)
+    twin, cell = Twin(extended, 0), compensation_of(BASE, extended, ALL_INPUTS).cell
+    assert isinstance(cell, CellMap)
+    for voltage_v, temperature_c in ((2.0, 20.0), (5.0, 31.0), (3.5, 12.0)):
+        twin.set_surroundings(Surroundings(temperature_c=temperature_c))
+        twin.command(voltage_v)
+        twin.advance(1.0)
+        assert cell.force_n(twin.read(), temperature_c, voltage_v) == pytest.approx(twin.force_n, abs=1e-6)
+
+
+def test_a_straightened_command_reaches_the_pressure_of_a_straight_regulator():
+    bent, straight = (
+        Twin(
+            plant_with(
+                regulator__command_step_v=0.0, regulator__dead_band_pa=0.0, regulator__hysteresis_pa=0.0, **numbers
+            ),
+            0,
+        )
+        for numbers in ({"regulator__command_bow": 0.07, "regulator__command_s": -0.03}, {})
+    )
+    command = compensation_of(BASE, bent.plant).command
+    assert command
+    for voltage_v in (1.0, 4.0, 7.5, 2.0):
+        straight.command(voltage_v)
+        bent.command(command.sent_v(voltage_v))
+        straight.advance(2.0)
+        bent.advance(2.0)
+        assert bent.pressure_pa == pytest.approx(straight.pressure_pa, abs=1.0)
+
+
+def test_equal_plants_give_the_null_compensation():
+    assert compensation_of(BASE, BASE, ALL_INPUTS, new_model=True) == NO_COMPENSATION

@@ -1,0 +1,89 @@
+"""Which fits are offered: a bad one, or one worse than what is in use, is kept with its reason and not used by accident."""
+
+import json
+from itertools import pairwise
+from math import pi, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.bsfm import CoefficientLimits
+from gateway.calibrations.activation import Activation
+from gateway.calibrations.store import CalibrationStore, StoreError
+from gateway.profiles import load_rig
+from gateway.recording import Recorder
+from gateway.service.fitting.fit_process import fit_and_store
+
+TURNS_V = [8.0, 7.0, 2.0, 5.0, 3.0, 4.5, 1.0, 6.0, 3.5, 5.5, 0.5, 2.5, 1.5, 3.0]
+
+
+def recorded(state: Path, step_v: float = 1.0, shape: float = 0.0, walk: bool = True) -> Path:
+    """A play of 3 N on a thrust that bends by 4 N, and waves by `shape` N: two groups and partial reversals, 10 Hz."""
+    up = np.arange(0.0, 8.01, step_v).tolist()
+    partly = (
+        [volts for a, b in pairwise([0.0, *TURNS_V]) for volts in np.linspace(a, b, 4)[1:].tolist()] if walk else []
+    )
+    recorder = Recorder(state / "recordings", {"rig": "demo", "name": "left cell"}, ("time_s", "command_v", "force_n"))
+    rng, time_s, newtons = np.random.default_rng(5), 0.0, 0.0
+    for volts in [*(up + up[-2::-1]) * 2, *partly, 0.0]:
+        for _ in range(5):
+            recorder.append((time_s, volts, newtons + rng.normal(0.0, 0.02)))
+            time_s += 0.1
+            thrust_n = 8.0 * volts + 4.0 * sin(0.125 * pi * volts) + shape * sin(2.5 * volts)
+            newtons = float(np.clip(newtons, thrust_n - 0.2 * volts, thrust_n + 0.2 * volts))
+    recorder.close()
+    return recorder.path
+
+
+def store_of(state: Path) -> CalibrationStore:
+    return CalibrationStore(state, load_rig("demo").calibration)
+
+
+def test_a_good_fit_is_offered_under_the_users_name_with_its_error_on_all_points(tmp_path: Path) -> None:
+    result = fit_and_store(recorded(tmp_path), "demo", tmp_path)
+    stored = store_of(tmp_path).load(result["stored"])
+    document = json.loads(Path(result["document"]).read_text(encoding="utf-8"))
+    assert (stored.name, stored.rejected) == ("left cell", "")
+    assert document["measured"]["points"] == document["ladder"]["points"] + document["ladder"]["minor_points"] - 1
+    assert stored.rms_n == pytest.approx(document["measured"]["rms_n"])
+    report = Path(result["report"]).read_text(encoding="utf-8")
+    assert f"<title>left cell · calibration {result['stored']}</title>" in report
+    assert "<h1>left cell</h1>" in report
+    assert f"{stored.rms_n:.3f}" in report
+    assert "reversals included" in report
+
+
+@pytest.mark.parametrize("why", ["the band", "what is in use"])
+def test_what_is_out_of_band_or_worse_than_what_is_in_use_is_kept_and_not_offered(why: str, tmp_path: Path) -> None:
+    if why == "the band":
+        result, words = (
+            fit_and_store(recorded(tmp_path, shape=3.0), "demo", tmp_path),
+            "allowed 1.000 N (in_band_tolerance_n",
+        )
+    else:
+        store_of(tmp_path).use(fit_and_store(recorded(tmp_path), "demo", tmp_path)["stored"])
+        result, words = (
+            fit_and_store(recorded(tmp_path, step_v=2.0, walk=False), "demo", tmp_path),
+            "N by calibration 2 in use on the",
+        )
+    assert "stored" not in result
+    assert result["refused"].startswith(f"E435 calibration {result['rejected']} is stored as rejected")
+    before = store_of(tmp_path).standing().selection
+    store = store_of(tmp_path)
+    rejected = store.load(result["rejected"])
+    assert words in rejected.rejected
+    assert "Rejected, not offered" in Path(result["report"]).read_text(encoding="utf-8")
+    activation = Activation(store, CoefficientLimits(cell_range_n=98.0))
+    with pytest.raises(StoreError, match=f"E436 calibration {rejected.number} was rejected: .*--force"):
+        activation.take_offered(rejected.number)
+    assert store.standing().selection == before
+    assert activation.take_offered(rejected.number, force=True).calibration == rejected
+    assert store_of(tmp_path).standing().calibration == rejected
+
+
+def test_without_a_reversal_part_the_branches_are_judged_and_it_is_said(tmp_path: Path) -> None:
+    result = fit_and_store(recorded(tmp_path, walk=False), "demo", tmp_path)
+    measured = json.loads(Path(result["document"]).read_text(encoding="utf-8"))["measured"]
+    assert not measured["reversals"]
+    assert measured["rms_n"] < 0.3

@@ -1,0 +1,181 @@
+"""A ladder that was cut, anywhere and by anything, and gone on with: nothing enters the fit twice or half, and the calibration
+is as good as that of a run that nobody has cut.
+
+The cut is made in the recording: a run that was ended, killed or unplugged leaves the rows so far and nothing else. What goes
+on is a run of its own in virtual time, one for each number of groups that may be left.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gateway.bsfm.ladder.labels import CHECK, DONE, LABELS, WALK, Labels
+from gateway.calibrations.store import CalibrationStore
+from gateway.cli.calibration.resume import resumed
+from gateway.cli.errors import CliError
+from gateway.profiles import load_rig
+from gateway.recording import Recorder, Recording, read_recording
+from gateway.recording.tables.columns import LADDER
+from gateway.registers.words import CalibrationPhase
+from gateway.service.fitting.fit_process import fit_and_store
+from gateway.service.fitting.ladder_source import Background, checked_source
+from gateway.service.running_rig import calibration_runs
+from gateway.service.running_rig.calibration_runs import LadderKeeper
+from tests.service.running_rig.test_calibration_runs import kept
+from tests.service.wired import Wired
+
+PLAN = {"step_v": 1.0, "groups": 2, "minor_points": 24}
+DEMO = Background(rig="demo")
+
+
+class NoFit:
+    """In place of the process that fits."""
+
+    def __init__(self, recording: Path, *others: object) -> None:
+        self.recording = recording
+
+    def close(self) -> None: ...
+
+
+def climbed(wired: Wired, keeper: LadderKeeper, request: dict[str, Any]) -> Recording:
+    keeper.answer(request)
+    while keeper.answer({})["phase"] != "fitting":
+        wired.run(0.5)
+    wired.run(0.1)
+    return read_recording(Path(keeper.status()["recording"]))
+
+
+@dataclass(frozen=True)
+class Runs:
+    """whole: not cut; rest: by the number of groups that a cut run had, what goes on from recording 1."""
+
+    whole: Recording
+    rest: dict[int, Recording]
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
+    state = tmp_path_factory.mktemp("runs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(calibration_runs, "FitChild", NoFit)
+        recordings = []
+        for first_group in (None, 1, 2):
+            wired = Wired(seed=11 + (first_group or 0)).ready()
+            keeper = kept(wired, state)
+            if first_group is None:
+                recordings.append(climbed(wired, keeper, {"plan": PLAN, "name": "left cell"}))
+            else:
+                plan = PLAN | {"first_group": first_group, "v_max_v": recordings[0].header["ladder"]["top_v"]}
+                recordings.append(climbed(wired, keeper, {"plan": plan, "continues": [1]}))
+    return Runs(recordings[0], dict(zip((1, 2), recordings[1:], strict=True)))
+
+
+def written(state: Path, recording: Recording, rows: int | None = None, **facts: object) -> Path:
+    """The first rows of a recording, as the next one of this state directory."""
+    header = {name: value for name, value in recording.header.items() if name not in ("number", "columns")} | facts
+    recorder = Recorder(state / "recordings", header, tuple(recording.columns))
+    for row in np.stack(list(recording.columns.values()), axis=1)[:rows].tolist():
+        recorder.append(tuple(row))
+    recorder.close()
+    return recorder.path
+
+
+def groups_left_behind(recording: Recording, rows: int) -> int:
+    """Told by the plan alone: the check's 9 stairs, then 17 to a group; a stair is left when the next one has begun."""
+    return min(2, max(0, int(recording.columns["stair"][rows - 1]) - 9) // 17)
+
+
+def test_the_labels_are_the_registers_words() -> None:
+    assert (CalibrationPhase.CHECK, CalibrationPhase.MINOR_LOOPS, CalibrationPhase.FITTING) == (CHECK, WALK, DONE)
+    assert LADDER == LABELS
+
+
+def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbed_again(runs, tmp_path: Path) -> None:
+    path = written(tmp_path, runs.whole)
+    rows, seen, top_v = runs.whole.rows, set(), runs.whole.header["ladder"]["top_v"]
+    for cut in [*range(1, rows, 61), *(np.flatnonzero(np.diff(runs.whole.columns["group"])) + 1).tolist(), rows - 1]:
+        path.unlink()
+        assert written(tmp_path, runs.whole, cut) == path
+        rest, groups = resumed(tmp_path), groups_left_behind(runs.whole, cut)
+        assert (rest.groups, rest.earlier) == (groups, [1] if groups else []), f"cut at row {cut}"
+        assert not rest.is_whole(rest.plan)
+        plan = rest.plan_with({})
+        assert (plan["first_group"], plan["v_max_v"], plan["step_v"]) == (groups, top_v, 1.0)
+        seen.add(groups)
+    assert seen == {0, 1, 2}
+
+
+@pytest.mark.parametrize("stair", [0, 4, 9, 20, 26, 34, 43, 60])
+def test_a_run_that_was_cut_gives_a_calibration_as_good_as_one_that_was_not(runs, stair: int, tmp_path: Path) -> None:
+    cut = int(np.searchsorted(runs.whole.columns["stair"], stair)) + 20
+    written(tmp_path, runs.whole, cut)
+    rest = resumed(tmp_path)
+    last = written(tmp_path, runs.rest[rest.groups] if rest.groups else runs.whole, continues=rest.earlier)
+    checked, whole = (checked_source(read_recording(path), DEMO) for path in (last, runs.whole.path))
+    assert checked.ladder.voltage_v == pytest.approx(whole.ladder.voltage_v)
+    assert checked.ladder.direction.tolist() == whole.ladder.direction.tolist()
+    assert checked.ladder.group.tolist() == whole.ladder.group.tolist()
+    assert checked.minor_v == pytest.approx(whole.minor_v)
+    assert np.abs(checked.ladder.force_n - whole.ladder.force_n).max() < 0.6
+
+
+@pytest.mark.parametrize("groups", [1, 2])
+def test_the_fit_of_a_resumed_run_is_offered_and_its_error_is_that_of_a_whole_one(runs, groups, tmp_path: Path) -> None:
+    rms_n = []
+    for state, parts in (("whole", (runs.whole,)), ("cut", (runs.whole, runs.rest[groups]))):
+        for k, part in enumerate(parts):
+            cut = int(np.searchsorted(part.columns["stair"], 9 + 17 * groups + 3)) if k < len(parts) - 1 else None
+            path = written(tmp_path / state, part, cut)
+        result = fit_and_store(path, "demo", tmp_path / state)
+        stored = CalibrationStore(tmp_path / state, load_rig("demo").calibration).load(result["stored"])
+        assert (stored.order, stored.rejected) == (2, "")
+        rms_n.append(stored.rms_n)
+    assert rms_n[1] < 1.2 * rms_n[0] + 0.02  # 59 points: two runs differ by so much for themselves
+
+
+def test_a_finished_run_repeats_nothing_and_its_fit_is_made_once(runs, tmp_path: Path) -> None:
+    path = written(tmp_path, runs.whole)
+    rest = resumed(tmp_path)
+    assert rest.is_whole(rest.plan)
+    assert rest.name == "left cell"
+    first = fit_and_store(path, "demo", tmp_path)
+    assert fit_and_store(path, "demo", tmp_path) == first
+    assert [entry.number for entry in CalibrationStore(tmp_path).list()] == [first["stored"]]
+    more = rest.plan_with({"groups": 3})
+    assert (more["first_group"], rest.is_whole(more)) == (2, False)
+
+
+def test_an_earlier_part_that_is_gone_is_climbed_again(runs, tmp_path: Path) -> None:
+    gone = written(tmp_path, runs.whole, int(np.searchsorted(runs.whole.columns["stair"], 30)))
+    written(tmp_path, runs.rest[1], int(np.searchsorted(runs.rest[1].columns["stair"], 12)), continues=[1])
+    assert (resumed(tmp_path).groups, resumed(tmp_path).earlier) == (1, [1])
+    gone.unlink()
+    assert (resumed(tmp_path).groups, resumed(tmp_path).earlier) == (0, [])
+
+
+def test_a_tare_that_a_restart_has_lost_moves_no_group(runs, tmp_path: Path) -> None:
+    cut = int(np.searchsorted(runs.whole.columns["stair"], 30))
+    tared = replace(runs.whole, columns=runs.whole.columns | {"force_n": runs.whole.columns["force_n"] - 1.7})
+    written(tmp_path, tared, cut, zero_n=1.7)
+    last = written(tmp_path, runs.rest[1], continues=[1], zero_n=0.0)
+    checked, whole = checked_source(read_recording(last), DEMO), checked_source(tared, DEMO)
+    assert np.abs(checked.ladder.force_n - whole.ladder.force_n).max() < 0.6
+    assert any("another zero" in note for note in checked.notes)
+
+
+def test_only_the_last_stair_left_makes_a_run_whole(runs) -> None:
+    labels = Labels.of(runs.whole.columns)
+    assert labels is not None
+    assert labels.last_stair == runs.whole.header["ladder"]["stairs"]
+    assert labels.has_walk
+    before = Labels.of({name: values[:-1] for name, values in runs.whole.columns.items()})
+    assert before is not None
+    assert not before.has_walk
+
+
+def test_without_a_recorded_ladder_there_is_nothing_to_go_on_with(tmp_path: Path) -> None:
+    with pytest.raises(CliError, match="E422"):
+        resumed(tmp_path)

@@ -1,0 +1,174 @@
+"""Bank, gateway and controller around a small plant, in virtual time and without wires: a thousand times faster than real.
+
+Masters write through the bank's own faces (FC05, FC06, FC16, FC22, floats), so that an answer is what a master would get.
+Two racks with the same past live the same next seconds: what a refused write changes all the same shows.
+"""
+
+from dataclasses import replace
+from math import nan
+from random import Random
+from struct import pack
+
+from gateway.control import Controller, ControlSettings
+from gateway.devices.messages import ForceSample, Quality
+from gateway.modbus import Peer
+from gateway.profiles import load_register_map
+from gateway.registers import BankRules, Refusal, RegisterBank
+from gateway.registers.rules import BASIC_BITS
+from gateway.registers.words import ControlBit, FaultCode, State
+from gateway.service.running_rig.gateway_core import Gateway
+from tests.control.bench import SmallPlant, bsfm, settings
+
+OWNER, OTHER = Peer("10.0.0.5", 4001), Peer("10.0.0.6", 4002)
+TICK_S = 0.01
+MAP = load_register_map("force-v1")
+ENABLE, RESET, TARE, TAKE, VALVE, CALIBRATE, SELF_TEST = (int(bit) for bit in ControlBit)
+
+
+class Wire:
+    """Stands for the output line: every voltage is acknowledged at once."""
+
+    def __init__(self) -> None:
+        self.voltage_v = self.acknowledged_v = 0.0
+        self.unanswered_since_s: float | None = None
+        self.fault = FaultCode.NONE
+        self.pressure_pa = self.round_trip_s = nan
+
+    @property
+    def sent_v(self) -> float:
+        return self.voltage_v
+
+    def want(self, voltage_v: float, now_s: float) -> None:
+        self.voltage_v = self.acknowledged_v = voltage_v
+
+    def tick(self, now_s: float) -> None: ...
+
+
+class Samples:
+    """Stands for the load cell's line: what is put here comes out at the next bytes."""
+
+    def __init__(self) -> None:
+        self.next: ForceSample | None = None
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | None]:
+        return [self.next]
+
+    def tick(self, now_s: float) -> None:
+        """A stream is not asked."""
+
+
+class Rack:
+    """Times are virtual seconds. beats: the owner's heartbeat changes every tenth of a second, where there is a lease."""
+
+    def __init__(self, control: ControlSettings | None = None, *, seed: int = 1, **plant: float) -> None:
+        self.settings = control or settings()
+        self.ticks = 0
+        self.is_cell_silent = False
+        self.beats = self.settings.supervision.lease_s is not None
+        self.beat = 0
+        self.log: list[str] = []
+        self.trace: list[tuple[State, float, float]] = []
+        self.plant = SmallPlant(Random(seed), **plant)  # type: ignore[arg-type]
+        self.wire, self.samples = Wire(), Samples()
+        rules = BankRules(
+            rig_name="rack",
+            force_max_n=self.settings.limits.force_max_n,
+            supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION,
+        )
+        self.bank = RegisterBank(MAP, rules, now=self.now)
+        self.controller = Controller(self.settings, bsfm(), calibration_id=1)
+        self.gateway = Gateway(
+            self.bank,
+            self.controller,
+            self.wire,
+            self.samples,
+            clock=self.now,
+            log=self.note,  # type: ignore[arg-type]
+        )
+        self.run(0.5)
+
+    def now(self) -> float:
+        return self.ticks * TICK_S
+
+    def note(self, cause: str, sentence: str) -> None:
+        self.log.append(sentence)
+
+    # -- time
+
+    def run(self, seconds: float) -> "Rack":
+        for _ in range(round(seconds / TICK_S)):
+            self._tick()
+        return self
+
+    def until(self, state: State, within_s: float = 5.0) -> "Rack":
+        for _ in range(round(within_s / TICK_S)):
+            if self.state is state:
+                return self
+            self._tick()
+        raise AssertionError(f"{self.state.name}, not {state.name}, within {within_s} s: {self.log[-3:]}")
+
+    def _tick(self) -> None:
+        self.ticks += 1
+        for _ in range(10):
+            self.plant.advance(self.wire.voltage_v)
+        if not self.is_cell_silent:
+            force_n = self.plant.reading_n()
+            self.samples.next = ForceSample(force_n, force_n, Quality.OK, self.now())
+            self.gateway.on_cell_bytes(b"", self.now())
+        if self.beats and self.ticks % 10 == 0 and self.bank.owner == OWNER.host:
+            self.beat += 1
+            self.write(4, self.beat)
+        self.gateway.on_tick(1, 0.0)
+        self.trace.append((self.state, self.wire.voltage_v, self.plant.force_n))
+
+    # -- masters
+
+    def write(self, address: int, *words: int, peer: Peer = OWNER) -> None:
+        """FC06 or FC16; a Refusal comes through."""
+        self.bank.write_registers(address, pack(f">{len(words)}H", *(word & 0xFFFF for word in words)), peer)
+
+    def answer(self, address: int, *words: int, peer: Peer = OWNER) -> Refusal | None:
+        try:
+            self.write(address, *words, peer=peer)
+        except Refusal as refusal:
+            return refusal
+        return None
+
+    def block(self, word: int, force_n: float | None = None, *, beat: int | None = None) -> tuple[int, ...]:
+        """The whole command block as it stands, with this control word, for a cyclic master."""
+        words = list(self.words(0, 13))
+        words[0] = word
+        words[1] = words[1] if force_n is None else round(100 * force_n)
+        words[4] = words[4] if beat is None else beat
+        return tuple(words)
+
+    def words(self, address: int, count: int) -> tuple[int, ...]:
+        data = self.bank.read_registers(address, count)
+        return tuple(data[2 * k] << 8 | data[2 * k + 1] for k in range(count))
+
+    def word(self, name: str) -> int:
+        return self.words(MAP.find(name).address, 1)[0]
+
+    @property
+    def state(self) -> State:
+        return State(self.word("state"))
+
+    # -- where it may stand
+
+    def holding(self, force_n: float = 12.0) -> "Rack":
+        self.write(0, ENABLE, round(100 * force_n))
+        return self.until(State.HOLDING)
+
+    def faulted(self) -> "Rack":
+        self.holding().is_cell_silent = True
+        self.until(State.FAULT)
+        self.is_cell_silent = False
+        return self.run(1.5)
+
+    def calibrating(self, word: int = CALIBRATE) -> "Rack":
+        self.write(0, word)
+        return self.until(State.CALIBRATING).run(2.5)
+
+
+def with_limits(control: ControlSettings, **limits: float) -> ControlSettings:
+    return replace(control, limits=replace(control.limits, **limits))  # type: ignore[arg-type]

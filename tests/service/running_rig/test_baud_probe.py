@@ -1,0 +1,146 @@
+"""Why a line says nothing: heard at every usual speed over a pty that behaves like a wire of one speed."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from gateway.devices import DeviceProfile, cell_device, output_device
+from gateway.devices.messages import Accepted, Garbage, SetVoltage
+from gateway.ports import PacedPty
+from gateway.profiles import CellLine, OutputLine
+from gateway.service.running_rig.baud_probe import achieved, why_no_words
+from tests.service.rigs import demo
+
+FRAME_PERIOD_S = 0.01
+
+
+class SpeakingCell:
+    """An amplifier that streams at its own speed whatever the client's is."""
+
+    def __init__(
+        self, profile: DeviceProfile, baud: int, frame: bytes | None = None, period_s: float = FRAME_PERIOD_S
+    ) -> None:
+        self._period_s = period_s
+        self._frame = cell_device(profile).frame(12.0) if frame is None else frame
+        self.pty = PacedPty(baud, on_bytes=lambda chunk, now_s: None)
+
+    def start(self) -> None:
+        self.pty.open()
+        assert self.pty._pty
+        self.pty._pty.set_client_baud(demo().load_cell.baud)  # the gateway has had it open until now
+        self._next()
+
+    def _next(self) -> None:
+        if self._frame:
+            self.pty.send(self._frame)
+        self._timer = asyncio.get_running_loop().call_later(self._period_s, self._next)
+
+    def close(self) -> None:
+        self._timer.cancel()
+        self.pty.close()
+
+
+class AnsweringRegulator:
+    """Answers what it understands at its own speed; to anything else it says its own word, or nothing."""
+
+    def __init__(self, profile: DeviceProfile, baud: int, setting_v: float = 2.0, only_refuses: bool = False) -> None:
+        self._device = output_device(profile)
+        self._setting_v = setting_v
+        self._only_refuses = only_refuses
+        self.heard: list[object] = []
+        self.pty = PacedPty(baud, on_bytes=self._on_bytes)
+
+    def start(self) -> None:
+        self.pty.open()
+
+    def close(self) -> None:
+        self.pty.close()
+
+    def _on_bytes(self, chunk: bytes, now_s: float) -> None:
+        for request in self._device.receive(chunk, now_s):
+            self.heard.append(request)
+            if isinstance(request, Garbage) or self._only_refuses:
+                garbage = request if isinstance(request, Garbage) else Garbage(b"")
+                self.pty.send(self._device.reply(self._device.refusal(garbage)))
+            else:
+                self.pty.send(self._device.reply(Accepted(self._setting_v), to=request))
+
+
+def asked(device: SpeakingCell | AnsweringRegulator, question: Callable[[str], Coroutine[Any, Any, Any]]) -> Any:
+    async def scene() -> Any:
+        device.start()
+        try:
+            async with asyncio.timeout(10):
+                return await question(device.pty.path)
+        finally:
+            device.close()
+
+    return asyncio.run(scene())
+
+
+@pytest.fixture
+def cell() -> CellLine:
+    return demo().load_cell
+
+
+@pytest.fixture
+def output() -> OutputLine:
+    return demo().output
+
+
+@pytest.mark.parametrize(("right", "period_s"), [(9600, 0.19), (38400, 0.025)])
+def test_another_speed_of_the_load_cell_is_found_and_named(cell: CellLine, right: int, period_s: float) -> None:
+    sentence = asked(SpeakingCell(cell.device, right, period_s=period_s), lambda path: why_no_words(cell, path))
+    assert sentence.startswith("E110 /dev/pts/")
+    assert "0 valid lines at 115200" in sentence
+    assert f"at {right} the same device gives valid lines: set baud: {right} in the rig" in sentence
+
+
+@pytest.mark.parametrize("right", [19200, 115200])
+def test_another_speed_of_the_regulator_is_found_and_named(output: OutputLine, right: int) -> None:
+    device = AnsweringRegulator(output.device, right)
+    sentence = asked(device, lambda path: why_no_words(output, path))
+    assert sentence.startswith("E110 ")
+    assert f"set baud: {right} in the rig" in sentence
+    assert not [one for one in device.heard if isinstance(one, SetVoltage)], "a probe asks, it sets nothing"
+
+
+def test_silence_is_e111_with_what_to_look_at(cell: CellLine, output: OutputLine) -> None:
+    for line in (cell, output):
+        sentence = asked(SpeakingCell(cell.device, 9600, frame=b""), lambda path, line=line: why_no_words(line, path))
+        assert sentence.startswith("E111 ")
+        assert "silence at every speed" in sentence
+        assert "explain E111" in sentence
+
+
+def test_bytes_that_mean_nothing_at_any_speed_are_another_device(cell: CellLine) -> None:
+    sentence = asked(SpeakingCell(cell.device, 9600, frame=b"$GPGGA,123519\r\n"), lambda path: why_no_words(cell, path))
+    assert sentence.startswith("E110 ")
+    assert "nor at 9600, 19200, 38400" in sentence
+    assert "another device" in sentence
+
+
+def test_a_device_that_speaks_now_was_silent_a_moment_ago(cell: CellLine) -> None:
+    sentence = asked(SpeakingCell(cell.device, 115200), lambda path: why_no_words(cell, path))
+    assert "valid lines at 115200" in sentence
+    assert "E1" not in sentence
+
+
+def test_a_refusal_in_the_devices_own_words_is_heard(output: OutputLine) -> None:
+    heard = asked(AnsweringRegulator(output.device, 9600, only_refuses=True), lambda path: achieved(output, path))
+    assert heard.valid >= 1
+
+
+def test_what_is_heard_is_told_in_numbers(cell: CellLine) -> None:
+    heard = asked(SpeakingCell(cell.device, 115200), lambda path: achieved(cell, path))
+    assert heard.baud == 115200
+    assert heard.valid >= 3
+    assert heard.bytes >= 3 * 18
+
+
+def test_a_port_that_is_not_there_is_told_as_such(cell: CellLine) -> None:
+    sentence = asyncio.run(why_no_words(replace(cell, port="/dev/none"), "/dev/none"))
+    assert sentence.startswith("E102 /dev/none is not there")

@@ -1,0 +1,115 @@
+"""A load cell that must be asked: one question on the wire, as fast as the wire allows, and never silent for a lost answer."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.devices import DeviceProfile, cell_device, cell_host
+from gateway.devices.exchange import ForceReading
+from gateway.devices.messages import ForceSample
+from gateway.profiles import load_device
+from gateway.service.running_rig.load_cell_line import CellExchange
+
+TIMEOUT_S, ROUND_TRIP_S = 0.1, 0.02
+READING = ForceReading(ask="W?", frame="W {force:+08.2f}", unit="N")
+POLLED: DeviceProfile = replace(
+    load_device("stream-st-gs"), name="polled", stream=None, read_force=READING, reply_timeout_s=TIMEOUT_S
+)
+
+
+class Wire:
+    """What was asked, and the answers that a test gives."""
+
+    def __init__(self, profile: DeviceProfile = POLLED) -> None:
+        self.asked: list[bytes] = []
+        self.exchange = CellExchange(cell_host(profile), self.asked.append, profile)
+        self.device = cell_device(profile)
+        self.now_s = 100.0
+        self.samples: list[ForceSample] = []
+
+    def tick(self, after_s: float = 0.01) -> None:
+        self.now_s += after_s
+        self.exchange.tick(self.now_s)
+
+    def answer(self, force_n: float = 1.0, after_s: float = ROUND_TRIP_S) -> None:
+        self.now_s += after_s
+        found = self.exchange.receive(self.device.frame(force_n), self.now_s)
+        self.samples += [one for one in found if isinstance(one, ForceSample)]
+
+
+@pytest.fixture
+def wire() -> Wire:
+    return Wire()
+
+
+def test_a_stream_is_never_asked() -> None:
+    wire = Wire(load_device("stream-st-gs"))
+    wire.tick()
+    wire.answer(5.0)
+    wire.tick(1.0)
+    assert wire.asked == []
+    assert wire.samples[0].force_n == pytest.approx(5.0, abs=0.05)
+
+
+def test_the_next_question_follows_the_answer_at_once(wire: Wire) -> None:
+    wire.tick()
+    for count in range(1, 6):
+        assert wire.asked == [b"W?\r\n"] * count
+        wire.answer(count)
+    assert [sample.force_n for sample in wire.samples] == [1, 2, 3, 4, 5]
+    assert wire.samples[-1].time_s == wire.now_s
+
+
+def test_there_is_never_a_second_question_before_the_answer_or_its_time(wire: Wire) -> None:
+    wire.tick()
+    for _ in range(9):
+        wire.tick(0.01)
+    assert len(wire.asked) == 1
+    wire.tick(0.02)
+    assert len(wire.asked) == 2
+    assert wire.exchange.overdue == 1
+
+
+def test_a_faster_wire_waits_for_the_devices_own_rate() -> None:
+    wire = Wire(replace(POLLED, read_force=replace(READING, rate_hz=10.0)))
+    wire.tick()
+    wire.answer(after_s=0.001)
+    wire.tick(0.05)
+    assert len(wire.asked) == 1
+    wire.tick(0.05)
+    assert len(wire.asked) == 2
+
+
+def test_an_answer_that_comes_late_is_a_reading_and_brings_no_third_question(wire: Wire) -> None:
+    """On a bus of two wires it would meet the answer to the second."""
+    wire.tick()
+    wire.tick(TIMEOUT_S + 0.01)
+    assert len(wire.asked) == 2
+    wire.answer(3.0)
+    assert len(wire.samples) == 1
+    wire.tick(0.01)
+    assert len(wire.asked) == 2
+    wire.answer(4.0)
+    assert (len(wire.samples), len(wire.asked)) == (2, 3)
+
+
+def test_after_a_lost_answer_the_line_is_back_at_its_rate(wire: Wire) -> None:
+    wire.tick()
+    wire.tick(TIMEOUT_S + 0.01)
+    wire.answer()
+    wire.tick(TIMEOUT_S + 0.01)
+    for _ in range(5):
+        wire.answer()
+        wire.answer()
+    asked = len(wire.asked)
+    wire.answer()
+    assert len(wire.asked) == asked + 1
+
+
+def test_half_an_answer_from_before_a_reopening_is_no_part_of_the_next(wire: Wire) -> None:
+    wire.tick()
+    wire.exchange.receive(b"W +0001", wire.now_s)
+    wire.exchange.opened()
+    wire.tick()
+    wire.answer(2.0)
+    assert [sample.force_n for sample in wire.samples] == [2.0]

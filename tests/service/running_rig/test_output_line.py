@@ -1,0 +1,387 @@
+"""One question on the wire, and of waiting setpoints only the last: the output line with a device played by the test."""
+
+from dataclasses import replace
+from math import isnan
+
+import pytest
+
+from gateway.devices import output_host
+from gateway.devices.exchange import VoltageExchange, VoltageRange
+from gateway.registers.words import FaultCode
+from gateway.service.running_rig.output_line import OutputExchange
+from tests.service.rigs import demo
+
+REPLY_TIMEOUT_S = 0.06
+ROUND_TRIP_S = 0.02
+
+
+class Wire:
+    """What was written, and the answers that a test gives to it; every call takes the time that the test says."""
+
+    def __init__(self) -> None:
+        self.written: list[bytes] = []
+        self.pressures_pa: list[float] = []
+        self.exchange = OutputExchange(output_host(demo().output.device), self.written.append, REPLY_TIMEOUT_S)
+        self.exchange.on_pressure = self.pressures_pa.append
+        self.now_s = 100.0
+
+    @property
+    def last(self) -> str:
+        return self.written[-1].decode().strip()
+
+    def want(self, counts: float, after_s: float = 0.0) -> None:
+        self.now_s += after_s
+        self.exchange.want(counts * 10 / 1023, self.now_s)
+
+    def answer(self, text: str, after_s: float = ROUND_TRIP_S) -> None:
+        self.now_s += after_s
+        self.exchange.on_bytes(text.encode() + b"\r\n", self.now_s)
+
+    def tick(self, after_s: float = 0.01) -> None:
+        self.now_s += after_s
+        self.exchange.tick(self.now_s)
+
+    def settle(self, counts: int) -> None:
+        """This setting acknowledged, the wire idle."""
+        self.want(counts)
+        self.answer(str(counts))
+        if self.last == "MON":
+            self.answer("0")
+
+
+@pytest.fixture
+def wire() -> Wire:
+    return Wire()
+
+
+def test_a_voltage_is_sent_at_once_when_the_wire_is_free(wire: Wire) -> None:
+    wire.want(512)
+    assert wire.written == [b"SET 512\r\n"]
+    assert wire.exchange.acknowledged_v is None
+    wire.answer("512")
+    assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
+    assert wire.exchange.round_trip_s == pytest.approx(ROUND_TRIP_S)
+
+
+def test_of_waiting_setpoints_only_the_last_is_sent(wire: Wire) -> None:
+    wire.want(100)
+    for counts in (200, 300, 400, 900, 350):
+        wire.want(counts, after_s=0.001)
+    assert wire.written == [b"SET 100\r\n"]
+    wire.answer("100")
+    assert wire.written == [b"SET 100\r\n", b"SET 350\r\n"]
+
+
+def test_a_thousand_setpoints_leave_no_queue_behind(wire: Wire) -> None:
+    for counts in range(1000):
+        wire.want(counts, after_s=0.0001)
+    wire.answer("0")
+    wire.answer("999")
+    assert [line for line in wire.written if line.startswith(b"SET")] == [b"SET 0\r\n", b"SET 999\r\n"]
+
+
+def test_there_is_never_a_second_question_on_the_wire(wire: Wire) -> None:
+    wire.want(100)
+    for _ in range(5):
+        wire.tick(0.01)
+        wire.want(500)
+    assert len(wire.written) == 1
+
+
+def test_within_half_a_step_of_the_device_nothing_is_sent(wire: Wire) -> None:
+    wire.settle(512)
+    before = len(wire.written)
+    wire.want(512.4)
+    wire.want(511.6)
+    assert len(wire.written) == before
+    wire.want(512.6)
+    assert wire.last == "SET 513"
+
+
+def test_the_idle_wire_asks_for_the_pressure_ten_times_a_second(wire: Wire) -> None:
+    wire.settle(512)
+    polls = wire.written.count(b"MON\r\n")
+    for _ in range(100):
+        wire.tick(0.01)
+        if wire.exchange.unanswered_since_s is not None:
+            wire.answer("512", after_s=0.0)
+    assert 9 <= wire.written.count(b"MON\r\n") - polls <= 11
+    assert wire.pressures_pa[-1] == pytest.approx(512 * 0.9e6 / 1023)
+
+
+def test_a_setpoint_goes_before_a_pressure_poll(wire: Wire) -> None:
+    wire.settle(512)
+    wire.tick(0.2)
+    assert wire.last == "MON"
+    wire.want(600)
+    wire.answer("400", after_s=0.2)  # the next poll is due as well
+    assert wire.last == "SET 600"
+
+
+def test_before_the_first_wish_nothing_is_asked(wire: Wire) -> None:
+    """I6: the first thing a device hears after an opening is control's voltage, not a poll."""
+    for _ in range(50):
+        wire.tick()
+    assert wire.written == []
+    wire.want(0)
+    assert wire.written == [b"SET 0\r\n"]
+
+
+def test_after_a_lost_answer_the_newest_voltage_is_asked_again(wire: Wire) -> None:
+    wire.want(512)
+    wire.want(300)
+    wire.tick(REPLY_TIMEOUT_S - 0.001)
+    assert wire.written == [b"SET 512\r\n"]
+    wire.tick(0.002)
+    assert wire.written == [b"SET 512\r\n", b"SET 300\r\n"]
+    wire.answer("300")
+    assert wire.exchange.acknowledged_v == pytest.approx(300 * 10 / 1023)
+
+
+def test_silence_keeps_its_age_over_retries(wire: Wire) -> None:
+    wire.want(512)
+    began_s = wire.now_s
+    for _ in range(30):
+        wire.tick()
+    assert len(wire.written) >= 4
+    assert wire.exchange.unanswered_since_s == began_s
+    wire.answer("512")
+    assert wire.exchange.unanswered_since_s != began_s
+
+
+def test_silence_while_nothing_is_wanted_is_noticed_by_a_poll(wire: Wire) -> None:
+    wire.settle(512)
+    began_s = wire.now_s
+    for _ in range(30):
+        wire.tick()
+    assert wire.exchange.unanswered_since_s is not None
+    assert wire.exchange.unanswered_since_s - began_s <= 0.11
+
+
+@pytest.mark.parametrize("failures", [1, 2])
+def test_one_or_two_bad_echoes_are_noise(wire: Wire, failures: int) -> None:
+    wire.want(512)
+    for _ in range(failures):
+        wire.answer("510")
+    assert wire.exchange.fault is FaultCode.NONE
+    wire.answer("512")
+    assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
+
+
+def test_three_bad_echoes_in_a_row_are_an_altered_output(wire: Wire) -> None:
+    wire.want(512)
+    for _ in range(3):
+        wire.answer("510")
+    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
+    assert wire.exchange.acknowledged_v == pytest.approx(510 * 10 / 1023)  # what stands, not what was asked
+
+
+def test_a_good_echo_between_bad_ones_starts_the_count_anew(wire: Wire) -> None:
+    for counts in (512, 600, 512):
+        wire.want(counts)
+        wire.answer("510")
+        wire.answer("510")
+        wire.answer(str(counts))
+    assert wire.exchange.fault is FaultCode.NONE
+
+
+def test_three_refusals_in_a_row_are_a_refused_output(wire: Wire) -> None:
+    wire.want(512)
+    for _ in range(3):
+        assert wire.exchange.fault is FaultCode.NONE
+        wire.answer("OUT OF RANGE")
+    assert wire.exchange.fault is FaultCode.OUTPUT_REFUSED
+    assert wire.exchange.acknowledged_v is None
+
+
+def test_the_fault_is_gone_once_the_device_obeys_again(wire: Wire) -> None:
+    wire.want(512)
+    for _ in range(3):
+        wire.answer("UNKNOWN COMMAND")
+    wire.answer("512")
+    assert wire.exchange.fault is FaultCode.NONE
+
+
+def test_garbage_is_counted_and_answers_nothing(wire: Wire) -> None:
+    wire.want(512)
+    wire.answer("5a2")
+    assert wire.exchange.garbage_bytes == 5
+    assert wire.exchange.unanswered_since_s is not None
+    wire.answer("512")
+    assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
+
+
+def test_an_answer_in_pieces_is_an_answer(wire: Wire) -> None:
+    wire.want(512)
+    for piece in (b"5", b"1", b"2\r", b"\n"):
+        wire.exchange.on_bytes(piece, wire.now_s)
+    assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
+
+
+class SlowDevice:
+    """Obeys at once and answers in order; one answer in `every` takes longer than a host waits."""
+
+    def __init__(self, wire: Wire, every: int, slow_s: float, pressure: str = "7") -> None:
+        self.wire, self.every, self.slow_s, self.pressure = wire, every, slow_s, pressure
+        self.answers: list[tuple[float, str]] = []
+        self.seen = 0
+
+    def advance(self, until_s: float) -> None:
+        """To that time in steps of a millisecond, a tick every ten."""
+        while self.wire.now_s < until_s - 1e-9:
+            self._hear()
+            self.wire.now_s += 0.001
+            while self.answers and self.answers[0][0] <= self.wire.now_s:
+                self.wire.answer(self.answers.pop(0)[1], after_s=0.0)
+                self._hear()
+            if round(self.wire.now_s * 1000) % 10 == 0:
+                self.wire.tick(0.0)
+
+    def _hear(self) -> None:
+        for question in self.wire.written[self.seen :]:
+            self.seen += 1
+            after_s = self.slow_s if self.seen % self.every == 0 else ROUND_TRIP_S
+            word = question.decode().split()[-1]
+            self.answers.append((self.wire.now_s + after_s, self.pressure if word == "MON" else word))
+            self.answers.sort(key=lambda answer: answer[0])
+
+
+@pytest.mark.parametrize("every", [7, 10, 23])
+@pytest.mark.parametrize("slow_s", [0.062, 0.075, 0.09, 0.11])
+def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slow_s: float) -> None:
+    wire.settle(200)
+    device = SlowDevice(wire, every, slow_s)
+    device.seen = len(wire.written)
+    for index in range(200):  # a setpoint that moves all the time: the wire is never idle
+        wire.want(200 + (index * 7) % 500)
+        device.advance(wire.now_s + 0.01)
+        assert wire.exchange.fault is FaultCode.NONE
+    device.advance(wire.now_s + 0.4)
+    assert wire.exchange.acknowledged_v == pytest.approx((200 + (199 * 7) % 500) * 10 / 1023)
+    assert {round(pressure_pa) for pressure_pa in wire.pressures_pa} <= {0, round(7 * 0.9e6 / 1023)}
+    assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
+
+
+def test_a_late_answer_costs_one_reply_time_and_no_fall_waits_for_it(wire: Wire) -> None:
+    wire.settle(200)
+    wire.want(210)
+    wire.want(220)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.answer("210")  # of the question that was given up
+    wire.want(230)
+    assert wire.last == "SET 220", "a rise waits until the line is quiet"
+    wire.want(0)
+    assert wire.last == "SET 0"
+
+
+def test_a_device_that_alters_its_settings_is_found_after_a_lost_answer_too(wire: Wire) -> None:
+    wire.want(512)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.answer("510")
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    for _ in range(3):
+        assert wire.exchange.fault is FaultCode.NONE
+        wire.answer("510")
+    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
+
+
+def test_a_device_whose_answers_are_cut_still_hears_the_safe_voltage(wire: Wire) -> None:
+    """It may have obeyed the question whose answer was lost: what it acknowledged before that does not stand for sure."""
+    wire.settle(0)
+    wire.want(512)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.want(0)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.last == "SET 0"
+
+
+def test_opened_again_nothing_said_before_counts(wire: Wire) -> None:
+    wire.want(512)
+    wire.answer("510")
+    wire.answer("510")
+    wire.answer("510")
+    wire.want(900)
+    wire.exchange.opened()
+    exchange = wire.exchange
+    assert (exchange.acknowledged_v, exchange.unanswered_since_s, exchange.fault) == (None, None, FaultCode.NONE)
+    before = len(wire.written)
+    wire.tick()
+    assert len(wire.written) == before, "the old wish is not sent to a device behind a new opening"
+    wire.answer("900")  # of a question asked before
+    assert exchange.acknowledged_v is None
+
+
+# -- devices that have fewer words
+
+
+def with_words(**words: object) -> Wire:
+    """The regulator with other words: an acknowledgement without a number, no pressure, no reading."""
+    wire = Wire()
+    profile = replace(demo().output.device, **words)  # type: ignore[arg-type]
+    wire.exchange = OutputExchange(output_host(profile), wire.written.append, REPLY_TIMEOUT_S)
+    return wire
+
+
+OBEYED = VoltageExchange(ask="SET {counts:d}", answer=">", range=demo().output.device.set_voltage.range)  # type: ignore[union-attr]
+TELLS_NOTHING = replace(OBEYED, answer="")
+
+
+def test_a_device_without_a_pressure_is_asked_for_its_setting() -> None:
+    wire = with_words(read_pressure=None)
+    wire.settle(512)
+    wire.tick(0.2)
+    assert wire.last == "REQ"
+    wire.answer("512")
+    assert wire.exchange.fault is FaultCode.NONE
+    assert isnan(wire.exchange.pressure_pa)
+
+
+def test_a_device_that_can_be_asked_nothing_is_told_its_setting_again() -> None:
+    """So that it does not go unnoticed when it falls silent."""
+    wire = with_words(read_pressure=None, read_voltage=None, set_voltage=OBEYED)
+    wire.want(512)
+    wire.answer(">")
+    wire.tick(0.2)
+    assert wire.written == [b"SET 512\r\n"] * 2
+    wire.tick(0.05)
+    assert wire.exchange.unanswered_since_s is not None
+
+
+def test_a_setting_that_somebody_else_has_changed_is_set_anew_and_at_last_a_fault() -> None:
+    wire = with_words(read_pressure=None)
+    wire.settle(512)
+    for _ in range(3):
+        assert wire.exchange.fault is FaultCode.NONE
+        while wire.last != "REQ":
+            wire.tick(0.2)
+        wire.answer("400")
+        assert wire.last == "SET 512"
+        wire.answer("512")
+    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED, "its echo says one thing, its reading another"
+
+
+def test_a_device_that_says_nothing_to_a_setting_is_read_back_in_the_same_breath() -> None:
+    wire = with_words(read_pressure=None, set_voltage=TELLS_NOTHING)
+    wire.want(512)
+    assert wire.written == [b"SET 512\r\nREQ\r\n"]
+    wire.answer("512")
+    assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
+    wire.want(600)
+    for _ in range(4):  # the first is the answer to a poll
+        wire.answer("512")
+    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
+
+
+def test_an_answer_that_counts_in_coarser_steps_confirms_and_is_not_asked_for_ever() -> None:
+    fine = replace(
+        OBEYED, ask="V {volts:.3f}", answer="{volts:.1f}", range=VoltageRange(device=(0, 10), voltage_v=(0, 10))
+    )
+    wire = with_words(read_pressure=None, read_voltage=None, set_voltage=fine)
+    wire.exchange.want(1.234, wire.now_s)
+    assert wire.last == "V 1.234"
+    wire.answer("1.2")
+    assert wire.exchange.fault is FaultCode.NONE
+    wire.exchange.want(1.234, wire.now_s + 0.01)
+    assert len(wire.written) == 1
+    wire.exchange.want(1.240, wire.now_s + 0.02)
+    assert wire.last == "V 1.240"

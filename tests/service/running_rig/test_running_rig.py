@@ -1,0 +1,175 @@
+"""One running cell in this process, on ptys whose devices the test serves: what a defect of ours leaves on the wire."""
+
+import asyncio
+import socket
+import struct
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.modbus import Peer
+from gateway.processes import message_link
+from gateway.processes.event_log import EventLog
+from gateway.processes.exit_cause import EndCause, Ending
+from gateway.profiles import load_rig
+from gateway.registers.words import FaultCode
+from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig.running_rig import Cell
+from tests.end_to_end.own_devices import OwnDevices
+
+MASTER = Peer("10.0.0.5", 40001)
+Scene = Callable[[Cell, socket.socket], Awaitable[None]]
+
+
+@pytest.fixture
+def devices(tmp_path: Path) -> Iterator[OwnDevices]:
+    with OwnDevices(tmp_path) as devices:
+        yield devices
+
+
+def with_cell(devices: OwnDevices, scene: Scene, restarted: Ending | None = None) -> list[str]:
+    """Start a cell, play the scene, close it; what was logged."""
+    lines: list[str] = []
+    state = devices.directory / "state"
+    state.mkdir()
+
+    async def play(log: EventLog) -> None:
+        ours, theirs = message_link.pair()
+        theirs.setblocking(False)
+        rig = load_rig(str(devices.rig))
+        guardian = GuardianLine(theirs)
+        cell = Cell(rig, rig.ports(), state, guardian, log)
+        try:
+            await cell.start(["127.0.0.1", 0], record=False, restarted=restarted)
+            async with asyncio.timeout(10):
+                await scene(cell, ours)
+        finally:
+            await cell.close()
+            guardian.close()
+            drop(ours)
+
+    with EventLog(lines.append) as log:
+        asyncio.run(play(log))
+    return lines
+
+
+def drop(guardian: socket.socket) -> None:
+    """Close the guardian's end, and every descriptor that was passed to it."""
+    while (message := message_link.receive(guardian)) is not None:
+        for descriptor in message.descriptors:
+            socket.close(descriptor)
+    guardian.close()
+
+
+async def pressing(cell: Cell, devices: OwnDevices, volts: float = 4.0) -> None:
+    cell.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, round(1000 * volts)), MASTER)
+    while devices.setting_v < volts - 0.1:
+        await asyncio.sleep(0.005)
+
+
+def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices: OwnDevices) -> None:
+    """3 s for the first words and 3 s of other speeds are for somebody who sets a rig up, not for a running line."""
+    devices.is_silent = True
+
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        assert cell.gateway.restart_cause is FaultCode.MACHINE_BUSY
+
+    began_s = time.monotonic()
+    with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
+    assert time.monotonic() - began_s < 2.5
+    assert devices.heard
+
+
+def test_a_defect_anywhere_in_the_loop_ends_with_the_safe_voltage(devices: OwnDevices) -> None:
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        await pressing(cell, devices)
+        asyncio.get_running_loop().call_soon(lambda: 1 // 0)
+        await cell.failed.wait()
+
+    lines = with_cell(devices, scene)
+    deadline_s = time.monotonic() + 1.0
+    while devices.heard[-1].voltage_v != 0.0:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.001)
+    assert any("error   internal A499" in line and "ZeroDivisionError" in line for line in lines)
+
+
+def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevices, monkeypatch) -> None:
+    """Whatever hangs in closing the rest, the wire has its last word already."""
+    seen_v: list[float] = []
+
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        await pressing(cell, devices)
+        close = cell._server.close
+
+        async def look_and_close() -> None:
+            await asyncio.sleep(0.02)
+            seen_v.append(devices.setting_v)
+            await close()
+
+        monkeypatch.setattr(cell._server, "close", look_and_close)
+
+    with_cell(devices, scene)
+    assert seen_v == [0.0]
+
+
+def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        await pressing(cell, devices)
+        with monkeypatch.context() as patched:
+            patched.setattr(cell.controller, "_step", lambda *arguments: 1 // 0)
+            while devices.setting_v > 0.0:
+                await asyncio.sleep(0.005)
+        while cell.gateway.decision is None or cell.gateway.decision.fault is not FaultCode.INTERNAL:
+            await asyncio.sleep(0.005)
+        assert not cell.failed.is_set()
+
+    assert any("A499" in line for line in with_cell(devices, scene))
+
+
+def test_the_guardian_has_the_line_before_anything_but_safe_is_written(devices: OwnDevices) -> None:
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        assert {heard.voltage_v for heard in devices.settings_since(0.0)} <= {0.0}
+        guardian.setblocking(False)
+        messages = []
+        while not messages or messages[-1].tag != message_link.LINE:
+            message = message_link.receive(guardian)
+            assert message
+            messages.append(message)
+        handed = messages[-1]
+        assert bytes.fromhex(handed.body["safe_frame"]) == b"SET 0\r\n"
+        assert bytes.fromhex(handed.body["safe_reply"]) == b"0\r\n"
+        assert len(handed.descriptors) == 1
+        socket.close(handed.descriptors[0])
+
+    with_cell(devices, scene)
+
+
+def test_the_heartbeat_comes_from_the_loop_itself(devices: OwnDevices) -> None:
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        def beats() -> int:
+            count = 0
+            while True:
+                try:
+                    message = message_link.receive(guardian)
+                except BlockingIOError:
+                    return count
+                assert message
+                count += message.tag == message_link.HEARTBEAT
+                for descriptor in message.descriptors:
+                    socket.close(descriptor)
+
+        guardian.setblocking(False)
+        beats()
+        ticks = cell.gateway.health.ticks
+        await asyncio.sleep(0.2)
+        heard, ticked = beats(), cell.gateway.health.ticks - ticks
+        assert heard >= 10
+        assert heard <= ticked
+        time.sleep(0.15)  # the loop does not come by
+        assert beats() == 0
+        guardian.setblocking(True)
+
+    with_cell(devices, scene)

@@ -1,0 +1,421 @@
+"""What goes wrong in the world, and what then stands on the wire and in the registers: SAFETY.md's table in virtual time."""
+
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from gateway.control.inputs import Output
+from gateway.devices.messages import ForceSample, Garbage
+from gateway.profiles import Rig
+from gateway.registers import Refusal
+from gateway.registers.words import FaultCode, LimitedBy, State, WarningBit
+from gateway.service.running_rig.load_cell_line import CellExchange
+from tests.service.rigs import demo, strict, with_supervision
+from tests.service.wired import ENABLE, RESET, STEP_S, Wired
+
+WIRE_S = 0.04  # an answer that is on its way, then `SET 0` at 9600 baud
+TICK_S = 0.01
+LAST_WORD_S = 0.06 + 2 * TICK_S + WIRE_S  # an overdue answer is waited for, then the safe voltage is asked
+
+
+def at_twenty(rig: Rig | None = None) -> Wired:
+    return Wired(rig or strict()).pressing(20.0)
+
+
+def fails_with(wired: Wired, cause: FaultCode, within_s: float) -> float:
+    """Seconds until the fault; then the safe voltage must follow within a sentence's time on the wire."""
+    took_s = wired.until(lambda: wired.state is State.FAULT, within_s)
+    assert wired.fault_code is cause
+    assert wired.value("output_voltage") == 0.0
+    assert wired.word("control_word") == 0, "the registers show no enable that is not there"
+    return took_s
+
+
+def heal_and_reset(wired: Wired) -> None:
+    wired.run(0.3)
+    wired.write(0, RESET, 0, 0, 0)
+    wired.run(0.3)
+    assert wired.state is State.OFF, wired.show()
+    wired.write(0, ENABLE, 1500, 0, 0)
+    wired.until(lambda: abs(wired.force_n - 15.0) <= 1.0, 2.0)  # I13
+    wired.observer.check(wired.rig)
+
+
+def test_a_cut_cell_is_a_fault_within_its_bound_and_safe_on_the_wire() -> None:
+    wired = at_twenty()
+    wired.fault("cell-cut")
+    assert fails_with(wired, FaultCode.SAMPLE_STALE, 0.05 + 2 * TICK_S) >= 0.04
+    assert wired.voltage_reaches_safe(WIRE_S) <= WIRE_S
+    wired.fault("cell-cut", on=False)
+    heal_and_reset(wired)
+
+
+def test_a_silent_output_device_is_a_fault_within_its_bound_and_is_told_the_safe_voltage() -> None:
+    """It hears and does not answer: T_dac, at the latest one poll after the cut."""
+    wired = at_twenty()
+    cut_s = wired.now_s
+    wired.fault("output-cut")
+    fails_with(wired, FaultCode.OUTPUT_SILENT, 0.1 + 0.1 + 2 * TICK_S)
+    wired.voltage_reaches_safe(0.06 + TICK_S + WIRE_S)
+    assert wired.now_s - cut_s < 0.35
+    assert wired.twin.pressure_pa > 0
+    wired.run(0.5)
+    assert wired.observer.settings[-1].voltage_v == 0.0
+    wired.fault("output-cut", on=False)
+    heal_and_reset(wired)
+
+
+def test_a_moving_setpoint_finds_a_silent_output_in_a_tenth_of_a_second() -> None:
+    wired = at_twenty()
+    wired.fault("output-cut")
+    began_s = wired.now_s
+    wired.write(0, ENABLE, 3000)
+    fails_with(wired, FaultCode.OUTPUT_SILENT, 0.2)
+    assert wired.now_s - began_s <= 0.1 + 3 * TICK_S
+
+
+def test_no_air_is_a_warning_in_numbers_and_not_a_fault() -> None:
+    wired = Wired().ready()
+    wired.fault("no-air")
+    wired.write(0, ENABLE, 1200)
+    wired.until(lambda: bool(wired.warnings & WarningBit.TARGET_UNREACHABLE), 4.0)
+    assert wired.word("status_word") & 128
+    assert wired.state is not State.FAULT
+    (sentence,) = wired.said("A301")
+    assert "V out" in sentence
+    assert "N measured" in sentence
+    wired.run(1.0)
+    assert len(wired.said("A301")) == 1, "said once"
+    wired.fault("no-air", on=False)
+    wired.until(lambda: abs(wired.force_n - 12.0) <= 1.0, 3.0)
+    wired.until(lambda: not wired.warnings & WarningBit.TARGET_UNREACHABLE, 1.0)
+
+
+def test_a_cell_that_freezes_while_the_force_is_held_is_found_within_two_seconds() -> None:
+    wired = Wired().pressing(12.0)
+    wired.run(3.0)
+    wired.fault("cell-frozen")
+    assert wired.until(lambda: wired.state is State.FAULT, 2.0) >= 0.4
+    assert wired.fault_code is FaultCode.SAMPLE_FROZEN
+    assert "bit for bit" in wired.said("A312")[0]
+
+
+class InKilograms:
+    """The same line to the cell, its kilograms taken for newtons from now on."""
+
+    def __init__(self, line: CellExchange) -> None:
+        self._line = line
+        self.tick = line.tick
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
+        heard = self._line.receive(chunk, now_s)
+        return [replace(one, force_n=one.raw) if isinstance(one, ForceSample) else one for one in heard]
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("no-air", "no air, or a closed valve"),
+        ("no-contact", "air is there, so no contact"),
+        ("cell-in-kgf", "is what kgf read as N looks like (A303)"),
+    ],
+)
+def test_what_takes_the_force_while_holding_is_told_by_pressure_and_factor(fault: str, words: str) -> None:
+    wired = Wired().pressing(12.0)
+    wired.run(1.0)
+    if fault == "cell-in-kgf":
+        wired.gateway._cell = InKilograms(wired.gateway._cell)  # type: ignore[assignment]
+    else:
+        wired.fault(fault)
+    wired.until(lambda: bool(wired.said("A301")), 6.0)
+    assert words in wired.said("A301")[0]
+    assert "kPa measured" in wired.said("A301")[0]
+
+
+def test_without_contact_the_tool_waits_and_does_not_press_harder() -> None:
+    wired = Wired().ready()
+    wired.fault("no-contact")
+    wired.write(0, ENABLE, 4000)
+    wired.run(3.0)
+    assert wired.state is not State.FAULT
+    assert wired.value("force_applied") <= 3.01, "the pre-contact force"
+    assert not wired.word("status_word") & 4
+
+
+@pytest.mark.parametrize("force_n", [8.0, 20.0, 40.0])
+def test_an_inverted_sign_is_a_fault_within_a_second(force_n: float) -> None:
+    wired = Wired().ready()
+    wired.fault("sign-inverted")
+    wired.write(0, ENABLE, round(100 * force_n))
+    fails_with(wired, FaultCode.SIGN_INVERTED, 1.0)
+    assert wired.said("A302")
+    assert "-1" in wired.said("A302")[0]
+
+
+def test_a_sign_that_turns_under_force_is_found_too() -> None:
+    wired = at_twenty()
+    wired.fault("sign-inverted")
+    fails_with(wired, FaultCode.SIGN_INVERTED, 1.0)
+
+
+def test_an_unplugged_output_is_a_fault_at_once_and_comes_back_safe() -> None:
+    wired = at_twenty()
+    wired.unplug()
+    fails_with(wired, FaultCode.OUTPUT_LOST, TICK_S)
+    wired.run(0.4)
+    assert wired.value("force_applied") == 0.0
+    wired.replug()
+    reopened_s = wired.now_s
+    wired.run(0.3)
+    first = wired.settings_since(reopened_s)[0]
+    assert first.voltage_v == 0.0, "I6: the first command after a reopening is safe"
+    assert wired.state is State.FAULT, "I5: a fault stays until it is reset"
+    heal_and_reset(wired)
+
+
+def test_unplugged_and_replugged_between_two_ticks_is_a_fault_all_the_same() -> None:
+    """I6: another device may be behind the name now; the voltage of before must not be its first command."""
+    wired = at_twenty()
+    wired.unplug()
+    wired.replug()
+    replugged_s = wired.now_s
+    with pytest.raises(Refusal):
+        wired.write(0, ENABLE, 2500)
+    wired.run(0.3)
+    assert wired.state is State.FAULT
+    assert wired.fault_code is FaultCode.OUTPUT_LOST
+    assert [one.voltage_v for one in wired.settings_since(replugged_s)] == [0.0]
+
+
+def test_while_the_output_is_unplugged_no_enable_is_accepted() -> None:
+    wired = Wired().ready()
+    wired.unplug()
+    wired.run(0.1)
+    with pytest.raises(Refusal) as refused:
+        wired.write(0, ENABLE, 1200)
+    assert refused.value.code == 4
+    assert wired.state is State.OFF
+
+
+def test_an_unplugged_cell_is_named_as_such() -> None:
+    wired = at_twenty()
+    wired.is_cell_plugged = False
+    wired.gateway.cell_lost = True
+    fails_with(wired, FaultCode.CELL_LOST, 2 * TICK_S)
+    wired.is_cell_plugged = True
+    wired.gateway.cell_opened()
+    heal_and_reset(wired)
+
+
+def test_a_cell_that_comes_back_within_half_a_frame_gives_no_wrong_force() -> None:
+    wired = Wired().ready()
+    wired.gateway.on_cell_bytes(b"ST,GS,+0009.", wired.now_s)
+    wired.gateway.cell_opened()
+    before = wired.gateway.samples
+    wired.gateway.on_cell_bytes(b"99kg\r\n", wired.now_s)
+    assert wired.gateway.samples == before
+    assert wired.gateway.cell_garbage_bytes == len(b"99kg\r\n")
+
+
+def test_a_defect_of_ours_is_the_safe_voltage_a_latched_fault_and_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    wired = at_twenty()
+
+    def defect(*arguments: object) -> None:
+        raise ZeroDivisionError("a defect planted by a test")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(wired.controller._pursuit, "step", defect)
+        assert wired.voltage_reaches_safe(TICK_S + WIRE_S) <= TICK_S + WIRE_S
+    assert wired.fault_code is FaultCode.INTERNAL
+    assert "ZeroDivisionError" in wired.said("A499")[0]
+    assert wired.word("force_setpoint") == 0
+    wired.run(0.2)
+    assert wired.state is State.FAULT, "the defect is gone, the fault stays"
+    heal_and_reset(wired)
+
+
+def test_a_defect_inside_a_masters_write_is_the_safe_voltage_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    wired = at_twenty()
+    monkeypatch.setattr(wired.controller, "_step", lambda *arguments: 1 / 0)
+    wired.write(1, 2500)
+    assert wired.value("output_voltage") == 0.0
+    assert wired.fault_code is FaultCode.INTERNAL
+    wired.run(0.5)
+    assert wired.observer.settings[-1].voltage_v == 0.0
+
+
+def test_what_arrived_during_a_stall_is_dropped() -> None:
+    """SAFETY: a request executed late. The setpoint that waited is not pressed with, the force goes away."""
+    wired = at_twenty()
+    stalled_s = wired.now_s
+    wired.stall(0.3, then=lambda: wired.write(1, 4000))
+    assert wired.fault_code is FaultCode.LOOP_STALLED
+    assert wired.word("force_setpoint") == 0
+    wired.run(0.3)
+    high_v = max(one.voltage_v for one in wired.observer.settings if one.time_s <= stalled_s)
+    assert all(one.voltage_v <= high_v for one in wired.settings_since(stalled_s))
+    heal_and_reset(wired)
+
+
+def test_a_short_stall_is_no_fault() -> None:
+    wired = at_twenty(demo())
+    wired.stall(0.08)
+    wired.run(0.3)
+    assert wired.state is State.HOLDING
+
+
+def test_a_heartbeat_that_stops_is_a_fault_within_the_lease() -> None:
+    wired = Wired(with_supervision(strict(), lease_s=0.2)).ready()
+    wired.write(0, ENABLE, 1500, 0, 0, 1)
+    for beat in range(2, 40):
+        wired.run(0.05)
+        wired.write(4, beat)
+    assert wired.state is State.HOLDING
+    began_s = wired.now_s
+    for _ in range(30):
+        wired.run(0.01)
+        wired.word("force_measured")  # reads do not feed it
+        if wired.state is not State.FAULT:
+            wired.write(4, 39)  # nor does the same value again
+    assert wired.fault_code is FaultCode.MASTER_LOST
+    faulted_s = next(one.time_s for one in wired.settings_since(began_s) if one.voltage_v == 0.0)
+    assert faulted_s - began_s <= 0.2 + TICK_S + WIRE_S
+
+
+def test_the_owners_last_connection_closed_is_a_fault_where_there_is_a_lease() -> None:
+    wired = Wired(with_supervision(strict(), lease_s=5.0)).ready()
+    wired.write(0, ENABLE, 1500, 0, 0, 1)
+    wired.run(0.5)
+    wired.gateway.owner_connected = False
+    fails_with(wired, FaultCode.MASTER_LOST, 2 * TICK_S)
+
+
+def test_over_force_is_a_fault_within_three_samples() -> None:
+    """The workpiece pushes back; what the cell saturates at counts as well."""
+    wired = at_twenty()
+    wired.twin.set_disturbance(70.0)
+    fails_with(wired, FaultCode.OVER_FORCE, 0.5)
+    assert wired.voltage_reaches_safe(WIRE_S) <= WIRE_S
+
+
+def test_three_altered_echoes_are_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A regulator that stops at 2 V says so in its echo."""
+    wired = Wired(strict()).ready()
+    device = wired.world._output
+    genuine = device.reply
+
+    def stops_at_two_volts(reply: object, to: object = None) -> bytes:
+        voltage_v = getattr(reply, "voltage_v", None)
+        if voltage_v is not None and voltage_v > 2.0:
+            reply = replace(reply, voltage_v=2.0)  # type: ignore[type-var]
+        return genuine(reply, to=to)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(device, "reply", stops_at_two_volts)
+    wired.write(0, ENABLE, 4000)
+    fails_with(wired, FaultCode.OUTPUT_ALTERED, 2.0)
+
+
+def test_a_fault_has_one_first_cause_and_latches() -> None:
+    """I5, I11: the cell goes, then the output goes; the cell is the cause, and healing alone resets nothing."""
+    wired = at_twenty()
+    wired.fault("cell-cut")
+    fails_with(wired, FaultCode.SAMPLE_STALE, 0.2)
+    wired.fault("output-cut")
+    wired.run(0.5)
+    assert wired.fault_code is FaultCode.SAMPLE_STALE
+    wired.fault("cell-cut", on=False)
+    wired.fault("output-cut", on=False)
+    wired.run(1.0)
+    assert (wired.state, wired.fault_code) == (State.FAULT, FaultCode.SAMPLE_STALE)
+    with pytest.raises(Refusal) as refused:
+        wired.write(0, ENABLE, 1000)
+    assert refused.value.code == 4
+    heal_and_reset(wired)
+
+
+def test_after_an_unclean_end_the_cause_is_readable_until_somebody_enables() -> None:
+    wired = at_twenty()
+    wired.start(unclean=True)
+    wired.gateway.restart_cause = FaultCode.LOOP_STALLED
+    restarted_s = wired.now_s
+    wired.ready()
+    wired.run(0.1)
+    assert wired.settings_since(restarted_s)[0].voltage_v == 0.0
+    assert wired.state is State.OFF
+    assert wired.warnings & WarningBit.RESTARTED
+    assert wired.fault_code is FaultCode.LOOP_STALLED
+    wired.write(0, ENABLE, 1000)
+    wired.until(lambda: not wired.warnings & WarningBit.RESTARTED, 0.1)
+    assert wired.fault_code is FaultCode.NONE
+
+
+def test_what_limits_the_voltage_is_named() -> None:
+    wired = Wired().pressing(10.0)
+    wired.write(0, ENABLE, 0, 0, 1, 0, 8400)
+    wired.run(0.05)
+    assert LimitedBy(wired.word("limited_by")) is LimitedBy.VOLTAGE_SLEW
+
+
+FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "output-cut")
+
+
+def misfortunes(wired: Wired, chance: Random) -> None:
+    """One thing that may happen to a gateway: a write, good or bad, a fault of the world, its end, a stall, a plug."""
+    draw = chance.random()
+    try:
+        if draw < 0.45:
+            wired.write(0, chance.choice((0, ENABLE, ENABLE, ENABLE, RESET)), chance.randrange(0, 6500, 50))
+        elif draw < 0.55:
+            wired.write(0, RESET, 0)
+        elif draw < 0.6:
+            wired.write(0, ENABLE, 0, 0, 1, 0, chance.randrange(0, 10000))
+        elif draw < 0.75:
+            wired.fault(chance.choice(FAULTS), on=True)
+        elif draw < 0.93:
+            wired.fault(chance.choice(FAULTS), on=False)
+        elif draw < 0.96:
+            wired.stall(chance.uniform(0.02, 0.3))
+        elif wired.is_plugged:
+            wired.unplug()
+        else:
+            wired.replug()
+    except Refusal:
+        pass
+
+
+def non_safe_without_leave(wired: Wired, decision: Output) -> bool:
+    return decision.voltage_v > 0.0 and decision.state in (State.OFF, State.FAULT)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_whatever_happens_the_wire_keeps_the_invariants(seed: int, budget: int) -> None:
+    for schedule in range(seed * budget, (seed + 1) * budget):
+        print(f"schedule {schedule}")
+        chance = Random(schedule)
+        wired = Wired(strict(), seed=schedule)
+        disabled_s = 0.0
+        for _ in range(25):
+            misfortunes(wired, chance)
+            for _ in wired.samples(round(chance.uniform(0.02, 0.4) / STEP_S) * STEP_S):
+                decision = wired.gateway.decision
+                assert decision is None or not non_safe_without_leave(wired, decision), "I4"
+                may_press = not wired.is_plugged or wired.state not in (State.OFF, State.FAULT)
+                disabled_s = 0.0 if may_press else disabled_s + STEP_S
+                if disabled_s > LAST_WORD_S:
+                    assert wired.observer.settings[-1].voltage_v == 0.0, "I3"
+        for name in FAULTS:
+            wired.fault(name, on=False)
+        if not wired.is_plugged:
+            wired.replug()
+        wired.run(0.5)
+        wired.write(0, 0)
+        heal_and_reset(wired)
+
+
+def test_the_observer_sees_planted_violations() -> None:
+    for planted in (b"SET 1000\r\n", b"SET 300\r\nSET 800\r\n", b"SET 0\r\nSET 4", b"SET -1\r\n"):
+        wired = Wired().ready()
+        wired.observer.hear(planted + b"\r\n", wired.now_s)
+        with pytest.raises(AssertionError):
+            wired.observer.check(wired.rig)

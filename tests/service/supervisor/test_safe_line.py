@@ -1,0 +1,175 @@
+"""The guardian's last word: repeated until acknowledged, at most three times, whatever a dead process left on the wire."""
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from gateway.devices import output_device
+from gateway.devices.messages import Accepted, Garbage, SetVoltage
+from gateway.ports import Pty
+from gateway.service.supervisor.safe_line import SafeLine
+from tests.service.rigs import demo
+
+FRAME, REPLY = b"SET 0\r\n", b"0\r\n"
+SHORT_S = 0.05
+
+
+class Regulator:
+    """The shipped device role at the far end of a pty, in a thread; `answers` turns a reply into what is sent."""
+
+    def __init__(self, pty: Pty, answers: Callable[[bytes], bytes] = lambda reply: reply) -> None:
+        self.pty = pty
+        self.heard: list[object] = []
+        self.setting_v = 5.0
+        self._answers = answers
+        self._device = output_device(demo().output.device)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> "Regulator":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                chunk = os.read(self.pty.fd, 256)
+            except BlockingIOError:
+                time.sleep(0.001)
+                continue
+            for request in self._device.receive(chunk, 0.0):
+                self.heard.append(request)
+                os.write(self.pty.fd, self._answers(self._answer(request)))
+
+    def _answer(self, request: object) -> bytes:
+        if isinstance(request, SetVoltage):
+            self.setting_v = request.voltage_v
+            return self._device.reply(Accepted(request.voltage_v))
+        assert isinstance(request, Garbage)
+        return self._device.reply(self._device.refusal(request))
+
+
+@pytest.fixture
+def pty() -> Iterator[Pty]:
+    pty = Pty()
+    os.set_blocking(pty.fd, False)
+    yield pty
+    pty.close()
+
+
+@pytest.fixture
+def client(pty: Pty) -> Iterator[int]:
+    descriptor = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    yield descriptor
+    os.close(descriptor)
+
+
+def test_an_acknowledged_safe_voltage_is_written_once(pty: Pty, client: int) -> None:
+    with Regulator(pty) as device:
+        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert device.heard == [SetVoltage(0.0)]
+
+
+def test_half_a_command_of_a_dead_process_swallows_one_frame_and_no_more(pty: Pty, client: int) -> None:
+    os.write(client, b"SET 51")
+    with Regulator(pty) as device:
+        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert device.setting_v == 0.0
+    assert [type(request) for request in device.heard] == [Garbage, SetVoltage]
+
+
+@pytest.mark.parametrize("half", [b"S", b"SET", b"SET ", b"SET 5", b"MO", b"SET 51\r"])
+def test_whatever_half_it_is_the_safe_voltage_stands_in_the_end(pty: Pty, client: int, half: bytes) -> None:
+    os.write(client, half)
+    with Regulator(pty) as device:
+        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert device.setting_v == 0.0
+
+
+@pytest.mark.parametrize("other", [b"510\r\n", b"10\r\n", b"00\r\n", b"0", b"\r\n", b"0.\r\n"])
+def test_another_answer_does_not_acknowledge(pty: Pty, client: int, other: bytes) -> None:
+    with Regulator(pty, answers=lambda reply: other) as device:
+        assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert device.heard == [SetVoltage(0.0)] * 3
+
+
+def test_the_answer_to_an_older_question_may_come_before_the_acknowledgement(pty: Pty, client: int) -> None:
+    with Regulator(pty, answers=lambda reply: b"510\r\n" + reply) as device:
+        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert len(device.heard) == 1
+
+
+def test_what_was_said_before_the_frame_acknowledges_nothing(pty: Pty, client: int) -> None:
+    """A pressure of 0 that nobody has read yet looks like the echo of SET 0."""
+    os.write(pty.fd, b"0\r\n")
+    os.write(client, b"SET 51")
+    with Regulator(pty) as device:
+        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert device.setting_v == 0.0
+
+
+def test_an_answer_in_pieces_acknowledges(pty: Pty, client: int) -> None:
+    line = SafeLine(client, FRAME, REPLY)
+
+    def slowly() -> None:
+        while not _heard(pty):
+            time.sleep(0.001)
+        for piece in (b"0", b"\r", b"\n"):
+            os.write(pty.fd, piece)
+            time.sleep(0.002)
+
+    thread = threading.Thread(target=slowly)
+    thread.start()
+    assert line.write_safe(0.5)
+    thread.join()
+
+
+def _heard(pty: Pty) -> bytes:
+    try:
+        return os.read(pty.fd, 256)
+    except BlockingIOError:
+        return b""
+
+
+def test_a_silent_device_gets_three_frames_and_no_more(pty: Pty, client: int) -> None:
+    began_s = time.monotonic()
+    assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert time.monotonic() - began_s < 10 * SHORT_S
+    assert os.read(pty.fd, 256) == FRAME * 3
+
+
+def test_a_device_that_never_answers_is_believed_after_one_frame(pty: Pty, client: int) -> None:
+    assert SafeLine(client, FRAME, b"").write_safe(SHORT_S)
+    assert os.read(pty.fd, 256) == FRAME
+
+
+def test_a_port_that_is_gone_is_no_acknowledgement(client: int, pty: Pty) -> None:
+    pty.close()
+    assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+
+
+def test_a_dead_descriptor_is_no_acknowledgement_and_no_exception() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    os.close(writer)
+    line = SafeLine(writer, FRAME, REPLY)
+    assert not line.write_safe(SHORT_S)
+    line.close()
+
+
+def test_a_line_that_takes_no_bytes_does_not_hold_the_guardian(pty: Pty, client: int) -> None:
+    try:
+        while True:
+            os.write(client, b"x" * 4096)
+    except BlockingIOError:
+        pass
+    began_s = time.monotonic()
+    assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert time.monotonic() - began_s < 1.0

@@ -1,0 +1,87 @@
+"""What the residual watch tells control: checked, shown in one bit and one register, said once, and never acted upon."""
+
+import pytest
+
+from gateway.registers.residual_cause import ResidualCause
+from gateway.registers.words import State, WarningBit
+from gateway.service.watch_reports import WatchDesk
+from tests.service.wired import Wired
+
+
+@pytest.fixture
+def wired() -> Wired:
+    return Wired().pressing(12)
+
+
+@pytest.fixture
+def desk(wired: Wired) -> WatchDesk:
+    return WatchDesk(
+        wired.gateway, lambda: wired.now_s, lambda cause, sentence: wired.log.append((wired.now_s, sentence))
+    )
+
+
+def told(cause: int, sentence: str = "friction has doubled", **counters: object) -> dict[str, object]:
+    return {"do": "residual", "cause": int(cause), "sentence": sentence, "counters": counters}
+
+
+def test_a_cause_raises_the_warning_and_names_itself_in_all_three_faces(wired, desk):
+    desk.answer(told(ResidualCause.COULOMB_FRICTION))
+    assert wired.warnings & WarningBit.MODEL_DIFFERS
+    assert wired.word("residual_cause") == 12
+    assert wired.floats(232 + 2 * 29, 1) == (12.0,)
+    assert wired.said("A345") == ["A345 friction has doubled"]
+
+
+def test_it_changes_nothing_else(wired, desk):
+    before = (wired.state, wired.value("output_voltage"), wired.word("fault_code"))
+    desk.answer(told(ResidualCause.UNKNOWN))
+    assert (wired.state, wired.value("output_voltage"), wired.word("fault_code")) == before
+    wired.run(0.5)
+    assert wired.state is State.HOLDING
+
+
+def test_repeated_words_are_logged_once_and_agreement_clears_it(wired, desk):
+    for _ in range(5):
+        desk.answer(told(ResidualCause.LINEAR_DRIFT))
+    assert len(wired.said("A345")) == 1
+    assert desk.figures()["warnings"] == 1
+    desk.answer(told(ResidualCause.NONE, ""))
+    assert not wired.warnings & WarningBit.MODEL_DIFFERS
+    assert wired.word("residual_cause") == 0
+    assert wired.said("info the model agrees")
+
+
+def test_counters_and_age_can_be_read(wired, desk):
+    assert desk.figures()["age_s"] is None
+    desk.answer(told(0, "", looks=7, cpu_s=1.5, nonsense=3, rms_n=float("nan")))
+    wired.run(2.0)
+    figures = desk.answer({"do": "residual"})
+    assert (figures["looks"], figures["cpu_s"], figures["name"]) == (7, 1.5, "none")
+    assert figures["age_s"] == pytest.approx(2.0)
+    assert not {"nonsense", "rms_n"} & set(figures)
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {"cause": 44},
+        {"cause": "friction"},
+        {"cause": True},
+        {"cause": -1},
+        {"cause": 12, "sentence": 5},
+        {"cause": None},
+        {"cause": 12, "counters": [1, 2]},
+        {"cause": 12, "caus": 12},
+    ],
+)
+def test_nonsense_is_refused_and_leaves_no_trace(wired, desk, request_):
+    with pytest.raises(ValueError, match=r"cause|sentence|counters"):
+        desk.answer(request_)
+    assert wired.word("residual_cause") == 0
+    assert desk.figures()["age_s"] is None
+
+
+def test_strange_counters_and_long_sentences_do_no_harm(wired, desk):
+    desk.answer({"cause": 12, "sentence": "x" * 10000, "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]}})
+    assert not {"looks", "cpu_s", "judged"} & set(desk.figures())
+    assert len(wired.said("A345")[0]) < 600

@@ -1,0 +1,69 @@
+"""When the warning of the residual watch rises, what it is called, and when it falls."""
+
+from gateway.registers.residual_cause import ResidualCause as C
+from gateway.watch.warning_filter import Finding, Opinion
+
+
+def after(*findings: Finding) -> C:
+    opinion = Opinion()
+    for finding in findings:
+        opinion.hear(finding)
+    return opinion.standing.cause
+
+
+def convicts(cause: C, *others: str, excitation_v: float = 1.0) -> Finding:
+    return Finding(cause, cause.effect, excitation_v, (cause.effect, *others))
+
+
+FRICTION, DELAY = convicts(C.COULOMB_FRICTION), convicts(C.TRANSPORT_DELAY)
+FINE = Finding(excitation_v=1.0)
+
+
+def test_one_window_does_not_raise_the_warning():
+    assert after(FRICTION) is C.NONE
+    assert after(FRICTION, FINE, FRICTION) is C.NONE
+
+
+def test_two_in_a_row_give_the_name():
+    assert after(FRICTION, FRICTION) is C.COULOMB_FRICTION
+
+
+def test_two_that_differ_raise_it_without_a_name_until_two_agree():
+    """A window in which the change happened may be misnamed."""
+    assert after(DELAY, FRICTION) is C.UNKNOWN
+    assert after(DELAY, FRICTION, FRICTION) is C.COULOMB_FRICTION
+
+
+def test_members_of_one_group_agree_and_the_name_stays():
+    offset = convicts(C.CLOCK_OFFSET, "transport-delay")
+    delay = convicts(C.TRANSPORT_DELAY, "clock-offset")
+    assert after(delay, delay, offset) is C.TRANSPORT_DELAY
+    assert after(offset, delay) is C.TRANSPORT_DELAY
+
+
+def test_another_cause_takes_its_place_after_two_windows():
+    assert after(FRICTION, FRICTION, DELAY) is C.COULOMB_FRICTION
+    assert after(FRICTION, FRICTION, DELAY, DELAY) is C.TRANSPORT_DELAY
+
+
+def test_a_window_that_agrees_clears_it():
+    assert after(FRICTION, FRICTION, FINE) is C.NONE
+
+
+def test_a_window_that_could_not_have_seen_it_clears_nothing():
+    """Nobody moved: that is no sign of health."""
+    still = Finding(excitation_v=0.1)
+    assert after(FRICTION, FRICTION, still) is C.COULOMB_FRICTION
+    assert after(FRICTION, still, FRICTION) is C.COULOMB_FRICTION
+
+
+def test_numbers_are_the_catalogues_in_its_order():
+    from gateway.diagnosis import EFFECTS
+
+    assert [effect.name for effect in EFFECTS] == [cause.effect for cause in C if 0 < cause < 99]
+    assert [int(cause) for cause in C] == [*range(44), 99]
+
+
+def test_an_effect_that_the_map_does_not_know_is_unknown():
+    assert C.of_effect("extra-lag") is C.EXTRA_LAG
+    assert C.of_effect("gain") is C.UNKNOWN
