@@ -21,6 +21,7 @@ from typing import Any, Final
 
 from gateway.calibrations.activation import Activation, InUse, NotFit, uploaded
 from gateway.calibrations.store import Standing, StoreError
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.processes.disk_worker import Apart, Done, Work
 from gateway.registers.map.register_map import RegisterMap
@@ -28,7 +29,7 @@ from gateway.registers.refusal import Refusal
 from gateway.registers.upload.coefficients import HEAD_WORDS
 from gateway.registers.upload.staging import Staged, StagedFault, check_staged
 from gateway.registers.upload.staging_block import StagingBlock
-from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus, RefusalReason, UploadReason
+from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus, UploadReason
 
 _NO_COEFFICIENT: Final = -1
 _NO_ROOM: Final = "E431"

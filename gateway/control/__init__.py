@@ -10,11 +10,9 @@ from gateway.control.compensation.load_cell import CellMap
 from gateway.control.controller import Controller
 from gateway.control.decision import safe_output
 from gateway.control.inputs import NO_COMMAND, Line, Output
-from gateway.control.messages import FAULT_CODES
 from gateway.control.settings import ControlSettings, Defaults, LeadSettings, LeaseAction, Limits, Supervision, Trim
 
 __all__ = [
-    "FAULT_CODES",
     "NO_COMMAND",
     "NO_COMPENSATION",
     "CellMap",

@@ -11,6 +11,8 @@ from math import inf
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.model import Response
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandFollower, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.decision import Outcome, Standing, output_of, safe_output, warning_bits
@@ -33,7 +35,7 @@ from gateway.control.supervision.plausibility import ModelResponse
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import Asked, EdgeRefusal
-from gateway.registers.words import ControlBit, FaultCode, RefusalReason, State
+from gateway.registers.words import ControlBit, State
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _CALIBRATE = int(ControlBit.START_CALIBRATION)

@@ -3,13 +3,16 @@
 from dataclasses import dataclass, field
 from math import nan
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
 from gateway.control.force_loop.force_loop import Pursuit
 from gateway.control.inputs import Output
 from gateway.control.messages import fault_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.state_table import ENABLED_STATES
 from gateway.registers.command import Command
-from gateway.registers.words import FaultCode, LimitedBy, Mode, RefusalReason, State, StatusBit, WarningBit
+from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 
 _ENABLED, _READY, _CONTACT, _IN_BAND = 1, 2, 4, 8  # StatusBit as plain integers: an IntFlag operation costs 0.5 us
 _FAULT, _WARNING, _LIMITED, _UNREACHABLE = 16, 32, 64, 128

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
+from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandFollower, Edges
 from gateway.control.runs.active_run import AnyPlan, Calibrating
 from gateway.control.runs.ladder_stairs import RunPlan
@@ -18,7 +19,7 @@ from gateway.control.state_table import ENABLED_STATES
 from gateway.control.tare import Zero
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import Asked, EdgeRefusal
-from gateway.registers.words import ControlBit, RefusalReason, State
+from gateway.registers.words import ControlBit, State
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _CALIBRATE, _TAKE = int(ControlBit.START_CALIBRATION), int(ControlBit.TAKE_OWNERSHIP)

@@ -4,8 +4,11 @@ from dataclasses import dataclass
 from math import nan
 from typing import Final
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
 from gateway.registers.command import Command
-from gateway.registers.words import FaultCode, LimitedBy, RefusalReason, State, StatusBit, WarningBit
+from gateway.registers.words import LimitedBy, State, StatusBit
 
 _NO_WARNING: Final = WarningBit(0)
 _NO_STATUS: Final = StatusBit(0)

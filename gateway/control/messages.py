@@ -1,33 +1,11 @@
 """The sentences of control: a code, what was seen in numbers, what it probably is, one thing to do (FIRST-HOUR's rule)."""
 
-from typing import Final
-
+from gateway.codes.faults import FaultCode
 from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
-from gateway.registers.words import FaultCode
-
-FAULT_CODES: Final[dict[FaultCode, str]] = {
-    FaultCode.SIGN_INVERTED: "A302",
-    FaultCode.GAIN_WRONG: "A303",
-    FaultCode.MASTER_LOST: "A310",
-    FaultCode.SAMPLE_STALE: "A311",
-    FaultCode.SAMPLE_FROZEN: "A312",
-    FaultCode.OVER_FORCE: "A313",
-    FaultCode.OUTPUT_SILENT: "A314",
-    FaultCode.OUTPUT_REFUSED: "A315",
-    FaultCode.OUTPUT_ALTERED: "A316",
-    FaultCode.OUTPUT_LOST: "A317",
-    FaultCode.CELL_LOST: "A318",
-    FaultCode.LOOP_STALLED: "A319",
-    FaultCode.NOT_FINITE: "A320",
-    FaultCode.MODEL_INVALID: "A321",
-    FaultCode.INTERNAL: "A499",
-    FaultCode.MACHINE_BUSY: "A403",
-}
-"""What `explain` knows each fault by."""
 
 
 def fault_sentence(fault: FaultCode, detail: str) -> str:
-    return f"{FAULT_CODES[fault]} {detail}"
+    return f"{fault.code} {detail}"
 
 
 def unreachable_sentence(seen: Evidence) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
+from gateway.codes.faults import FaultCode
 from gateway.control.demand import Demand
 from gateway.control.force_loop.feedforward import ModelError
 from gateway.control.force_loop.force_loop import Moment, Pursuit
@@ -19,7 +20,6 @@ from gateway.control.settings import ControlSettings
 from gateway.control.state_table import Event
 from gateway.control.supervision.fault_detection import Finding, finding
 from gateway.control.supervision.plausibility import ModelResponse
-from gateway.registers.words import FaultCode
 
 Moved: TypeAlias = Event | Finding
 

@@ -9,13 +9,17 @@ import re
 from datetime import UTC, datetime
 from typing import Any, Final, NamedTuple
 
+from gateway.codes.alarms import ALARMS
+from gateway.codes.warning_bits import WarningBit
+
 INFO: Final = "info"
 WARNING: Final = "warning"
 ERROR: Final = "error"
 SEVERITIES: Final = (INFO, WARNING, ERROR)
 """Least first."""
 
-WARNING_ALARMS: Final = frozenset({"A301", "A330", "A340", "A341", "A342", "A343", "A344", "A345", "A346"})
+_ALARM_TABLE: Final = (*ALARMS, *(bit.explanation for bit in WarningBit))
+WARNING_ALARMS: Final = frozenset(alarm.code for alarm in _ALARM_TABLE if alarm.is_warning)
 """Alarms that leave the force as it is; every other A and every E is an error, every W a warning."""
 
 RECORD_START: Final = b'{"time": "'

@@ -11,6 +11,7 @@ output: then the bit takes enable's place.
 from dataclasses import replace
 from typing import Final, NamedTuple
 
+from gateway.codes.refusals import RefusalReason
 from gateway.registers.command import Command
 from gateway.registers.command_block import (
     CONTROL_WORD,
@@ -28,7 +29,7 @@ from gateway.registers.map.register_map import Block
 from gateway.registers.ownership import Ownership
 from gateway.registers.refusal import Refusal
 from gateway.registers.rules import BankRules
-from gateway.registers.words import ControlBit, RefusalReason
+from gateway.registers.words import ControlBit
 
 ENABLE: Final = int(ControlBit.ENABLE)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)

@@ -22,6 +22,7 @@ from typing import Final
 
 from gateway import VERSION
 from gateway.bsfm.model import Calibration
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, RequestError, ServerId
 from gateway.modbus.bits import pack_bits
 from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, Admitted, Write
@@ -37,7 +38,7 @@ from gateway.registers.refusal import Refusal, request_refusal
 from gateway.registers.rules import BankRules
 from gateway.registers.status_block import StatusBlock
 from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
-from gateway.registers.words import ControlBit, RefusalReason, State, StatusBit
+from gateway.registers.words import ControlBit, State, StatusBit
 
 BITS: Final = 16
 SERVER_ID: Final = 0x46  # "F"

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from math import nan
 
-from gateway.registers.words import ControlBit, FaultCode, LimitedBy, Mode, State
+from gateway.codes.faults import FaultCode
+from gateway.registers.words import ControlBit, LimitedBy, Mode, State
 
 
 @dataclass(frozen=True, slots=True)

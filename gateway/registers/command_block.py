@@ -11,6 +11,7 @@ from math import radians
 from struct import Struct
 from typing import Final
 
+from gateway.codes.refusals import RefusalReason
 from gateway.registers.command import Command
 from gateway.registers.command_field import CommandField, command_field
 from gateway.registers.image import RegisterImage
@@ -18,7 +19,7 @@ from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.rules import BankRules
 from gateway.registers.values import WordOrder, swap_words, words_swapped_from_little_endian
-from gateway.registers.words import ControlBit, Mode, RefusalReason
+from gateway.registers.words import ControlBit, Mode
 
 NAMES: Final = (
     "control_word", "force_setpoint", "force_ramp", "mode", "heartbeat", "voltage_setpoint", "tilt_angle",

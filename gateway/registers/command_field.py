@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Final
 
+from gateway.codes.refusals import RefusalReason
 from gateway.registers.map.register_map import Register
 from gateway.registers.refusal import Refusal, allowed_range, quantity
 from gateway.registers.rules import BankRules
 from gateway.registers.values import WordOrder, float32, pack_number, unpack_number
-from gateway.registers.words import RefusalReason
 
 SMALLEST_MEANT: Final = 1.0e-3
 FORCES: Final = ("force_setpoint", "precontact_force")

@@ -7,8 +7,9 @@ knows whether it can take it; the decision is the answer to the master. Only wha
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
+from gateway.codes.refusals import RefusalReason
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, RefusalReason
+from gateway.registers.words import ControlBit
 
 
 class Asked(NamedTuple):

@@ -1,4 +1,4 @@
-"""Numbers with names that masters rely on: frozen within a map version; profiles/registers repeats them and a test compares."""
+"""Numbers with names that masters rely on: frozen within a map version. Faults, warnings and refusals are in gateway.codes."""
 
 from enum import IntEnum, IntFlag
 from typing import Final
@@ -53,77 +53,6 @@ class LimitedBy(IntEnum):
     CALIBRATION_RANGE = 4
     FORCE_RANGE = 5
     SMALLEST_FORCE = 6
-
-
-class FaultCode(IntEnum):
-    """The first cause of a latched fault."""
-
-    NONE = 0
-    MASTER_LOST = 1  # A310: the lease ran out
-    SAMPLE_STALE = 2
-    SAMPLE_FROZEN = 3
-    OVER_FORCE = 4  # saturation counts as over-force
-    SIGN_INVERTED = 5  # A302
-    GAIN_WRONG = 6  # A303
-    OUTPUT_SILENT = 7
-    OUTPUT_REFUSED = 8
-    OUTPUT_ALTERED = 9
-    OUTPUT_LOST = 10  # the port went away
-    CELL_LOST = 11
-    LOOP_STALLED = 12
-    NOT_FINITE = 13
-    INTERNAL = 14
-    MODEL_INVALID = 15
-    MACHINE_BUSY = 16  # A403: the loop was late because the machine did not let it run
-
-
-class WarningBit(IntFlag):
-    RESTARTED = 1 << 0
-    TARGET_UNREACHABLE = 1 << 1  # A301
-    TRIM_SATURATED = 1 << 2
-    SERIAL_NOISE = 1 << 3
-    SLOW_LOOP = 1 << 4
-    NO_WATCHDOG = 1 << 5
-    CLOCK_FALLBACK = 1 << 6
-    MASTER_LOST = 1 << 7  # A310: the lease ran out, and the rig says hold or ramp
-    MODEL_DIFFERS = 1 << 8  # A345: the residual watch finds that the rig's plant no longer explains what is measured
-
-
-class RefusalReason(IntEnum):
-    """Why the last write was refused; the sentence goes to the log."""
-
-    NONE = 0
-    ADDRESS = 1  # W202, W203
-    READ_ONLY = 2
-    HALF_VALUE = 3
-    NOT_FINITE = 4
-    OUT_OF_RANGE = 5  # W204
-    WORDS_SWAPPED = 6  # W201
-    TOO_SMALL = 7
-    RESERVED = 8
-    NOT_OWNER = 9
-    ROLE = 10
-    FAULT_LATCHED = 11
-    NOT_READY = 12
-    OUTPUT_FAULT = 13
-    CELL_SILENT = 14
-    RESET_NEEDS_ZERO = 15
-    UNSUPPORTED_BIT = 16
-    BYTE_ORDER_UNPROVEN = 17
-    BUSY = 18
-    QUANTITY = 19
-    FUNCTION = 20
-    COEFFICIENTS = 21
-    HEARTBEAT_STALE = 22  # W302: a reset where there is a lease, without a new heartbeat
-    NOTHING_TO_RESET = 23
-    TARE_REFUSED = 24  # W303
-    CALIBRATION_REFUSED = 25  # W305: the state or the plan forbids it
-    CALIBRATING = 26  # W310: a calibration or an experiment has the output
-    FITTING = 27  # W311: the last ladder is not fitted yet
-    CALIBRATION_HELD = 28  # W313: bit 5 was kept at 1 beyond the end of the run that it began
-    STOPPING = 29  # W315: the force is on its way to 0, and then the output is off
-    EMPTY_SLOT = 30
-    UNIT = 40
 
 
 class CalibrationPhase(IntEnum):

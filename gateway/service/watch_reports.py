@@ -7,8 +7,8 @@ status register, and never the control. What it said last stands until it says o
 from collections.abc import Callable
 from typing import Any, Final
 
+from gateway.codes.warning_bits import WarningBit
 from gateway.registers.residual_cause import ResidualCause
-from gateway.registers.words import WarningBit
 from gateway.service.running_rig.gateway_core import Gateway, Log
 from gateway.service.socket_requests import ResidualRequest, read
 

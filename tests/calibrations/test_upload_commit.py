@@ -9,8 +9,9 @@ import pytest
 
 from gateway.bsfm import CoefficientReason, Response
 from gateway.calibrations.store import UNKNOWN_N
+from gateway.codes.refusals import RefusalReason
 from gateway.registers.upload.coefficients import CoefficientSet, model_hash, words_of_block
-from gateway.registers.words import CommitNotice, CommitStatus, RefusalReason, UploadReason
+from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
 from tests.calibrations.coefficients import calibration, staged, swapped
 from tests.calibrations.failing_disk import disk
 from tests.calibrations.upload_bench import COMMIT, DRY_RUN, OWN, PEER

@@ -2,7 +2,8 @@
 
 import pytest
 
-from gateway.registers.words import CommitStatus, RefusalReason, UploadReason
+from gateway.codes.refusals import RefusalReason
+from gateway.registers.words import CommitStatus, UploadReason
 from tests.calibrations.coefficients import calibration
 from tests.calibrations.upload_bench import OWN, PEER, Bench
 

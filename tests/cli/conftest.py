@@ -11,11 +11,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from gateway.cli.main import command
+from gateway.codes.refusals import RefusalReason
 from gateway.fieldbus import ModbusTcpServer, ServerSettings
 from gateway.modbus import ModbusError, Peer, RequestError
 from gateway.profiles import load_register_map
 from gateway.registers import RegisterMap
-from gateway.registers.words import RefusalReason
 
 
 @dataclass

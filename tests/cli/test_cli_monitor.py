@@ -22,8 +22,10 @@ from gateway.cli.live_monitor.poll import Poller
 from gateway.cli.live_monitor.table import View, Writer
 from gateway.cli.live_monitor.track import Point, Track, buckets
 from gateway.cli.master.client import GatewayClient, Reading
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.registers import RegisterMap
-from gateway.registers.words import FaultCode, State, StatusBit, WarningBit
+from gateway.registers.words import State, StatusBit
 
 IN_BAND = StatusBit.ENABLED | StatusBit.CONTACT | StatusBit.IN_BAND
 

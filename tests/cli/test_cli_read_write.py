@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from gateway.cli.master.client import Assignment, GatewayClient
-from gateway.registers.words import RefusalReason
+from gateway.codes.refusals import RefusalReason
 
 
 def test_read_shows_units_names_and_bits(fake, call) -> None:

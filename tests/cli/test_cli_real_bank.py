@@ -6,11 +6,12 @@ from dataclasses import replace
 import pytest
 
 from gateway.bsfm import Response
+from gateway.codes.refusals import RefusalReason
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
 from gateway.registers.edge_questions import EdgeRefusal
-from gateway.registers.words import ControlBit, RefusalReason, State
+from gateway.registers.words import ControlBit, State
 
 
 @pytest.fixture

@@ -6,9 +6,10 @@ import pytest
 
 from gateway.cli.errors import CliError
 from gateway.cli.master import refusal_text
+from gateway.codes.refusals import RefusalReason
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.edge_questions import EdgeRefusal
-from gateway.registers.words import ControlBit, RefusalReason
+from gateway.registers.words import ControlBit
 
 OWN = "tare refused: 1.56 V are out: disable the output or set the force to 0 first"
 

@@ -11,9 +11,11 @@ from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import Beat, Lease
 from gateway.cli.force_hold.sequence import End, HoldRun, seen_of
 from gateway.cli.master.client import GatewayClient
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
 from gateway.control.settings import LeaseAction
 from gateway.registers import RegisterMap
-from gateway.registers.words import FaultCode, RefusalReason, State
+from gateway.registers.words import State
 from tests.cli.conftest import PlainBank, Server
 from tests.service.rigs import demo, with_supervision
 from tests.service.wired import Wired

@@ -12,11 +12,12 @@ from math import nan
 from random import Random
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
+from gateway.codes.faults import FaultCode
 from gateway.control import Controller, ControlSettings, Limits, Line, Output, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import Asked, EdgeRefusal
-from gateway.registers.words import ControlBit, FaultCode, Mode
+from gateway.registers.words import ControlBit, Mode
 
 STEP_S = 0.001
 MOMENTARY = ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP

@@ -5,9 +5,12 @@ from math import isnan
 
 import pytest
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
 from gateway.control import LeaseAction, Line
 from gateway.devices.messages import Quality
-from gateway.registers.words import ControlBit, FaultCode, LimitedBy, RefusalReason, State, StatusBit, WarningBit
+from gateway.registers.words import ControlBit, LimitedBy, State, StatusBit
 from tests.control.bench import Bench, settings
 
 

@@ -6,10 +6,11 @@ from math import cos, e, pi, radians
 
 import pytest
 
+from gateway.codes.warning_bits import WarningBit
 from gateway.control import Trim
 from gateway.control.force_loop.feedforward import ForceLaw
 from gateway.control.force_loop.trim import TrimIntegral
-from gateway.registers.words import LimitedBy, Mode, State, StatusBit, WarningBit
+from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 from tests.control.bench import Bench, bsfm, settings
 

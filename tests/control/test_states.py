@@ -2,10 +2,13 @@
 
 import pytest
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
 from gateway.control.controller import Controller
 from gateway.control.state_table import ENABLED_STATES, TRANSITIONS, Event, TransitionError, next_state
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, FaultCode, RefusalReason, State, StatusBit, WarningBit
+from gateway.registers.words import ControlBit, State, StatusBit
 from tests.control.bench import Bench, settings
 
 

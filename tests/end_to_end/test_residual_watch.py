@@ -13,9 +13,9 @@ from typing import Any
 import psutil
 import pytest
 
+from gateway.codes.warning_bits import WarningBit
 from gateway.profiles import root
 from gateway.registers.residual_cause import ResidualCause
-from gateway.registers.words import WarningBit
 from tests.end_to_end.conftest import RunningGateway, start, stop
 from tests.end_to_end.test_lean_processes import HEAVY, mapped
 

@@ -6,9 +6,11 @@ from math import nan
 import pytest
 
 from gateway.bsfm import Status
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
 from gateway.devices.messages import Quality
-from gateway.registers.words import ControlBit, FaultCode, Mode, RefusalReason, State, StatusBit
+from gateway.registers.words import ControlBit, Mode, State, StatusBit
 from tests.control.bench import Bench, has_fault, settings
 
 TICK_S = 0.01

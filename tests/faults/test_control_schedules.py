@@ -12,8 +12,9 @@ from random import Random
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.devices.messages import Quality
-from gateway.registers.words import ControlBit, FaultCode, Mode
+from gateway.registers.words import ControlBit, Mode
 from tests.control.bench import Bench, Record, settings
 
 SEEDS = range(60)

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from gateway.cli.codes import CATALOGUE, FAULT_CODES, WARNING_CODES
+from gateway.codes.catalogue import CATALOGUE
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.processes import event_file
 from gateway.processes.event import WARNING_ALARMS, Event, event_in, event_of, line_of, record, severity_of
 from gateway.processes.event_file import KEPT, EventFile, EventReader
@@ -164,13 +166,13 @@ def test_the_code_alone_decides_the_severity(sentence: str, severity: str, code:
 
 
 def test_every_fault_is_an_error_and_every_refusal_a_warning() -> None:
-    assert {severity_of(code) for code in FAULT_CODES.values()} == {"error"}
+    assert {severity_of(fault.code) for fault in FaultCode if fault} == {"error"}
     assert {severity_of(code) for code in CATALOGUE if code[0] == "W"} == {"warning"}
     assert {severity_of(code) for code in CATALOGUE if code[0] == "E"} == {"error"}
 
 
 def test_alarms_that_are_only_warnings_are_those_of_the_catalogue() -> None:
-    only_warnings = set(WARNING_CODES.values()) - set(FAULT_CODES.values()) - {"A401"}
+    only_warnings = {bit.code for bit in WarningBit} - {fault.code for fault in FaultCode} - {"A401"}
     assert only_warnings <= WARNING_ALARMS <= set(CATALOGUE)
 
 

@@ -13,7 +13,7 @@ from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.rigs.rig_file import RigFile
 from gateway.profiles.strict_yaml.text import Document, parse
 from gateway.profiles.strict_yaml.typed import adapter, build
-from gateway.registers import RegisterMap
+from gateway.registers.map.map_reader import read_map
 
 KINDS: dict[str, type] = {"rig": RigFile, "device": DeviceProfile, "calibration": Calibration}
 
@@ -51,4 +51,4 @@ def test_a_plant_survives_writing_and_reading(name: str) -> None:
 def test_a_register_map_survives_json_whose_keys_are_all_text(name: str) -> None:
     value = document("registers", name).value
     as_text = json.loads(json.dumps(value))
-    assert RegisterMap.from_document(as_text).map_hash == RegisterMap.from_document(value).map_hash
+    assert read_map(as_text).map_hash == read_map(value).map_hash

@@ -9,6 +9,7 @@ import yaml
 
 from gateway.modbus import Peer
 from gateway.registers import BankRules, Command, Refusal, RegisterBank, RegisterMap
+from gateway.registers.map.map_reader import read_map
 
 MAP_FILE = Path(__file__).parents[2] / "profiles" / "registers" / "force-v1.yaml"
 
@@ -62,7 +63,7 @@ def document() -> dict:
 
 @pytest.fixture(scope="session")
 def register_map(document: dict) -> RegisterMap:
-    return RegisterMap.from_document(document)
+    return read_map(document)
 
 
 @pytest.fixture

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers import BankRules, Command, RegisterBank
-from gateway.registers.words import ControlBit, Mode, RefusalReason
+from gateway.registers.words import ControlBit, Mode
 
 
 def test_enable_and_setpoint_in_one_write_are_one_command(master, commands):

@@ -8,10 +8,11 @@ from dataclasses import astuple
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import ModbusError, Peer
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
 from gateway.registers.edge_questions import Asked, EdgeRefusal
-from gateway.registers.words import ControlBit, RefusalReason, State
+from gateway.registers.words import ControlBit, State
 
 PEERS = [Peer("10.0.0.1", 1), Peer("10.0.0.2", 2), Peer("fe80::1", 3)]
 ADDRESSES = st.one_of(

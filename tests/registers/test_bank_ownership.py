@@ -2,8 +2,9 @@
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.registers.ownership import NOT_IPV4, ip_number
-from gateway.registers.words import ControlBit, RefusalReason
+from gateway.registers.words import ControlBit
 
 TAKE = int(ControlBit.TAKE_OWNERSHIP)
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import ModbusError, answer
 from gateway.registers import Refusal
-from gateway.registers.words import RefusalReason
 
 
 def test_reserved_words_inside_a_block_read_zero(bank):

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.registers.edge_questions import EdgeRefusal
-from gateway.registers.words import ControlBit, RefusalReason
+from gateway.registers.words import ControlBit
 
 R = RefusalReason
 NAN = math.nan

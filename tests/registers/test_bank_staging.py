@@ -8,9 +8,10 @@ from dataclasses import replace
 import pytest
 
 from gateway.bsfm.model import Calibration
+from gateway.codes.refusals import RefusalReason
 from gateway.registers import Refusal, RegisterBank
 from gateway.registers.upload.coefficients import SET_BYTES, CoefficientSet
-from gateway.registers.words import CommitAction, CommitStatus, RefusalReason, UploadReason
+from gateway.registers.words import CommitAction, CommitStatus, UploadReason
 
 CALIBRATION = Calibration(
     number=16,

@@ -6,8 +6,10 @@ from copy import deepcopy
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.registers import BankRules, RegisterBank, RegisterMap, Status
-from gateway.registers.words import FaultCode, LimitedBy, State
+from gateway.registers.map.map_reader import read_map
+from gateway.registers.words import LimitedBy, State
 
 FULL = Status(
     state=State.HOLDING,
@@ -115,8 +117,8 @@ def test_a_map_that_lacks_what_control_publishes_is_no_map_for_a_bank(document):
     poorer = deepcopy(document)
     del poorer["blocks"]["status"]["registers"][2]
     with pytest.raises(ValueError, match="block status lacks force_measured"):
-        RegisterBank(RegisterMap.from_document(poorer), BankRules(rig_name="x", force_max_n=1.0), now=lambda: 0.0)
+        RegisterBank(read_map(poorer), BankRules(rig_name="x", force_max_n=1.0), now=lambda: 0.0)
     poorer = deepcopy(document)
     poorer["blocks"]["command"]["registers"][1]["name"] = "force"
     with pytest.raises(ValueError, match="block command must hold control_word, force_setpoint"):
-        RegisterBank(RegisterMap.from_document(poorer), BankRules(rig_name="x", force_max_n=1.0), now=lambda: 0.0)
+        RegisterBank(read_map(poorer), BankRules(rig_name="x", force_max_n=1.0), now=lambda: 0.0)

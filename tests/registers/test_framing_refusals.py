@@ -2,11 +2,11 @@
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, answer
 from gateway.modbus.server import refuse_unit
 from gateway.registers import RegisterBank
 from gateway.registers.refusal import NO_ADDRESS
-from gateway.registers.words import RefusalReason
 
 MASTER = Peer("10.0.0.5", 40001)
 

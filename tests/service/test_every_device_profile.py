@@ -5,11 +5,12 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceProfile, PacedWire, Role, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import Accepted, ForceSample, Garbage, Pressure, ReadPressure, ReadVoltage, SetVoltage
 from gateway.ports import Pty
 from gateway.profiles import load_device, load_rig, shipped
-from gateway.registers.words import FaultCode, State
+from gateway.registers.words import State
 from gateway.service.running_rig.output_line import OutputExchange
 from tests.service.wired import Wired
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.processes.json_socket import JsonLineServer
-from gateway.registers.words import FaultCode, State
+from gateway.registers.words import State
 from gateway.service.control_socket import Asked, ControlSocket
 from gateway.service.running_rig.calibration_runs import LadderKeeper
 from gateway.service.running_rig.calibrations import RigCalibrations

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control.settings import LeaseAction
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.registers.words import FaultCode
 from gateway.service.banner import Ready, banner, info, try_lines
 from gateway.service.clean_shutdown_marker import RunFlag
 from gateway.service.running_rig.bank_rules import bank_rules, server_settings

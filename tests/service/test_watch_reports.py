@@ -2,8 +2,9 @@
 
 import pytest
 
+from gateway.codes.warning_bits import WarningBit
 from gateway.registers.residual_cause import ResidualCause
-from gateway.registers.words import State, WarningBit
+from gateway.registers.words import State
 from gateway.service.watch_reports import WatchDesk
 from tests.service.wired import Wired
 

@@ -12,12 +12,14 @@ from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.devices import PacedWire, cell_host, output_host
 from gateway.modbus import Peer
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers import RegisterBank
-from gateway.registers.words import FaultCode, State, WarningBit
+from gateway.registers.words import State
 from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.gateway_core import Gateway
 from gateway.service.running_rig.load_cell_line import CellExchange

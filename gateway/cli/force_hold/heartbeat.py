@@ -12,7 +12,8 @@ from gateway.cli.errors import CliError
 from gateway.cli.force_hold.sequence import HoldRun, Seen, Write, seen_of
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explained
-from gateway.registers.words import RefusalReason, WarningBit
+from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
 
 DEFAULT_PERIOD_S: Final = 0.05  # of a lease that nobody has told us: 200 ms is usual
 _ACTIONS: Final = {

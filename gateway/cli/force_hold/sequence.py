@@ -11,7 +11,9 @@ from enum import Enum
 from math import isnan, nan
 from typing import Final
 
-from gateway.registers.words import ControlBit, FaultCode, LimitedBy, State, StatusBit, WarningBit
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
+from gateway.registers.words import ControlBit, LimitedBy, State, StatusBit
 
 _STUCK_S: Final = 3.0  # a ramp down that makes no way for so long is not waited for
 _ENABLE, _RESET = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT)

@@ -6,9 +6,9 @@ import sys
 from math import isnan
 from typing import Any, Final
 
-from gateway.cli.codes import FAULT_CODES, WARNING_CODES
 from gateway.cli.force_hold.sequence import Seen
-from gateway.registers.words import LimitedBy, State, StatusBit, WarningBit
+from gateway.codes.warning_bits import WarningBit
+from gateway.registers.words import LimitedBy, State, StatusBit
 
 _PLAIN_S: Final = 1.0
 _ERASE: Final = "\r\x1b[K"
@@ -21,7 +21,7 @@ def words(seen: Seen) -> str:
     if seen.limited_by is not LimitedBy.NONE:
         parts.append(f"  limited by {seen.limited_by.name.lower().replace('_', ' ')}")
     if seen.state is State.FAULT:
-        parts.append(f"  {FAULT_CODES.get(seen.fault, seen.fault.name)}")
+        parts.append(f"  {seen.fault.code or seen.fault.name}")
     parts += [f"  {code}" for code in _warnings(seen)]
     return " ".join(parts)
 
@@ -40,7 +40,7 @@ def document(seen: Seen, time_s: float) -> dict[str, Any]:
         **{name: None if isnan(value) else round(value, 4) for name, value in numbers.items()},
         "in_band": bool(seen.bits & StatusBit.IN_BAND),
         "limited_by": seen.limited_by.name.lower(),
-        "fault": FAULT_CODES.get(seen.fault),
+        "fault": seen.fault.code or None,
         "warnings": _warnings(seen),
     }
 
@@ -50,7 +50,7 @@ def _number(value: float, decimals: int) -> str:
 
 
 def _warnings(seen: Seen) -> list[str]:
-    return [WARNING_CODES[bit] for bit in WarningBit if seen.warnings & bit and bit in WARNING_CODES]
+    return [bit.code for bit in WarningBit if seen.warnings & bit]
 
 
 class Shown:

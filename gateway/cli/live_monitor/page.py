@@ -8,12 +8,14 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from gateway.cli.codes import CATALOGUE, FAULT_CODES, WARNING_CODES
 from gateway.cli.live_monitor.parts import big, chart, chart_top_n
 from gateway.cli.live_monitor.table import View, register_table
 from gateway.cli.live_monitor.track import Track, buckets
 from gateway.cli.master.value_text import shown
-from gateway.registers.words import FaultCode, State, StatusBit, WarningBit
+from gateway.codes.catalogue import CATALOGUE
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
+from gateway.registers.words import State, StatusBit
 
 _STATE_STYLE: Final = {
     State.OFF: "white on grey30",
@@ -120,7 +122,7 @@ def _alarms(track: Track) -> list[Text]:
         codes.append((_code_of_fault(int(fault)), "bold white on red"))
     warnings = track.value("warning_word")
     if not isnan(warnings):
-        codes += [(code, "black on yellow") for bit, code in WARNING_CODES.items() if int(warnings) & bit]
+        codes += [(bit.code, "black on yellow") for bit in WarningBit if int(warnings) & bit]
     lines = [_alarm(code, style, _detail(code, track)) for code, style in codes[:3]]
     if len(codes) > 3:
         lines[-1] = Text(f" and {len(codes) - 2} more: see warning_word ", style="black on yellow")
@@ -129,13 +131,13 @@ def _alarms(track: Track) -> list[Text]:
 
 def _detail(code: str, track: Track) -> str:
     """What else the registers say of an alarm: the name that the residual watch has for its cause."""
-    if code != WARNING_CODES[WarningBit.MODEL_DIFFERS] or "residual_cause" not in track.readings:
+    if code != WarningBit.MODEL_DIFFERS.code or "residual_cause" not in track.readings:
         return ""
     return f": {shown(track.readings['residual_cause']).replace('_', '-')}"
 
 
 def _code_of_fault(number: int) -> str:
-    return FAULT_CODES.get(FaultCode(number), "") if number in set(FaultCode) else ""
+    return FaultCode(number).code if number in set(FaultCode) else ""
 
 
 def _alarm(code: str, style: str, detail: str) -> Text:

@@ -10,10 +10,9 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
-from gateway.cli.codes import CATALOGUE, REFUSAL_CODES
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import Frame, GatewayClient, Reading, RefusedError
-from gateway.registers.words import RefusalReason
+from gateway.codes.refusals import RefusalReason
 
 EXCEPTIONS: Final = {
     0x01: "function not served",
@@ -41,13 +40,12 @@ def explained(client: GatewayClient, frames: "list[Frame] | None" = None, state:
 def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], state: Path | None) -> str:
     exception = f"exception {refused.code:02X} ({EXCEPTIONS.get(refused.code, 'not a known exception')})"
     reason, at, where = _last_refusal(client, frames)
-    code = REFUSAL_CODES.get(reason)
-    if code is None:
+    if reason is RefusalReason.NONE:
         return f"{exception} to {refused.request}"
-    entry = CATALOGUE[code]
-    seen = f"{code} {entry.title}: {exception} to {refused.request}; {where}"
-    own = _own_sentence(client, at, reason, state).removeprefix(f"{code} ")
-    return "\n  ".join(part for part in (seen, own, f"{entry.do} (force-gateway explain {code})") if part)
+    entry = reason.explanation
+    seen = f"{entry.code} {entry.title}: {exception} to {refused.request}; {where}"
+    own = _own_sentence(client, at, reason, state).removeprefix(f"{entry.code} ")
+    return "\n  ".join(part for part in (seen, own, f"{entry.do} (force-gateway explain {entry.code})") if part)
 
 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:

@@ -17,7 +17,7 @@ def command(*, code: str | None, as_json: bool) -> None:
 
     A name in the registers, such as over_force, does too; without CODE all are listed.
     """
-    from gateway.cli.codes import CATALOGUE
+    from gateway.codes.catalogue import CATALOGUE
 
     if code is not None:
         _one(code, as_json=as_json)
@@ -29,9 +29,9 @@ def command(*, code: str | None, as_json: bool) -> None:
 
 
 def _one(code: str, *, as_json: bool) -> None:
-    from gateway.cli.codes import find
+    from gateway.codes.catalogue import find_codes
 
-    entries = find(code)
+    entries = find_codes(code)
     if not entries:
         raise click.UsageError(_unknown(code))
     if as_json:
@@ -44,7 +44,7 @@ def _one(code: str, *, as_json: bool) -> None:
 
 
 def _unknown(code: str) -> str:
-    from gateway.cli.codes import CATALOGUE
+    from gateway.codes.catalogue import CATALOGUE
 
     known = [*CATALOGUE, *(entry.name for entry in CATALOGUE.values() if entry.name)]
     near = get_close_matches(code.upper().replace("-", "_"), known, n=2, cutoff=0.6)

@@ -142,7 +142,7 @@ def _tell(beat: "Beat", where: str, *, as_json: bool) -> None:
 
 def _disabled_words(beat: "Beat") -> str:
     """Why the output is off although nobody here has asked for it."""
-    from gateway.registers.words import WarningBit
+    from gateway.codes.warning_bits import WarningBit
 
     if beat.warned & WarningBit.MASTER_LOST:
         return "A310 the lease ran out: the gateway has ramped to 0 N and let go; a busy machine? --rig tells the lease"
@@ -153,14 +153,11 @@ def _disabled_words(beat: "Beat") -> str:
 
 def _fault_words(beat: "Beat") -> str:
     """The fault's sentence, and how to go on."""
-    from gateway.cli.codes import CATALOGUE, FAULT_CODES
-
     assert beat.seen
-    code = FAULT_CODES[beat.seen.fault]
-    entry = CATALOGUE[code]
+    entry = beat.seen.fault.explanation
     when = f"while holding {beat.hold.force_n:g} N" if beat.hold.is_pressing else "is latched"
     return (
-        f"{code} {entry.title}, {when}: {entry.seen} The output is at the safe voltage\n"
-        f"  {entry.do} (force-gateway explain {code})\n"
+        f"{entry.code} {entry.title}, {when}: {entry.seen} The output is at the safe voltage\n"
+        f"  {entry.do} (force-gateway explain {entry.code})\n"
         f"  then: force-gateway hold {beat.hold.force_n:g} --reset"
     )

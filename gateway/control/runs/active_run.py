@@ -9,6 +9,7 @@ from math import nan
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
+from gateway.codes.faults import FaultCode
 from gateway.control.force_loop.force_loop import Pursuit
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
@@ -19,7 +20,7 @@ from gateway.control.settings import ControlSettings
 from gateway.control.supervision.fault_detection import Finding
 from gateway.control.supervision.force_ceiling import Ceiling
 from gateway.control.supervision.plausibility import ModelResponse
-from gateway.registers.words import CalibrationPhase, FaultCode
+from gateway.registers.words import CalibrationPhase
 
 AnyPlan: TypeAlias = RunPlan | ExperimentPlan
 AnyRun: TypeAlias = LadderRun | ExperimentRun

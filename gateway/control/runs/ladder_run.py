@@ -14,13 +14,14 @@ from math import sqrt
 from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
+from gateway.codes.faults import FaultCode
 from gateway.control.messages import gain_sentence, ladder_silent_sentence, sign_sentence
 from gateway.control.runs.ladder_pace import LadderPace, Trace
 from gateway.control.runs.ladder_stairs import RunPlan, Stair, stairs_of
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.fault_detection import Finding
-from gateway.registers.words import CalibrationPhase, FaultCode
+from gateway.registers.words import CalibrationPhase
 
 ZERO_S: Final = 0.6
 WINDOW_S: Final = 0.2

@@ -8,13 +8,14 @@ refuse an enable.
 from dataclasses import dataclass
 from typing import Final
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
 from gateway.control.inputs import Line
 from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.plausibility import ModelResponse, RiseCheck
 from gateway.control.supervision.stuck_sensor import FrozenWatch
-from gateway.registers.words import FaultCode, RefusalReason
 
 _STUCK_S: Final = 1.0
 _FAR_OFF: Final = 3.0  # measured over expected force that points at the cell rather than at the process

@@ -12,8 +12,8 @@ reads ten times too little looks like air: the tool waits, and the warning A301 
 from typing import Final
 
 from gateway.bsfm import Bsfm
+from gateway.codes.faults import FaultCode
 from gateway.control.sample_conditioning import Reading
-from gateway.registers.words import FaultCode
 
 _SMOOTHING_S: Final = 0.05
 _LASTING_S: Final = 0.3  # a violation must last this long: impacts and lag do not

@@ -1,7 +1,9 @@
 """JSON Schema of a register map file. Written out, for the registers room reads maps by hand; a test compares the keys."""
 
+from collections.abc import Iterable
 from typing import Any, Final
 
+from gateway.registers.map.value_names import BIT_NAMES, VALUE_NAMES
 from gateway.registers.values import TYPES
 
 _ADDRESS: Final[dict[str, Any]] = {"type": "integer", "minimum": 0, "maximum": 65535}
@@ -9,6 +11,12 @@ _NAMES: Final[dict[str, Any]] = {
     "type": "object",
     "additionalProperties": {"type": "string", "pattern": "^[a-z][a-z0-9_]*$"},
 }
+
+
+def _named(own: Iterable[str]) -> dict[str, Any]:
+    return {"anyOf": [_NAMES, {"enum": list(own)}]}
+
+
 _ORDER: Final[dict[str, Any]] = {"enum": ["abcd", "cdab"], "description": "which word of a 32-bit value comes first"}
 
 _REGISTER: Final[dict[str, Any]] = {
@@ -24,8 +32,9 @@ _REGISTER: Final[dict[str, Any]] = {
         "min": {"type": "number", "description": "least value, in the unit; else what the type carries"},
         "max": {"type": "number", "description": "largest value, in the unit; else what the type carries"},
         "text": {"type": "string", "description": "what it means, for the register table"},
-        "values": _NAMES | {"description": "names of an enumeration's numbers"},
-        "bits": _NAMES | {"description": "names of a word's bits"},
+        "values": _named(VALUE_NAMES)
+        | {"description": "names of an enumeration's numbers, or one of the program's own"},
+        "bits": _named(BIT_NAMES) | {"description": "names of a word's bits, or one of the program's own"},
         "constant": {"type": "number", "description": "what a proof register always reads"},
         "word_order": _ORDER,
         "count": {"type": "integer", "minimum": 1, "maximum": 256, "description": "makes NAME_0, NAME_1, ..."},

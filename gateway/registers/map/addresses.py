@@ -7,23 +7,20 @@ writes force_setpoint one register too far cannot be seen.
 from collections.abc import Sequence
 from typing import Final
 
+from gateway.codes.refusals import OFF_BY_ONE, RefusalReason
 from gateway.registers.map.register_map import Block
-from gateway.registers.refusal import OFF_BY_ONE, Refusal
-from gateway.registers.words import RefusalReason
+from gateway.registers.refusal import Refusal
 
 _NAMES: Final = ((40001, 49999, "holding register"), (30001, 39999, "input register"), (10001, 19999, "discrete input"))
 
 
 def no_such_address(blocks: Sequence[Block], address: int, count: int) -> Refusal:
     """The refusal of a range that no block holds."""
-    text, label = _named(address), None
-    if not text:
-        text = _shifted(blocks, address, count)
-        label = OFF_BY_ONE if text else None
-    if not text:
-        ranges = ", ".join(f"{block.first}-{block.last}" for block in blocks)
-        text = f"{_range(address, count)} is not in one block; blocks are {ranges}"
-    return Refusal(RefusalReason.ADDRESS, address, text, label=label)
+    if shifted := _shifted(blocks, address, count):
+        return Refusal(OFF_BY_ONE, address, shifted)
+    ranges = ", ".join(f"{block.first}-{block.last}" for block in blocks)
+    elsewhere = f"{_range(address, count)} is not in one block; blocks are {ranges}"
+    return Refusal(RefusalReason.ADDRESS, address, _named(address) or elsewhere)
 
 
 def _range(address: int, count: int) -> str:

@@ -71,8 +71,14 @@ class DocumentReader:
             return WordOrder.ABCD
         return WordOrder(given)
 
-    def numbered(self, place: Place, given: Any, most: int) -> dict[int, str]:
-        """{number: name}; numbers may have become text on the way (JSON)."""
+    def numbered(
+        self, place: Place, given: Any, most: int, known: Mapping[str, Mapping[int, str]]
+    ) -> Mapping[int, str]:
+        """Return {number: name}, as given or as the named one of `known` has it; numbers may have become text (JSON)."""
+        if isinstance(given, str):
+            if given not in known:
+                self.fault(place, f"{given} is not one of {', '.join(known)}{meant(given, known)}")
+            return known.get(given, {})
         names: dict[int, str] = {}
         for key, name in self.group(place, given).items():
             is_number = str(key).isdecimal() and int(key) <= most

@@ -7,7 +7,8 @@ The document is plain data (mappings, lists, text, numbers), so that no YAML lib
         registers: [{name, address, type, scale, unit, access, min, max, text, values, bits, constant, word_order, count}]
         or repeats: {BLOCK: base address}, word_order}}
 
-`count: 16` makes NAME_0 .. NAME_15. Missing access is R, missing scale 1, missing limits are those of the type.
+`count: 16` makes NAME_0 .. NAME_15. values and bits are {number: name}, or the name of one of the program's enumerations
+(value_names.py). Missing access is R, missing scale 1, missing limits are those of the type.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,6 +17,7 @@ from typing import Any, Final
 
 from gateway.registers.map.document_reader import DocumentReader, Place, meant
 from gateway.registers.map.register_map import Block, Register, RegisterMap, repeated
+from gateway.registers.map.value_names import BIT_NAMES, VALUE_NAMES
 from gateway.registers.values import RAW_LIMITS, TYPES, words_of
 
 _MAP_KEYS: Final = ("name", "version", "text", "blocks")
@@ -119,8 +121,8 @@ class _Reader(DocumentReader):
             minimum=low,
             maximum=high,
             text=self.text(place, entry, "text"),
-            values=self.numbered((*place, "values"), entry.get("values", {}), 0xFFFF),
-            bits=self.numbered((*place, "bits"), entry.get("bits", {}), 15),
+            values=self.numbered((*place, "values"), entry.get("values", {}), 0xFFFF, VALUE_NAMES),
+            bits=self.numbered((*place, "bits"), entry.get("bits", {}), 15, BIT_NAMES),
             word_order=self.order(place, entry),
             constant=self.number(place, entry, "constant") if "constant" in entry else None,
         )

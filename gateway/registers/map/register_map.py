@@ -1,6 +1,6 @@
 """The Modbus map as data: blocks of registers, each with name, address, type, scale, unit, access, limits and text.
 
-Built from profiles/registers/*.yaml by `RegisterMap.from_document` (see map_reader.py). Addresses are 0-based. A name is unique
+Built from profiles/registers/*.yaml by map_reader.read_map. Addresses are 0-based. A name is unique
 within its block; a bare NAME means the int16 register, `NAME@BLOCK` any other.
 """
 
@@ -119,13 +119,6 @@ class RegisterMap:
     blocks: tuple[Block, ...]
     registers: tuple[Register, ...]
     text: str = ""
-
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any]) -> "RegisterMap":
-        """A map from the content of its YAML file. MapError (a ValueError) lists every fault with its place in the file."""
-        from gateway.registers.map.map_reader import read_map  # the reader builds these classes
-
-        return read_map(document)
 
     def block(self, name: str) -> Block:
         """LookupError for a block that is not there."""

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.bsfm.model import Calibration
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers.command_block import check_zeros
 from gateway.registers.image import RegisterImage
@@ -24,7 +25,7 @@ from gateway.registers.upload.coefficients import (
     CoefficientSet,
     model_hash,
 )
-from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus, RefusalReason
+from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus
 
 NO_SLOT: Final = 0xFFFF
 

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.control.inputs import Line, Output
 from gateway.devices.messages import ForceSample
@@ -20,7 +22,6 @@ from gateway.registers import RegisterBank
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import Asked, EdgeRefusal
 from gateway.registers.residual_cause import ResidualCause
-from gateway.registers.words import FaultCode, WarningBit
 from gateway.service.running_rig.calibration_runs import LadderKeeper
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange

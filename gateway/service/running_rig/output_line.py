@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, nan
 
+from gateway.codes.faults import FaultCode
 from gateway.devices import OutputHost
 from gateway.devices.messages import (
     Accepted,
@@ -25,7 +26,6 @@ from gateway.devices.messages import (
     Refused,
     SetVoltage,
 )
-from gateway.registers.words import FaultCode
 
 _FAILURES_BEFORE_FAULT = 3  # SAFETY: T_dac is three writes or 100 ms; one bad echo is noise
 _POLL_PERIOD_S = 0.1

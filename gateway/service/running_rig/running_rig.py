@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.calibrations.activation import InUse
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.devices import cell_host, output_host
 from gateway.fieldbus import BindError, ModbusTcpServer
@@ -21,7 +23,6 @@ from gateway.processes.scheduler_counters import TurnsOf
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
-from gateway.registers.words import FaultCode, WarningBit
 from gateway.service import banner
 from gateway.service.clean_shutdown_marker import RunFlag
 from gateway.service.control_socket import Asked, ControlSocket

@@ -2,10 +2,11 @@
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part, plan_faults
 from gateway.control.runs.experiment_schedule import Schedule, segments_of
 from gateway.control.runs.ladder_stairs import highest_voltage_v
-from gateway.registers.words import CalibrationPhase, FaultCode, State
+from gateway.registers.words import CalibrationPhase, State
 from tests.control.bench import Bench, bsfm, settings
 
 LIMITS = settings().limits

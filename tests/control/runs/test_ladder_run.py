@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control import ControlSettings
 from gateway.control.runs.ladder_run import GUESSED_DWELL_S, MOST_DWELL_S, LadderRow, LadderRun
 from gateway.control.runs.ladder_stairs import QUICK, RunPlan, highest_voltage_v, stairs_of
 from gateway.control.sample_conditioning import Reading
-from gateway.registers.words import CalibrationPhase, ControlBit, FaultCode, State
+from gateway.registers.words import CalibrationPhase, ControlBit, State
 from tests.control.bench import Bench, bsfm, settings
 
 SHORT = RunPlan(step_v=2.0, groups=2, minor_points=13, response_steps=3)

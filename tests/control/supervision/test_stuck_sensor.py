@@ -6,12 +6,13 @@ from random import Random
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control import Supervision
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.plausibility import ModelResponse
 from gateway.control.supervision.repeated_readings import CellNoise, power
 from gateway.control.supervision.stuck_sensor import FrozenWatch
-from gateway.registers.words import FaultCode, State
+from gateway.registers.words import State
 from tests.control.bench import Bench, bsfm, has_fault
 
 QUANTUM_N = 0.098

@@ -9,13 +9,14 @@ from math import nan
 from random import Random
 from struct import pack
 
+from gateway.codes.faults import FaultCode
 from gateway.control import Controller, ControlSettings
 from gateway.devices.messages import ForceSample, Quality
 from gateway.modbus import Peer
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, Refusal, RegisterBank
 from gateway.registers.rules import BASIC_BITS
-from gateway.registers.words import ControlBit, FaultCode, State
+from gateway.registers.words import ControlBit, State
 from gateway.service.running_rig.gateway_core import Gateway
 from tests.control.bench import SmallPlant, bsfm, settings
 

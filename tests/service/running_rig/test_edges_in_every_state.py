@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.control.runs.ladder_stairs import RunPlan
-from gateway.registers.words import CalibrationPhase, RefusalReason, State
+from gateway.registers.words import CalibrationPhase, State
 from tests.control.bench import settings
 from tests.service.running_rig.simulated_rig import (
     CALIBRATE,

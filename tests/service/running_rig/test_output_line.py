@@ -5,9 +5,9 @@ from math import isnan
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.devices import output_host
 from gateway.devices.exchange import VoltageExchange, VoltageRange
-from gateway.registers.words import FaultCode
 from gateway.service.running_rig.output_line import OutputExchange
 from tests.service.rigs import demo
 

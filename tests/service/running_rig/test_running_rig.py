@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.modbus import Peer
 from gateway.processes import message_link
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import load_rig
-from gateway.registers.words import FaultCode
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.running_rig import Cell
 from tests.end_to_end.own_devices import OwnDevices

@@ -7,12 +7,14 @@ from struct import pack, unpack
 
 import pytest
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
 from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part
 from gateway.control.runs.ladder_stairs import RunPlan
 from gateway.profiles import load_calibration
 from gateway.registers.refusal import Refusal
-from gateway.registers.words import CalibrationPhase, FaultCode, RefusalReason, State
+from gateway.registers.words import CalibrationPhase, State
 from tests.control.bench import settings
 from tests.service.running_rig.simulated_rig import (
     CALIBRATE,

@@ -5,11 +5,13 @@ from random import Random
 
 import pytest
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample, Garbage
 from gateway.profiles import Rig
 from gateway.registers import Refusal
-from gateway.registers.words import FaultCode, LimitedBy, State, WarningBit
+from gateway.registers.words import LimitedBy, State
 from gateway.service.running_rig.load_cell_line import CellExchange
 from tests.service.rigs import demo, strict, with_supervision
 from tests.service.wired import ENABLE, RESET, STEP_S, Wired

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample
 from gateway.recording import Recorder, read_recording
 from gateway.registers import Refusal
-from gateway.registers.words import FaultCode, RefusalReason, State
+from gateway.registers.words import State
 from gateway.service.running_rig.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
 from tests.service.rigs import demo, without_trim

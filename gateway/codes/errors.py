@@ -2,274 +2,273 @@
 
 from typing import Final
 
-from gateway.cli.codes.entry import Entry
+from gateway.codes.explanation import Explanation
 
-ENTRIES: Final = (
-    Entry(
+ERRORS: Final = (
+    Explanation(
         "E101",
         "no permission for a serial port",
         "The port is there, but this user may not open it.",
         "Serial ports belong to a group (dialout on Debian and Ubuntu, uucp on Arch) and you are not in it.",
         "sudo usermod -aG GROUP USER with the names from the message, then log out and in again.",
     ),
-    Entry(
+    Explanation(
         "E102",
         "serial port missing or renamed",
         "The port that the rig file names does not exist.",
-        "The adapter is unplugged, or has another by-id name than the one in the file (another adapter of the same make).",
+        "The adapter is unplugged, or has another by-id name than the one in the file (another adapter of the same "
+        "make).",
         "Compare with `force-gateway ports` and put the by-id path of your adapter into the rig file.",
     ),
-    Entry(
+    Explanation(
         "E103",
         "serial port in use",
         "Another process holds the port, and two talkers on one line garble each other.",
         "A terminal program, a second gateway or ModemManager; the message names the process.",
         "End that process; for ModemManager: sudo systemctl mask --now ModemManager.",
     ),
-    Entry(
+    Explanation(
         "E104",
         "another gateway runs on this state directory",
         "The state directory's lock is held.",
         "A gateway for this rig already runs, as a service or in another terminal.",
         "Use the one that runs, stop it, or give this one its own --state DIR.",
     ),
-    Entry(
+    Explanation(
         "E105",
         "no permission",
         "The operating system refused access to a file or directory.",
         "It belongs to another user, often because an earlier run was made with sudo.",
         "ls -l the path in the message; chown it, or choose another with --state or -o.",
     ),
-    Entry(
+    Explanation(
         "E106",
         "the operating system refused",
         "A file operation failed; the message has the system's own words and the path.",
         "A full disk, a missing directory, or a directory where a file was expected.",
         "df -h and ls -ld of the path in the message show which.",
     ),
-    Entry(
+    Explanation(
         "E110",
         "bytes arrive, no valid line",
         "The line carries bytes, none of which form a message of this device at this baud rate.",
         "The wrong baud rate, or the wrong device profile; seldom inverted or missing ground.",
         "Set `baud:` in the rig file to what the device's own menu says; 9600 and 115200 are the usual ones.",
     ),
-    Entry(
+    Explanation(
         "E111",
         "silence on a serial line",
         "Not one byte came from the device, or it does not answer.",
         "No power, RX and TX crossed, the wrong port, or an amplifier that is not in stream mode.",
         "Check its power light, then swap RX and TX (pins 2 and 3); then look for `stream` in its menu.",
     ),
-    Entry(
+    Explanation(
         "E120",
         "the Modbus port needs a right",
         "Listening on a port below 1024 (Modbus' own is 502) was refused.",
         "Linux gives these ports to programs with the capability net_bind_service only.",
         "Use --bind HOST:5020, or run it as a service with AmbientCapabilities=CAP_NET_BIND_SERVICE.",
     ),
-    Entry(
+    Explanation(
         "E121",
         "the Modbus port cannot be opened",
         "Listening on the wanted address failed.",
         "Another program (an earlier gateway?) listens there, or the address is not one of this machine.",
         "ss -ltnp shows who listens; --bind 127.0.0.1:0 takes any free port.",
     ),
-    Entry(
+    Explanation(
         "E122",
         "an open address without an allow-list",
         "The gateway is to listen on an address that others can reach, and nobody said who may connect.",
         "`bind:` was changed and `allow:` was not; plain Modbus has no password, so the list is the only door.",
         "Put the robot's network under network.allow in the rig file, e.g. 192.168.125.0/24.",
     ),
-    Entry(
+    Explanation(
         "E130",
         "no gateway there",
         "Nothing accepted the connection.",
         "The gateway is not running, listens on another address or port, or a firewall is between.",
         "Compare --gateway with the `modbus tcp` line of the gateway's banner.",
     ),
-    Entry(
+    Explanation(
         "E131",
         "connected, but no Modbus answer",
         "The connection was accepted, and no answer came within a second, or one that is not Modbus.",
-        "Another program listens there, the allow-list of the gateway closes your connection, or its unit id is another.",
+        "Another program listens there, the allow-list of the gateway closes your connection, or its unit id is "
+        "another.",
         "Check port and --unit; the rig's network.allow must contain this machine's address.",
     ),
-    Entry(
+    Explanation(
         "E140",
         "no running gateway on this state directory",
         "Nobody listens on control.sock in the state directory.",
         "The gateway is not running, or runs with another --state or rig than you named here.",
         "Give the same --state DIR (or --rig) as to `force-gateway run`.",
     ),
-    Entry(
+    Explanation(
         "E141",
         "the running gateway said no",
         "The control socket answered, with a refusal; the message has its sentence.",
         "What was asked does not fit its present state, e.g. a second recording beside a running one.",
         "force-gateway record status shows what it is doing.",
     ),
-    Entry(
+    Explanation(
         "E150",
         "events are not kept",
         "The disk did not take a line of events.jsonl. Control goes on; the lines are still on the gateway's stderr.",
         "The disk is full, read-only or gone, or the state directory was removed.",
         "df -h on the state directory; once lines are taken again, the next one says how many are missing.",
     ),
-    Entry(
+    Explanation(
         "E151",
         "gateway did not start: the rig file has faults",
         "The rig file could not be used; every fault is in the event, with its line and column.",
         "It was edited since the last start, or belongs to another version.",
-        "force-gateway check RIG shows the same; mend it and start again.",
+        "force-gateway check RIG shows the same; fix it and start again.",
     ),
-    Entry(
+    Explanation(
         "E152",
         "no local socket for the tools",
-        "control.sock (or rig.sock of a simulated rig) could not be made in the state directory. Control works without it.",
+        "control.sock (or rig.sock of a simulated rig) could not be made in the state directory. Control works "
+        "without it.",
         "A path of more than 107 bytes, or a file system that has no sockets.",
         "Give a shorter --state DIR, on a local disk.",
     ),
-    Entry(
+    Explanation(
         "E180",
         "the gateway was lost while a force was held",
         "The connection to the gateway broke and could not be had again while a lease may run.",
         "The gateway was stopped, its machine went down, or the network between is broken.",
-        "Look at the tool first: a rig with a lease has let go, one without may still press. Then read the gateway's log.",
+        "Look at the tool first: a rig with a lease has let go, one without may still press. Then read the "
+        "gateway's log.",
     ),
-    Entry(
-        "E401",
-        "coefficients refused",
-        "An uploaded calibration failed a check; index and reason are in failing_index and failing_reason.",
-        "Float words in the wrong order, a CRC over the wrong range, branches that cross or do not rise, or stops too stiff.",
-        "Read failing_index and failing_reason; the active set is unchanged, so there is no hurry.",
-    ),
-    Entry(
+    Explanation(
         "E402",
         "recording stopped",
         "The disk did not take a batch of the recording. Control goes on, rows before that are whole.",
         "The disk is full, or it was removed.",
         "Free space (df -h on the state directory), then force-gateway record on.",
     ),
-    Entry(
+    Explanation(
         "E403",
         "not a readable recording",
-        "The file is no recording of ours, or was cut inside its header, before the first row.",
+        "The file is not a recording of force-gateway, or was cut inside its header, before the first row.",
         "The wrong file, a text-mode transfer, or a recorder that was killed in the moment it began.",
         "force-gateway recordings list shows which are readable.",
     ),
-    Entry(
+    Explanation(
         "E404",
         "not a usable backup",
         "The archive is damaged, was not made by `backup`, or contains paths that lead out of the directory.",
         "The wrong file, or a transfer that broke off. Nothing was changed.",
         "gzip -t FILE tells whether the transfer is whole; copy it again.",
     ),
-    Entry(
+    Explanation(
         "E405",
         "something is already there",
         "The target exists and would be overwritten.",
         "You ran the same verb before, or chose a name that is taken.",
         "Take another name, or --force where the verb has it.",
     ),
-    Entry(
+    Explanation(
         "E406",
         "more slip stops than an upload carries",
         "The calibration has more slip stops than the registers have room for; nothing was sent.",
         "A calibration file made by other means than this program's fit, which gives no more than fit.",
         "Name the file as the rig's calibration (calibration: FILE), or fit it with fewer stops.",
     ),
-    Entry(
+    Explanation(
         "E421",
         "not a ladder to fit",
         "The table can be read, but a calibration must not be made from it; the message says what was seen.",
         "One direction only, a saturated cell, kgf read as N, a wrong sign, swapped columns, or another rig's file.",
         "Do what the message ends with, and run the ladder again: force-gateway calibrate.",
     ),
-    Entry(
+    Explanation(
         "E422",
         "nothing to go on with",
         "calibrate --resume found no recorded calibration run in the state directory.",
         "Another --state or --rig than the one the run was started with.",
         "Compare with force-gateway recordings list, or begin a new run without --resume.",
     ),
-    Entry(
+    Explanation(
         "E431",
         "calibration not stored",
         "The disk refused a calibration or the note of which one is in use. What was in use stays in use.",
         "The disk is full (ENOSPC), read-only, or broken (EIO).",
         "Free space (df -h on the state directory), then repeat the upload or `calibration use`.",
     ),
-    Entry(
+    Explanation(
         "E432",
         "damaged file in the calibration store",
         "A calibration, or the note of which one is in use, does not have the CRC-32 in its first line.",
         "The file was edited by hand, or the disk lost a part of it. The one before it is used, else the rig's own.",
         "force-gateway calibration list shows which are whole; `calibration use N` chooses; a backup has the rest.",
     ),
-    Entry(
+    Explanation(
         "E433",
         "no such calibration",
         "The number is not in the store, nothing was in use before, or this calibration cannot be used for that.",
         "A number of another rig or state directory, or the first calibration that was ever used here.",
         "force-gateway calibration list, with the same --state (or --rig) as `run`.",
     ),
-    Entry(
+    Explanation(
         "E434",
         "another set is in use than the one that was uploaded",
         "The commit went through, but the active block reads back other numbers.",
         "Another master, or `calibration use` on the gateway's machine, changed the set in the same moment.",
         "force-gateway read active_slot calibration_id shows what is in use; agree on one master for uploads.",
     ),
-    Entry(
+    Explanation(
         "E435",
         "calibration stored as rejected",
-        "The fit's RMS error on all measured points is more than in_band_tolerance_n, or clearly more than that of the "
-        "calibration in use on the same data.",
+        "The fit's RMS error on all measured points is more than in_band_tolerance_n, or clearly more than that of "
+        "the calibration in use on the same data.",
         "Too few or too coarse stairs, no reversal part, a tool that slipped, or a zero that moved during the run.",
-        "Look at its report, then run a finer ladder: force-gateway calibrate. `calibration use N --force` takes it anyway.",
+        "Look at its report, then run a finer ladder: force-gateway calibrate. `calibration use N --force` takes "
+        "it anyway.",
     ),
-    Entry(
+    Explanation(
         "E436",
         "a rejected calibration is not used",
         "`calibration use` names a calibration whose fit was rejected when it was made; the message has the figures.",
         "It was made of data that do not describe the rig well enough; see E435.",
         "Use another of `force-gateway calibration list`, or give --force if you know better.",
     ),
-    Entry(
+    Explanation(
         "E437",
         "another ladder than the one that was stopped",
         "calibrate --resume was given other stairs than those of the run that it is to go on with.",
         "Groups of different stairs describe different ladders and are not fitted together.",
         "Leave --step and --v-max out to go on, or leave --resume out to begin anew.",
     ),
-    Entry(
+    Explanation(
         "E520",
         "a column in another unit",
-        "The measured force, or a pressure, is by a unit's own factor larger or smaller than the plant gives for its drive.",
+        "The measured force, or a pressure, is by a unit's own factor larger or smaller than the plant gives for "
+        "its drive.",
         "The table's numbers are in kgf, mN, bar, mV, ms ..., not in what the column's name ends with.",
         "Give the unit: diagnose FILE --columns force_n=force_n:kgf (the message spells it). Causes come after that.",
     ),
-    Entry(
+    Explanation(
         "E521",
         "two columns are swapped",
         "The plant agrees with the recording only when two of its columns are exchanged.",
         "A header that is one column off, or the numbers in --columns.",
         "Exchange them: diagnose FILE --columns command_v=force_n,force_n=command_v (the message spells it).",
     ),
-    Entry(
+    Explanation(
         "E522",
         "the force has the wrong sign",
         "The measured force falls where the plant's rises, by the same amount.",
         "The cell's wires are exchanged, the rig's `sign` is wrong, or a pull counts as positive.",
         "diagnose FILE --columns force_n=force_n:-n turns it; in the rig file, load_cell: sign.",
     ),
-    Entry(
+    Explanation(
         "E500",
-        "a defect of force-gateway",
-        "A verb ended in a way that we did not foresee.",
-        "A defect of ours; nothing that you typed should do this.",
+        "internal error",
+        "A verb ended with an error that its author did not foresee.",
+        "An internal error; nothing that you typed should do this.",
         "Report it with the traceback that `force-gateway --debug ...` prints.",
     ),
 )

@@ -1,0 +1,94 @@
+"""A, without a number in the registers: what the guardian, its processes and a calibration run say in the log."""
+
+from typing import Final
+
+from gateway.codes.explanation import Explanation
+
+ALARMS: Final = (
+    Explanation(
+        "A402",
+        "restarted too often",
+        "Five restarts within 60 s; the safe voltage is held and the gateway has stopped.",
+        "What ended the control process is still there; the line counts the causes.",
+        "Read the first A401 line, not the last; machine-busy in the count means A403. Then start again.",
+    ),
+    Explanation(
+        "A404",
+        "control loop stalled",
+        "The control loop was later than the rig's stall_s although the machine let it run: it calculated, or slept.",
+        "An internal error, or a disk or driver that held it (the line says `in the kernel`).",
+        "Report it with the line, which has the times; look at the kernel's log (dmesg) for a disk or driver.",
+    ),
+    Explanation(
+        "A405",
+        "control process stopped",
+        "The control process was stopped by a signal or a debugger, and so was replaced.",
+        "kill -STOP, Ctrl-Z in a debugger, or a suspended container.",
+        "Let it run; to look into a live loop use force-gateway monitor.",
+    ),
+    Explanation(
+        "A406",
+        "control process did not start",
+        "The machine had no process for it, or it ended or hung before it was ready.",
+        "Out of processes or memory (ulimit -u, a container's limit), or a machine that takes more than 30 s for a "
+        "start.",
+        "free -h and ulimit -u show which; the guardian tries again, each time later.",
+    ),
+    Explanation(
+        "A407",
+        "prepared process ended",
+        "The process from which control processes are forked in milliseconds is gone. Control goes on; a restart "
+        "takes longer.",
+        "Somebody ended it, or the machine ran out of memory.",
+        "Nothing, if another one was started; else look for what ends processes here (dmesg shows the "
+        "out-of-memory killer).",
+    ),
+    Explanation(
+        "A408",
+        "simulated rig restarted",
+        "The process that simulates regulator, tool and load cell ended; another was started, without pressure, on "
+        "other ptys.",
+        "Somebody ended it, or an internal error.",
+        "Reset the fault (the lines were cut) and enable again.",
+    ),
+    Explanation(
+        "A409",
+        "simulated rig stays off",
+        "The simulated rig ended four times in a row.",
+        "No pseudo terminal to be had, too little memory, or an internal error.",
+        "Read the lines above it; ls /dev/pts and free -h show what is short.",
+    ),
+    Explanation(
+        "A330",
+        "calibration stopped",
+        "A calibration run ended before its last stair; the force went to 0 and the data are kept.",
+        "Nobody followed the run any more (a closed terminal), or the recording could not be written.",
+        "force-gateway calibrate --resume goes on with the groups that are missing; df -h shows a full disk.",
+        is_warning=True,
+    ),
+    Explanation(
+        "A350",
+        "a run reached the rig's largest force",
+        "A calibration or an experiment measured nearly force_max_n: a ladder leaves out the stairs above, an "
+        "experiment ends.",
+        "This plant makes more force for a voltage than the calibration in use expects.",
+        "Nothing: the new calibration ends there. Raise force_max_n in the rig file only if tool and workpiece "
+        "take more.",
+    ),
+    Explanation(
+        "A346",
+        "residual watch ended",
+        "The process that compares measurements with the rig's plant died; the fourth time it stays off. Control "
+        "goes on.",
+        "The machine ran out of memory (the watch is the first to go), somebody ended it, or an internal error.",
+        "Look at the lines above it in the log; `residual_watch: {enabled: false}` in the rig file switches it off.",
+        is_warning=True,
+    ),
+    Explanation(
+        "A331",
+        "fit ended without a result",
+        "The ladder was run and recorded, but the process that fits it ended without saying anything.",
+        "It was killed, or the machine ran out of memory.",
+        "force-gateway fit RECORDING --store does the same in the foreground.",
+    ),
+)

@@ -1,0 +1,22 @@
+"""What `explain` says of a code: what was seen, what it probably is, one thing to do."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """code: as messages begin (`A310`); title: a few words; is_warning: an alarm that leaves the force as it is.
+
+    Every other A and every E is an error, every W a warning.
+    """
+
+    code: str
+    title: str
+    seen: str
+    probably: str
+    do: str
+    is_warning: bool = False
+
+
+NO_CODE = Explanation("", "none", "", "", "")
+"""Of the number 0 in the registers."""

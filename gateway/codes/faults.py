@@ -1,0 +1,193 @@
+"""A, with a number in fault_code: the first cause of a latched fault. The safe voltage is out until the reset."""
+
+from enum import IntEnum
+from typing import Self
+
+from gateway.codes.explanation import NO_CODE, Explanation
+
+
+class FaultCode(IntEnum):
+    """The first cause of a latched fault: its number in the registers, and what `explain` says of it."""
+
+    _value_: int
+    explanation: Explanation
+
+    def __new__(cls, number: int, explanation: Explanation = NO_CODE) -> Self:
+        member = int.__new__(cls, number)
+        member._value_ = number
+        member.explanation = explanation
+        return member
+
+    @property
+    def code(self) -> str:
+        """`A310`; empty for NONE."""
+        return self.explanation.code
+
+    NONE = 0
+    # the lease ran out
+    MASTER_LOST = (
+        1,
+        Explanation(
+            "A310",
+            "master lost",
+            "The owner's heartbeat did not change within the lease.",
+            "The robot program stopped, its connection closed, or it writes a constant heartbeat.",
+            "Let the master change the heartbeat register at least every lease; then reset with setpoint 0.",
+        ),
+    )
+    SAMPLE_STALE = (
+        2,
+        Explanation(
+            "A311",
+            "no fresh force sample",
+            "The last sample of the load cell is older than the bound.",
+            "A loose cable, a power cut at the amplifier, or a rate too low for sample_timeout_s.",
+            "Look at sample_age; check the amplifier's power and its output rate.",
+        ),
+    )
+    SAMPLE_FROZEN = (
+        3,
+        Explanation(
+            "A312",
+            "force reading is frozen",
+            "Sample after sample is the same, bit for bit: the force, or the noise of the cell, must have changed it.",
+            "The amplifier is in hold or menu mode, or repeats its last value without a cell.",
+            "Leave the amplifier's menu and release `hold`; press the cell by hand and watch `force-gateway monitor`.",
+        ),
+    )
+    # saturation counts as over-force
+    OVER_FORCE = (
+        4,
+        Explanation(
+            "A313",
+            "too much force",
+            "The measured force passed over_force_n, or the cell is saturated, several samples long.",
+            "A collision, a wrong calibration, or a broken cell wire (an open input saturates).",
+            "Clear the tool; look at force_measured with the tool in the air before the reset.",
+        ),
+    )
+    SIGN_INVERTED = (
+        5,
+        Explanation(
+            "A302",
+            "force has the wrong sign",
+            "The voltage rose in contact and the measured force fell.",
+            "The load cell's signal wires are exchanged, or it is mounted the other way round.",
+            "Exchange SIG+ and SIG-, or set `sign: -1` under load_cell in the rig file.",
+        ),
+    )
+    GAIN_WRONG = (
+        6,
+        Explanation(
+            "A303",
+            "force has the wrong size",
+            "The first rise in contact is less than 30 % or more than 300 % of what the model expects.",
+            "Kilograms read as newtons (a factor of 9.81), another cell, or another cylinder than the calibrated one.",
+            "Check the unit on the amplifier's display against the rig file; else calibrate this rig.",
+        ),
+    )
+    OUTPUT_SILENT = (
+        7,
+        Explanation(
+            "A314",
+            "output device is silent",
+            "A voltage was written and not acknowledged in time.",
+            "No power at the DAC or regulator, or a broken cable.",
+            "Check its power and cable; `force-gateway explain E111`.",
+        ),
+    )
+    OUTPUT_REFUSED = (
+        8,
+        Explanation(
+            "A315",
+            "output device refused",
+            "The DAC or regulator answered that it will not do what was asked.",
+            "A value outside the device's own range, or its watchdog has tripped and is latched.",
+            "Compare voltage_max_v with the device's range; reset the device's own alarm.",
+        ),
+    )
+    OUTPUT_ALTERED = (
+        9,
+        Explanation(
+            "A316",
+            "output differs from what was asked",
+            "The acknowledged voltage is another than the one written.",
+            "Noise on the line, a second talker, or a device set to another range.",
+            "Check shield and ground, and that nothing else is connected to the device.",
+        ),
+    )
+    # the port went away
+    OUTPUT_LOST = (
+        10,
+        Explanation(
+            "A317",
+            "output's port lost",
+            "The serial port of the output went away; its last voltage may still stand.",
+            "The USB adapter was unplugged or reset itself.",
+            "Plug it in again: the safe voltage is written first; then reset with setpoint 0.",
+        ),
+    )
+    CELL_LOST = (
+        11,
+        Explanation(
+            "A318",
+            "load cell's port lost",
+            "The serial port of the load cell went away.",
+            "The USB adapter was unplugged or reset itself.",
+            "Plug it in again: the gateway reopens it by itself; then reset with setpoint 0.",
+        ),
+    )
+    LOOP_STALLED = (
+        12,
+        Explanation(
+            "A319",
+            "control loop stalled",
+            "The loop came round later than the bound; commands that waited meanwhile were dropped.",
+            "It was stopped or suspended, or an internal error; where the kernel does not count waiting, an "
+            "overloaded machine.",
+            "The line says how long it waited for a processor, if the kernel counts that; look for other load (top).",
+        ),
+    )
+    NOT_FINITE = (
+        13,
+        Explanation(
+            "A320",
+            "a number was not finite",
+            "A computation inside the gateway gave NaN or infinity, and the safe voltage was written instead.",
+            "An internal error, or a calibration from outside its range.",
+            "Report it with a recording; go back to the previous calibration.",
+        ),
+    )
+    INTERNAL = (
+        14,
+        Explanation(
+            "A499",
+            "internal error",
+            "The control law failed with an exception; the safe voltage was written.",
+            "An internal error.",
+            "Report it with the traceback in the gateway's log.",
+        ),
+    )
+    MODEL_INVALID = (
+        15,
+        Explanation(
+            "A321",
+            "voltage-force model invalid",
+            "The active calibration fails its checks.",
+            "A calibration file that was edited by hand, or a damaged disk.",
+            "force-gateway check RIG names file and line.",
+        ),
+    )
+    # the loop was late because the machine did not let it run
+    MACHINE_BUSY = (
+        16,
+        Explanation(
+            "A403",
+            "machine too busy",
+            "The control loop was later than the rig's stall_s; most of that time it could have run but got no "
+            "processor.",
+            "Other programs take all cores: a build, more gateways, a virtual machine with too few of them.",
+            "End them, or `nice -n 10` them; else give the loop priority (run --realtime), or the rig a longer "
+            "stall_s.",
+        ),
+    )
