@@ -2,7 +2,8 @@
 
 pyserial's own read and write are not used in the loop: they would add a select per call and hide hang-ups. A read error, a
 hang-up or a device that takes no bytes for too long all end in `on_lost` and a reopening with backoff; `on_open` comes again.
-Nothing written before a loss is sent after it: an old voltage is worse than none.
+Only a pty that has lost its device is not looked for under its number, which may be another's by then: `move` says where
+it is. Nothing written before a loss is sent after it: an old voltage is worse than none.
 """
 
 import asyncio
@@ -16,6 +17,7 @@ from typing import Final
 
 from gateway.devices import SerialSettings
 from gateway.ports.errors import SERIAL_FAILURES, PortError, why_lost
+from gateway.ports.identity import Identity
 from gateway.ports.latency import set_low_latency
 from gateway.ports.opening import open_descriptor
 from gateway.ports.port import WRITE_DEADLINE_S, OnBytes, OnLost, OnOpen, monotonic_s
@@ -36,6 +38,8 @@ class SerialPort:
         self._settings = settings
         self._on_bytes, self._on_lost, self._on_open = on_bytes, on_lost, on_open
         self._descriptor = -1
+        self._is_wanted = False  # from `open` to `close`
+        self._identity = Identity()
         self._unsent = b""
         self._backoff_s = _FIRST_BACKOFF_S
         self._reopening: asyncio.TimerHandle | None = None
@@ -63,14 +67,30 @@ class SerialPort:
         return self._descriptor
 
     async def open(self) -> None:
-        self._open()
+        self._identity.take(self._path)
+        try:
+            self._open()
+        except PortError:
+            self._identity.release()
+            raise
+        self._is_wanted = True
+
+    def begin_lost(self, failure: PortError) -> None:
+        """Where the first opening failed: told like any loss, and tried again like after any."""
+        self._identity.take(self._path)
+        self._is_wanted = True
+        self._reopen_after(self._backoff_s)
+        self._on_lost(failure)
 
     def move(self, path: str) -> None:
-        """The device is found elsewhere from now on. A lost port is opened there at once; an open one is still good."""
+        """The device is found elsewhere from now on: whatever is not that one is given up, and it is opened at once."""
+        if not self._is_wanted or (path == self._path and self.is_open and not self._identity.is_gone):
+            return
+        self._lose(why_lost(self._path, None))
         self._path = path
-        if self._reopening and self._descriptor < 0:
-            self._reopening.cancel()
-            self._reopen()
+        self._identity.take(path)
+        self._stop_reopening()
+        self._reopen()
 
     def write(self, data: bytes) -> bool:
         if not self.is_open:
@@ -116,9 +136,9 @@ class SerialPort:
 
     def close(self) -> None:
         """Blocks for at most 0.25 s, and only while bytes are on their way."""
-        if self._reopening:
-            self._reopening.cancel()
-            self._reopening = None
+        self._is_wanted = False
+        self._stop_reopening()
+        self._identity.release()
         if self._descriptor >= 0:
             with contextlib.suppress(*SERIAL_FAILURES):
                 self._send_the_rest(monotonic_s() + _CLOSE_DEADLINE_S)
@@ -184,7 +204,15 @@ class SerialPort:
     def _reopen_after(self, delay_s: float) -> None:
         self._reopening = asyncio.get_running_loop().call_later(delay_s, self._reopen)
 
+    def _stop_reopening(self) -> None:
+        if self._reopening:
+            self._reopening.cancel()
+            self._reopening = None
+
     def _reopen(self) -> None:
+        self._reopening = None
+        if self._identity.is_gone:
+            return
         try:
             self._open()
             self.reopened += 1

@@ -161,11 +161,14 @@ def test_a_closed_port_stays_closed(ear: Any, line: Pty) -> None:
 
 
 def test_reopening_waits_longer_each_time_up_to_two_seconds(
-    ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch
+    ear: Any, line: Pty, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    name = tmp_path / "by-id"
+    name.symlink_to(line.path)
+
     async def scene() -> list[float]:
         loop = asyncio.get_running_loop()
-        port = ear.port(line.path)
+        port = ear.port(str(name))
         await port.open()
         waits_s: list[float] = []
 
@@ -196,6 +199,74 @@ def test_a_lost_port_that_is_found_elsewhere_is_opened_there_at_once(ear: Any, l
         assert (port.is_open, port.path, port.reopened, len(ear.losses)) == (True, other.path, 1, 1)
         port.close()
         other.close()
+
+    asyncio.run(scene())
+
+
+def successor_of(line: Pty, most: int = 32) -> list[Pty]:
+    """Ptys of somebody else, the last of them under the number of this one, which has lost its device."""
+    others = [Pty()]
+    while others[-1].path != line.path:
+        assert len(others) < most, "the kernel gives the lowest free number"
+        others.append(Pty())
+    return others
+
+
+def test_a_lost_ptys_number_is_not_its_name(ear: Any, line: Pty) -> None:
+    """Somebody else's line is neither opened nor locked, however often the port tries."""
+
+    async def scene() -> None:
+        port, path = ear.port(line.path), line.path
+        await port.open()
+        line.close()
+        await ear.until(lambda: bool(ear.losses))
+        assert "may soon be another's" in str(ear.losses[0])
+        line.path = path
+        others = successor_of(line)
+        for _ in range(3):
+            port._reopen()
+        assert not port.is_open
+        assert port._reopening is None, "and not later either"
+        os.close(open_descriptor(path, SerialSettings(baud=9600)))
+        here = Pty()
+        port.move(here.path)
+        assert (port.is_open, port.path) == (True, here.path)
+        port.close()
+        for other in (*others, here):
+            other.close()
+
+    asyncio.run(scene())
+
+
+def test_a_port_that_is_told_of_another_place_gives_up_what_it_has(ear: Any, line: Pty) -> None:
+    """What it has is not the device: that one has been started anew."""
+
+    async def scene() -> None:
+        port, here = ear.port(line.path), Pty()
+        await port.open()
+        port.move(here.path)
+        assert (port.is_open, port.path, len(ear.losses)) == (True, here.path, 1)
+        os.close(open_descriptor(line.path, SerialSettings(baud=9600)))
+        port.close()
+        port.move(line.path)
+        assert not port.is_open, "a closed port stays closed"
+        here.close()
+
+    asyncio.run(scene())
+
+
+def test_a_port_that_is_held_at_the_beginning_is_opened_as_soon_as_it_is_free(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        holder = open_descriptor(line.path, SerialSettings(baud=9600))
+        port = ear.port(line.path)
+        with pytest.raises(PortError, match="E103") as held:
+            await port.open()
+        port.begin_lost(held.value)
+        assert ear.losses == [held.value]
+        os.close(holder)
+        await ear.until(lambda: bool(ear.opened))
+        assert port.is_open
+        port.close()
 
     asyncio.run(scene())
 
