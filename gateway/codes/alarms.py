@@ -59,6 +59,13 @@ ALARMS: Final = (
         "Read the lines above it; ls /dev/pts and free -h show what is short.",
     ),
     Explanation(
+        "A410",
+        "killed control process does not go",
+        "It was killed and is still there after 2 s. The safe voltage is held; no other is started beside it.",
+        "The kernel holds it in a call that cannot be interrupted: a disk or network drive that does not answer, or a driver.",
+        "dmesg names the disk or driver; unplug the adapter, or restart the machine. It goes on by itself once that ends.",
+    ),
+    Explanation(
         "A330",
         "calibration stopped",
         "A calibration run ended before its last stair; the force went to 0 and the data are kept.",

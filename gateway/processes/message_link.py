@@ -20,6 +20,7 @@ NEED_RIG: Final = "n"  # control -> guardian: {"rig": name or path}: start the s
 READY: Final = "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s}
 FIRST_CAUSE: Final = "f"  # control -> guardian: {"text": ...}, kept for the next start
 BORN: Final = "b"  # a forked child -> guardian: {"pid": number}, before anything else
+ADOPTED: Final = "a"  # guardian -> a forked child: it is followed from now on, and may begin
 PTYS: Final = "y"  # simulated rig -> guardian: {"ptys": {...}}
 RIG: Final = "p"  # guardian -> control: {"ptys": {...}} or {"failed": True}; again whenever the ports have moved
 STOP: Final = "q"  # guardian -> control: ramp to 0, safe voltage, exit
@@ -61,12 +62,12 @@ def send(link: socket.socket, tag: str, body: dict[str, Any] | None = None, *des
 
 
 def receive(link: socket.socket) -> Message | None:
-    """The next message, None at the end of the line; a reset of a killed peer is an end too.
+    """The next message, None at the end of the line; a reset of a killed peer is an end too, behind its last words.
 
     BlockingIOError when there is none yet, NonsenseError for what is not of this protocol.
     """
     try:
-        data, ancillary, flags, _ = link.recvmsg(_LARGEST, socket.CMSG_SPACE(4 * _MOST_DESCRIPTORS), _FLAGS)
+        data, ancillary, flags, _ = _received(link)
     except BlockingIOError:
         raise
     except OSError:
@@ -81,6 +82,15 @@ def receive(link: socket.socket) -> Message | None:
         message.drop_descriptors()
         raise
     return message
+
+
+def _received(link: socket.socket) -> tuple[bytes, list[tuple[int, int, bytes]], int, Any]:
+    """A peer that died with something of ours unread gives one reset, and only then what it had said before."""
+    space = socket.CMSG_SPACE(4 * _MOST_DESCRIPTORS)
+    try:
+        return link.recvmsg(_LARGEST, space, _FLAGS)
+    except ConnectionResetError:
+        return link.recvmsg(_LARGEST, space, _FLAGS)
 
 
 def _body(data: bytes, flags: int) -> dict[str, Any]:

@@ -87,6 +87,7 @@ class GuardianLine:
         if message is None:
             self.is_gone = True
             self.told_to_stop.set()
+            self._on_rig({"failed": True})  # nobody is left to answer
             asyncio.get_running_loop().remove_reader(self._link.fileno())
         elif message.tag == guardian_link.STOP:
             self.told_to_stop.set()

@@ -40,6 +40,8 @@ from gateway.service.watch_reports import WatchDesk
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
 _WORDS_AGAIN_S = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
 _STOP_BOUND_S = 4.5  # the guardian waits 5 s
+_HELD_BOUND_S = 0.5  # how long a restart waits for a port that somebody holds who is about to end
+_HELD_AGAIN_S = 0.05
 
 
 class StartError(Exception):
@@ -75,6 +77,7 @@ class Cell:
         self._log = log
         self._flag = RunFlag(state)
         self._closing = False
+        self._not_opened: dict[str, PortError] = {}  # after a restart, by path
         self._spoke = asyncio.Event()
         self.ring: SampleRing | None = None
         self.failed = asyncio.Event()
@@ -161,8 +164,8 @@ class Cell:
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
         self._wire(_cause_of_restart(restarted, was_unclean=self._flag.raise_flag()))
-        await self._output_port.open()
-        await self._cell_port.open()
+        for port in (self._output_port, self._cell_port):
+            await (self._open_again(port) if restarted else port.open())
         self._tick.start()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
@@ -183,6 +186,21 @@ class Cell:
             force_n=self.gateway.sample.force_n if self.gateway.sample else None,
             notes=notes,
         )
+
+    async def _open_again(self, port: SerialPort) -> None:
+        """After a restart a port that is held or away is a lost one, as it would be without the restart: a fault, and
+        tried again for as long as it takes. Ending over it would use up the restarts within seconds (A402)."""
+        deadline_s = time.monotonic() + _HELD_BOUND_S
+        while True:
+            try:
+                return await port.open()
+            except PortError as error:
+                if error.code == "E101":  # no time will mend a permission
+                    raise
+                if error.code != "E103" or time.monotonic() >= deadline_s:
+                    self._not_opened[port.path] = error
+                    return port.begin_lost(error)
+            await asyncio.sleep(_HELD_AGAIN_S)
 
     def move_ports(self, ports: dict[str, str]) -> None:
         """The simulated rig has been started again, elsewhere: what was lost is opened there."""
@@ -212,6 +230,8 @@ class Cell:
 
         Not after a restart: seconds of listening would tell what the start has told already.
         """
+        if restarted and port.path in self._not_opened:
+            return str(self._not_opened[port.path])
         if restarted:
             return f"E111 {port.path}: nothing heard within {_WORDS_AGAIN_S:g} s of the restart; power, wires?"
         port.close()

@@ -39,6 +39,11 @@ class Child:
         self.died = os.pidfd_open(pid)
         self.pid, self.turns = pid, TurnsOf(pid)
 
+    def adopt(self, pid: int) -> None:
+        """Follow a forked process that has told of its birth, and let it begin; OSError when it has died already."""
+        self.born(pid)
+        guardian_link.send(self.link, guardian_link.ADOPTED)
+
     def kill(self) -> None:
         if self.pid and self._code is None:
             with contextlib.suppress(OSError):

@@ -6,6 +6,10 @@ spoken. The pages are shared with the children, which costs less memory than two
 
     guardian -> FORK {"module", "arguments"} + the child's end of its line, then what else it inherits
     child -> guardian: BORN {"pid"}, on its own line
+    guardian -> child: ADOPTED, after which it begins
+
+A child that nobody adopts ends before it has opened anything: one that was forked so late that the guardian has given it
+up and started another one must not become a second control.
 
 Forked twice, so that the child becomes the guardian's own (the guardian is a subreaper): its exit code and its last
 counters are the guardian's to read. This process has one thread and opens nothing, so there is nothing that a fork could
@@ -116,13 +120,27 @@ def _child(message: guardian_link.Message, parent: int) -> int:
     words = [str(theirs), json.dumps(arguments)]
     show_command([sys.executable, "-m", module, *words])
     line = socket.socket(fileno=theirs)
-    try:
-        guardian_link.send(line, guardian_link.BORN, {"pid": os.getpid()})
-    except OSError:
+    if not is_adopted(line):
         return 0  # nobody waits for us any more
     line.detach()
     code: int = import_module(module).main(words)
     return code
+
+
+def is_adopted(line: socket.socket) -> bool:
+    """The child's side: tell of its birth, and wait until the guardian follows it. False when it has been given up."""
+    answered = select.poll()
+    answered.register(line, select.POLLIN)
+    try:
+        guardian_link.send(line, guardian_link.BORN, {"pid": os.getpid()})
+        while True:
+            answered.poll()
+            message = guardian_link.receive(line)
+            if message is None or message.tag in (guardian_link.ADOPTED, guardian_link.STOP):
+                return message is not None and message.tag == guardian_link.ADOPTED
+            message.drop_descriptors()  # where the rig has moved to is told again when it is asked for
+    except (OSError, guardian_link.NonsenseError):
+        return False
 
 
 def show_command(command: list[str]) -> None:

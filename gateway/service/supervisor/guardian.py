@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -75,6 +76,7 @@ class Guardian:
     wait: Callable[[list[int], float], set[int]] = wait_for
 
     control: Child | None = None  # None: between a death and the next start
+    leaving: Child | None = None  # killed and not gone yet: until then no other is started, for there are never two
     rig_keeper: RigKeeper | None = None
     watch_keeper: WatchKeeper | None = None
     ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
@@ -122,6 +124,7 @@ class Guardian:
         if self.control:
             sources += [] if self.link_ended else [self.control.link.fileno()]
             sources += [self.control.died] if self.control.died >= 0 else []
+        sources += [self.leaving.died] if self.leaving else []
         for keeper in (self.rig_keeper, self.watch_keeper):
             sources += keeper.sources if keeper else []
         return sources
@@ -136,13 +139,15 @@ class Guardian:
     def _deadline_s(self) -> float:
         """When control is overdue: its heartbeat, READY, its birth; or when it is to be started."""
         if self.control is None:
-            return self.asked_s
+            return inf if self.leaving else self.asked_s
         if self.pulse.is_up:
             return self.pulse.due_s
         return self.asked_s + (_START_GRACE_S if self.control.pid else self.nursery.birth_bound_s)
 
     def _follow_others(self, readable: set[int]) -> None:
         now_s = self.clock()
+        if self.leaving and self.leaving.died in readable:
+            self._forget_leaving()
         self.nursery.follow(readable, now_s)
         if self.rig_keeper:
             self.rig_keeper.follow(readable, now_s)
@@ -186,7 +191,7 @@ class Guardian:
                 self.pulse.heard(control, self.clock())
         elif message.tag == message_link.BORN:
             with contextlib.suppress(OSError):  # it has died since: the end of its line is behind this message
-                control.born(int(message.body["pid"]))
+                control.adopt(int(message.body["pid"]))
                 self.nursery.was_born()
         elif message.tag == message_link.LINE:
             self._take_line(message)
@@ -284,8 +289,12 @@ class Guardian:
             return EXIT_OK  # told to stop while there was none
         is_gone = control.died < 0 or bool(self.wait([control.died], _DEATH_BOUND_S))
         ending = self.said_cause or (cause if isinstance(cause, Ending) else cause())
-        code = control.wait()
-        control.close()
+        self.pulse.forget()
+        code = control.wait(0.0)
+        if is_gone:
+            control.close()
+        else:
+            self.leaving = control
         reap_strangers(set(self._pids().values()))
         if self.stop_deadline_s is not None:
             self.log.note("stop", f"stopped as asked: safe voltage {words.wire_of(acknowledged)}")
@@ -312,10 +321,18 @@ class Guardian:
             self.log("restart", words.too_many_sentence(self.restarts.causes))
             return EXIT_FAILED
         self.next_start, self.asked_s = ending, now_s + pause_s
+        if self.leaving:
+            self.log("restart", words.leaving_sentence(self.leaving.pid))
+            return None
         return self._start_control() if pause_s == 0.0 else None
 
+    def _forget_leaving(self) -> None:
+        if self.leaving:
+            self.leaving.wait(0.0)
+            self.leaving.close()
+            self.leaving = None
+
     def _start_control(self) -> int | None:
-        self.pulse.forget()
         self.said_cause, self.link_ended, self.asked_s = None, False, self.clock()
         try:
             self.control = self.nursery.control(
@@ -341,6 +358,7 @@ class Guardian:
         for child in (self.control, self.rig_keeper, self.watch_keeper, self.nursery):
             if child:
                 child.end()
+        self._forget_leaving()
         if self.ring is not None:
             os.close(self.ring)
 

@@ -36,6 +36,13 @@ def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str
     return f"A401 {ending.sentence}; {how}; safe voltage {wire_of(acknowledged)}: restarted in OFF"
 
 
+def leaving_sentence(pid: int) -> str:
+    return (
+        f"A410 the killed control process (pid {pid}) does not go: the kernel holds it, for a disk or a driver; the next one "
+        "is started as soon as it is gone, for there are never two"
+    )
+
+
 def wire_of(acknowledged: bool | None) -> str:
     """How the last word on the wire went; None: there was no line."""
     return {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]

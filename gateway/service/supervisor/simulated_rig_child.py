@@ -91,7 +91,7 @@ class RigKeeper:
         try:
             message = message_link.receive(child.link)
             if message is not None and message.tag == message_link.BORN:
-                child.born(int(message.body["pid"]))
+                child.adopt(int(message.body["pid"]))
             elif message is not None and message.tag == message_link.PTYS:
                 self._due_s, self._answer = inf, {"ptys": dict(message.body["ptys"])}
         except (OSError, ValueError, KeyError, TypeError):

@@ -253,15 +253,38 @@ def test_only_a_refusal_with_a_sentence_is_an_end(scene, port, code, comes_up_fi
     assert port.wrote().startswith(SAFE_FRAME)
 
 
-def test_a_process_that_does_not_go_keeps_nobody_waiting(scene, port):
+def test_there_are_never_two_control_processes(scene, port):
+    """One that was killed and does not go may still hold the port; the next one is started once it is gone."""
+
     def script(child: FakeChild) -> None:
         dies_after(8, port, None)(child)
         child.is_immortal = True
 
     one = scene(script, lives(port))
-    assert one.run(lambda: len(one.nursery.started) == 2) is None
+    one.run(lambda: len(one.said) == 2)
     assert port.wrote() == SAFE_FRAME
     assert "it does not go" in one.said[0]
+    assert one.said[1].startswith("A410 the killed control process (pid 1000) does not go")
+    assert one.guardian._patience_s() > 1e6
+    one.now_s += 3600.0
+    assert one.guardian._on_deadline() is None
+    assert len(one.nursery.started) == 1
+    one.child.dies(-9)
+    comes_up(one)
+    assert len(one.nursery.started) == 2
+
+
+def test_a_stop_does_not_wait_for_a_process_that_does_not_go(scene, port):
+    def script(child: FakeChild) -> None:
+        dies_after(8, port, None)(child)
+        child.is_immortal = True
+
+    one = scene(script)
+    one.run(lambda: len(one.said) == 2)
+    began_s = one.now_s
+    one.signals.send()
+    assert one.run() == 0
+    assert one.now_s == began_s
 
 
 @pytest.mark.parametrize(
