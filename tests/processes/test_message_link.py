@@ -74,6 +74,15 @@ def test_a_peer_killed_with_unread_messages_is_an_end_too(ends: Pair) -> None:
     assert message_link.receive(ends[1]) is None
 
 
+def test_the_last_words_of_a_peer_killed_with_unread_messages_are_heard(ends: Pair) -> None:
+    """The line that it has handed over is the way to the safe voltage."""
+    message_link.send(ends[0], message_link.LINE, {"safe_frame": "00"})
+    message_link.send(ends[1], message_link.STOP)
+    ends[0].close()
+    assert message_link.receive(ends[1]) == message_link.Message(message_link.LINE, {"safe_frame": "00"})
+    assert message_link.receive(ends[1]) is None
+
+
 def test_control_hears_stop_and_the_end_of_its_guardian(ends: Pair) -> None:
     async def scene() -> tuple[bool, bool]:
         ends[1].setblocking(False)
@@ -133,6 +142,21 @@ def test_control_asks_for_the_simulated_ports_and_gets_them_or_the_reason(ends: 
     ptys = {"output": "/dev/pts/1", "load_cell": "/dev/pts/2"}
     assert asyncio.run(scene({"ptys": ptys})) == ptys
     assert asyncio.run(scene({"failed": 78})) is None
+
+
+def test_control_does_not_wait_for_ports_of_a_guardian_that_is_gone(ends: Pair) -> None:
+    async def scene() -> dict[str, str] | None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        asking = asyncio.ensure_future(guardian.simulated_ports("demo"))
+        await asyncio.sleep(0)
+        ends[0].close()
+        async with asyncio.timeout(2):
+            ports = await asking
+        guardian.close()
+        return ports
+
+    assert asyncio.run(scene()) is None
 
 
 def test_a_guardian_that_does_not_read_does_not_stop_the_loop(ends: Pair) -> None:

@@ -1,8 +1,10 @@
 """One running cell in this process, on ptys whose devices the test serves: what a defect of ours leaves on the wire."""
 
 import asyncio
+import os
 import socket
 import struct
+import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
@@ -10,7 +12,10 @@ from pathlib import Path
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.devices import SerialSettings
 from gateway.modbus import Peer
+from gateway.ports import PortError
+from gateway.ports.opening import open_descriptor
 from gateway.processes import message_link
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
@@ -80,6 +85,63 @@ def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices
     with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
     assert time.monotonic() - began_s < 2.5
     assert devices.heard
+
+
+def held(path: str) -> int:
+    """A descriptor of the port that carries the lock, as another process has it."""
+    return open_descriptor(path, SerialSettings(baud=9600))
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    while not condition():
+        await asyncio.sleep(0.005)
+
+
+def test_a_restart_waits_a_moment_for_a_port_whose_holder_is_about_to_end(devices: OwnDevices) -> None:
+    holder = held(str(devices.output.link))
+    ending = threading.Timer(0.1, os.close, [holder])
+    ending.start()
+
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        await until(lambda: cell.gateway.decision is not None)
+        assert cell.gateway.decision is not None
+        assert cell.gateway.decision.fault is FaultCode.NONE, "it was nobody's fault"
+
+    lines = with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
+    ending.join()
+    assert not [line for line in lines if "E103" in line]
+
+
+def test_a_restart_whose_port_stays_held_comes_up_without_it_and_takes_it_when_it_is_free(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ending over it would use up five restarts within seconds, and with them the gateway."""
+    monkeypatch.setattr("gateway.service.running_rig.running_rig._HELD_BOUND_S", 0.0)
+    holder = held(str(devices.output.link))
+
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        assert not cell._output_port.is_open
+        assert cell.gateway.output_lost is FaultCode.OUTPUT_LOST
+        os.close(holder)
+        await until(lambda: cell._output_port.is_open)
+        heard = len(devices.heard)
+        await until(lambda: len(devices.heard) > heard)
+
+    lines = with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
+    assert [line for line in lines if "E103" in line and "is held by this very process" in line]
+    assert {heard.voltage_v for heard in devices.settings_since(0.0)} <= {0.0}
+
+
+def test_a_first_start_ends_over_a_port_that_is_held(devices: OwnDevices) -> None:
+    """Somebody sits in front of it, who is told what to stop."""
+    holder = held(str(devices.output.link))
+
+    async def scene(cell: Cell, guardian: socket.socket) -> None:
+        raise AssertionError("it must not come up")
+
+    with pytest.raises(PortError, match="E103"):
+        with_cell(devices, scene)
+    os.close(holder)
 
 
 def test_a_defect_anywhere_in_the_loop_ends_with_the_safe_voltage(devices: OwnDevices) -> None:
