@@ -28,11 +28,10 @@ from gateway.service.supervisor.child_process import Child, exit_word, reap_stra
 from gateway.service.supervisor.child_starter import Nursery
 from gateway.service.supervisor.event_wait import Signals, wait_for
 from gateway.service.supervisor.heartbeat import Pulse
+from gateway.service.supervisor.other_children import OtherChildren
 from gateway.service.supervisor.restart_policy import Restarts
 from gateway.service.supervisor.run_options import RunOptions
 from gateway.service.supervisor.safe_line import SafeLine
-from gateway.service.supervisor.simulated_rig_child import RigKeeper
-from gateway.service.supervisor.watch_child import WatchKeeper
 
 _START_GRACE_S: Final = 30.0  # imports on a slow machine; nothing but the safe voltage is written before READY
 _STOP_BOUND_S: Final = 5.0  # from the first signal; from the end of the line of a control process that never was ready
@@ -77,8 +76,7 @@ class Guardian:
 
     control: Child | None = None  # None: between a death and the next start
     leaving: Child | None = None  # killed and not gone yet: until then no other is started, for there are never two
-    rig_keeper: RigKeeper | None = None
-    watch_keeper: WatchKeeper | None = None
+    others: OtherChildren = field(init=False)
     ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
     line: SafeLine | None = None
     pulse: Pulse = field(default_factory=Pulse)
@@ -91,6 +89,9 @@ class Guardian:
     announced: bool = False
     link_ended: bool = False
     restarts: Restarts = field(default_factory=Restarts)
+
+    def __post_init__(self) -> None:
+        self.others = OtherChildren(self.nursery, self.log, lambda answer: self._tell_control(message_link.RIG, answer))
 
     def watch(self) -> int:
         """Until the end; the exit code."""
@@ -120,18 +121,15 @@ class Guardian:
         return self._on_deadline()
 
     def _sources(self) -> list[int]:
-        sources = [self.signals.descriptor, *self.nursery.sources]
+        sources = [self.signals.descriptor, *self.others.sources]
         if self.control:
             sources += [] if self.link_ended else [self.control.link.fileno()]
             sources += [self.control.died] if self.control.died >= 0 else []
         sources += [self.leaving.died] if self.leaving else []
-        for keeper in (self.rig_keeper, self.watch_keeper):
-            sources += keeper.sources if keeper else []
         return sources
 
     def _patience_s(self) -> float:
-        deadlines = [self._deadline_s(), self.nursery.due_s]
-        deadlines += [keeper.due_s for keeper in (self.rig_keeper, self.watch_keeper) if keeper]
+        deadlines = [self._deadline_s(), self.others.due_s]
         if self.stop_deadline_s is not None:
             deadlines.append(self.stop_deadline_s)
         return max(0.0, min(deadlines) - self.clock())
@@ -145,14 +143,9 @@ class Guardian:
         return self.asked_s + (_START_GRACE_S if self.control.pid else self.nursery.birth_bound_s)
 
     def _follow_others(self, readable: set[int]) -> None:
-        now_s = self.clock()
         if self.leaving and self.leaving.died in readable:
             self._forget_leaving()
-        self.nursery.follow(readable, now_s)
-        if self.rig_keeper:
-            self.rig_keeper.follow(readable, now_s)
-        if self.watch_keeper:
-            self.watch_keeper.follow(readable, now_s)
+        self.others.follow(readable, self.clock())
 
     # -- what is said to us
 
@@ -196,7 +189,7 @@ class Guardian:
         elif message.tag == message_link.LINE:
             self._take_line(message)
         elif message.tag == message_link.NEED_RIG:
-            self._provide_rig()
+            self.others.provide_rig(self.clock())
         elif message.tag == message_link.FIRST_CAUSE:
             self.said_cause = Ending(EndCause.DEFECT, str(message.body["text"]))
         elif message.tag == message_link.READY:
@@ -217,16 +210,6 @@ class Guardian:
 
     # -- what others need
 
-    def _provide_rig(self) -> None:
-        if self.rig_keeper is None:
-            nursery = self.nursery
-            self.rig_keeper = RigKeeper(
-                lambda first: nursery.rig(prepared=first),
-                lambda answer: self._tell_control(message_link.RIG, answer),
-                partial(self.log, "rig"),
-            )
-        self.rig_keeper.ask(self.clock())
-
     def _announce(self, control: Child, message: message_link.Message) -> None:
         info, banner = message.body["info"], message.body["banner"]
         self.pulse.stall_s = float(message.body["stall_s"])
@@ -243,19 +226,15 @@ class Guardian:
         self.restarts.came_up()
 
     def _pids(self) -> dict[str, int]:
-        found = {"guardian": os.getpid(), "control": self.control.pid if self.control else None}
-        found |= {"rig": self.rig_keeper.pid if self.rig_keeper else None}
-        found |= {"watch": self.watch_keeper.pid if self.watch_keeper else None, "fork_server": self.nursery.server_pid}
+        found = {"guardian": os.getpid(), "control": self.control.pid if self.control else None, **self.others.pids}
         return {name: pid for name, pid in found.items() if pid}
 
     def _provide_watch(self, wanted: dict[str, Any] | None) -> None:
         """wanted: what the residual watch is told, None where the rig has none."""
         if wanted is None or self.ring is None:
             return
-        if self.watch_keeper is None:
-            arguments = wanted | {"rig": self.options.rig, "state": str(self.state), "ring": self.ring}
-            self.watch_keeper = WatchKeeper(lambda: self.nursery.watch(arguments), partial(self.log, "watch"))
-        self.watch_keeper.start(self.clock())
+        arguments = wanted | {"rig": self.options.rig, "state": str(self.state), "ring": self.ring}
+        self.others.provide_watch(arguments, self.clock())
 
     # -- when control is silent or gone
 
@@ -355,9 +334,9 @@ class Guardian:
     def _close(self) -> None:
         """Whatever ends us, the safe voltage goes first: control would die of the signal without a word."""
         self._last_word()
-        for child in (self.control, self.rig_keeper, self.watch_keeper, self.nursery):
-            if child:
-                child.end()
+        if self.control:
+            self.control.end()
+        self.others.end()
         self._forget_leaving()
         if self.ring is not None:
             os.close(self.ring)

@@ -1,0 +1,71 @@
+"""What the guardian keeps besides control: the prepared process, the simulated rig and the residual watch.
+
+Each looks after itself (see its keeper); together they say what to wait for and until when, and who is there. Standard
+library only.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from gateway.processes.event_log import EventLog
+from gateway.service.supervisor.child_starter import Nursery
+from gateway.service.supervisor.simulated_rig_child import Answer, RigKeeper
+from gateway.service.supervisor.watch_child import WatchKeeper
+
+
+class OtherChildren:
+    """tell: an answer for control about the simulated rig. Times are monotonic seconds."""
+
+    def __init__(self, nursery: Nursery, log: EventLog, tell: Callable[[Answer], None]) -> None:
+        self._nursery, self._log, self._tell = nursery, log, tell
+        self._rig: RigKeeper | None = None
+        self._watch: WatchKeeper | None = None
+
+    @property
+    def sources(self) -> list[int]:
+        """What becomes readable when one of them says something or has died."""
+        return [source for one in self._all for source in one.sources]
+
+    @property
+    def due_s(self) -> float:
+        """When `follow` has something to do without an event."""
+        return min(one.due_s for one in self._all)
+
+    @property
+    def pids(self) -> dict[str, int | None]:
+        """None: it is not there."""
+        return {
+            "rig": self._rig.pid if self._rig else None,
+            "watch": self._watch.pid if self._watch else None,
+            "fork_server": self._nursery.server_pid,
+        }
+
+    def follow(self, readable: set[int], now_s: float) -> None:
+        """After each wait."""
+        for one in self._all:
+            one.follow(readable, now_s)
+
+    def provide_rig(self, now_s: float) -> None:
+        """Control asks for the simulated rig's ports."""
+        if self._rig is None:
+            nursery = self._nursery
+            self._rig = RigKeeper(lambda first: nursery.rig(prepared=first), self._tell, partial(self._log, "rig"))
+        self._rig.ask(now_s)
+
+    def provide_watch(self, arguments: dict[str, Any], now_s: float) -> None:
+        """Control is ready, and its rig is one that is watched. The first arguments count."""
+        if self._watch is None:
+            nursery = self._nursery
+            self._watch = WatchKeeper(lambda: nursery.watch(arguments), partial(self._log, "watch"))
+        self._watch.start(now_s)
+
+    def end(self) -> None:
+        """Ask each, then insist."""
+        for one in (self._rig, self._watch, self._nursery):
+            if one:
+                one.end()
+
+    @property
+    def _all(self) -> list[Nursery | RigKeeper | WatchKeeper]:
+        return [one for one in (self._nursery, self._rig, self._watch) if one]
