@@ -84,10 +84,10 @@ class SerialPort:
 
     def move(self, path: str) -> None:
         """The device is found elsewhere from now on: whatever is not that one is given up, and it is opened at once."""
-        if not self._is_wanted or (path == self._path and self.is_open and not self._identity.is_gone):
+        was, self._path = self._path, path
+        if not self._is_wanted or (path == was and self.is_open and not self._identity.is_gone):
             return
-        self._lose(why_lost(self._path, None))
-        self._path = path
+        self._lose(why_lost(was, None))
         self._identity.take(path)
         self._stop_reopening()
         self._reopen()

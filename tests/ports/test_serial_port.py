@@ -249,7 +249,7 @@ def test_a_port_that_is_told_of_another_place_gives_up_what_it_has(ear: Any, lin
         os.close(open_descriptor(line.path, SerialSettings(baud=9600)))
         port.close()
         port.move(line.path)
-        assert not port.is_open, "a closed port stays closed"
+        assert (port.is_open, port.path) == (False, line.path), "a closed port stays closed until it is opened there"
         here.close()
 
     asyncio.run(scene())
