@@ -182,7 +182,12 @@ class SerialPort:
 
     def _fail(self, failure: PortError) -> None:
         self._failure = failure
-        asyncio.get_running_loop().call_soon(self._lose, failure)
+        asyncio.get_running_loop().call_soon(self._lose_if_failed, failure)
+
+    def _lose_if_failed(self, failure: PortError) -> None:
+        """Not what has been opened elsewhere since."""
+        if self._failure is failure:
+            self._lose(failure)
 
     def _lose(self, failure: PortError) -> None:
         if self._descriptor < 0:

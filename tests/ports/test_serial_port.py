@@ -255,6 +255,27 @@ def test_a_port_that_is_told_of_another_place_gives_up_what_it_has(ear: Any, lin
     asyncio.run(scene())
 
 
+def test_a_failure_of_the_old_place_is_none_of_the_new_one(
+    ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A write fails, and before the loop comes to it the port has moved."""
+
+    async def scene() -> None:
+        port, here = ear.port(line.path), Pty()
+        await port.open()
+        with monkeypatch.context() as patched:
+            patched.setattr(os, "write", lambda *_: (_ for _ in ()).throw(OSError(errno.EIO, "")))
+            assert not port.write(b"SET 0\r\n")
+        port.move(here.path)
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        assert (port.is_open, len(ear.losses)) == (True, 1)
+        port.close()
+        here.close()
+
+    asyncio.run(scene())
+
+
 def test_a_port_that_is_held_at_the_beginning_is_opened_as_soon_as_it_is_free(ear: Any, line: Pty) -> None:
     async def scene() -> None:
         holder = open_descriptor(line.path, SerialSettings(baud=9600))
