@@ -16,7 +16,6 @@ from typing import Final, Literal
 from serial import SerialException
 
 from gateway.ports.holders import holders_of
-from gateway.ports.identity import is_numbered
 
 PortCode = Literal["E101", "E102", "E103", "E110", "E111"]
 
@@ -65,8 +64,6 @@ def why_closed(path: str, error: Exception, present: Sequence[str]) -> PortError
 def why_lost(path: str, error: Exception | None) -> PortError:
     """The reason why an open port is gone."""
     reason = f" ({os.strerror(number)})" if error and (number := number_of(error)) else ""
-    if is_numbered(path):
-        return PortError("E102", f"{path} is gone{reason}: its device has ended, and its number may soon be another's")
     return PortError("E102", f"{path} is gone{reason}: unplugged? It is reopened as soon as it is back")
 
 

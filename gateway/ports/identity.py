@@ -1,12 +1,11 @@
 """Is a pty still the one that it was? Its number says nothing about that: it is given anew as soon as both ends are closed.
 
-So a port that has lost a pty must not look for it under its number. It once did, and a gateway whose simulated rig had died
-took the output port of another gateway, whose control process was being started again, and kept it. Behind a number may as
-well be somebody's terminal.
+So a port that has lost a simulated rig's pty must not look for it under its number. It once did, and a gateway whose
+simulated rig had died took the output port of another gateway, whose control process was being started again, and kept it.
 
 The kernel tells: a descriptor that only names the pty (O_PATH, which opens no line and holds no lock) keeps its directory
 entry, and that has no link left once the device's end is closed. Devices and links by name (/dev/serial/by-id) are meant to
-be found again, and are never gone here. Off Linux there is no O_PATH, and nothing is told.
+be found again, and are never gone here; so are the ptys that a rig file names, for nobody else will say where they are. Off Linux there is no O_PATH, and nothing is told.
 """
 
 import contextlib
@@ -17,21 +16,21 @@ _PTY_NUMBERS: Final = "/dev/pts/"
 _NAME_ONLY: Final[int] = getattr(os, "O_PATH", 0)
 
 
-def is_numbered(path: str) -> bool:
-    """Whether this path is a pty's own number, and no lasting name."""
-    return path.startswith(_PTY_NUMBERS)
+class PtyIdentity:
+    """Of the pty that a path leads to now; `take` and `release` as often as wanted.
 
+    is_kept: without it nothing is remembered and nothing is ever gone: a rig file that names a pty by its number means
+    whatever is there.
+    """
 
-class Identity:
-    """Of what a path leads to now; `take` and `release` as often as wanted."""
-
-    def __init__(self) -> None:
+    def __init__(self, *, is_kept: bool) -> None:
+        self._is_kept = is_kept
         self._descriptor = -1
 
     def take(self, path: str) -> None:
         """Remember this one. What is not there yet, or has a lasting name, is not remembered."""
         self.release()
-        if _NAME_ONLY and is_numbered(path):
+        if self._is_kept and _NAME_ONLY and path.startswith(_PTY_NUMBERS):
             with contextlib.suppress(OSError):
                 self._descriptor = os.open(path, _NAME_ONLY | os.O_CLOEXEC)
 

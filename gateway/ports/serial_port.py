@@ -2,8 +2,8 @@
 
 pyserial's own read and write are not used in the loop: they would add a select per call and hide hang-ups. A read error, a
 hang-up or a device that takes no bytes for too long all end in `on_lost` and a reopening with backoff; `on_open` comes again.
-Only a pty that has lost its device is not looked for under its number, which may be another's by then: `move` says where
-it is. Nothing written before a loss is sent after it: an old voltage is worse than none.
+Only a simulated rig's pty that has lost its device is not looked for under its number, which may be another's by then:
+`move` says where it is. Nothing written before a loss is sent after it: an old voltage is worse than none.
 """
 
 import asyncio
@@ -17,7 +17,7 @@ from typing import Final
 
 from gateway.devices import SerialSettings
 from gateway.ports.errors import SERIAL_FAILURES, PortError, why_lost
-from gateway.ports.identity import Identity
+from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
 from gateway.ports.opening import open_descriptor
 from gateway.ports.port import WRITE_DEADLINE_S, OnBytes, OnLost, OnOpen, monotonic_s
@@ -29,17 +29,27 @@ _CLOSE_DEADLINE_S: Final = 0.25
 
 
 class SerialPort:
-    """See port.Port. All callbacks run in the loop; on_lost is never called from inside `write`."""
+    """See port.Port. All callbacks run in the loop; on_lost is never called from inside `write`.
+
+    is_simulated: a lost pty is not looked for under its number; `move` will tell where its device is from then on.
+    """
 
     def __init__(
-        self, path: str, settings: SerialSettings, *, on_bytes: OnBytes, on_lost: OnLost, on_open: OnOpen
+        self,
+        path: str,
+        settings: SerialSettings,
+        *,
+        on_bytes: OnBytes,
+        on_lost: OnLost,
+        on_open: OnOpen,
+        is_simulated: bool = False,
     ) -> None:
         self._path = path
         self._settings = settings
         self._on_bytes, self._on_lost, self._on_open = on_bytes, on_lost, on_open
         self._descriptor = -1
         self._is_wanted = False  # from `open` to `close`
-        self._identity = Identity()
+        self._identity = PtyIdentity(is_kept=is_simulated)
         self._unsent = b""
         self._backoff_s = _FIRST_BACKOFF_S
         self._reopening: asyncio.TimerHandle | None = None

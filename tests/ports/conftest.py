@@ -49,9 +49,15 @@ class Ear:
                 self._changed.clear()
                 await self._changed.wait()
 
-    def port(self, path: str, settings: SerialSettings | None = None) -> SerialPort:
-        settings = settings or SerialSettings(baud=9600)
-        return SerialPort(path, settings, on_bytes=self.on_bytes, on_lost=self.on_lost, on_open=self.on_open)
+    def port(self, path: str, settings: SerialSettings | None = None, *, is_simulated: bool = False) -> SerialPort:
+        return SerialPort(
+            path,
+            settings or SerialSettings(baud=9600),
+            on_bytes=self.on_bytes,
+            on_lost=self.on_lost,
+            on_open=self.on_open,
+            is_simulated=is_simulated,
+        )
 
 
 @pytest.fixture

@@ -216,11 +216,10 @@ def test_a_lost_ptys_number_is_not_its_name(ear: Any, line: Pty) -> None:
     """Somebody else's line is neither opened nor locked, however often the port tries."""
 
     async def scene() -> None:
-        port, path = ear.port(line.path), line.path
+        port, path = ear.port(line.path, is_simulated=True), line.path
         await port.open()
         line.close()
         await ear.until(lambda: bool(ear.losses))
-        assert "may soon be another's" in str(ear.losses[0])
         line.path = path
         others = successor_of(line)
         for _ in range(3):
@@ -233,6 +232,25 @@ def test_a_lost_ptys_number_is_not_its_name(ear: Any, line: Pty) -> None:
         assert (port.is_open, port.path) == (True, here.path)
         port.close()
         for other in (*others, here):
+            other.close()
+
+    asyncio.run(scene())
+
+
+def test_a_pty_that_a_rig_names_by_its_number_is_found_again_under_it(ear: Any, line: Pty) -> None:
+    """Nobody will say where else it is, and whoever wrote the number means it."""
+
+    async def scene() -> None:
+        port, path = ear.port(line.path), line.path
+        await port.open()
+        line.close()
+        await ear.until(lambda: bool(ear.losses))
+        line.path = path
+        others = successor_of(line)
+        await ear.until(lambda: len(ear.opened) == 2)
+        assert port.is_open
+        port.close()
+        for other in others:
             other.close()
 
     asyncio.run(scene())

@@ -91,6 +91,7 @@ class Cell:
             on_bytes=self._on_output_bytes,
             on_lost=self._on_output_lost,
             on_open=self._on_output_open,
+            is_simulated=rig.simulated,
         )
         self._cell_port = SerialPort(
             ports["load_cell"],
@@ -98,6 +99,7 @@ class Cell:
             on_bytes=self._on_cell_bytes,
             on_lost=self._on_cell_lost,
             on_open=self._on_cell_open,
+            is_simulated=rig.simulated,
         )
         self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
         self._turns = TurnsOf(os.getpid())
