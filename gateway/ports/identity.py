@@ -5,7 +5,8 @@ simulated rig had died took the output port of another gateway, whose control pr
 
 The kernel tells: a descriptor that only names the pty (O_PATH, which opens no line and holds no lock) keeps its directory
 entry, and that has no link left once the device's end is closed. Devices and links by name (/dev/serial/by-id) are meant to
-be found again, and are never gone here; so are the ptys that a rig file names, for nobody else will say where they are. Off Linux there is no O_PATH, and nothing is told.
+be found again, and are never gone here; so are the ptys that a rig file names, for nobody else will say where they are. Off
+Linux there is no O_PATH, and nothing is told.
 """
 
 import contextlib
