@@ -7,8 +7,8 @@ and effect (43 causes and where a search for them begins), scene, candidates, co
 result (the answer). Pure: time and chance are arguments.
 """
 
-from gateway.diagnosis.catalogue.catalogue import BY_NAME, EFFECTS, effect_named
-from gateway.diagnosis.catalogue.effect import Effect, Parameter
+from gateway.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.diagnose import Options, diagnose
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.result import Diagnosis, Verdict
@@ -23,5 +23,4 @@ __all__ = [
     "Parameter",
     "Verdict",
     "diagnose",
-    "effect_named",
 ]

@@ -11,9 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.catalogue import BY_NAME, EFFECTS
-from gateway.diagnosis.catalogue.cylinder import COULOMB, DRAG_ASYMMETRY
-from gateway.diagnosis.catalogue.effect import Effect, Parameter
+from gateway.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.catalogue.cylinder import COULOMB, DRAG_ASYMMETRY
+from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
 from gateway.diagnosis.input_checks import Suspect, suspects
 from gateway.diagnosis.measurement import Measurement

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.catalogue import BY_NAME, EFFECTS
-from gateway.diagnosis.catalogue.effect import Effect, Parameter
+from gateway.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.experiments.identifiability import invisible
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.noise_floor import replicate_floor_n

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gateway.catalogue.sensing import DRIFT, ZERO_PER_K
 from gateway.diagnosis import BY_NAME, Diagnosis, Measurement, Options, diagnose
-from gateway.diagnosis.catalogue.sensing import DRIFT, ZERO_PER_K
 from gateway.diagnosis.noise import coloured, white
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
 from gateway.diagnosis.search.bench import Bench

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gateway.catalogue.catalogue import BY_NAME
 from gateway.diagnosis import Options, Verdict, diagnose
-from gateway.diagnosis.catalogue.catalogue import BY_NAME
 from gateway.diagnosis.result import Gain
 from gateway.diagnosis.search.model_comparison import Contest
 from gateway.diagnosis.search.normal_equations import HeldOut

@@ -10,7 +10,6 @@ from gateway.diagnosis import EFFECTS
 from gateway.profiles import check_report, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import plant_text, with_origins
 from gateway.profiles.rigs.compensation import ALL_INPUTS, TREATMENTS, By, changed, compensation_of, number_at
-from gateway.profiles.rigs.uncompensated import REASONS
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 
@@ -33,8 +32,10 @@ def rig_with(folder: Path, line: str, **numbers: float) -> Path:
 
 def test_every_effect_of_the_catalogue_has_a_treatment_or_a_reason():
     assert {treatment.name for treatment in TREATMENTS} == {effect.name for effect in EFFECTS}
-    assert all(why and why[0].islower() and not why.endswith(".") for _, why in REASONS.values())
-    assert {treatment.name for treatment in TREATMENTS if treatment.by is By.NOTHING} == set(REASONS)
+    for treatment in TREATMENTS:
+        why = treatment.why_not
+        assert bool(why) == (treatment.by is By.NOTHING), treatment.name
+        assert not why or (why[0].islower() and not why.endswith(".")), treatment.name
 
 
 def test_every_number_that_makes_an_effect_is_looked_at():

@@ -4,16 +4,13 @@ Levels are shares of what the rig may use (with the shipped rig about 0 .. 8 V, 
 step or ramp, so blocks may follow each other in any order; what two effects share is run once.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
+from gateway.catalogue.effect import PartName
 from gateway.control.runs.experiment_plan import Do, Move, Part
 
 LEVELS: Final = (0.2, 0.45, 0.75)
-
-
-def _part(name: str, why: str, moves: Iterator[Move] | Sequence[Move]) -> Part:
-    return Part(name=name, why=why, moves=tuple(moves))
 
 
 def _step(level: float, hold_s: float) -> Move:
@@ -88,29 +85,34 @@ def _cycles(high: float, hold_s: float, times: int) -> Iterator[Move]:
         yield _step(0.15, hold_s)
 
 
-STAIRCASE: Final = _part("staircase", "all levels, from both sides", (_ladder(1.0, 20, 0.6), _ladder(0.0, 20, 0.6)))
-DWELLS: Final = _part("dwells", "levels held long enough for leaks, creep and oscillation to show", _dwells())
-REVERSALS: Final = _part(
-    "reversals", "loops of three sizes around three levels: the shape of friction", _reversals((0.02, 0.08, 0.25), 1.2)
-)
-STEPS: Final = _part("steps", "steps of four sizes: delay, lags and limits of speed part", _steps())
-RAMPS: Final = _part("ramps", "the same way at three speeds: what depends on speed", _ramps())
-FINE: Final = _part("fine stairs", "stairs as small as a dead band, up and down around three levels", _fine())
-RESTS: Final = _part("rests", "rests of six lengths, each followed by the same ramp", _rests())
-STROKES: Final = _part(
-    "strokes", "nearly the whole range, four times", (_ramp(0.5, 2.0), _swing(0.9, 4, 3.0, 0.3), _ramp(0.05, 1.0))
-)
-SLOW_RAMP: Final = _part("slow ramp", "so slow that each step of the command stands alone", (
-    _step(0.25, 1.0), _ramp(0.5, 40.0), _ramp(0.25, 40.0),
-))  # fmt: skip
-TOUCHES: Final = _part("touches", "from no force to a little and back: play, lost force and signs", _touches())
-CYCLES: Final = _part("cycles", "30 s at a high and at a low level, three times", _cycles(0.75, 30.0, 3))
-LASTING: Final = _part(
-    "steps throughout", "the same steps from beginning to end", (_step(0.45, 2.0), _swing(0.4, 60, None, 2.5))
-)
-REST: Final = _part("rest", "no force: what the cell and its cable say by themselves", (_step(0.0, 20.0),))
-LONG_REST: Final = _part("long rest", "ten minutes without force", (_step(0.0, 600.0),))
-LEVEL: Final = _part("one level", "one force for as long as what is moved by hand takes", (_step(0.45, 60.0),))
-THREE_LEVELS: Final = _part(
-    "three levels", "20 s at each of three forces", tuple(_step(level, 20.0) for level in LEVELS)
-)
+_BLOCKS: Final[dict[PartName, tuple[str, Iterable[Move]]]] = {
+    PartName.STAIRCASE: ("all levels, from both sides", (_ladder(1.0, 20, 0.6), _ladder(0.0, 20, 0.6))),
+    PartName.DWELLS: ("levels held long enough for leaks, creep and oscillation to show", _dwells()),
+    PartName.REVERSALS: (
+        "loops of three sizes around three levels: the shape of friction",
+        _reversals((0.02, 0.08, 0.25), 1.2),
+    ),
+    PartName.STEPS: ("steps of four sizes: delay, lags and limits of speed part", _steps()),
+    PartName.RAMPS: ("the same way at three speeds: what depends on speed", _ramps()),
+    PartName.FINE: ("stairs as small as a dead band, up and down around three levels", _fine()),
+    PartName.RESTS: ("rests of six lengths, each followed by the same ramp", _rests()),
+    PartName.STROKES: (
+        "nearly the whole range, four times",
+        (_ramp(0.5, 2.0), _swing(0.9, 4, 3.0, 0.3), _ramp(0.05, 1.0)),
+    ),
+    PartName.SLOW_RAMP: (
+        "so slow that each step of the command stands alone",
+        (_step(0.25, 1.0), _ramp(0.5, 40.0), _ramp(0.25, 40.0)),
+    ),
+    PartName.TOUCHES: ("from no force to a little and back: play, lost force and signs", _touches()),
+    PartName.CYCLES: ("30 s at a high and at a low level, three times", _cycles(0.75, 30.0, 3)),
+    PartName.LASTING: ("the same steps from beginning to end", (_step(0.45, 2.0), _swing(0.4, 60, None, 2.5))),
+    PartName.REST: ("no force: what the cell and its cable say by themselves", (_step(0.0, 20.0),)),
+    PartName.LONG_REST: ("ten minutes without force", (_step(0.0, 600.0),)),
+    PartName.LEVEL: ("one force for as long as what is moved by hand takes", (_step(0.45, 60.0),)),
+    PartName.THREE_LEVELS: ("20 s at each of three forces", (_step(level, 20.0) for level in LEVELS)),
+}
+BLOCKS: Final[dict[PartName, Part]] = {
+    name: Part(name=str(name), why=why, moves=tuple(moves)) for name, (why, moves) in _BLOCKS.items()
+}
+"""Every part that a recipe of the catalogue may name, ready to run."""

@@ -1,23 +1,21 @@
 """What to record next: for each effect of the catalogue an experiment that shows it, and one plan for several of them.
 
-An experiment names the blocks that the gateway runs by itself, the columns that must be recorded, and what a person has to
-do: `apart` from the run (dead weights on the cell), or `meanwhile` (turn the tool). What is done meanwhile changes what
-every other block would show, so such a run stands alone.
+The catalogue's recipes say which blocks the gateway runs by itself, which columns must be recorded, and what a person has
+to do. What is done meanwhile changes what every other block would show, so such a run stands alone.
 Why an experiment shows its effect is the catalogue's own signature.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Final
 
+from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.effect import RECORDED, Effect
 from gateway.control.runs.experiment_plan import ExperimentPlan, Part
-from gateway.diagnosis.catalogue.catalogue import BY_NAME, EFFECTS
-from gateway.diagnosis.experiments import blocks as block
+from gateway.diagnosis.experiments.blocks import BLOCKS
 from gateway.diagnosis.result import Diagnosis
 
-RECORDED: Final = frozenset({"time_s", "command_v", "force_n", "pressure_kpa"})
-"""What a gateway records by itself, pressure where its output device measures it."""
 USUAL_LONGEST_S: Final = 600.0
 
 
@@ -57,143 +55,21 @@ class Plan:
         return self.experiment.duration_s
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Way:
-    """One way to experiment, which several effects share."""
-
-    names: tuple[str, ...]
-    parts: tuple[Part, ...]
-    columns: tuple[str, ...] = ()
-    apart: str = ""
-    meanwhile: str = ""
-    check: bool = True
-
-
-_PRESSURE: Final = ("pressure_kpa",)
-_WARM: Final = ("temperature_c",)
-_WAYS: Final = (
-    _Way(names=("transport-delay", "extra-lag", "slew-limit"), parts=(block.STEPS,), columns=_PRESSURE),
-    _Way(names=("clock-offset",), parts=(block.STEPS, block.RAMPS), columns=_PRESSURE),
-    _Way(names=("clock-skew",), parts=(block.LASTING,)),
-    _Way(names=("dead-band",), parts=(block.FINE,), columns=_PRESSURE),
-    _Way(names=("regulator-hysteresis",), parts=(block.STAIRCASE, block.FINE), columns=_PRESSURE),
-    _Way(names=("command-quantisation",), parts=(block.SLOW_RAMP,)),
-    _Way(names=("command-nonlinearity", "supply-saturation"), parts=(block.STAIRCASE, block.STEPS), columns=_PRESSURE),
-    _Way(
-        names=("supply-droop",),
-        parts=(block.THREE_LEVELS,),
-        columns=("supply_kpa",),
-        meanwhile="let another consumer on the same air line switch on and off every few seconds",
-    ),
-    _Way(names=("leak",), parts=(block.DWELLS, block.STEPS), columns=_PRESSURE),
-    _Way(names=("regulator-hunting",), parts=(block.REST, block.DWELLS), columns=_PRESSURE),
-    _Way(names=("coulomb-friction", "viscous-friction"), parts=(block.RAMPS, block.STROKES), columns=_PRESSURE),
-    _Way(names=("stribeck-friction",), parts=(block.RAMPS, block.RESTS)),
-    _Way(
-        names=("presliding", "load-dependent-friction", "asymmetric-friction"), parts=(block.REVERSALS, block.STROKES)
-    ),
-    _Way(names=("dwell-stiction",), parts=(block.RESTS,)),
-    _Way(names=("creep",), parts=(block.DWELLS, block.CYCLES)),
-    _Way(
-        names=("contact-nonlinearity", "sensor-quadratic", "sensor-cubic"),
-        parts=(block.STAIRCASE,),
-        columns=_PRESSURE,
-        apart="put dead weights on the load cell, seven levels up and down: a bent cell shows with them, a bent contact "
-        "does not",
-    ),
-    _Way(
-        names=("end-stop",),
-        parts=(block.STAIRCASE,),
-        columns=("position_mm",),
-        apart="run the plan again with the workpiece 1 mm nearer: a stop then takes another share",
-    ),
-    _Way(
-        names=("side-load",),
-        parts=(block.REVERSALS,),
-        columns=("feed_mm_s", "tilt_deg"),
-        meanwhile="let the robot feed at two speeds, and stand, for some seconds each",
-    ),
-    _Way(
-        names=("tilt-gravity",),
-        parts=(block.LEVEL,),
-        columns=("tilt_deg",),
-        meanwhile="turn the tool to 0, 45, 90 and 135 degrees, 10 s each, with its pad on a workpiece that turns along",
-    ),
-    _Way(
-        names=("feed-drag",),
-        parts=(block.LEVEL,),
-        columns=("feed_mm_s",),
-        meanwhile="let the robot feed at 0, 5 and 15 mm/s in both directions",
-    ),
-    _Way(
-        names=("spindle-vibration",),
-        parts=(block.LEVEL,),
-        columns=("spindle_rpm",),
-        meanwhile="run the spindle at nothing, half and full speed, 20 s each",
-    ),
-    _Way(
-        names=("pad-wear",),
-        parts=(block.CYCLES,),
-        columns=("distance_m", "temperature_c"),
-        apart="note distance_m: wear follows the way that was ground, drift follows time and goes on at rest",
-    ),
-    _Way(
-        names=("position-dependence", "position-ripple"),
-        parts=(block.LEVEL,),
-        columns=("position_mm",),
-        meanwhile="let the robot go the whole way forth and back at two speeds",
-    ),
-    _Way(names=("backlash",), parts=(block.TOUCHES, block.REVERSALS)),
-    _Way(
-        names=("thermal-zero-drift", "thermal-span-drift"),
-        parts=(block.CYCLES,),
-        columns=_WARM,
-        apart="warm the cell up by some kelvin (a lamp), run the plan, let it cool down, run it again",
-    ),
-    _Way(
-        names=("warm-up",),
-        parts=(block.LONG_REST,),
-        columns=_WARM,
-        apart="switch the amplifier off for half an hour before",
-    ),
-    _Way(names=("linear-drift",), parts=(block.CYCLES,)),
-    _Way(names=("mains-hum", "outliers"), parts=(block.REST, block.DWELLS)),
-    _Way(names=("repeated-samples", "sensor-quantisation"), parts=(block.REST, block.RAMPS)),
-    _Way(
-        names=("valve-crosstalk",),
-        parts=(block.STEPS,),
-        meanwhile="shut the air off and vent the line before; what moves then is no force",
-        check=False,
-    ),
-    _Way(
-        names=("sign-loss",),
-        parts=(block.TOUCHES,),
-        apart="pull at the load cell by hand, with the output off: the reading must become negative",
-    ),
-)
+def experiment_of(effect: Effect) -> Experiment:
+    """Return the experiment that an entry of the catalogue describes."""
+    recipe = effect.recipe
+    return Experiment(
+        name=effect.name,
+        why=f"{effect.what}: {effect.signature}",
+        parts=tuple(BLOCKS[name] for name in recipe.parts),
+        columns=tuple(dict.fromkeys((*effect.inputs, *recipe.columns))),
+        apart=recipe.apart,
+        meanwhile=recipe.meanwhile,
+        check=recipe.check,
+    )
 
 
-def _why(name: str) -> str:
-    effect = BY_NAME[name]
-    return f"{effect.what}: {effect.signature}"
-
-
-def _experiments() -> Iterator[Experiment]:
-    ways = {name: way for way in _WAYS for name in way.names}
-    for effect in EFFECTS:
-        way = ways[effect.name]
-        yield Experiment(
-            name=effect.name,
-            why=_why(effect.name),
-            parts=way.parts,
-            columns=way.columns,
-            apart=way.apart,
-            meanwhile=way.meanwhile,
-            check=way.check,
-        )
-
-
-EXPERIMENTS: Final[dict[str, Experiment]] = {experiment.name: experiment for experiment in _experiments()}
+EXPERIMENTS: Final[dict[str, Experiment]] = {effect.name: experiment_of(effect) for effect in EFFECTS}
 """By name of the effect, in the catalogue's order."""
 
 

@@ -7,7 +7,7 @@ base model could absorb and the noise could hide.
 from collections.abc import Sequence
 from typing import Final
 
-from gateway.diagnosis.catalogue.effect import Effect
+from gateway.catalogue.effect import Effect
 from gateway.diagnosis.result import NotIdentifiable
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.candidates import Score

@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.catalogue import EFFECTS
-from gateway.diagnosis.catalogue.cylinder import AREA, COULOMB
-from gateway.diagnosis.catalogue.effect import Parameter
-from gateway.diagnosis.catalogue.regulator import LAG
-from gateway.diagnosis.catalogue.sensing import CLOCK_OFFSET
+from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.cylinder import AREA, COULOMB
+from gateway.catalogue.effect import Parameter
+from gateway.catalogue.regulator import LAG
+from gateway.catalogue.sensing import CLOCK_OFFSET
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench

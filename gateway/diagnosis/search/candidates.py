@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.effect import ANY, Effect, Form, Scene, Start
+from gateway.catalogue.effect import ANY, Effect, Form, Scene, Start
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.levenberg_marquardt import Fitted, Whiten

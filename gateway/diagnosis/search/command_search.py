@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.cylinder import AREA, COULOMB
-from gateway.diagnosis.catalogue.regulator import DEAD_BAND, LAG
+from gateway.catalogue.cylinder import AREA, COULOMB
+from gateway.catalogue.regulator import DEAD_BAND, LAG
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench, Segment

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.effect import Parameter
-from gateway.diagnosis.catalogue.sensing import OUTLIER, OUTLIER_SHARE, QUANTUM, REPEATED
+from gateway.catalogue.effect import Parameter
+from gateway.catalogue.sensing import OUTLIER, OUTLIER_SHARE, QUANTUM, REPEATED
 from gateway.diagnosis.measurement import Flags, Floats
 from gateway.diagnosis.noise import fast_noise_n
 from gateway.diagnosis.search.bench import Bench

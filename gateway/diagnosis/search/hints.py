@@ -4,8 +4,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.cylinder import AREA, COULOMB
-from gateway.diagnosis.catalogue.effect import Scene
+from gateway.catalogue.cylinder import AREA, COULOMB
+from gateway.catalogue.effect import Scene
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.effect import Parameter
+from gateway.catalogue.effect import Parameter
 from gateway.diagnosis.measurement import Flags, Floats
 from gateway.diagnosis.noise import Whitener, white
 from gateway.diagnosis.search.bench import Bench, begins_at_rest

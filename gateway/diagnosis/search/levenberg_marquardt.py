@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.catalogue.effect import Parameter
+from gateway.catalogue.effect import Parameter
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.parameters import Point

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.random import default_rng
 
-from gateway.diagnosis.catalogue.catalogue import BY_NAME
-from gateway.diagnosis.catalogue.effect import Effect, Form, Parameter, Scene
+from gateway.catalogue.catalogue import BY_NAME
+from gateway.catalogue.effect import Effect, Form, Parameter, Scene
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.candidates import Score, Wave, best_of_each, scores, wave

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gateway.diagnosis.catalogue.effect import Form, Parameter, Start
+from gateway.catalogue.effect import Form, Parameter, Start
 from gateway.twin.plant import Plant, with_value
 from gateway.twin.replay.drive import Strains
 

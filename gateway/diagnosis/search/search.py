@@ -20,7 +20,7 @@ import numpy as np
 from numpy.random import default_rng
 from numpy.typing import NDArray
 
-from gateway.diagnosis.catalogue.effect import Effect, Form, Parameter, Scene
+from gateway.catalogue.effect import Effect, Form, Parameter, Scene
 from gateway.diagnosis.noise import Whitener, coloured
 from gateway.diagnosis.residual_tests import Answer, best_answer
 from gateway.diagnosis.search.base_fit import refit

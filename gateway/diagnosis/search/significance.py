@@ -14,8 +14,8 @@ import numpy as np
 from numpy.random import default_rng
 from numpy.typing import NDArray
 
-from gateway.diagnosis.catalogue.catalogue import BY_NAME
-from gateway.diagnosis.catalogue.cylinder import AREA
+from gateway.catalogue.catalogue import BY_NAME
+from gateway.catalogue.cylinder import AREA
 from gateway.diagnosis.noise import Whitener, white
 from gateway.diagnosis.result import Gain
 from gateway.diagnosis.search.bench import Bench

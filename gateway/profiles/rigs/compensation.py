@@ -1,20 +1,20 @@
 """From an extended plant to what control compensates of it, and why it leaves the rest.
 
 Compared with the base plant, the one that rig and calibration were made for: an effect counts where one of its numbers
-differs. Each has a treatment; the sentence of one that has none says what would be needed. Inputs are what control is told
-besides the load cell; a part whose input is missing stays off and is listed, not refused.
+differs. What control does about an effect, or why nothing, stands in its entry of the catalogue. Inputs are what control
+is told besides the load cell; a part whose input is missing stays off and is listed, not refused.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from math import radians
 from typing import Any, Final
 
+from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.effect import By, Effect
 from gateway.control.compensation.command_map import CommandMap
 from gateway.control.compensation.compensation import Compensation, OutsideForce, Timing
 from gateway.control.compensation.load_cell import CellMap
-from gateway.profiles.rigs.uncompensated import REASONS
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 
@@ -29,52 +29,35 @@ CALIBRATE: Final = "it is the calibration's: `force-gateway calibrate` measures 
 _NOT_SIMULATED: Final = "a simulated rig is not told how the tool is held"
 
 
-class By(StrEnum):
-    """Where an effect is compensated."""
-
-    MODEL = "model"
-    COMMAND = "command"
-    CELL = "cell"
-    OUTSIDE = "outside"
-    TIMING = "timing"
-    NOTHING = "nothing"
-
-
 @dataclass(frozen=True, slots=True)
-class Treatment:
-    """One effect of the catalogue: the numbers of a plant that make it, by whom it is compensated, which input that needs."""
+class FieldTreatment:
+    """What control does about one effect: the numbers of a plant that make it, by whom it is compensated, which input that
+    needs; why not, where nothing compensates it."""
 
     name: str
     fields: tuple[str, ...]
-    by: By = By.NOTHING
-    needs: str = ""
+    by: By
+    needs: tuple[str, ...]
+    why_not: str
 
 
-TREATMENTS: Final = (
-    Treatment("transport-delay", ("regulator.delay_s",), By.TIMING),
-    Treatment("extra-lag", ("regulator.lag_s", "regulator.second_lag_s", "cell.filter_s"), By.TIMING),
-    Treatment("command-nonlinearity", ("regulator.command_bow", "regulator.command_s"), By.COMMAND),
-    Treatment("regulator-hysteresis", ("regulator.hysteresis_pa",), By.MODEL),
-    Treatment("coulomb-friction", ("friction.coulomb_n",), By.MODEL),
-    Treatment("presliding", ("friction.presliding_m",), By.MODEL),
-    Treatment("load-dependent-friction", ("friction.load_dependent_n_per_n",), By.MODEL),
-    Treatment("asymmetric-friction", ("friction.asymmetry_n",), By.MODEL),
-    Treatment("contact-nonlinearity", ("contact.hardening",), By.MODEL),
-    Treatment("backlash", ("contact.backlash_n", "contact.lost_n"), By.MODEL),
-    Treatment("tilt-gravity", ("contact.tilt_n", "contact.tilt_zero_deg"), By.OUTSIDE, "tilt_deg"),
-    Treatment(
-        "feed-drag",
-        ("contact.feed_drag_n_s_per_mm", "contact.feed_drag_n", "contact.feed_drag_abs_n_s_per_mm"),
-        By.OUTSIDE,
-        "feed_mm_s",
-    ),
-    Treatment("thermal-zero-drift", ("cell.zero_n_per_k",), By.CELL, "temperature_c"),
-    Treatment("thermal-span-drift", ("cell.span_per_k",), By.CELL, "temperature_c"),
-    Treatment("sensor-quadratic", ("cell.quadratic_per_n",), By.CELL),
-    Treatment("sensor-cubic", ("cell.cubic_per_n2",), By.CELL),
-    Treatment("valve-crosstalk", ("cell.crosstalk_n_per_v",), By.CELL),
-    *(Treatment(name, fields) for name, (fields, _) in REASONS.items()),
-)
+def treatments_of(effects: Iterable[Effect]) -> tuple[FieldTreatment, ...]:
+    """Return the treatments of these entries of the catalogue in its order, those of what is compensated first."""
+    found = [
+        FieldTreatment(
+            effect.name,
+            treatment.fields or tuple(parameter.path for parameter in effect.parameters),
+            treatment.by,
+            effect.inputs if treatment.by is not By.NOTHING else (),
+            treatment.why_not,
+        )
+        for effect in effects
+        for treatment in effect.treatments
+    ]
+    return tuple(sorted(found, key=lambda each: each.by is By.NOTHING))
+
+
+TREATMENTS: Final = treatments_of(EFFECTS)
 
 
 def number_at(plant: Plant, path: str) -> Any:
@@ -82,7 +65,7 @@ def number_at(plant: Plant, path: str) -> Any:
     return getattr(getattr(plant, section), name)
 
 
-def changed(base: Plant, extended: Plant) -> tuple[Treatment, ...]:
+def changed(base: Plant, extended: Plant) -> tuple[FieldTreatment, ...]:
     """Effects in which the two plants differ, in the catalogue's order of compensation."""
     return tuple(
         treatment
@@ -146,11 +129,11 @@ def compensation_words(compensation: Compensation) -> tuple[str, ...]:
     return (acts, *(f"not compensated: {name}: {why}" for name, why in compensation.limited))
 
 
-def _why_not(treatment: Treatment, told: frozenset[str], new_model: bool) -> str:
+def _why_not(treatment: FieldTreatment, told: frozenset[str], new_model: bool) -> str:
     if treatment.by is By.NOTHING:
-        return REASONS[treatment.name][1]
-    if treatment.needs and treatment.needs not in told:
-        return f"needs {treatment.needs}, which nobody tells the controller"
+        return treatment.why_not
+    if missing := [name for name in treatment.needs if name not in told]:
+        return f"needs {' and '.join(missing)}, which nobody tells the controller"
     return CALIBRATE if treatment.by is By.MODEL and not new_model else ""
 
 

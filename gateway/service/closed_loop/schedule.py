@@ -11,8 +11,9 @@ from typing import Final
 
 from numpy.random import default_rng
 
+from gateway.catalogue.catalogue import EFFECTS
 from gateway.profiles.rigs.compensation import changed
-from gateway.twin import Plant
+from gateway.twin import Plant, surroundings
 from gateway.twin.surroundings import Surroundings
 
 STEPS_N: Final = (5.0, 20.0, 40.0, 25.0, 10.0, 30.0, 15.0, 35.0)
@@ -30,17 +31,11 @@ WARMER_K: Final = 12.0
 FEED_MM_S: Final = 10.0
 TILTED_DEG: Final = 60.0
 COLUMNS: Final = {
-    "tilt-gravity": "tilt_deg",
-    "feed-drag": "feed_mm_s",
-    "thermal-zero-drift": "temperature_c",
-    "thermal-span-drift": "temperature_c",
-    "supply-droop": "supply_kpa",
-    "spindle-vibration": "spindle_rpm",
-    "pad-wear": "distance_m",
-    "position-dependence": "position_mm",
-    "position-ripple": "position_mm",
-    "end-stop": "position_mm",
+    effect.name: effect.columns[0]
+    for effect in EFFECTS
+    if len(effect.columns) == 1 and effect.columns[0] in surroundings.COLUMNS
 }
+"""What has to move around the tool for an effect to show, by its name: the one column that it depends on."""
 
 
 @dataclass(frozen=True, slots=True)

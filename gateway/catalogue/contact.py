@@ -2,9 +2,21 @@
 
 from typing import Final
 
-from gateway.diagnosis.catalogue.cylinder import SIDE_LOAD
-from gateway.diagnosis.catalogue.effect import Effect, Form, Parameter, Scene, Start, fixed
-from gateway.diagnosis.catalogue.regulator import LIMITS, limits
+from gateway.catalogue.cylinder import SIDE_LOAD
+from gateway.catalogue.effect import (
+    PRESSURE,
+    By,
+    Effect,
+    Form,
+    Parameter,
+    PartName,
+    Recipe,
+    Scene,
+    Start,
+    Treatment,
+    fixed,
+)
+from gateway.catalogue.regulator import LIMITS, TOO_FAST, TRIM, limits
 
 CREEP: Final = Parameter("contact", "creep_share", "1", 0.0, -1.0, 1.0, 0.002)
 CREEP_TIME: Final = Parameter("contact", "creep_s", "s", 10.0, 0.3, 1.0e4, 0.2, shape=True)
@@ -31,6 +43,16 @@ LOST: Final = Parameter("contact", "lost_n", "N", 0.0, 0.0, 100.0, 0.05)
 
 MONOTONE: Final = ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift")
 
+DEAD_WEIGHTS: Final = Recipe(
+    parts=(PartName.STAIRCASE,),
+    columns=PRESSURE,
+    apart="put dead weights on the load cell, seven levels up and down: a bent cell shows with them, a bent contact does not",
+)
+_WHOLE_WAY: Final = Recipe(
+    parts=(PartName.LEVEL,), meanwhile="let the robot go the whole way forth and back at two speeds"
+)
+_NO_PLACE: Final = "the command block carries no place along the path; what is slow the trim takes back"
+
 
 def _stroke(scene: Scene) -> tuple[Start, ...]:
     """Travel at which the pad carries a force that was nearly reached; the pad's stiffness is the default plant's."""
@@ -48,11 +70,14 @@ def _ripple(scene: Scene) -> tuple[Start, ...]:
 CONTACT: Final = (
     Effect(
         name="creep",
+        number=19,
         family="contact and tool",
         what="pad or cell body give way slowly under load",
         signature="after each step the force goes on a little for seconds",
         excitation="dwells of many seconds at different levels, with returns to the first",
         experiment="hold 30 s at high force, 30 s at low force, three times",
+        recipe=Recipe(parts=(PartName.DWELLS, PartName.CYCLES)),
+        treatments=(Treatment(why_not=TRIM),),
         forms=(
             Form(
                 parameters=(CREEP, CREEP_TIME),
@@ -64,21 +89,31 @@ CONTACT: Final = (
     ),
     Effect(
         name="contact-nonlinearity",
+        number=20,
         family="contact and tool",
         what="the contact passes the force on along a bent line",
         signature="the residual bends with the force",
         excitation="levels over the whole range",
         experiment="dead weights on the load cell: they tell a bent cell from a bent contact",
+        recipe=DEAD_WEIGHTS,
+        treatments=(Treatment(by=By.MODEL),),
         forms=(Form(parameters=(HARDENING,), probes=fixed((0.01,)), proportional=True),),
         group=LIMITS,
     ),
     Effect(
         name="end-stop",
+        number=21,
         family="contact and tool",
         what="the slide reaches its end stop, which takes the rest of the thrust",
         signature="the force stops rising at one travel",
         excitation="forces, or positions, beyond the stop",
         experiment="a staircase to full force with position_mm recorded, at two distances of the workpiece",
+        recipe=Recipe(
+            parts=(PartName.STAIRCASE,),
+            columns=("position_mm",),
+            apart="run the plan again with the workpiece 1 mm nearer: a stop then takes another share",
+        ),
+        treatments=(Treatment(why_not="beyond it the slide carries no more force: mount the tool nearer"),),
         forms=(
             Form(parameters=(STROKE,), probes=_stroke),
             Form(parameters=(STOP_STIFFNESS, STOP), probes=_stop, needs=("position_mm",), proportional=True),
@@ -88,11 +123,17 @@ CONTACT: Final = (
     SIDE_LOAD,
     Effect(
         name="tilt-gravity",
+        number=23,
         family="contact and tool",
         what="the weight of the tool presses with the cosine of its tilt",
         signature="the residual is a cosine of tilt_deg",
         excitation="tilts over 20 degrees or more, recorded as tilt_deg",
         experiment="hold one force at 0, 45, 90 and 135 degrees, with tilt_deg recorded",
+        recipe=Recipe(
+            parts=(PartName.LEVEL,),
+            meanwhile="turn the tool to 0, 45, 90 and 135 degrees, 10 s each, with its pad on a workpiece that turns along",
+        ),
+        treatments=(Treatment(by=By.OUTSIDE),),
         forms=(
             Form(
                 parameters=(TILT, TILT_ZERO),
@@ -105,11 +146,14 @@ CONTACT: Final = (
     ),
     Effect(
         name="feed-drag",
+        number=24,
         family="contact and tool",
         what="moving along the workpiece drags the tool",
         signature="the residual follows feed_mm_s",
         excitation="feeds of both directions and different speeds, recorded as feed_mm_s",
         experiment="one force, feeds of 0, 5 and 15 mm/s in both directions, with feed_mm_s recorded",
+        recipe=Recipe(parts=(PartName.LEVEL,), meanwhile="let the robot feed at 0, 5 and 15 mm/s in both directions"),
+        treatments=(Treatment(by=By.OUTSIDE),),
         forms=(
             Form(parameters=(FEED_DRAG,), probes=fixed((0.02,)), needs=("feed_mm_s",), proportional=True),
             Form(parameters=(FEED_DRAG_DRY,), probes=fixed((0.2,)), needs=("feed_mm_s",), proportional=True),
@@ -118,11 +162,24 @@ CONTACT: Final = (
     ),
     Effect(
         name="spindle-vibration",
+        number=25,
         family="contact and tool",
         what="the turning spindle shakes the tool",
         signature="a line at the spindle's turning while it is on",
         excitation="spindle on and off, recorded as spindle_rpm",
         experiment="one force with the spindle off, at half and at full speed, 10 s each, with spindle_rpm recorded",
+        recipe=Recipe(parts=(PartName.LEVEL,), meanwhile="run the spindle at nothing, half and full speed, 20 s each"),
+        treatments=(
+            Treatment(
+                why_not=TOO_FAST,
+                fields=(
+                    "contact.spindle_n",
+                    "contact.spindle_n_per_krpm2",
+                    "contact.spindle_order",
+                    "contact.spindle_phase_rad",
+                ),
+            ),
+        ),
         forms=(
             Form(
                 parameters=(SPINDLE, SPINDLE_PHASE),
@@ -143,11 +200,18 @@ CONTACT: Final = (
     ),
     Effect(
         name="pad-wear",
+        number=26,
         family="contact and tool",
         what="the pad wears along the way that it has ground",
         signature="the force falls with distance_m",
         excitation="a long way under force, with rests between, recorded as distance_m",
         experiment="three passes with rests of a minute between them, with distance_m and temperature_c recorded",
+        recipe=Recipe(
+            parts=(PartName.CYCLES,),
+            columns=("temperature_c",),
+            apart="note distance_m: wear follows the way that was ground, drift follows time and goes on at rest",
+        ),
+        treatments=(Treatment(why_not=TRIM),),
         forms=(
             Form(parameters=(WEAR,), probes=fixed((0.01,)), needs=("distance_m",), proportional=True),
             Form(parameters=(WEAR_N,), probes=fixed((0.01,)), needs=("distance_m",), proportional=True),
@@ -156,11 +220,14 @@ CONTACT: Final = (
     ),
     Effect(
         name="position-dependence",
+        number=27,
         family="contact and tool",
         what="the force depends on where the tool stands",
         signature="the residual follows position_mm",
         excitation="positions over the whole way, more than once, recorded as position_mm",
         experiment="one force, the whole way forth and back at two speeds, with position_mm recorded",
+        recipe=_WHOLE_WAY,
+        treatments=(Treatment(why_not=_NO_PLACE),),
         forms=(
             Form(parameters=(SLOPE,), probes=fixed((0.02,)), needs=("position_mm",), proportional=True),
             Form(
@@ -173,11 +240,14 @@ CONTACT: Final = (
     ),
     Effect(
         name="position-ripple",
+        number=28,
         family="contact and tool",
         what="a periodic force along the way: a screw, a belt, a waviness",
         signature="a sine of position_mm",
         excitation="a way of several periods, recorded as position_mm",
         experiment="one force, 50 mm forth and back at two speeds, with position_mm recorded",
+        recipe=_WHOLE_WAY,
+        treatments=(Treatment(why_not=_NO_PLACE),),
         forms=(
             Form(
                 parameters=(RIPPLE, RIPPLE_PITCH, RIPPLE_PHASE),
@@ -190,11 +260,14 @@ CONTACT: Final = (
     ),
     Effect(
         name="backlash",
+        number=29,
         family="contact and tool",
         what="play in mount or guide that must close before force passes (lost at each reversal, it widens the loop)",
         signature="no force until the thrust has closed the gap",
         excitation="returns to no force, from different sizes",
         experiment="reversals of 0.05 to 1 V around three levels with position_mm recorded",
+        recipe=Recipe(parts=(PartName.TOUCHES, PartName.REVERSALS)),
+        treatments=(Treatment(by=By.MODEL, fields=("contact.backlash_n", "contact.lost_n")),),
         forms=(
             Form(parameters=(LOST,), probes=fixed((0.5,), (2.0,))),
         ),  # the other play is friction's: one cannot tell

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from gateway.diagnosis import BY_NAME, EFFECTS, Effect, Parameter, effect_named
+from gateway.diagnosis import BY_NAME, EFFECTS, Effect, Parameter
 from gateway.twin.plant import Plant, values
 from tests.diagnosis.hidden import BY_NAME as EXAMPLES
 from tests.diagnosis.machine import LOGGED, MACHINE, command_v, plant, readings_n, times_s
@@ -52,11 +52,6 @@ def test_the_names_are_those_of_the_page() -> None:
 def test_families_have_the_size_of_the_page() -> None:
     counts = {name: sum(effect.family == name for effect in EFFECTS) for name in FAMILIES}
     assert counts == FAMILIES
-
-
-def test_a_name_that_is_not_there_is_a_key_error() -> None:
-    with pytest.raises(KeyError):
-        effect_named("gremlins")
 
 
 @pytest.mark.parametrize("word", WORDS)

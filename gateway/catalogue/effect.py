@@ -1,4 +1,4 @@
-"""What an effect is to the diagnosis: names, parameters of the plant, and where a search begins.
+"""What one entry of the catalogue holds: names, parameters of the plant, where a search begins, experiment and cure.
 
 An effect is told by one or more forms: ways in which it may show, for nobody says whether a dead band swallows small
 commands or leaves the pressure short of its target. A form moves parameters of the plant away from where they are.
@@ -8,10 +8,15 @@ one form differ in size only where the response is not proportional to it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final
 
 Start = tuple[float, ...]
+
+RECORDED: Final = frozenset({"time_s", "command_v", "force_n", "pressure_kpa"})
+"""What a gateway records by itself, pressure where its output device measures it."""
+PRESSURE: Final = ("pressure_kpa",)
 
 ANY: Final = 1.0e12
 
@@ -77,22 +82,89 @@ class Form:
     least: float = 0.0
 
 
+class PartName(StrEnum):
+    """Parts of which experiments are made; gateway.diagnosis.experiments.blocks says what each does."""
+
+    STAIRCASE = "staircase"
+    DWELLS = "dwells"
+    REVERSALS = "reversals"
+    STEPS = "steps"
+    RAMPS = "ramps"
+    FINE = "fine stairs"
+    RESTS = "rests"
+    STROKES = "strokes"
+    SLOW_RAMP = "slow ramp"
+    TOUCHES = "touches"
+    CYCLES = "cycles"
+    LASTING = "steps throughout"
+    REST = "rest"
+    LONG_REST = "long rest"
+    LEVEL = "one level"
+    THREE_LEVELS = "three levels"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """How a gateway makes an effect show. columns: to record besides command, force and what the effect needs.
+
+    What a person does: `apart` from the run (dead weights on the cell), or `meanwhile` (turn the tool). check: the coarse
+    cycle may come first.
+    """
+
+    parts: tuple[PartName, ...]
+    columns: tuple[str, ...] = ()
+    apart: str = ""
+    meanwhile: str = ""
+    check: bool = True
+
+
+class By(StrEnum):
+    """What of the controller compensates an effect."""
+
+    MODEL = "model"
+    COMMAND = "command"
+    CELL = "cell"
+    OUTSIDE = "outside"
+    TIMING = "timing"
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Treatment:
+    """What control does about an effect. fields: numbers of the plant that make it, `section.name`; none: its parameters.
+
+    why_not: what stands in the way where nothing compensates it, as the end of a sentence.
+    """
+
+    by: By = By.NOTHING
+    why_not: str = ""
+    fields: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """One entry of the catalogue. group: names it is easily confused with; excitation: what a recording must contain."""
+    """One entry of the catalogue; names and numbers are contracts.
+
+    number: in the register residual_cause, frozen within a version of the map; what, signature: what it is and how it
+    shows, as parts of a sentence; excitation: what a recording must contain; experiment: what to do next, in words;
+    recipe: the same for the gateway; treatments: what control does about it; group: names it is easily confused with.
+    """
 
     name: str
+    number: int
     family: str
     what: str
     signature: str
     excitation: str
     experiment: str
+    recipe: Recipe
+    treatments: tuple[Treatment, ...]
     forms: tuple[Form, ...]
     group: tuple[str, ...] = ()
     rarity: float = 0.0  # chi-square by which it must beat a commoner cause that explains as much
     least: float = 0.0  # of the first parameter, below which it is part of every machine
     direct: bool = False  # told by the readings themselves, not by what the model leaves
-    marks: tuple[Parameter, ...] = field(default=())  # parameters that only the direct way sets
+    marks: tuple[Parameter, ...] = ()  # parameters that only the direct way sets
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -106,7 +178,17 @@ class Effect:
         common = set.intersection(*(set(form.needs) for form in self.forms)) if self.forms else set()
         return tuple(sorted(common))
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns that at least one form needs."""
+        return tuple(sorted({name for form in self.forms for name in form.needs}))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """What it needs and a gateway does not record by itself: somebody has to tell it."""
+        return tuple(name for name in self.needs if name not in RECORDED)
+
 
 def fixed(*starts: Start) -> Callable[[Scene], tuple[Start, ...]]:
-    """Starts that do not depend on the recording."""
+    """Return a `probes` whose starts do not depend on the recording."""
     return lambda scene: starts

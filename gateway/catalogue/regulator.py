@@ -2,7 +2,19 @@
 
 from typing import Final
 
-from gateway.diagnosis.catalogue.effect import Effect, Form, Parameter, Scene, Start, fixed
+from gateway.catalogue.effect import (
+    PRESSURE,
+    By,
+    Effect,
+    Form,
+    Parameter,
+    PartName,
+    Recipe,
+    Scene,
+    Start,
+    Treatment,
+    fixed,
+)
 
 DELAY: Final = Parameter("regulator", "delay_s", "s", 0.0, 0.0, 1.0, 0.001)
 LAG: Final = Parameter("regulator", "lag_s", "s", 0.0, 0.0, 2.0, 0.002)
@@ -33,6 +45,10 @@ LIMITS: Final = (
     "command-nonlinearity",
     "end-stop",
 )
+TRIM: Final = "the trim takes it back as the load cell sees it"
+TOO_FAST: Final = "it is faster than the regulator's delay and lags let the force follow"
+_STEPS_RECIPE: Final = Recipe(parts=(PartName.STEPS,), columns=PRESSURE)
+_STAIRS_AND_STEPS: Final = Recipe(parts=(PartName.STAIRCASE, PartName.STEPS), columns=PRESSURE)
 _TRANSIENTS: Final = "steps or ramps of the command, several times its lag apart, at 100 rows a second or more"
 _SLOW_STEPS: Final = "a slow staircase up and down over the whole range with small steps"
 
@@ -67,63 +83,81 @@ def _hunting(scene: Scene) -> tuple[Start, ...]:
 REGULATOR: Final = (
     Effect(
         name="transport-delay",
+        number=1,
         family="regulator",
         what="time before the pressure begins to follow the command",
         signature="the whole response comes late; the residual follows the slope of the force",
         excitation=_TRANSIENTS,
         experiment="steps of the command with pressure_kpa recorded: a delay shows in both, a clock offset in one",
+        recipe=_STEPS_RECIPE,
+        treatments=(Treatment(by=By.TIMING),),
         least=7.0e-4,
         forms=(Form(parameters=(DELAY,), probes=fixed((0.004,), (0.02,), (0.06,))),),
         group=SLOW_LAGS,
     ),
     Effect(
         name="extra-lag",
+        number=2,
         family="regulator",
         what="a second first-order lag behind the regulator's own",
         signature="steps begin softly and then follow; the residual follows the curvature of the force",
         excitation=_TRANSIENTS,
         experiment="steps of the command with the pressure recorded, 200 rows a second or more",
+        recipe=_STEPS_RECIPE,
+        treatments=(Treatment(by=By.TIMING, fields=("regulator.lag_s", "regulator.second_lag_s", "cell.filter_s")),),
         least=7.0e-4,
         forms=(Form(parameters=(SECOND_LAG,), probes=fixed((0.005,), (0.02,), (0.06,))),),
         group=SLOW_LAGS,
     ),
     Effect(
         name="dead-band",
+        number=3,
         family="regulator",
         what="changes of the command below a threshold are not followed",
         signature="the force stands still while the command creeps, then jumps",
         excitation="steps of the command smaller than the dead band, up and down",
         experiment="a staircase of 0.01 V steps up and down around three levels",
+        recipe=Recipe(parts=(PartName.FINE,), columns=PRESSURE),
+        treatments=(Treatment(why_not="changes of the command within it are not heard, whatever they are"),),
         forms=(Form(parameters=(DEAD_BAND,), probes=_dead_band, exact=True),),
         group=("regulator-hysteresis", "command-quantisation"),
     ),
     Effect(
         name="regulator-hysteresis",
+        number=4,
         family="regulator",
         what="the pressure depends on the direction from which the command came",
         signature="a loop of constant width between command and pressure",
         excitation=_SLOW_STEPS,
         experiment="a staircase up and down with the pressure recorded: the loop stands between command and pressure",
+        recipe=Recipe(parts=(PartName.STAIRCASE, PartName.FINE), columns=PRESSURE),
+        treatments=(Treatment(by=By.MODEL),),
         forms=(Form(parameters=(HYSTERESIS,), probes=fixed((600.0,), (3.0e3,), (1.0e4,), (3.0e4,))),),
         group=("coulomb-friction",),
     ),
     Effect(
         name="command-quantisation",
+        number=5,
         family="regulator",
         what="the command input has coarse steps",
         signature="the force is a staircase of a ramp; the residual is a saw tooth of the command",
         excitation="ramps or many different levels of the command",
         experiment="a ramp of 0.05 V/s over two volts",
+        recipe=Recipe(parts=(PartName.SLOW_RAMP,)),
+        treatments=(Treatment(why_not="nothing between two steps can be sent"),),
         forms=(Form(parameters=(COMMAND_STEP,), probes=_steps, exact=True, everywhere=True),),
         group=("dead-band",),
     ),
     Effect(
         name="command-nonlinearity",
+        number=6,
         family="regulator",
         what="the pressure is no straight line of the command",
         signature="the residual bends with the command, before lag and friction",
         excitation="levels over the whole range",
         experiment="a slow staircase over the whole range with the pressure recorded",
+        recipe=_STAIRS_AND_STEPS,
+        treatments=(Treatment(by=By.COMMAND),),
         forms=(
             Form(parameters=(BOW,), probes=fixed((0.01,)), proportional=True),
             Form(parameters=(S_SHAPE,), probes=fixed((0.01,)), proportional=True),
@@ -132,21 +166,35 @@ REGULATOR: Final = (
     ),
     Effect(
         name="supply-saturation",
+        number=7,
         family="regulator",
         what="the air line cannot give more pressure",
         signature="the force stops rising above one level, whatever the command",
         excitation="commands above the supply pressure",
         experiment="a staircase to full scale with supply_kpa or pressure_kpa recorded",
+        recipe=_STAIRS_AND_STEPS,
+        treatments=(Treatment(why_not="the air line has no more pressure"),),
         forms=(Form(parameters=(SUPPLY,), probes=_supply), Form(parameters=(CEILING,), probes=_supply)),
         group=LIMITS,
     ),
     Effect(
         name="supply-droop",
+        number=8,
         family="regulator",
         what="the pressure follows swings of the supply",
         signature="the residual follows supply_kpa",
         excitation="a supply that swings, recorded as supply_kpa",
         experiment="hold three levels while another consumer draws air from the same line, with supply_kpa recorded",
+        recipe=Recipe(
+            parts=(PartName.THREE_LEVELS,),
+            meanwhile="let another consumer on the same air line switch on and off every few seconds",
+        ),
+        treatments=(
+            Treatment(
+                why_not=f"the supply pressure is not told to the controller; {TRIM}",
+                fields=("regulator.droop_pa_per_pa", "regulator.droop_share_per_pa", "regulator.droop_reference_pa"),
+            ),
+        ),
         forms=(
             Form(parameters=(DROOP,), probes=fixed((0.02,)), needs=("supply_kpa",), proportional=True),
             Form(parameters=(DROOP_SHARE,), probes=fixed((1.0e-7,)), needs=("supply_kpa",), proportional=True),
@@ -154,11 +202,18 @@ REGULATOR: Final = (
     ),
     Effect(
         name="leak",
+        number=9,
         family="regulator",
         what="air escapes between valve and cylinder",
         signature="the force falls while the command stands still, or misses most just above zero pressure",
         excitation="dwells of several seconds at several levels, steps up and down",
         experiment="hold three levels for 10 s each, then steps up and down between them",
+        recipe=Recipe(parts=(PartName.DWELLS, PartName.STEPS), columns=PRESSURE),
+        treatments=(
+            Treatment(
+                why_not=TRIM, fields=("regulator.leak_per_s", "regulator.leak_flow_pa", "regulator.fill_slowdown")
+            ),
+        ),
         forms=(
             Form(parameters=(LEAK,), probes=fixed((0.003,), (0.03,))),
             Form(parameters=(LEAK_FLOW,), probes=fixed((5.0e3,)), proportional=True),
@@ -168,11 +223,14 @@ REGULATOR: Final = (
     ),
     Effect(
         name="regulator-hunting",
+        number=10,
         family="regulator",
         what="the regulator's own loop oscillates",
         signature="a line in the spectrum below 40 Hz while there is pressure",
         excitation="dwells under pressure, sampled at more than twice the line",
         experiment="hold three levels for 10 s each at 200 rows a second, spindle off",
+        recipe=Recipe(parts=(PartName.REST, PartName.DWELLS), columns=PRESSURE),
+        treatments=(Treatment(why_not=TOO_FAST),),
         forms=(
             Form(parameters=(HUNTING, HUNTING_HZ, HUNTING_PHASE), probes=_hunting, proportional=True, quadrature=True),
         ),
@@ -180,11 +238,14 @@ REGULATOR: Final = (
     ),
     Effect(
         name="slew-limit",
+        number=11,
         family="regulator",
         what="the pressure has a fastest rate of change",
         signature="large steps are ramps, small ones are not",
         excitation="steps of different sizes",
         experiment="steps of 0.5, 1, 2 and 4 V up and down",
+        recipe=_STEPS_RECIPE,
+        treatments=(Treatment(why_not="the regulator cannot be faster than it is"),),
         forms=(Form(parameters=(SLEW,), probes=_slew),),
         group=("leak",),
     ),

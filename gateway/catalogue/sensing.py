@@ -2,9 +2,21 @@
 
 from typing import Final
 
-from gateway.diagnosis.catalogue.contact import MONOTONE
-from gateway.diagnosis.catalogue.effect import Effect, Form, Parameter, Scene, Start, fixed
-from gateway.diagnosis.catalogue.regulator import LIMITS, SLOW_LAGS
+from gateway.catalogue.contact import DEAD_WEIGHTS, MONOTONE
+from gateway.catalogue.effect import (
+    PRESSURE,
+    By,
+    Effect,
+    Form,
+    Parameter,
+    PartName,
+    Recipe,
+    Scene,
+    Start,
+    Treatment,
+    fixed,
+)
+from gateway.catalogue.regulator import LIMITS, SLOW_LAGS
 
 ZERO: Final = Parameter("cell", "zero_n", "N", 0.0, -1.0e4, 1.0e4, 0.05, settled=True)  # fitted as the offset
 ZERO_PER_K: Final = Parameter("cell", "zero_n_per_k", "N/K", 0.0, -20.0, 20.0, 0.005)
@@ -26,6 +38,13 @@ OUTLIER_SHARE: Final = Parameter("cell", "outlier_share", "1", 0.0, 0.0, 0.5, 0.
 OUTLIER: Final = Parameter("cell", "outlier_n", "N", 0.0, 0.0, 1.0e4, 0.1)
 QUANTUM: Final = Parameter("cell", "quantum_n", "N", 0.0, 0.0, 100.0, 0.001)
 
+_WARM_UP_AND_DOWN: Final = Recipe(
+    parts=(PartName.CYCLES,),
+    apart="warm the cell up by some kelvin (a lamp), run the plan, let it cool down, run it again",
+)
+_SINGLE_READINGS: Final = "it is in single readings: the trim is slow enough not to follow them"
+_ONE_CLOCK: Final = "it is the recording's: the control loop has one clock"
+_UNKNOWN_ZERO: Final = "the cell shows it as force, and its size now is not known: tare before work"
 _TEMPERATURE: Final = "a temperature that goes up and down by some kelvin, recorded as temperature_c"
 
 
@@ -44,80 +63,108 @@ def _drift(scene: Scene) -> tuple[Start, ...]:
 SENSING: Final = (
     Effect(
         name="thermal-zero-drift",
+        number=30,
         family="sensing and logging",
         what="the zero of the load cell moves with temperature",
         signature="the residual follows temperature_c at any force",
         excitation=_TEMPERATURE,
         experiment="a warm-up and a cool-down without force and under force, with temperature_c recorded",
+        recipe=_WARM_UP_AND_DOWN,
+        treatments=(Treatment(by=By.CELL),),
         forms=(Form(parameters=(ZERO_PER_K,), probes=fixed((0.02,)), needs=("temperature_c",), proportional=True),),
         group=MONOTONE,
     ),
     Effect(
         name="thermal-span-drift",
+        number=31,
         family="sensing and logging",
         what="the sensitivity of the load cell moves with temperature",
         signature="the residual follows temperature_c times the force",
         excitation=_TEMPERATURE + ", at low and high force",
         experiment="reversals over the whole range at two temperatures, with temperature_c recorded",
+        recipe=_WARM_UP_AND_DOWN,
+        treatments=(Treatment(by=By.CELL),),
         forms=(Form(parameters=(SPAN_PER_K,), probes=fixed((0.001,)), needs=("temperature_c",), proportional=True),),
     ),
     Effect(
         name="warm-up",
+        number=32,
         family="sensing and logging",
         what="after switching on the zero settles exponentially",
         signature="an exponential in time, at any force",
         excitation="the first minutes after switching on",
         experiment="record from switching on for ten minutes without force, with temperature_c recorded",
+        recipe=Recipe(
+            parts=(PartName.LONG_REST,),
+            columns=("temperature_c",),
+            apart="switch the amplifier off for half an hour before",
+        ),
+        treatments=(Treatment(why_not=_UNKNOWN_ZERO),),
         forms=(Form(parameters=(WARM_UP, WARM_UP_TIME), probes=_warm_up, proportional=True),),
         group=MONOTONE,
     ),
     Effect(
         name="linear-drift",
+        number=33,
         family="sensing and logging",
         what="the zero moves steadily in time",
         signature="a straight line in time, at any force",
         excitation="a recording of a minute or more that returns to the same levels",
         experiment="ten minutes without force, then ten at one force, with temperature_c and distance_m recorded",
+        recipe=Recipe(parts=(PartName.CYCLES,)),
+        treatments=(Treatment(why_not=_UNKNOWN_ZERO),),
         forms=(Form(parameters=(DRIFT,), probes=_drift, proportional=True),),
         group=MONOTONE,
     ),
     Effect(
         name="sensor-quadratic",
+        number=34,
         family="sensing and logging",
         what="the load cell's line is bent to one side",
         signature="the residual is a parabola of the force",
         excitation="levels over the whole range",
         experiment="dead weights on the load cell, five levels",
+        recipe=DEAD_WEIGHTS,
+        treatments=(Treatment(by=By.CELL),),
         forms=(Form(parameters=(QUADRATIC,), probes=fixed((2.0e-4,)), proportional=True),),
         group=LIMITS,
     ),
     Effect(
         name="sensor-cubic",
+        number=35,
         family="sensing and logging",
         what="the load cell's line is bent symmetrically",
         signature="the residual is a cubic of the force",
         excitation="levels over the whole range",
         experiment="dead weights on the load cell, seven levels",
+        recipe=DEAD_WEIGHTS,
+        treatments=(Treatment(by=By.CELL),),
         forms=(Form(parameters=(CUBIC,), probes=fixed((5.0e-6,)), proportional=True),),
         group=LIMITS,
     ),
     Effect(
         name="mains-hum",
+        number=36,
         family="sensing and logging",
         what="the mains couple into the cell's cable",
         signature="a line at 50 or 60 Hz, or where the sampling folds it",
         excitation="any; sampled at 120 rows a second or more to tell it from other lines",
         experiment="ten seconds at rest at 500 rows a second",
+        recipe=Recipe(parts=(PartName.REST, PartName.DWELLS)),
+        treatments=(Treatment(why_not=_SINGLE_READINGS),),
         forms=(Form(parameters=(HUM, HUM_HZ, HUM_PHASE), probes=_hum, proportional=True, quadrature=True),),
         group=("spindle-vibration", "regulator-hunting"),
     ),
     Effect(
         name="clock-offset",
+        number=37,
         family="sensing and logging",
         what="the clock of the force differs from that of the command",
         signature="the whole force comes late or early",
         excitation="steps or ramps of the command",
         experiment="steps of the command with pressure_kpa recorded by the clock of the force",
+        recipe=Recipe(parts=(PartName.STEPS, PartName.RAMPS), columns=PRESSURE),
+        treatments=(Treatment(why_not=_ONE_CLOCK),),
         least=7.0e-4,
         rarity=3.0,
         forms=(Form(parameters=(CLOCK_OFFSET,), probes=fixed((0.003,), (0.03,), (-0.02,))),),
@@ -125,62 +172,91 @@ SENSING: Final = (
     ),
     Effect(
         name="clock-skew",
+        number=38,
         family="sensing and logging",
         what="one clock runs faster than the other",
         signature="the force comes later and later",
         excitation="steps from the beginning to the end of a minute or more",
         experiment="steps of the command over ten minutes",
+        recipe=Recipe(parts=(PartName.LASTING,)),
+        treatments=(Treatment(why_not=_ONE_CLOCK),),
         forms=(Form(parameters=(CLOCK_SKEW,), probes=fixed((2.0e-4,), (2.0e-3,), (-2.0e-4,), (-2.0e-3,))),),
     ),
     Effect(
         name="repeated-samples",
+        number=39,
         family="sensing and logging",
         what="the logger writes the last reading again",
         signature="readings that are equal to the last digit",
         excitation="any motion",
         experiment="count the amplifier's own sample numbers",
+        recipe=Recipe(parts=(PartName.REST, PartName.RAMPS)),
+        treatments=(Treatment(why_not=_SINGLE_READINGS),),
         forms=(),
         direct=True,
         marks=(REPEATED,),
     ),
     Effect(
         name="outliers",
+        number=40,
         family="sensing and logging",
         what="single wrong readings",
         signature="spikes of one row",
         excitation="any",
         experiment="ten minutes at rest; then with the valve's cable moved away",
+        recipe=Recipe(parts=(PartName.REST, PartName.DWELLS)),
+        treatments=(Treatment(why_not=_SINGLE_READINGS),),
         forms=(),
         direct=True,
         marks=(OUTLIER_SHARE, OUTLIER),
     ),
     Effect(
         name="sensor-quantisation",
+        number=41,
         family="sensing and logging",
         what="the amplifier's counts are coarse",
         signature="readings lie on a lattice coarser than the noise",
         excitation="any",
         experiment="read the amplifier's resolution setting",
+        recipe=Recipe(parts=(PartName.REST, PartName.RAMPS)),
+        treatments=(Treatment(why_not="what is between two counts is lost"),),
         forms=(),
         direct=True,
         marks=(QUANTUM,),
     ),
     Effect(
         name="valve-crosstalk",
+        number=42,
         family="sensing and logging",
         what="the command's voltage couples into the force reading",
         signature="the reading jumps with the command, before any air has moved",
         excitation="steps of the command at 100 rows a second or more",
         experiment="steps of the command with the air shut off",
+        recipe=Recipe(
+            parts=(PartName.STEPS,),
+            meanwhile="shut the air off and vent the line before; what moves then is no force",
+            check=False,
+        ),
+        treatments=(Treatment(by=By.CELL),),
         forms=(Form(parameters=(CROSSTALK,), probes=fixed((0.02,)), needs=("command_v",), proportional=True),),
     ),
     Effect(
         name="sign-loss",
+        number=43,
         family="sensing and logging",
         what="the sign of negative readings is lost",
         signature="readings that should be negative are mirrored",
         excitation="forces below zero",
         experiment="pull at the load cell by hand",
+        recipe=Recipe(
+            parts=(PartName.TOUCHES,),
+            apart="pull at the load cell by hand, with the output off: the reading must become negative",
+        ),
+        treatments=(
+            Treatment(
+                why_not="a lost sign cannot be brought back: check the amplifier's settings", fields=("cell.sign_lost",)
+            ),
+        ),
         forms=(Form(parameters=(SIGN_LOST, ZERO), probes=fixed((1.0, 0.0), (1.0, -0.3), (1.0, -1.0)), exact=True),),
         group=("backlash",),
     ),

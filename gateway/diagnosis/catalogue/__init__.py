@@ -1,1 +1,0 @@
-"""The effects that the diagnosis knows, in the order of the signal."""
