@@ -6,11 +6,12 @@ from typing import Any, Final, TypeVar
 
 import click
 
+from gateway import defaults
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 Endpoint = tuple[str, int]
-_DEFAULT_PORT: Final = 5020
 _LONGEST_NAME: Final = 60
-DEFAULT_ENDPOINT: Final = f"127.0.0.1:{_DEFAULT_PORT}"
+DEFAULT_ENDPOINT: Final = f"{defaults.HOST}:{defaults.MODBUS_PORT}"
 
 
 def endpoint(context: click.Context, parameter: click.Parameter, value: str | None) -> Endpoint | None:
@@ -18,10 +19,10 @@ def endpoint(context: click.Context, parameter: click.Parameter, value: str | No
     if value is None:
         return None
     host, port = _split(value)
-    port = port or str(_DEFAULT_PORT)
+    port = port or str(defaults.MODBUS_PORT)
     if not port.isdecimal() or int(port) > 65535:
         raise click.BadParameter(f"{value} is not HOST:PORT such as {DEFAULT_ENDPOINT} (port 0..65535)")
-    return host or "127.0.0.1", int(port)
+    return host or defaults.HOST, int(port)
 
 
 def _split(text: str) -> tuple[str, str]:
@@ -38,8 +39,12 @@ def _split(text: str) -> tuple[str, str]:
 def gateway_options(function: Function) -> Function:
     """--gateway, --unit and --map: which server to speak to, and by which names."""
     for option in (
-        click.option("--map", "map_name", default="force-v1", metavar="NAME", help="Register map (name or file)."),
-        click.option("--unit", type=click.IntRange(0, 255), default=1, show_default=True, help="Modbus unit id."),
+        click.option(
+            "--map", "map_name", default=defaults.REGISTER_MAP, metavar="NAME", help="Register map (name or file)."
+        ),
+        click.option(
+            "--unit", type=click.IntRange(0, 255), default=defaults.UNIT_ID, show_default=True, help="Modbus unit id."
+        ),
         click.option(
             "--gateway",
             "endpoint",
@@ -58,7 +63,7 @@ def state_options(function: Function) -> Function:
     """--state and --rig: which state directory."""
     for option in (
         click.option(
-            "--rig", default="demo", show_default=True, help="The rig whose default state directory is meant."
+            "--rig", default=defaults.RIG, show_default=True, help="The rig whose default state directory is meant."
         ),
         click.option(
             "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway."

@@ -2,6 +2,8 @@
 
 from typing import Final
 
+from gateway import defaults
+
 _TEXT: Final = """\
 # Rig @NAME@. Try it without hardware: force-gateway run @NAME@.yaml --sim
 # Then go through the lines marked EDIT, take each mark away, and ask: force-gateway check @NAME@.yaml
@@ -10,19 +12,19 @@ name: @NAME@
 description: a constant-force cell # EDIT: one line that your colleagues understand
 loop_hz: 100 # tick of the watchdogs and the trim; a setpoint acts when it arrives, not at the next tick
 
-registers: force-v1 # the Modbus map; `force-gateway registers` prints it
-plant: paper-slide # what `run --sim` simulates; the real rig does not use it
+registers: @REGISTER_MAP@ # the Modbus map; `force-gateway registers` prints it
+plant: @PLANT@ # what `run --sim` simulates; the real rig does not use it
 calibration: demo # EDIT: the simulated rig's. Enough to move, not to be exact: calibrate your own
 
 output: # the line to the DAC or pressure regulator
   device: smc-itv-rc # or your own: a YAML file beside this one, see profiles/devices
   port: /dev/serial/by-id/EDIT-output # EDIT: `force-gateway ports` lists yours
-  baud: 9600 # EDIT: as set in the device
+  baud: @OUTPUT_BAUD@ # EDIT: as set in the device
 
 load_cell: # the line from the load-cell amplifier
   device: stream-st-gs
   port: /dev/serial/by-id/EDIT-load-cell # EDIT
-  baud: 115200 # EDIT: as set in the amplifier
+  baud: @CELL_BAUD@ # EDIT: as set in the amplifier
   sign: 1 # -1 where a push reads negative
   range_n: 98.07 # EDIT: rated force of your cell
 
@@ -49,15 +51,15 @@ trim: # slow correction by the load cell on top of the model; gain 0 switches it
 #   second_lag_s: 0.05
 
 supervision:
-  lease_s: 0.2 # EDIT: the master changes the heartbeat at least this often (`force-gateway hold` does); null: a command lasts
+  lease_s: @LEASE_S@ # EDIT: the master changes the heartbeat at least this often (`force-gateway hold` does); null: no lease
   lease_action: fault # fault (safe voltage, latched), hold, ramp (to 0 N, then off)
   sample_timeout_s: 0.05
   saturation_n: 96 # EDIT: 98 % of range_n
 
 network:
-  bind: 127.0.0.1 # EDIT: this machine's address on the robot's network; any but loopback needs `allow`
-  port: 5020 # many PLCs want 502: needs a right, see `force-gateway explain E120`
-  units: [0, 1, 255]
+  bind: @HOST@ # EDIT: this machine's address on the robot's network; any but loopback needs `allow`
+  port: @MODBUS_PORT@ # many PLCs want 502: needs a right, see `force-gateway explain E120`
+  units: @UNIT_IDS@
   # allow: [192.168.125.0/24] # who may connect at all
 
 # The ITV has no watchdog: if this machine loses power, it holds its last pressure. true says that you know, and that an
@@ -67,5 +69,8 @@ accept_no_device_watchdog: true # EDIT
 
 
 def starter_rig(name: str) -> str:
-    """The text of NAME.yaml."""
-    return _TEXT.replace("@NAME@", name)
+    """Return the text of NAME.yaml."""
+    text = _TEXT.replace("@NAME@", name).replace("@UNIT_IDS@", str(list(defaults.UNIT_IDS)))
+    for default in ("REGISTER_MAP", "PLANT", "OUTPUT_BAUD", "CELL_BAUD", "LEASE_S", "HOST", "MODBUS_PORT"):
+        text = text.replace(f"@{default}@", str(getattr(defaults, default)))
+    return text

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from gateway import defaults
 from gateway.codes.explanation import Explanation
 
 ERRORS: Final = (
@@ -67,7 +68,7 @@ ERRORS: Final = (
         "the Modbus port needs a right",
         "Listening on a port below 1024 (Modbus' own is 502) was refused.",
         "Linux gives these ports to programs with the capability net_bind_service only.",
-        "Use --bind HOST:5020, or run it as a service with AmbientCapabilities=CAP_NET_BIND_SERVICE.",
+        f"Use --bind HOST:{defaults.MODBUS_PORT}, or run it as a service with AmbientCapabilities=CAP_NET_BIND_SERVICE.",
     ),
     Explanation(
         "E121",

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt, Le
 
+from gateway import defaults
+
 STRICT = {"extra": "forbid"}  # read by pydantic in gateway.profiles
 
 
@@ -20,7 +22,7 @@ class Limits:
     over_force_samples: Annotated[int, Ge(1), Le(10)] = 3
     smallest_force_n: Annotated[float, Ge(0)] = 0.0  # below it the output is 0 V
     voltage_min_v: Annotated[float, Ge(0)] = 0.0
-    voltage_max_v: Annotated[float, Gt(0), Le(10)] = 10.0
+    voltage_max_v: Annotated[float, Gt(0), Le(10)] = defaults.VOLTAGE_MAX_V
     safe_voltage_v: Annotated[float, Ge(0)] = 0.0
     voltage_slew_v_per_s: Annotated[float, Gt(0)] = 100.0  # rising only; falling may be immediate
 

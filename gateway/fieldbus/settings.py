@@ -1,7 +1,9 @@
-"""What a rig may say about its Modbus TCP face. Defaults are FIELDBUS's."""
+"""What a rig may say about its Modbus TCP face."""
 
 from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Network
+
+from gateway import defaults
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,11 +13,11 @@ class ServerSettings:
     requests_per_s is for each address that is not loopback; more than that waits, it is never refused.
     """
 
-    units: tuple[int, ...] = (0, 1, 255)
-    connections: int = 32
-    per_address: int = 4
-    idle_s: float = 60.0
+    units: tuple[int, ...] = defaults.UNIT_IDS
+    connections: int = defaults.CONNECTIONS
+    per_address: int = defaults.PER_ADDRESS
+    idle_s: float = defaults.IDLE_S
     partial_s: float = 5.0
     write_buffer_bytes: int = 65536
-    requests_per_s: float = 200.0
+    requests_per_s: float = defaults.REQUESTS_PER_S
     allow: tuple[IPv4Network | IPv6Network, ...] = ()

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
+from gateway import defaults
 from gateway.registers.words import ControlBit
 
 BASIC_BITS: Final = ControlBit.ENABLE | ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP
@@ -22,8 +23,8 @@ class BankRules:
     setpoint_min_n: float = 0.0
     force_source: str = ""
     voltage_min_v: float = 0.0
-    voltage_max_v: float = 10.0
-    cell_range_n: float = 100.0
+    voltage_max_v: float = defaults.VOLTAGE_MAX_V
+    cell_range_n: float = defaults.CELL_RANGE_N
     supported_bits: ControlBit = BASIC_BITS
     require_byte_order_echo: bool = False
     owner: str | None = None

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Any, Final
 
-from gateway import VERSION
+from gateway import VERSION, defaults
 from gateway.profiles import Rig
 
 _FORCE_N: Final = 12.0
@@ -61,16 +61,16 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
     A rig with a lease needs a heartbeat, which mbpoll has none of. A rig that names its master lets nobody else command.
     """
     host = _reached_at(host, rig)
-    unit = 1 if 1 in rig.network.units else rig.network.units[0]
-    where = "" if (host, port) == ("127.0.0.1", 5020) else f" --gateway {_in_url(host)}:{port}"
-    where += "" if unit == 1 else f" --unit {unit}"
+    unit = defaults.UNIT_ID if defaults.UNIT_ID in rig.network.units else rig.network.units[0]
+    where = "" if (host, port) == (defaults.HOST, defaults.MODBUS_PORT) else f" --gateway {_in_url(host)}:{port}"
+    where += "" if unit == defaults.UNIT_ID else f" --unit {unit}"
     if rig.network.owner and not ip_address(rig.network.owner).is_loopback:
         return (f"force-gateway monitor{where}        ({rig.network.owner} alone may command)",)
     force_n, lease_s = _force_to_try_n(rig), rig.control.supervision.lease_s
     if lease_s is not None or rig.network.require_byte_order_echo:
         pace = "" if lease_s is None or lease_s >= _USUAL_LEASE_S else f" --rig {rig.file}"
         return (f"force-gateway hold {force_n:g}{where}{pace}        (enable, heartbeat; Ctrl-C ramps to 0)",)
-    polled = f"{'' if unit == 1 else f' -a {unit}'} -p {port} -r 1 {host} 1 {round(100 * force_n)}"
+    polled = f"{'' if unit == defaults.UNIT_ID else f' -a {unit}'} -p {port} -r 1 {host} 1 {round(100 * force_n)}"
     return (
         f"mbpoll -1{polled}        (enable, {force_n:.2f} N)",
         f"force-gateway write force_setpoint={force_n:g} control_word=1{where}",
@@ -80,7 +80,7 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
 
 def _reached_at(host: str, rig: Rig) -> str:
     """An address that takes connections: a server on all of them is reached at its loopback, where that may connect."""
-    loopback = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host)
+    loopback = {"0.0.0.0": defaults.HOST, "::": "::1"}.get(host)
     if loopback is None:
         return host
     return loopback if any(ip_address(loopback) in network for network in rig.network.allow) else "THIS-MACHINE"

@@ -9,6 +9,7 @@ from math import nan
 from pathlib import Path
 from typing import Any, Final
 
+from gateway import defaults
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import GatewayClient, RefusedError
@@ -77,7 +78,7 @@ class RemoteRun:
     """A gateway elsewhere; the recording and the report are there, too."""
 
     def __init__(self, gateway: tuple[str, int]) -> None:
-        self._map = load_register_map("force-v1")
+        self._map = load_register_map(defaults.REGISTER_MAP)
         self._client = GatewayClient(*gateway, 1, self._map)
         self._registers = [self._map.find(name) for name in _WORDS]
         self._values: list[float] = []

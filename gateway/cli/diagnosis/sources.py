@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.options import state_directory
@@ -19,8 +20,8 @@ from gateway.service.fitting.recorded_rig import plant_of, rig_of, rig_texts
 from gateway.twin.plant import values
 
 _WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
-START_PLANT: Final = "paper-slide"
-_ANY_STATE: Final = "demo"  # whose state directory is meant where neither --state nor --rig says one
+START_PLANT: Final = defaults.PLANT
+_ANY_STATE: Final = defaults.RIG  # whose state directory is meant where neither --state nor --rig says one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.sequence import HoldRun, Seen, Write, seen_of
@@ -15,13 +16,13 @@ from gateway.cli.master.refusal_text import explained
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 
-DEFAULT_PERIOD_S: Final = 0.05  # of a lease that nobody has told us: 200 ms is usual
 _ACTIONS: Final = {
     "fault": "safe voltage, fault A310",
     "hold": "the force stays, with a warning",
     "ramp": "it ramps to 0 N",
 }
 _BEATS_PER_LEASE: Final = 4.0
+DEFAULT_PERIOD_S: Final = defaults.LEASE_S / _BEATS_PER_LEASE  # of a lease that nobody has told us
 _SHORTEST_PERIOD_S: Final = 0.005
 _LOOK_S: Final = 0.1
 _LOOKS_AFTER_A_LOSS_S: Final = 2.0  # without a lease, or one that we do not know

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import click
 
+from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.options import endpoint, json_option, name_option, state_directory, state_options
@@ -24,20 +25,34 @@ _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 
 
 @click.command()
-@click.option("--groups", type=click.IntRange(1, 100), help="How often the ladder is climbed  [default: 5]")
-@click.option("--step", "step_v", type=click.FloatRange(min=0.01), help="Height of a stair in V  [default: 0.2]")
+@click.option(
+    "--groups",
+    type=click.IntRange(1, 100),
+    help=f"How often the ladder is climbed  [default: {defaults.LADDER_GROUPS}]",
+)
+@click.option(
+    "--step",
+    "step_v",
+    type=click.FloatRange(min=0.01),
+    help=f"Height of a stair in V  [default: {defaults.LADDER_STEP_V}]",
+)
 @click.option("--v-max", "v_max_v", type=click.FloatRange(min=0.1), help="Top in V  [default: as the rig allows]")
 @click.option(
-    "--minor", "minor_points", type=click.IntRange(0, 2000), help="Points of the reversal part  [default: 150]"
+    "--minor",
+    "minor_points",
+    type=click.IntRange(0, 2000),
+    help=f"Points of the reversal part  [default: {defaults.LADDER_MINOR_POINTS}]",
 )
 @click.option(
     "--response",
     "response_steps",
     type=click.IntRange(0, 200),
-    help="Large steps for dead time and lags  [default: 12]",
+    help=f"Large steps for dead time and lags  [default: {defaults.LADDER_RESPONSE_STEPS}]",
 )
 @click.option(
-    "--quick", is_flag=True, help="0.5 V stairs, one group, short reversal part, a few steps: about a minute."
+    "--quick",
+    is_flag=True,
+    help=f"{defaults.QUICK_LADDER_STEP_V} V stairs, one group, short reversal part, a few steps: about a minute.",
 )
 @click.option("--tare", is_flag=True, help="Take the force at rest as zero first (only with the tool unloaded).")
 @click.option(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.options import count_of, json_option
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("file", metavar="RIG", default="demo")
+@click.argument("file", metavar="RIG", default=defaults.RIG)
 @json_option
 @click.pass_context
 def command(context: click.Context, *, file: str, as_json: bool) -> None:

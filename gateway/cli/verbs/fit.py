@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.options import json_option, name_option, state_directory
@@ -98,7 +99,7 @@ def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
     from gateway.service.fitting.ladder_fit import fit_recording
     from gateway.service.fitting.ladder_source import Background, find_source, read_source
 
-    path = find_source(name, state_directory(options["state"], options["rig"] or "demo"))
+    path = find_source(name, state_directory(options["state"], options["rig"] or defaults.RIG))
     if not path.exists():
         raise CliError(
             f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA
@@ -125,7 +126,7 @@ def _stored(fit: "LadderFit", options: dict[str, Any]) -> int:
     from gateway.profiles import load_rig
     from gateway.service.fitting.ladder_fit import calibration_of
 
-    rig = load_rig(options["rig"] or fit.document["rig"] or "demo")
+    rig = load_rig(options["rig"] or fit.document["rig"] or defaults.RIG)
     state = state_directory(options["state"], rig.name)
     try:
         calibration = calibration_of(fit, rig.load_cell.range_n)

@@ -2,10 +2,14 @@
 
 import click
 
+from gateway import defaults
+
 
 @click.command()
 @click.option("--format", "form", type=click.Choice(["markdown", "csv", "json"]), default="markdown", show_default=True)
-@click.option("--map", "map_name", default="force-v1", metavar="NAME", show_default=True, help="Map name or file.")
+@click.option(
+    "--map", "map_name", default=defaults.REGISTER_MAP, metavar="NAME", show_default=True, help="Map name or file."
+)
 def command(*, form: str, map_name: str) -> None:
     """Print the register table."""
     from gateway.profiles import load_register_map

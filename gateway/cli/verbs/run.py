@@ -5,11 +5,12 @@ from typing import Any
 
 import click
 
+from gateway import defaults
 from gateway.cli.options import endpoint
 
 
 @click.command()
-@click.argument("rig", default="demo")
+@click.argument("rig", default=defaults.RIG)
 @click.option("--sim", "simulate", is_flag=True, help="Simulate the rig's devices, whatever its file says.")
 @click.option(
     "--bind",

@@ -10,6 +10,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import Final
 
+from gateway import defaults
 from gateway.bsfm import Bsfm
 from gateway.bsfm.ladder.plan import FALLING, RISING, ladder_plan
 from gateway.control.settings import STRICT, Limits
@@ -32,15 +33,15 @@ class RunPlan:
 
     __pydantic_config__ = STRICT
     v_max_v: float | None = None
-    step_v: float = 0.2
-    groups: int = 5
-    minor_points: int = 150
-    response_steps: int = 12
+    step_v: float = defaults.LADDER_STEP_V
+    groups: int = defaults.LADDER_GROUPS
+    minor_points: int = defaults.LADDER_MINOR_POINTS
+    response_steps: int = defaults.LADDER_RESPONSE_STEPS
     first_group: int = 0
     tare: bool = False
 
 
-QUICK: Final = RunPlan(step_v=0.5, groups=1, minor_points=32)
+QUICK: Final = RunPlan(step_v=defaults.QUICK_LADDER_STEP_V, groups=1, minor_points=32)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
+from gateway import defaults
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.settings import ControlSettings, Defaults, Limits, Supervision, Trim
 from gateway.devices import DeviceProfile
@@ -28,7 +29,7 @@ from gateway.registers.map.register_map import RegisterMap
 
 T = TypeVar("T")
 
-STAND_IN_PLANT: Final = "paper-slide"
+STAND_IN_PLANT: Final = defaults.PLANT
 """What `run --sim` simulates for a real rig that names no plant."""
 
 FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *wire_checks.FAULTS, *network_checks.FAULTS)
@@ -84,7 +85,7 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     file, faults = build(RigFile, document)
     findings.faults += faults
     register_map = read_named(
-        "registers", written_at(document, ("registers",), path.parent, "force-v1"), read_registers, findings
+        "registers", written_at(document, ("registers",), path.parent, defaults.REGISTER_MAP), read_registers, findings
     )
     parts = _parts(document, path.parent, findings)
     findings.faults += _first_of_each_path(_told(document, FAULTS, parts))

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from gateway import defaults
 from gateway.bsfm.model import Calibration
 from gateway.control.compensation.compensation import Compensation
 from gateway.control.settings import Defaults, Limits, Supervision, Trim
@@ -162,7 +163,7 @@ def times_fit(parts: Parts) -> Found:
 
 def a_simulated_rig_has_a_plant(parts: Parts) -> Found:
     if parts.simulated and not parts.names_plant:
-        yield "plant", "is missing: a simulated rig needs something to simulate, such as `plant: paper-slide`"
+        yield "plant", f"is missing: a simulated rig needs something to simulate, such as `plant: {defaults.PLANT}`"
 
 
 def a_real_rig_is_wise(parts: Parts) -> Found:

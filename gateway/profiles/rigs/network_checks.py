@@ -3,6 +3,7 @@
 from ipaddress import ip_address
 from typing import Final
 
+from gateway import defaults
 from gateway.profiles.rigs.checks import Check, Found, Parts
 
 
@@ -34,7 +35,7 @@ def the_face_is_wise(parts: Parts) -> Found:
     if 0 < network.port < 1024:
         yield (
             "network.port",
-            f"E120 {network.port} needs a privilege (a service, or CAP_NET_BIND_SERVICE); 5020 does not",
+            f"E120 {network.port} needs a privilege (a service, or CAP_NET_BIND_SERVICE); {defaults.MODBUS_PORT} does not",
         )
     if any(allowed.prefixlen == 0 for allowed in network.allow):
         yield "network.allow", "lets every address in the world connect"

@@ -6,6 +6,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
+from gateway import defaults
 from gateway.bsfm.model import Bsfm, Calibration, Response
 from gateway.control.compensation.command_map import sent
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
@@ -127,8 +128,11 @@ class Rig:
         if compensation.outside is not self.compensation.outside:
             notes = (*notes, "no force from outside is simulated, so none is compensated")
         if not ip_address(network.bind).is_loopback:
-            notes = (*notes, f"bound to 127.0.0.1: a simulated rig does not take the cell's address {network.bind}")
-            network = replace(network, bind="127.0.0.1")
+            notes = (
+                *notes,
+                f"bound to {defaults.HOST}: a simulated rig does not take the cell's address {network.bind}",
+            )
+            network = replace(network, bind=defaults.HOST)
         return replace(
             self,
             simulated=True,

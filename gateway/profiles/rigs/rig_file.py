@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import AfterValidator, Field, PlainValidator, WithJsonSchema
 
+from gateway import defaults
 from gateway.control.settings import STRICT, Defaults, LeadSettings, Limits, ResponseSource, Supervision, Trim
 from gateway.devices.line_settings import Baud
 
@@ -53,7 +54,7 @@ class OutputFile:
     __pydantic_config__ = STRICT
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
-    baud: Baud = 9600  # as set in the device
+    baud: Baud = defaults.OUTPUT_BAUD  # as set in the device
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,10 +64,10 @@ class CellFile:
     __pydantic_config__ = STRICT
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
-    baud: Baud = 115200  # as set in the amplifier
+    baud: Baud = defaults.CELL_BAUD  # as set in the amplifier
     sign: Literal[1, -1] = 1  # -1 where the wiring shows a push as a negative force
     unit: Literal["N", "kg", "g", "lb"] | None = None  # only where the amplifier's own text leaves the unit out
-    range_n: Annotated[float, Gt(0), Le(5000)] = 100.0  # the cell's rated force, N
+    range_n: Annotated[float, Gt(0), Le(5000)] = defaults.CELL_RANGE_N  # the cell's rated force, N
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,17 +75,23 @@ class Network:
     """The Modbus TCP face."""
 
     __pydantic_config__ = STRICT
-    bind: Address = "127.0.0.1"  # the gateway's own address; any but loopback needs `allow`
-    port: Annotated[int, Ge(0), Le(65535)] = 5020  # 0: any free port; below 1024 needs a privilege
-    units: Annotated[tuple[Annotated[int, Ge(0), Le(255)], ...], MinLen(1)] = (0, 1, 255)  # unit ids that are answered
+    bind: Address = defaults.HOST  # the gateway's own address; any but loopback needs `allow`
+    port: Annotated[int, Ge(0), Le(65535)] = defaults.MODBUS_PORT  # 0: any free port; below 1024 needs a privilege
+    units: Annotated[tuple[Annotated[int, Ge(0), Le(255)], ...], MinLen(1)] = (
+        defaults.UNIT_IDS
+    )  # unit ids that are answered
     allow: tuple[Network4Or6, ...] = ()  # networks that may connect, such as 192.168.125.0/24
     owner: Address | None = None  # the one master that may command; null: the first that does
     require_byte_order_echo: bool = False  # the master must prove its word order before it may enable
     allow_plain_upload: bool = False  # coefficients may be uploaded without TLS
-    connections: Annotated[int, Ge(1), Le(256)] = 32  # most connections at a time
-    per_address: Annotated[int, Ge(1), Le(256)] = 4  # most connections of one address; loopback is exempt
-    idle_s: Annotated[float, Gt(0)] = 60.0  # a connection that asks nothing this long is closed
-    requests_per_s: Annotated[float, Gt(0)] = 200.0  # of one client; above it reading pauses; loopback is exempt
+    connections: Annotated[int, Ge(1), Le(256)] = defaults.CONNECTIONS  # most connections at a time
+    per_address: Annotated[int, Ge(1), Le(256)] = (
+        defaults.PER_ADDRESS
+    )  # most connections of one address; loopback is exempt
+    idle_s: Annotated[float, Gt(0)] = defaults.IDLE_S  # a connection that asks nothing this long is closed
+    requests_per_s: Annotated[float, Gt(0)] = (
+        defaults.REQUESTS_PER_S
+    )  # of a client; above it reading waits; loopback is exempt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +116,7 @@ class RigFile:
     simulated: bool = False  # true: the devices are simulated, with the plant behind them
     seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 0  # of the simulation's noise
     loop_hz: Annotated[float, Ge(50), Le(250)] = 100.0  # rate of the control loop's tick; setpoints act on arrival
-    registers: Annotated[str, MinLen(1)] = "force-v1"  # the Modbus map
+    registers: Annotated[str, MinLen(1)] = defaults.REGISTER_MAP  # the Modbus map
     plant: Annotated[str, MinLen(1)] | None = None  # what is simulated; in a real rig for `--sim` and residual_watch
     calibration: Annotated[str, MinLen(1)]  # voltage-force model to start with
     compensation: Annotated[str, MinLen(1)] | None = None  # an extended plant, of which control takes back what it can

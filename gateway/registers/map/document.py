@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any, Final
 
+from gateway import defaults
 from gateway.registers.map.register_map import Block, Register, RegisterMap
 from gateway.registers.values import WordOrder
 
@@ -104,9 +105,9 @@ def _s7_place(registers: Sequence[Register]) -> str:
 def _mbpoll(block: Block, registers: Sequence[Register]) -> str:
     first, words = _span(registers)
     if not block.repeats:
-        return f"mbpoll -1 -p 5020 -r {first + 1} -c {words} HOST"
+        return f"mbpoll -1 -p {defaults.MODBUS_PORT} -r {first + 1} -c {words} HOST"
     option = " -B" if block.word_order is WordOrder.ABCD else ""
-    return f"mbpoll -1 -p 5020 -t 4:float{option} -r {first + 1} -c {words // 2} HOST"
+    return f"mbpoll -1 -p {defaults.MODBUS_PORT} -t 4:float{option} -r {first + 1} -c {words // 2} HOST"
 
 
 def _csv(register_map: RegisterMap) -> str:

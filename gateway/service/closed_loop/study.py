@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.random import default_rng
 
+from gateway import defaults
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.control import NO_COMPENSATION, Compensation, ControlSettings
@@ -28,7 +29,7 @@ TRIAL: Final = 10_000  # from the first seed to that of the trial run, which is 
 RESAMPLES: Final = 4000
 HEADROOM: Final = 0.94  # of the largest voltage: the ladder's top, so that the trim has room above it
 REACH: Final = 0.92  # of the force that the model reaches at its top
-STAND_IN: Final = "demo"
+STAND_IN: Final = defaults.RIG
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from gateway import defaults
 from gateway.bsfm import Calibration
 from gateway.bsfm.ladder.check import CheckedLadder, Expectation, checked_ladder, joined
 from gateway.calibrations.store import CalibrationStore
@@ -11,7 +12,7 @@ from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
 from gateway.recording.layout import SUFFIX
 
-_STAND_IN: Final = "demo"  # whose calibration a table without a known rig is compared with
+_STAND_IN: Final = defaults.RIG  # whose calibration a table without a known rig is compared with
 _MM2_PER_M2: Final = 1.0e6
 
 

@@ -8,6 +8,7 @@ import traceback
 from pathlib import Path
 from typing import Any, Final
 
+from gateway import defaults
 from gateway.calibrations.activation import InUse
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
@@ -247,7 +248,8 @@ class Cell:
             return await self._server.start(str(host), int(port))
         except PermissionError as error:
             raise StartError(
-                f"E120 port {port} needs the capability net_bind_service; use --bind {host}:5020 (force-gateway explain E120)",
+                f"E120 port {port} needs the capability net_bind_service; use --bind {host}:{defaults.MODBUS_PORT} "
+                "(force-gateway explain E120)",
                 77,
             ) from error
         except BindError as error:

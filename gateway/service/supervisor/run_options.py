@@ -4,12 +4,14 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from gateway import defaults
+
 
 @dataclass(frozen=True)
 class RunOptions:
     """The options of the verb, by name. state None: $XDG_STATE_HOME/force-gateway/RIG."""
 
-    rig: str = "demo"
+    rig: str = defaults.RIG
     simulate: bool = False
     bind: tuple[str, int] | None = None
     state: Path | None = None

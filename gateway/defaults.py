@@ -1,0 +1,39 @@
+"""Defaults that more than one room states: rig files, command line, messages and generated texts take them from here.
+
+A default that only one dataclass states (the bounds of control, for one) stands there, beside its unit and its limits.
+"""
+
+from typing import Final
+
+RIG: Final = "demo"
+"""The shipped rig that verbs mean where none is named."""
+REGISTER_MAP: Final = "force-v1"
+PLANT: Final = "paper-slide"
+"""Simulated where a real rig names no plant of its own."""
+
+HOST: Final = "127.0.0.1"
+MODBUS_PORT: Final = 5020
+"""Modbus' own is 502 (IANA), which Linux gives to programs with a right of their own only."""
+UNIT_ID: Final = 1
+UNIT_IDS: Final = (0, 1, 255)
+"""0 and 255 mean the device itself on Modbus TCP ("Messaging on TCP/IP Implementation Guide V1.0b", 4.4.2.3); 1 is what most
+clients send."""
+CONNECTIONS: Final = 32
+PER_ADDRESS: Final = 4
+"""Connections."""
+IDLE_S: Final = 60.0
+REQUESTS_PER_S: Final = 200.0
+
+OUTPUT_BAUD: Final = 9600
+CELL_BAUD: Final = 115200
+VOLTAGE_MAX_V: Final = 10.0
+"""End of the usual range of DACs and regulators, 0 .. 10 V."""
+CELL_RANGE_N: Final = 100.0
+LEASE_S: Final = 0.2
+"""Of a starter rig; and what `hold` keeps where nobody has told it the rig's."""
+
+LADDER_STEP_V: Final = 0.2
+LADDER_GROUPS: Final = 5
+LADDER_MINOR_POINTS: Final = 150
+LADDER_RESPONSE_STEPS: Final = 12
+QUICK_LADDER_STEP_V: Final = 0.5
