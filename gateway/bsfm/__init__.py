@@ -9,7 +9,7 @@ control.
 from gateway.bsfm.branches import Branches, Crossing
 from gateway.bsfm.coefficients import CoefficientFault, CoefficientLimits, CoefficientReason, Coefficients
 from gateway.bsfm.curve import ORDER_MAX, RationalBezier
-from gateway.bsfm.inverse import Status
+from gateway.bsfm.inverse import InverseStatus
 from gateway.bsfm.model import Bsfm, Calibration, Response
 from gateway.bsfm.slip.reversal import FALLING, RISING, DeadBand, Direction, LinearBlend, Memory, Reversal
 from gateway.bsfm.slip.slip_stops import SlipStops
@@ -29,13 +29,13 @@ __all__ = [
     "Crossing",
     "DeadBand",
     "Direction",
+    "InverseStatus",
     "LinearBlend",
     "Memory",
     "RationalBezier",
     "Response",
     "Reversal",
     "SlipStops",
-    "Status",
     "validate",
     "validate_coefficients",
 ]

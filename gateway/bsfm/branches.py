@@ -54,7 +54,7 @@ class Branches:
         split = self.rising.order + 1
         sides = []
         for curve, own in ((self.rising, handles[:split]), (self.falling, handles[split:])):
-            total = exact.scaled(exact.whole_numbers(curve.weights)[0])
+            total = exact.scale_bernstein(exact.whole_numbers(curve.weights)[0])
             sides.append((total, [w * b for w, b in zip(total, own, strict=True)]))
         (rising_w, rising_n), (falling_w, falling_n) = sides
         return exact.difference(exact.product(falling_n, rising_w), exact.product(rising_n, falling_w))

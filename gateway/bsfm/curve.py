@@ -14,7 +14,7 @@ from math import comb, frexp, isfinite, ldexp
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 from gateway.bsfm import exact
-from gateway.bsfm.inverse import Inverse, inverse_of, refused
+from gateway.bsfm.inverse import Inverse, inverse_of, refuse_inverse
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,7 +53,7 @@ class RationalBezier:
         scaled = _scaled(self.weights)
         self._multiply_out(scaled)
         self._increasing = exact.place_not_positive(self._numerator) is None
-        self.inverse = inverse_of(self.x0, self.x1, self.handles, scaled) if self._increasing else refused
+        self.inverse = inverse_of(self.x0, self.x1, self.handles, scaled) if self._increasing else refuse_inverse
 
     def _multiply_out(self, weights: tuple[float, ...]) -> None:
         totals = [comb(self.order, i) * weight for i, weight in enumerate(weights)]
@@ -102,9 +102,9 @@ class RationalBezier:
         ((low, high), span_scale), ((floor,), floor_scale) = map(
             exact.whole_numbers, ((self.x0, self.x1), (floor_n_per_v,))
         )
-        total = exact.scaled(weights)
+        total = exact.scale_bernstein(weights)
         wanted = floor * (high - low) * scale
-        steepness = exact.raised_by_two(exact.slope_numerator(weights, handles))
+        steepness = exact.raise_degree_by_two(exact.slope_numerator(weights, handles))
         squares = exact.product(total, total)
         rest = [c * span_scale * floor_scale - wanted * w for c, w in zip(steepness, squares, strict=True)]
         return exact.place_negative(rest) is None

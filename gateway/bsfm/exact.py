@@ -22,7 +22,7 @@ def whole_numbers(values: Iterable[float]) -> tuple[list[int], int]:
     return [numerator * (scale // denominator) for numerator, denominator in ratios], scale
 
 
-def scaled(bernstein: Sequence[int]) -> list[int]:
+def scale_bernstein(bernstein: Sequence[int]) -> list[int]:
     """Ordinary Bernstein coefficients -> coefficients on t^k (1-t)^(m-k)."""
     degree = len(bernstein) - 1
     return [comb(degree, k) * value for k, value in enumerate(bernstein)]
@@ -41,7 +41,7 @@ def difference(a: Sequence[int], b: Sequence[int]) -> list[int]:
     return [left - right for left, right in zip(a, b, strict=True)]
 
 
-def raised_by_two(a: Sequence[int]) -> list[int]:
+def raise_degree_by_two(a: Sequence[int]) -> list[int]:
     """The same polynomial, two degrees higher: multiplied by ((1-t) + t)^2 = 1."""
     return product(a, (1, 2, 1))
 

@@ -16,7 +16,7 @@ from enum import StrEnum
 from math import comb, inf, sqrt
 
 
-class Status(StrEnum):
+class InverseStatus(StrEnum):
     """How an inverse was answered: OK, or clamped at the LOW or HIGH end of the curve."""
 
     OK = "ok"
@@ -24,8 +24,12 @@ class Status(StrEnum):
     HIGH = "high"
 
 
-Inverse = Callable[[float], tuple[float, Status]]
-OK, LOW, HIGH = Status.OK, Status.LOW, Status.HIGH  # an enum member looked up on its class costs 30 ns
+Inverse = Callable[[float], tuple[float, InverseStatus]]
+OK, LOW, HIGH = (
+    InverseStatus.OK,
+    InverseStatus.LOW,
+    InverseStatus.HIGH,
+)  # an enum member looked up on its class costs 30 ns
 PLAIN = 1.0e60  # closed forms square their terms: outside 1e-60..1e60 the Newton form, which does not, is used
 
 
@@ -41,7 +45,7 @@ def inverse_of(x0: float, x1: float, handles: Sequence[float], weights: Sequence
     return _inverse_n(x0, x1, tuple(handles), tuple(weights))
 
 
-def refused(_force_n: float) -> tuple[float, Status]:
+def refuse_inverse(_force_n: float) -> tuple[float, InverseStatus]:
     """The inverse of a curve that has none."""
     raise ValueError("the curve is not increasing: it has no inverse")
 
@@ -50,7 +54,7 @@ def _inverse_1(x0: float, x1: float, handles: tuple[float, float], w1: float) ->
     b0, b1 = handles
     span = x1 - x0
 
-    def inverse(force_n: float) -> tuple[float, Status]:
+    def inverse(force_n: float) -> tuple[float, InverseStatus]:
         up = force_n - b0
         down = b1 - force_n
         if up > 0.0 < down:
@@ -69,7 +73,7 @@ def _inverse_2(x0: float, x1: float, handles: tuple[float, float, float], weight
     w1, w2 = weights
     span = x1 - x0
 
-    def inverse(force_n: float) -> tuple[float, Status]:
+    def inverse(force_n: float) -> tuple[float, InverseStatus]:
         up = force_n - b0
         down = b2 - force_n
         if up > 0.0 < down:
@@ -96,7 +100,7 @@ def _inverse_n(x0: float, x1: float, handles: tuple[float, ...], weights: tuple[
     half = sum(a * b for a, b in zip(w, handles, strict=True)) / sum(w)
     span = x1 - x0
 
-    def inverse(force_n: float) -> tuple[float, Status]:
+    def inverse(force_n: float) -> tuple[float, InverseStatus]:
         force_n = float(force_n)  # a numpy scalar would cost three times as much in each of the steps below
         if not first < force_n < last:
             return _at_an_end(force_n, (first, last), x0, x1)
@@ -109,7 +113,7 @@ def _inverse_n(x0: float, x1: float, handles: tuple[float, ...], weights: tuple[
     return inverse
 
 
-def _at_an_end(force_n: float, ends: tuple[float, float], x0: float, x1: float) -> tuple[float, Status]:
+def _at_an_end(force_n: float, ends: tuple[float, float], x0: float, x1: float) -> tuple[float, InverseStatus]:
     if force_n <= ends[0]:
         return x0, (LOW if force_n < ends[0] else OK)
     if force_n >= ends[1]:

@@ -11,7 +11,7 @@ from typing import Final
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.curve import RationalBezier
-from gateway.bsfm.inverse import Status
+from gateway.bsfm.inverse import InverseStatus
 from gateway.bsfm.slip.reversal import LinearBlend, Memory, Reversal
 from gateway.bsfm.slip.slip_stops import SlipStops
 
@@ -43,7 +43,7 @@ class Bsfm:
         """s of this memory, for the functions below."""
         return self.reversal.share(memory)
 
-    def voltage_v(self, force_n: float, state: float) -> tuple[float, Status]:
+    def voltage_v(self, force_n: float, state: float) -> tuple[float, InverseStatus]:
         """Feedforward V = (1+s)/2 V_rise(f) + (1-s)/2 V_fall(f) for the blend state s in [-1, 1].
 
         The status is that of the branches that take part; LOW or HIGH if either is clamped. ValueError for NaN.
@@ -55,7 +55,7 @@ class Bsfm:
         if rising_share == 0.0:
             return falling_v, falling_status
         rising_v, rising_status = self.branches.rising.inverse(force_n)
-        status = falling_status if rising_status is Status.OK else rising_status
+        status = falling_status if rising_status is InverseStatus.OK else rising_status
         return falling_v + rising_share * (rising_v - falling_v), status
 
     def force_n(self, voltage_v: float, state: float) -> float:

@@ -4,12 +4,12 @@
 supervision that shares nothing with it but the readings, over a state table. What a rig file may set is in `settings`.
 """
 
-from gateway.control.compensation.command_map import CommandMap, sent
-from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation, OutsideForce, Timing
+from gateway.control.compensation.command_map import CommandMap, apply_command_map
+from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation, OutsideForce, TimingCompensation
 from gateway.control.compensation.load_cell import CellMap
 from gateway.control.controller import Controller
 from gateway.control.decision import safe_output
-from gateway.control.inputs import NO_COMMAND, Line, Output
+from gateway.control.inputs import NO_COMMAND, LineStatus, Output
 from gateway.control.settings import ControlSettings, Defaults, LeadSettings, LeaseAction, Limits, Supervision, Trim
 
 __all__ = [
@@ -24,12 +24,12 @@ __all__ = [
     "LeadSettings",
     "LeaseAction",
     "Limits",
-    "Line",
+    "LineStatus",
     "Output",
     "OutsideForce",
     "Supervision",
-    "Timing",
+    "TimingCompensation",
     "Trim",
+    "apply_command_map",
     "safe_output",
-    "sent",
 ]

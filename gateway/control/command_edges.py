@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
 from gateway.control.demand import Demand, demand_of
-from gateway.control.limits import NotFiniteError, narrowed
+from gateway.control.limits import NotFiniteError, narrow_limits
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.lease import Lease
 from gateway.registers.command import Command
@@ -26,7 +26,7 @@ class Edges(NamedTuple):
 NO_EDGES: Final = Edges()
 
 
-class CommandFollower:
+class CommandTracker:
     """`demand` is the last one that made sense; `not_finite` names the number that did not, or is empty."""
 
     def __init__(self, settings: ControlSettings) -> None:
@@ -40,7 +40,7 @@ class CommandFollower:
 
     def use(self, model: Bsfm) -> None:
         """Hold to the force limits of this calibration, too: the demand of the last command may become a smaller one."""
-        limits = narrowed(self._rig_settings.limits, model.limits_n)
+        limits = narrow_limits(self._rig_settings.limits, model.limits_n)
         self._settings = replace(self._rig_settings, limits=limits)
         self._demand()
 

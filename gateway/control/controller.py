@@ -13,25 +13,25 @@ from gateway.bsfm import Bsfm
 from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
-from gateway.control.command_edges import CommandFollower, Edges
+from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
-from gateway.control.decision import Outcome, Standing, output_of, safe_output, warning_bits
-from gateway.control.demand import Demand, ramped_down
-from gateway.control.edge_checks import EdgeJudge, Situation
-from gateway.control.force_loop.force_loop import Moment, Pursuit
+from gateway.control.decision import ControllerStatus, Outcome, output_of, safe_output, warning_bits
+from gateway.control.demand import Demand, ramp_down_demand
+from gateway.control.edge_checks import EdgeCheck, Situation
+from gateway.control.force_loop.force_loop import ForceLoop, LoopInputs
 from gateway.control.force_loop.response_timing import timing_of
-from gateway.control.inputs import Line, Output
+from gateway.control.inputs import LineStatus, Output
 from gateway.control.messages import fault_sentence
 from gateway.control.motion import Motion, Moved
-from gateway.control.runs.active_run import AnyPlan, Calibrating
-from gateway.control.runs.ladder_stairs import RunPlan
-from gateway.control.sample_conditioning import NO_READING, Reader, Reading, at_time
+from gateway.control.runs.active_run import ActiveRun, AnyPlan
+from gateway.control.runs.ladder_stairs import CalibrationPlan
+from gateway.control.sample_conditioning import NO_READING, Reading, SampleConditioner, at_time
 from gateway.control.settings import ControlSettings, LeaseAction
-from gateway.control.state_table import ENABLED_STATES, Event, next_state
-from gateway.control.supervision.contact_detection import ContactSense
-from gateway.control.supervision.fault_detection import Finding, Supervisor, finding
-from gateway.control.supervision.one_shot_events import Telling
-from gateway.control.supervision.plausibility import ModelResponse
+from gateway.control.state_table import ENABLED_STATES, StateEvent, next_state
+from gateway.control.supervision.contact_detection import ContactDetector
+from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
+from gateway.control.supervision.one_shot_events import OneShotEvents
+from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import Asked, EdgeRefusal
@@ -61,23 +61,23 @@ class Controller:
         self.calibration_id = calibration_id
         self.state = State.OFF
         self._settings = settings
-        self._follower = CommandFollower(settings)
+        self._follower = CommandTracker(settings)
         self._follower.use(model)
-        self.calibrating = Calibrating(settings, model)
-        self._pursuit = Pursuit(settings, model, compensation.timing)
-        expected = ModelResponse(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
+        self.calibrating = ActiveRun(settings, model)
+        self._pursuit = ForceLoop(settings, model, compensation.timing)
+        expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
         self._motion = Motion(self._pursuit, expected, self.calibrating)
-        self._supervisor = Supervisor(settings)
-        self._reader = Reader(settings.supervision, compensation.cell)
-        self._judge = EdgeJudge(self._follower, self._reader.zero, self.calibrating)
-        self._contact = ContactSense(settings.defaults.contact_threshold_n)
+        self._supervisor = FaultDetector(settings)
+        self._reader = SampleConditioner(settings.supervision, compensation.cell)
+        self._judge = EdgeCheck(self._follower, self._reader.zero, self.calibrating)
+        self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._reading = NO_READING
         self._last_s: float | None = None
-        self._line = Line()
+        self._line = LineStatus()
         self._fault, self._faulted_s = FaultCode.NONE, -inf
         self._restarted = unclean_restart
         self._stopping = self._ramping_down = self._master_lost = False
-        self._telling = Telling(settings.supervision.stuck_n)
+        self._telling = OneShotEvents(settings.supervision.stuck_n)
         self._outcome = Outcome()
 
     # -- for the service
@@ -103,7 +103,7 @@ class Controller:
         self._follower.use(model)
         self.calibration_id = calibration_id
 
-    def refusal_of(self, now_s: float, asked: Asked, line: Line) -> EdgeRefusal | None:
+    def refusal_of(self, now_s: float, asked: Asked, line: LineStatus) -> EdgeRefusal | None:
         """Why a command cannot be taken at this moment; None: the next step takes it. Nothing changes by asking."""
         is_busy = self.state is State.CALIBRATING or self._ramping_down or self._stopping
         if not is_busy and not self._follower.edges_of(asked.command).rises:
@@ -119,7 +119,7 @@ class Controller:
         """What to write when `step` raised."""
         return safe_output(fault, self._settings.limits.safe_voltage_v)
 
-    def step(self, now_s: float, command: Command, sample: ForceSample | None, line: Line) -> Output:
+    def step(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> Output:
         """The decision of this moment. An exception is a defect of ours: INTERNAL is latched before it goes on, and the
         caller writes `safe_output`."""
         try:
@@ -133,7 +133,7 @@ class Controller:
 
     # -- the order of a step
 
-    def _step(self, now_s: float, command: Command, sample: ForceSample | None, line: Line) -> Output:
+    def _step(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> Output:
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
         self._last_s, self._line = now_s, line
         self._outcome = Outcome()
@@ -153,7 +153,7 @@ class Controller:
         """Contact force that the slide need not give."""
         return self._follower.demand.gravity_n + self._outside_n
 
-    def _sense(self, now_s: float, sample: ForceSample | None, line: Line) -> None:
+    def _sense(self, now_s: float, sample: ForceSample | None, line: LineStatus) -> None:
         around = (line.temperature_c, self._pursuit.stage.voltage_v)
         self._telling.hear(line)
         self._reading = reading = self._reader.read(now_s, sample, self._follower.demand.gravity_n, around)
@@ -165,7 +165,7 @@ class Controller:
             self._supervisor.observe_rest(reading)
             self._telling.stuck(self._supervisor.is_stuck, reading, self._outcome.events)
 
-    def _situation(self, now_s: float, line: Line) -> Situation:
+    def _situation(self, now_s: float, line: LineStatus) -> Situation:
         reading = at_time(
             self._reading, now_s - (now_s if self._last_s is None else self._last_s), self._settings.supervision
         )
@@ -181,7 +181,7 @@ class Controller:
             ramps_down=self._ramping_down or self._stopping,
         )
 
-    def _obey(self, now_s: float, edges: Edges, line: Line) -> None:
+    def _obey(self, now_s: float, edges: Edges, line: LineStatus) -> None:
         """What the bank has let through, in the order in which it was judged."""
         if edges.stops and self.state in ENABLED_STATES:
             self._disable(f"info disabled by {self._follower.who}")
@@ -194,7 +194,7 @@ class Controller:
         if edges.rises & _ENABLE and self.state not in ENABLED_STATES:
             self._enable(now_s)
         if edges.rises & _CALIBRATE:
-            self._begin_run(now_s, RunPlan(), f"info calibration begun by {self._follower.who}")
+            self._begin_run(now_s, CalibrationPlan(), f"info calibration begun by {self._follower.who}")
         self._obey_this_machine(now_s)
         self._ramping_down = self._ramping_down or self._stopping
 
@@ -214,7 +214,7 @@ class Controller:
     # -- edges of the command
 
     def _disable(self, sentence: str) -> None:
-        self.state = next_state(self.state, Event.DISABLE)
+        self.state = next_state(self.state, StateEvent.DISABLE)
         self._let_go(sentence)
 
     def _let_go(self, sentence: str) -> None:
@@ -228,7 +228,7 @@ class Controller:
     def _reset(self) -> None:
         if self.state is State.OFF:
             return
-        self.state = next_state(self.state, Event.RESET)
+        self.state = next_state(self.state, StateEvent.RESET)
         self._outcome.events.append(f"info fault {self._fault.name} reset by {self._follower.who}")
         self._fault = FaultCode.NONE
         self._restarted = False
@@ -239,7 +239,7 @@ class Controller:
         self._outcome.events.append(f"info tare: zero at {self._reader.zero.zero_n:.2f} N")
 
     def _enable(self, now_s: float) -> None:
-        self.state = next_state(self.state, Event.ENABLE)
+        self.state = next_state(self.state, StateEvent.ENABLE)
         self._started(now_s, f"info enabled by {self._follower.who}")
 
     def _started(self, now_s: float, sentence: str) -> None:
@@ -250,7 +250,7 @@ class Controller:
         self._outcome.events.append(sentence)
 
     def _begin_run(self, now_s: float, plan: AnyPlan, sentence: str, *, is_local: bool = False) -> None:
-        self.state = next_state(self.state, Event.CALIBRATE)
+        self.state = next_state(self.state, StateEvent.CALIBRATE)
         self.calibrating.begin(plan, is_local=is_local)
         self._started(now_s, sentence)
 
@@ -260,7 +260,7 @@ class Controller:
         self._ramping_down = True
         self._outcome.events.append(sentence)
 
-    def _block(self, now_s: float, line: Line) -> RefusalReason:
+    def _block(self, now_s: float, line: LineStatus) -> RefusalReason:
         """Why an enable would be refused now."""
         if self.state is State.FAULT:
             return RefusalReason.FAULT_LATCHED
@@ -270,14 +270,14 @@ class Controller:
             return RefusalReason.NONE
         return self._block_in_off(now_s, self._reading, line)
 
-    def _block_in_off(self, now_s: float, reading: Reading, line: Line) -> RefusalReason:
+    def _block_in_off(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         return RefusalReason.NOT_READY if self._stopping else self._supervisor.enable_block(now_s, reading, line)
 
     # -- supervision
 
-    def _supervise(self, now_s: float, line: Line) -> None:
+    def _supervise(self, now_s: float, line: LineStatus) -> None:
         name = self._follower.not_finite
-        found = finding(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
+        found = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
         found = found or self._supervisor.first_cause(now_s, self._reading, line, self._motion.expected_rise_n)
         if found:
             self._fail(now_s, found)
@@ -291,8 +291,8 @@ class Controller:
         """No master is needed: a run of this machine, or the way to 0 after any run."""
         return self.calibrating.is_local or (self.state is State.CALIBRATING and not self.calibrating.running)
 
-    def _fail(self, now_s: float, found: Finding) -> None:
-        self.state = next_state(self.state, Event.FAILED)
+    def _fail(self, now_s: float, found: StopCause) -> None:
+        self.state = next_state(self.state, StateEvent.FAILED)
         self._fault, self._faulted_s = found.fault, now_s
         self._let_go(found.sentence)
 
@@ -302,7 +302,7 @@ class Controller:
         action = self._settings.supervision.lease_action
         self._outcome.release_owner = True
         if action is LeaseAction.FAULT:
-            self._fail(now_s, finding(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
+            self._fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
             return
         self._master_lost = True
         self._ramping_down = self._ramping_down or action is LeaseAction.RAMP or self.calibrating.running
@@ -314,7 +314,7 @@ class Controller:
     def _target(self) -> Demand:
         """What to pursue now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
         demand = self._follower.demand
-        return ramped_down(demand, self._settings) if self._ramping_down else demand
+        return ramp_down_demand(demand, self._settings) if self._ramping_down else demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
         if self.state is State.CALIBRATING:
@@ -335,20 +335,20 @@ class Controller:
         moved = self._motion.climb(now_s, self._reading)
         if said := self.calibrating.take_said():
             self._outcome.events.append(said)
-        if isinstance(moved, Event) or moved.fault:
+        if isinstance(moved, StateEvent) or moved.fault:
             self._follow(now_s, moved)
             return False
         self._end_run(moved.sentence)
         return True
 
-    def _moment(self, now_s: float, dt_s: float) -> Moment:
+    def _moment(self, now_s: float, dt_s: float) -> LoopInputs:
         expected_n = self._motion.expected_n + self._given_n
         held_back, touching = self._supervisor.rise.is_too_high, self._contact.touching
-        return Moment(now_s, dt_s, self._reading, touching, expected_n, held_back, self._outside_n)
+        return LoopInputs(now_s, dt_s, self._reading, touching, expected_n, held_back, self._outside_n)
 
     def _follow(self, now_s: float, moved: Moved) -> None:
         """The state goes along with what has moved, or could not."""
-        if isinstance(moved, Event):
+        if isinstance(moved, StateEvent):
             self.state = next_state(self.state, moved)
         elif moved.fault:
             self._fail(now_s, moved)
@@ -357,9 +357,9 @@ class Controller:
 
     # -- what people see
 
-    def _standing(self, now_s: float, line: Line) -> Standing:
+    def _standing(self, now_s: float, line: LineStatus) -> ControllerStatus:
         enabled = self.state in ENABLED_STATES
-        return Standing(
+        return ControllerStatus(
             state=self.state,
             fault=self._fault,
             block=self._block(now_s, line),

@@ -6,7 +6,7 @@ from math import nan
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
-from gateway.control.force_loop.force_loop import Pursuit
+from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.inputs import Output
 from gateway.control.messages import fault_sentence
 from gateway.control.sample_conditioning import Reading
@@ -28,7 +28,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class ControllerStatus:
     """Where the controller stands at the end of a step."""
 
     state: State
@@ -57,7 +57,7 @@ def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
     )
 
 
-def status_bits(standing: Standing, pursuit: Pursuit) -> int:
+def status_bits(standing: ControllerStatus, pursuit: ForceLoop) -> int:
     enabled = standing.state in ENABLED_STATES
     return (
         (_ENABLED if enabled else 0)
@@ -71,7 +71,7 @@ def status_bits(standing: Standing, pursuit: Pursuit) -> int:
     )
 
 
-def warning_bits(word: int, pursuit: Pursuit, restarted: bool, master_lost: bool) -> int:
+def warning_bits(word: int, pursuit: ForceLoop, restarted: bool, master_lost: bool) -> int:
     """word: what the line and the process warn of."""
     return (
         word
@@ -82,7 +82,9 @@ def warning_bits(word: int, pursuit: Pursuit, restarted: bool, master_lost: bool
     )
 
 
-def output_of(command: Command, standing: Standing, pursuit: Pursuit, reading: Reading, outcome: Outcome) -> Output:
+def output_of(
+    command: Command, standing: ControllerStatus, pursuit: ForceLoop, reading: Reading, outcome: Outcome
+) -> Output:
     """The frozen answer. The measured force is nan unless fresh and usable: a stale number with an age is still a lie
     to most readers."""
     is_force = command.mode is Mode.FORCE or standing.state is State.CALIBRATING

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from math import cos
 from typing import Final
 
-from gateway.control.limits import finite, force_ranged
+from gateway.control.limits import finite, force_limited
 from gateway.control.settings import ControlSettings, Defaults
 from gateway.registers.command import Command
 from gateway.registers.words import LimitedBy, Mode
@@ -43,7 +43,7 @@ def gravity_n(payload_kg: float, tilt_rad: float) -> float:
 def demand_of(command: Command, settings: ControlSettings) -> Demand:
     """NotFiniteError if any number that matters is NaN or infinite."""
     defaults = settings.defaults
-    force_n, limited_by = force_ranged(command.force_setpoint_n, settings.limits)
+    force_n, limited_by = force_limited(command.force_setpoint_n, settings.limits)
     return Demand(
         mode=command.mode,
         force_n=force_n,
@@ -67,7 +67,7 @@ def _or_default(value: float, default: float, name: str) -> float:
     return value if finite(value, name) > 0.0 else default
 
 
-def ramped_down(demand: Demand, settings: ControlSettings) -> Demand:
+def ramp_down_demand(demand: Demand, settings: ControlSettings) -> Demand:
     """The same on the way to 0 N, within STOP_S whatever the force is."""
     rate_n_per_s = max(settings.defaults.force_ramp_n_per_s, settings.limits.force_max_n / STOP_S)
     return replace(demand, mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)

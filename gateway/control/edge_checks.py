@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.codes.refusals import RefusalReason
-from gateway.control.command_edges import CommandFollower, Edges
-from gateway.control.runs.active_run import AnyPlan, Calibrating
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.command_edges import CommandTracker, Edges
+from gateway.control.runs.active_run import ActiveRun, AnyPlan
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading
 from gateway.control.state_table import ENABLED_STATES
 from gateway.control.tare import Zero
@@ -51,10 +51,10 @@ class Situation:
     ramps_down: bool
 
 
-class EdgeJudge:
+class EdgeCheck:
     """Reads what it is given, changes nothing of it."""
 
-    def __init__(self, follower: CommandFollower, zero: Zero, calibrating: Calibrating) -> None:
+    def __init__(self, follower: CommandTracker, zero: Zero, calibrating: ActiveRun) -> None:
         self._follower = follower
         self._zero = zero
         self._calibrating = calibrating
@@ -119,7 +119,7 @@ class EdgeJudge:
         if edges.rises & _ENABLE and state not in ENABLED_STATES:
             yield from _some(_blocked(_in(state, at), ControlBit.ENABLE))
         if edges.rises & _CALIBRATE:
-            yield from _some(self.of_run(RunPlan(), _in(state, at)))
+            yield from _some(self.of_run(CalibrationPlan(), _in(state, at)))
             if held := _setpoints(command):
                 why = f"{' and '.join(held)}: a run begins with setpoint 0"
                 yield _no_run(RefusalReason.CALIBRATION_REFUSED, why)

@@ -15,7 +15,7 @@ _NO_STATUS: Final = StatusBit(0)
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LineStatus:
     """What the output line and the process know, at the time of a step.
 
     acknowledged_v: voltage that the device confirmed last, None before the first; sent_v: voltage that went out last on the

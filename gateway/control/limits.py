@@ -1,9 +1,9 @@
 """Every bound as a named function that tells whether it acted. `isfinite` comes before min and max: max(0, min(100,
 nan)) is 100.
 
-Time-bounded movements (voltage slew, force ramp) claim time from a `Pace`: it earns what passes, holds at most one nominal
-tick when nothing moves, and so lets a new command act at the moment it arrives without letting calls in quick succession
-beat the limit. On the wire: a rise between any two writes is at most slew x (time between them + one tick).
+Time-bounded movements (voltage slew, force ramp) claim time from a `RateBudget`: it earns what passes, holds at most one
+nominal tick when nothing moves, and so lets a new command act at the moment it arrives without letting calls in quick
+succession beat the limit. On the wire: a rise between any two writes is at most slew x (time between them + one tick).
 """
 
 from dataclasses import replace
@@ -29,14 +29,14 @@ def finite(value: float, name: str) -> float:
     return value
 
 
-def force_ranged(target_n: float, limits: Limits) -> Limited:
+def force_limited(target_n: float, limits: Limits) -> Limited:
     """0 .. force_max_n (rig limits); the bank refuses such a setpoint before, this is the second line."""
     target_n = finite(target_n, "force_setpoint_n")
     ranged_n = max(0.0, min(limits.force_max_n, target_n))
     return ranged_n, LimitedBy.NONE if ranged_n == target_n else LimitedBy.FORCE_RANGE
 
 
-def narrowed(limits: Limits, own_n: tuple[float, float] | None) -> Limits:
+def narrow_limits(limits: Limits, own_n: tuple[float, float] | None) -> Limits:
     """The rig's limits with the smaller of its largest force and a calibration's. The smallest force of a set bounds setpoints,
     in the bank: here it would keep a tool from its pre-contact force."""
     if own_n is None:
@@ -49,13 +49,13 @@ def is_below_usable(target_n: float, limits: Limits) -> bool:
     return finite(target_n, "force_target_n") < limits.smallest_force_n
 
 
-def trim_ranged(trim_v: float, limit_v: float) -> Limited:
+def trim_limited(trim_v: float, limit_v: float) -> Limited:
     """+- limit_v (rig, trim.limit_v): the trim corrects the model, it does not replace it."""
     ranged_v = max(-limit_v, min(limit_v, finite(trim_v, "trim_v")))
     return ranged_v, LimitedBy.NONE if abs(ranged_v) < limit_v or limit_v == 0.0 else LimitedBy.TRIM_RANGE
 
 
-def voltage_ranged(target_v: float, limits: Limits) -> Limited:
+def voltage_limited(target_v: float, limits: Limits) -> Limited:
     """voltage_min_v .. voltage_max_v (rig limits, within the output device's range)."""
     target_v = finite(target_v, "voltage_v")
     ranged_v = max(limits.voltage_min_v, min(limits.voltage_max_v, target_v))
@@ -70,13 +70,13 @@ def slew_limited(target_v: float, last_v: float, slew_v_per_s: float, dt_s: floa
     return target_v, LimitedBy.NONE
 
 
-def ramped(target_n: float, last_n: float, rate_n_per_s: float, dt_s: float) -> float:
+def ramp_limited(target_n: float, last_n: float, rate_n_per_s: float, dt_s: float) -> float:
     """Towards the target by at most rate x dt, both ways (command register force_ramp, or the rig's default)."""
     step_n = rate_n_per_s * finite(dt_s, "dt_s")
     return max(last_n - step_n, min(last_n + step_n, finite(target_n, "force_target_n")))
 
 
-class Pace:
+class RateBudget:
     """Seconds that a movement may claim now."""
 
     def __init__(self) -> None:

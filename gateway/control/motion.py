@@ -1,6 +1,6 @@
 """What moves the output while it is enabled: force law or direct voltage, or a calibration run in their place.
 
-One step answers with an event of the state table, or with a Finding: of a fault, or with FaultCode.NONE of an end that
+One step answers with an event of the state table, or with a StopCause: of a fault, or with FaultCode.NONE of an end that
 disables the output with a sentence. What the model expects is kept beside it, as both and the supervision compare with it.
 """
 
@@ -11,25 +11,25 @@ from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.demand import Demand
 from gateway.control.force_loop.feedforward import ModelError
-from gateway.control.force_loop.force_loop import Moment, Pursuit
-from gateway.control.inputs import Line
+from gateway.control.force_loop.force_loop import ForceLoop, LoopInputs
+from gateway.control.inputs import LineStatus
 from gateway.control.limits import NotFiniteError
-from gateway.control.runs.active_run import Calibrating
+from gateway.control.runs.active_run import ActiveRun
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
-from gateway.control.state_table import Event
-from gateway.control.supervision.fault_detection import Finding, finding
-from gateway.control.supervision.plausibility import ModelResponse
+from gateway.control.state_table import StateEvent
+from gateway.control.supervision.fault_detection import StopCause, stop_cause
+from gateway.control.supervision.plausibility import ExpectedForce
 
-Moved: TypeAlias = Event | Finding
+Moved: TypeAlias = StateEvent | StopCause
 
-_RAMPED_DOWN: Final = Finding(FaultCode.NONE, "info force ramped to 0, output disabled")
+_RAMPED_DOWN: Final = StopCause(FaultCode.NONE, "info force ramped to 0, output disabled")
 
 
 class Motion:
-    """Pursuit, run and response of one rig, with one calibration for all of them."""
+    """ForceLoop, run and response of one rig, with one calibration for all of them."""
 
-    def __init__(self, pursuit: Pursuit, response: ModelResponse, calibrating: Calibrating) -> None:
+    def __init__(self, pursuit: ForceLoop, response: ExpectedForce, calibrating: ActiveRun) -> None:
         self.pursuit = pursuit
         self.response = response
         self._calibrating = calibrating
@@ -42,7 +42,7 @@ class Motion:
         self.response.use(model)
         self._calibrating.use(model)
 
-    def elapse(self, dt_s: float, line: Line) -> None:
+    def elapse(self, dt_s: float, line: LineStatus) -> None:
         """dt_s has passed with the present voltage on the output, whoever drives it."""
         self.pursuit.elapse(dt_s, line)
         self.response.advance(self.pursuit.stage.voltage_v, dt_s)
@@ -74,9 +74,9 @@ class Motion:
 
     def climb(self, now_s: float, reading: Reading) -> Moved:
         """One step of the run."""
-        return self._calibrating.climb(now_s, reading, self.pursuit, self.response) or Event.MOVE
+        return self._calibrating.climb(now_s, reading, self.pursuit, self.response) or StateEvent.MOVE
 
-    def pursue(self, demand: Demand, moment: Moment, *, ramps_down: bool) -> Moved:
+    def pursue(self, demand: Demand, moment: LoopInputs, *, ramps_down: bool) -> Moved:
         """One step towards the demand. ramps_down: there is nothing left to do once the force is 0."""
         return self._moved(lambda: self.pursuit.step(demand, moment), ramps_down=ramps_down)
 
@@ -85,18 +85,18 @@ class Motion:
         being calibrated may not fit, and never up."""
         return self._moved(lambda: self._descended(demand, dt_s, given_n), ramps_down=True)
 
-    def _descended(self, demand: Demand, dt_s: float, given_n: float) -> Event:
+    def _descended(self, demand: Demand, dt_s: float, given_n: float) -> StateEvent:
         law = self.pursuit.law
         law.advance(0.0, demand.ramp_n_per_s, dt_s, given_n)
         voltage_v, _ = law.feedforward(given_n)
         self.pursuit.follow(min(voltage_v, self.pursuit.stage.voltage_v), law.applied_n, law.blend)
-        return Event.MOVE
+        return StateEvent.MOVE
 
-    def _moved(self, move: Callable[[], Event], *, ramps_down: bool) -> Moved:
+    def _moved(self, move: Callable[[], StateEvent], *, ramps_down: bool) -> Moved:
         try:
             event = move()
         except ModelError as error:
-            return finding(FaultCode.MODEL_INVALID, str(error))
+            return stop_cause(FaultCode.MODEL_INVALID, str(error))
         except NotFiniteError as error:
-            return finding(FaultCode.NOT_FINITE, str(error))
+            return stop_cause(FaultCode.NOT_FINITE, str(error))
         return _RAMPED_DOWN if ramps_down and self.pursuit.law.applied_n <= 0.0 else event

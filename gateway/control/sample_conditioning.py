@@ -37,7 +37,7 @@ def at_time(reading: Reading, later_s: float, supervision: Supervision) -> Readi
     return replace(reading, age_s=age_s, interval_s=0.0, is_new=False, is_fresh=age_s <= supervision.sample_timeout_s)
 
 
-class Reader:
+class SampleConditioner:
     """Turns samples into readings; a sample given twice is not new the second time."""
 
     def __init__(self, supervision: Supervision, cell: CellMap | None = None) -> None:

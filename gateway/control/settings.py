@@ -67,7 +67,7 @@ class ResponseSource(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Timing:
+class LoopTiming:
     """What control derives from a measured response (gateway.control.force_loop.response_timing). Seconds, N;
     integral_per_s: of the trim, N/s of
     correction by N of error; zone_n: errors within it are stiction's and noise's."""
@@ -113,4 +113,4 @@ class ControlSettings:
     supervision: Supervision = Supervision()
     lead: LeadSettings = LeadSettings()
     response: ResponseSource = ResponseSource.MEASURED
-    timing: Timing | None = None  # of the calibration in use, None where nothing was measured or the rig file rules
+    timing: LoopTiming | None = None  # of the calibration in use, None where nothing was measured or the rig file rules

@@ -13,7 +13,7 @@ from typing import Final
 from gateway.registers.words import State
 
 
-class Event(Enum):
+class StateEvent(Enum):
     ENABLE = "enable"  # rise of control_word bit 0, accepted
     DISABLE = "disable"  # fall of it, or the end of a ramp down
     WAIT = "wait"  # nothing to pursue
@@ -27,30 +27,30 @@ class Event(Enum):
 _OFF, _READY, _RAMPING, _HOLDING, _FAULT = State.OFF, State.READY, State.RAMPING, State.HOLDING, State.FAULT
 _CALIBRATING = State.CALIBRATING
 
-TRANSITIONS: Final[dict[tuple[State, Event], State]] = {
-    (_OFF, Event.ENABLE): _READY,
-    (_OFF, Event.FAILED): _FAULT,  # only a defect of ours fails while off
-    (_OFF, Event.CALIBRATE): _CALIBRATING,
-    (_READY, Event.CALIBRATE): _CALIBRATING,
-    (_READY, Event.WAIT): _READY,
-    (_READY, Event.MOVE): _RAMPING,
-    (_READY, Event.SETTLE): _HOLDING,
-    (_READY, Event.DISABLE): _OFF,
-    (_READY, Event.FAILED): _FAULT,
-    (_RAMPING, Event.WAIT): _READY,
-    (_RAMPING, Event.MOVE): _RAMPING,
-    (_RAMPING, Event.SETTLE): _HOLDING,
-    (_RAMPING, Event.DISABLE): _OFF,
-    (_RAMPING, Event.FAILED): _FAULT,
-    (_HOLDING, Event.WAIT): _READY,
-    (_HOLDING, Event.MOVE): _RAMPING,
-    (_HOLDING, Event.SETTLE): _HOLDING,
-    (_HOLDING, Event.DISABLE): _OFF,
-    (_HOLDING, Event.FAILED): _FAULT,
-    (_CALIBRATING, Event.MOVE): _CALIBRATING,
-    (_CALIBRATING, Event.DISABLE): _OFF,
-    (_CALIBRATING, Event.FAILED): _FAULT,
-    (_FAULT, Event.RESET): _OFF,
+TRANSITIONS: Final[dict[tuple[State, StateEvent], State]] = {
+    (_OFF, StateEvent.ENABLE): _READY,
+    (_OFF, StateEvent.FAILED): _FAULT,  # only a defect of ours fails while off
+    (_OFF, StateEvent.CALIBRATE): _CALIBRATING,
+    (_READY, StateEvent.CALIBRATE): _CALIBRATING,
+    (_READY, StateEvent.WAIT): _READY,
+    (_READY, StateEvent.MOVE): _RAMPING,
+    (_READY, StateEvent.SETTLE): _HOLDING,
+    (_READY, StateEvent.DISABLE): _OFF,
+    (_READY, StateEvent.FAILED): _FAULT,
+    (_RAMPING, StateEvent.WAIT): _READY,
+    (_RAMPING, StateEvent.MOVE): _RAMPING,
+    (_RAMPING, StateEvent.SETTLE): _HOLDING,
+    (_RAMPING, StateEvent.DISABLE): _OFF,
+    (_RAMPING, StateEvent.FAILED): _FAULT,
+    (_HOLDING, StateEvent.WAIT): _READY,
+    (_HOLDING, StateEvent.MOVE): _RAMPING,
+    (_HOLDING, StateEvent.SETTLE): _HOLDING,
+    (_HOLDING, StateEvent.DISABLE): _OFF,
+    (_HOLDING, StateEvent.FAILED): _FAULT,
+    (_CALIBRATING, StateEvent.MOVE): _CALIBRATING,
+    (_CALIBRATING, StateEvent.DISABLE): _OFF,
+    (_CALIBRATING, StateEvent.FAILED): _FAULT,
+    (_FAULT, StateEvent.RESET): _OFF,
 }
 
 ENABLED_STATES: Final = frozenset({_READY, _RAMPING, _HOLDING, _CALIBRATING})
@@ -60,7 +60,7 @@ class TransitionError(Exception):
     """A pair that the table does not have: our own defect."""
 
 
-def next_state(state: State, event: Event) -> State:
+def next_state(state: State, event: StateEvent) -> State:
     """The state after an event. TransitionError for a pair that is not in the table."""
     try:
         return TRANSITIONS[state, event]

@@ -10,7 +10,7 @@ from gateway.devices.fields import TemplateError, ValueRefused
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.profile import Certainty, DeviceProfile, Role
 from gateway.devices.roles import CellDevice, CellHost, OutputDevice, OutputHost
-from gateway.devices.wire import PacedWire, heard_at
+from gateway.devices.wire import PacedWire, resample_at_baud
 
 __all__ = [
     "CellDevice",
@@ -26,7 +26,7 @@ __all__ = [
     "ValueRefused",
     "cell_device",
     "cell_host",
-    "heard_at",
     "output_device",
     "output_host",
+    "resample_at_baud",
 ]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from math import isfinite
 
-from gateway.devices.checksum import sealed, unsealed
+from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.exchange import Exchange, VoltageExchange
 from gateway.devices.fields import Field, Value, ValueRefused
 from gateway.devices.framing import Line
@@ -46,11 +46,11 @@ class Grammar:
 
     def line(self, body: bytes) -> bytes:
         """A sentence with its checksum and terminator: what goes on the wire."""
-        return sealed(body, self.profile.checksum) + self.profile.terminator_bytes
+        return add_checksum(body, self.profile.checksum) + self.profile.terminator_bytes
 
     def body(self, line: Line) -> bytes | None:
         """The sentence in a line that arrived, None when it is overlong or its checksum is wrong."""
-        return unsealed(line.body, self.profile.checksum) if line.is_whole else None
+        return strip_checksum(line.body, self.profile.checksum) if line.is_whole else None
 
     def number_line(self, template: str, number: float) -> bytes:
         """The line with this number in it, nearest on the template's own grid."""

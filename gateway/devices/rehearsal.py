@@ -34,7 +34,7 @@ _NOW_S: Final = 0.0
 _LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
 
-def rehearsed(profile: DeviceProfile) -> Found:
+def rehearse(profile: DeviceProfile) -> Found:
     """What keeps the two ends of this profile from understanding each other; nothing when they do."""
     yield from _output(profile) if profile.role is Role.OUTPUT else _cell(profile)
 

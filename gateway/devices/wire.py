@@ -53,7 +53,7 @@ class PacedWire:
         return self._first_through_s + (count - 1) * self.character_s
 
 
-def heard_at(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
+def resample_at_baud(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
     """What a UART at heard_baud makes of characters (8N1) sent at sent_baud.
 
     The levels of the line are sampled as a receiver does: a start edge, then the middle of each bit. Characters without

@@ -5,7 +5,7 @@ gateway.registers.
 """
 
 from gateway.modbus.diagnostics import ServerId
-from gateway.modbus.errors import Fault, ModbusError, RequestError
+from gateway.modbus.errors import ModbusError, RequestError, RequestFault
 from gateway.modbus.host import AnswerMismatch, answer_bits, answer_data
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer
 from gateway.modbus.peer import Peer
@@ -15,12 +15,12 @@ __all__ = [
     "Adu",
     "AnswerMismatch",
     "DataBank",
-    "Fault",
     "FramingLost",
     "MbapFramer",
     "ModbusError",
     "Peer",
     "RequestError",
+    "RequestFault",
     "ServerId",
     "answer",
     "answer_bits",

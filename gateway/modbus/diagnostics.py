@@ -8,7 +8,7 @@ byte for the run indicator, where the specification leaves the text to the devic
 
 from typing import Final, NamedTuple
 
-from gateway.modbus.errors import Fault, RequestError
+from gateway.modbus.errors import RequestError, RequestFault
 from gateway.modbus.pdu import DIAGNOSTICS, REPORT_SERVER, wrong_length
 
 RETURN_QUERY_DATA: Final = 0
@@ -39,7 +39,7 @@ def loopback_answer(pdu: bytes) -> bytes:
         raise wrong_length(pdu, "a diagnostic request has a sub-function and whole words")
     function = int.from_bytes(pdu[1:3], "big")
     if function != RETURN_QUERY_DATA:
-        raise RequestError(Fault.FUNCTION, f"function 8 with sub-function {function}, served is 0", DIAGNOSTICS)
+        raise RequestError(RequestFault.FUNCTION, f"function 8 with sub-function {function}, served is 0", DIAGNOSTICS)
     return pdu
 
 

@@ -33,7 +33,7 @@ class ModbusError(Exception):
         self.code = code
 
 
-class Fault(Enum):
+class RequestFault(Enum):
     """What is wrong with a request that no bank has to look at, and the exception code that answers it."""
 
     FUNCTION = "function", ILLEGAL_FUNCTION
@@ -54,7 +54,7 @@ class RequestError(ModbusError):
     has none.
     """
 
-    def __init__(self, fault: Fault, sentence: str, value: int, address: int | None = None) -> None:
+    def __init__(self, fault: RequestFault, sentence: str, value: int, address: int | None = None) -> None:
         super().__init__(fault.code, sentence)
         self.fault = fault
         self.value = value

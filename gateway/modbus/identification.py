@@ -8,7 +8,7 @@ at 0.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from gateway.modbus.errors import Fault, RequestError
+from gateway.modbus.errors import RequestError, RequestFault
 from gateway.modbus.pdu import ENCAPSULATED, wrong_length
 
 MEI_TYPE: Final = 14
@@ -29,14 +29,16 @@ def identification_request(code: int, first_object: int = 0) -> bytes:
 def identification_answer(pdu: bytes, identity: Mapping[int, bytes]) -> bytes:
     """The device's answer. Raises RequestError: 01 other MEI types, 03 shape or code, 02 an object that is not there."""
     if len(pdu) > 1 and pdu[1] != MEI_TYPE:
-        raise RequestError(Fault.FUNCTION, f"function 43 with MEI type {pdu[1]}, served is {MEI_TYPE}", ENCAPSULATED)
+        raise RequestError(
+            RequestFault.FUNCTION, f"function 43 with MEI type {pdu[1]}, served is {MEI_TYPE}", ENCAPSULATED
+        )
     if len(pdu) != 4:
         raise wrong_length(pdu, "read device identification has 4")
     code, first = pdu[2], pdu[3]
     if code == INDIVIDUAL:
         return _individual(first, identity)
     if code not in _LAST_OBJECT:
-        raise RequestError(Fault.VALUE, f"read device identification code {code}, allowed 1 .. 4", code)
+        raise RequestError(RequestFault.VALUE, f"read device identification code {code}, allowed 1 .. 4", code)
     numbers = sorted(number for number in identity if number <= _LAST_OBJECT[code])
     return _stream(code, numbers[numbers.index(first) if first in numbers else 0 :], identity)
 
@@ -65,7 +67,7 @@ def _objects(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 def _individual(number: int, identity: Mapping[int, bytes]) -> bytes:
     if number not in identity:
-        raise RequestError(Fault.OBJECT, f"no identification object {number}", number)
+        raise RequestError(RequestFault.OBJECT, f"no identification object {number}", number)
     value = identity[number][: _ROOM - 2]
     return _head(INDIVIDUAL, identity) + bytes((0, 0, 1, number, len(value))) + value
 

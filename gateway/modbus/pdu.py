@@ -12,7 +12,7 @@ from struct import Struct
 from typing import Final
 
 from gateway.modbus.bits import pack_bits, unpack_bits
-from gateway.modbus.errors import Fault, RequestError
+from gateway.modbus.errors import RequestError, RequestFault
 
 READ_COILS: Final = 1
 READ_DISCRETE_INPUTS: Final = 2
@@ -160,17 +160,17 @@ def address_in(pdu: bytes) -> int | None:
 def wrong_length(pdu: bytes, expected: str) -> RequestError:
     """The refusal of a request that is cut off or has surplus bytes. expected: `a read has 5`."""
     sentence = f"function {pdu[0]} with {len(pdu)} bytes, {expected}"
-    return RequestError(Fault.QUANTITY, sentence, len(pdu), address_in(pdu))
+    return RequestError(RequestFault.QUANTITY, sentence, len(pdu), address_in(pdu))
 
 
 def _quantity(count: int, most: int, address: int) -> None:
     if not 1 <= count <= most:
-        raise RequestError(Fault.QUANTITY, f"quantity {count}, allowed 1 .. {most}", count, address)
+        raise RequestError(RequestFault.QUANTITY, f"quantity {count}, allowed 1 .. {most}", count, address)
 
 
 def _byte_count(found: int, expected: int, address: int) -> None:
     if found != expected:
-        raise RequestError(Fault.QUANTITY, f"byte count {found}, expected {expected}", found, address)
+        raise RequestError(RequestFault.QUANTITY, f"byte count {found}, expected {expected}", found, address)
 
 
 def _own_quantity(count: int, most: int, odd: int = 0) -> None:

@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 from gateway.modbus import pdu as P  # noqa: N812  the names of function codes are constants
 from gateway.modbus.diagnostics import ServerId, loopback_answer, report_answer
-from gateway.modbus.errors import Fault, ModbusError, RequestError
+from gateway.modbus.errors import ModbusError, RequestError, RequestFault
 from gateway.modbus.identification import identification_answer
 from gateway.modbus.peer import Peer
 
@@ -69,14 +69,14 @@ def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBan
     """The answer to a request (unit, PDU) for a unit that is not served here."""
     unit, pdu = request
     known = ", ".join(map(str, served))
-    refusal = RequestError(Fault.UNIT, f"unit id {unit}, served here: {known}", unit, P.address_in(pdu))
+    refusal = RequestError(RequestFault.UNIT, f"unit id {unit}, served here: {known}", unit, P.address_in(pdu))
     bank.refused(refusal, peer)
     return P.exception_pdu(pdu[0], refusal.code)
 
 
 def _not_served(pdu: bytes, _bank: DataBank, _peer: Peer) -> bytes:
     function = pdu[0] if pdu else 0
-    raise RequestError(Fault.FUNCTION, f"function {function} is not served", function)
+    raise RequestError(RequestFault.FUNCTION, f"function {function} is not served", function)
 
 
 def _read_bits(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
@@ -93,7 +93,7 @@ def _write_coil(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     address, word = P.parse_write_one(pdu)
     if word not in (0x0000, 0xFF00):
         bank.read_bits(address, 1)
-        raise RequestError(Fault.VALUE, f"coil value 0x{word:04X}, allowed 0x0000 and 0xFF00", word, address)
+        raise RequestError(RequestFault.VALUE, f"coil value 0x{word:04X}, allowed 0x0000 and 0xFF00", word, address)
     bank.write_bits(address, (word == 0xFF00,), peer)
     return pdu
 

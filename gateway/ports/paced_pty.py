@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable
 from typing import Final
 
-from gateway.devices import PacedWire, heard_at
+from gateway.devices import PacedWire, resample_at_baud
 from gateway.ports.port import OnBytes, monotonic_s
 from gateway.ports.pseudo_terminal import Pty
 
@@ -49,7 +49,7 @@ class PacedPty:
 
     def send(self, data: bytes) -> None:
         """Put bytes on the wire to the client, behind those that are still on it."""
-        self._outward.put(heard_at(data, self._baud, self._open_pty.client_baud()))
+        self._outward.put(resample_at_baud(data, self._baud, self._open_pty.client_baud()))
 
     @property
     def backlog_s(self) -> float:
@@ -78,7 +78,7 @@ class PacedPty:
             data = os.read(pty.fd, min(room, _CHUNK_BYTES))
         except OSError:  # nothing there after all
             return
-        self._inward.put(heard_at(data, pty.client_baud(), self._baud))
+        self._inward.put(resample_at_baud(data, pty.client_baud(), self._baud))
 
     def _deliver(self, data: bytes, now_s: float) -> None:
         asyncio.get_running_loop().add_reader(self._open_pty.fd, self._on_readable)

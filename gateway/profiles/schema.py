@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from gateway.bsfm.model import Calibration
 from gateway.control.runs.experiment_plan import ExperimentPlan
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.devices import DeviceProfile
 from gateway.profiles.find import FOLDERS, root
 from gateway.profiles.kinds.plants import ABOUT
@@ -126,7 +126,7 @@ def _with_origin(leaf: dict[str, Any]) -> dict[str, Any]:
 
 def plan_schema() -> dict[str, Any]:
     """The schema of a plan file: an experiment, or a ladder."""
-    experiment, ladder = dataclass_schema(ExperimentPlan), dataclass_schema(RunPlan)
+    experiment, ladder = dataclass_schema(ExperimentPlan), dataclass_schema(CalibrationPlan)
     definitions = experiment.pop("$defs", {}) | ladder.pop("$defs", {})
     return {"anyOf": [experiment, ladder], "$defs": definitions}
 

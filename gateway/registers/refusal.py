@@ -7,17 +7,17 @@ from math import nan
 from typing import Final
 
 from gateway.codes.refusals import NO_SUCH_OBJECT, NOT_A_COIL_VALUE, RefusalReason, SpecialRefusal
-from gateway.modbus import Fault, ModbusError, RequestError
+from gateway.modbus import ModbusError, RequestError, RequestFault
 
 NO_ADDRESS: Final = 0xFFFF
 """In refusal_address: the request has no address."""
 
-_REQUEST_FAULTS: Final[dict[Fault, RefusalReason | SpecialRefusal]] = {
-    Fault.FUNCTION: RefusalReason.FUNCTION,
-    Fault.QUANTITY: RefusalReason.QUANTITY,
-    Fault.VALUE: NOT_A_COIL_VALUE,
-    Fault.OBJECT: NO_SUCH_OBJECT,
-    Fault.UNIT: RefusalReason.UNIT,
+_REQUEST_FAULTS: Final[dict[RequestFault, RefusalReason | SpecialRefusal]] = {
+    RequestFault.FUNCTION: RefusalReason.FUNCTION,
+    RequestFault.QUANTITY: RefusalReason.QUANTITY,
+    RequestFault.VALUE: NOT_A_COIL_VALUE,
+    RequestFault.OBJECT: NO_SUCH_OBJECT,
+    RequestFault.UNIT: RefusalReason.UNIT,
 }
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final, TypeVar
 from annotated_types import Ge, Le, MaxLen
 
 from gateway.control.runs.experiment_plan import ExperimentPlan
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import adapter, build
 
@@ -87,7 +87,7 @@ for _shape in (
     CalibrateRequest,
     ResidualRequest,
     FaultRequest,
-    RunPlan,
+    CalibrationPlan,
     ExperimentPlan,
 ):
     adapter(_shape)

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from gateway.bsfm import RationalBezier, Status
+from gateway.bsfm import InverseStatus, RationalBezier
 
 ORDERS = (1, 2, 3, 5, 15)
 TOLERANCE = 1e-12  # the contract allows 1e-11
@@ -48,7 +48,7 @@ def test_inverse_agrees_with_fifty_digits_even_near_both_ends(order, spread, ref
     for share in (rng.random(), 1e-3, 1e-9, 1e-13, 1.0 - 1e-9, 1.0 - 1e-13):
         force = low + (high - low) * share
         x, status = curve.inverse(force)
-        assert status is Status.OK
+        assert status is InverseStatus.OK
         assert x == pytest.approx(float(truth.inverse(force)), rel=TOLERANCE)
 
 
@@ -95,7 +95,7 @@ def test_enormous_spreads_neither_overflow_nor_divide_by_zero(order):
     curve = RationalBezier(0.0, 8.0, range(order + 1), [1e-120 if i % 2 else 1e120 for i in range(order + 1)])
     for share in (1e-12, 0.2, 0.5, 0.9):
         x, status = curve.inverse(order * share)
-        assert status is Status.OK and 0.0 <= x <= 8.0
+        assert status is InverseStatus.OK and 0.0 <= x <= 8.0
         assert math.isfinite(curve.value(x)) and math.isfinite(curve.slope(x))
 
 
@@ -118,7 +118,7 @@ def test_flat_ends_and_nearly_flat_middles_are_inverted(order, reference):
 
 def test_textbook_quadratic_would_divide_zero_by_zero_here():
     curve = RationalBezier(0.0, 10.0, (0.0, 18.0, 36.0), (1.0, 1.0, 1.0))
-    assert curve.inverse(18.0) == (5.0, Status.OK)
+    assert curve.inverse(18.0) == (5.0, InverseStatus.OK)
     assert curve.inverse(9.0)[0] == pytest.approx(2.5, rel=1e-15)
 
 
@@ -126,11 +126,11 @@ def test_textbook_quadratic_would_divide_zero_by_zero_here():
 def test_ends_are_exact_and_beyond_them_is_clamped_with_a_status(order):
     curve = increasing_curve(random.Random(7), order, 6.0, 0.5, 7.5)
     low, high = curve.handles[0], curve.handles[-1]
-    assert curve.inverse(low) == (0.5, Status.OK)
-    assert curve.inverse(high) == (7.5, Status.OK)
-    assert curve.inverse(math.nextafter(low, -math.inf)) == (0.5, Status.LOW)
-    assert curve.inverse(math.nextafter(high, math.inf)) == (7.5, Status.HIGH)
-    assert (curve.inverse(-math.inf)[1], curve.inverse(math.inf)[1]) == (Status.LOW, Status.HIGH)
+    assert curve.inverse(low) == (0.5, InverseStatus.OK)
+    assert curve.inverse(high) == (7.5, InverseStatus.OK)
+    assert curve.inverse(math.nextafter(low, -math.inf)) == (0.5, InverseStatus.LOW)
+    assert curve.inverse(math.nextafter(high, math.inf)) == (7.5, InverseStatus.HIGH)
+    assert (curve.inverse(-math.inf)[1], curve.inverse(math.inf)[1]) == (InverseStatus.LOW, InverseStatus.HIGH)
     assert (curve.value(0.5), curve.value(-9.0), curve.value(-math.inf)) == (low,) * 3
     assert (curve.value(7.5), curve.value(99.0), curve.value(math.inf)) == (high,) * 3
     assert curve.slope(-1.0) == curve.slope(0.5) and curve.slope(8.0) == curve.slope(7.5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.bsfm import Branches, RationalBezier
-from gateway.bsfm.exact import place_negative, place_not_positive, product, raised_by_two, whole_numbers
+from gateway.bsfm.exact import place_negative, place_not_positive, product, raise_degree_by_two, whole_numbers
 
 
 def polynomial(handles: tuple[float, ...]) -> RationalBezier:
@@ -45,7 +45,7 @@ def test_a_dip_narrower_than_any_grid_is_found():
 
 
 def test_raising_the_degree_changes_nothing():
-    assert raised_by_two([3]) == [3, 6, 3] == product([1, 1], [3, 3])
+    assert raise_degree_by_two([3]) == [3, 6, 3] == product([1, 1], [3, 3])
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from random import Random
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.codes.faults import FaultCode
-from gateway.control import Controller, ControlSettings, Limits, Line, Output, Supervision, Trim
+from gateway.control import Controller, ControlSettings, Limits, LineStatus, Output, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import Asked, EdgeRefusal
@@ -86,7 +86,7 @@ class Record:
     force_n: float
     command: Command
     sample: ForceSample | None
-    line: Line
+    line: LineStatus
 
 
 class Bench:
@@ -97,7 +97,7 @@ class Bench:
         self.rng = Random(seed)
         self.plant = SmallPlant(self.rng, **plant)  # type: ignore[arg-type]
         self.controller = Controller(self.settings, bsfm(), calibration_id=1)
-        self.line = Line(acknowledged_v=0.0)
+        self.line = LineStatus(acknowledged_v=0.0)
         self.command = Command()
         self.sample: ForceSample | None = None
         self.history: list[Record] = []
@@ -206,7 +206,7 @@ class Bench:
     def heal(self) -> None:
         """Everything outside control works again."""
         self.cell_silent = self.output_silent = self.cell_frozen = False
-        self.line = Line(acknowledged_v=self.voltage_v)
+        self.line = LineStatus(acknowledged_v=self.voltage_v)
         self.alter_sample = lambda sample: sample
         self.plant.sign = self.plant.unit = 1.0
         self.plant.contact = self.plant.air = True

@@ -8,7 +8,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
-from gateway.control import LeaseAction, Line
+from gateway.control import LeaseAction, LineStatus
 from gateway.devices.messages import Quality
 from gateway.registers.words import ControlBit, LimitedBy, State, StatusBit
 from tests.control.bench import Bench, settings
@@ -197,7 +197,7 @@ def test_a_stale_force_is_unavailable_and_its_age_is_true():
 
 def test_warnings_of_the_line_are_passed_on():
     bench = Bench()
-    bench.line = Line(acknowledged_v=0.0, warnings=WarningBit.SERIAL_NOISE)
+    bench.line = LineStatus(acknowledged_v=0.0, warnings=WarningBit.SERIAL_NOISE)
     assert bench.run(0.1).warnings == WarningBit.SERIAL_NOISE
 
 

@@ -6,17 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.control.force_loop.voltage_limits import VoltageStage, strongest
+from gateway.control.force_loop.voltage_limits import VoltageLimiter, strongest
 from gateway.control.limits import (
     TICK_S,
     NotFiniteError,
-    Pace,
-    force_ranged,
+    RateBudget,
+    force_limited,
     is_below_usable,
-    ramped,
+    ramp_limited,
     slew_limited,
-    trim_ranged,
-    voltage_ranged,
+    trim_limited,
+    voltage_limited,
 )
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
@@ -27,12 +27,12 @@ LIMITS = Limits(force_max_n=50.0, over_force_n=60.0, smallest_force_n=0.5, volta
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
 def test_nothing_infinite_passes_a_limit(bad):
     for limit in (
-        lambda: force_ranged(bad, LIMITS),
-        lambda: voltage_ranged(bad, LIMITS),
-        lambda: trim_ranged(bad, 0.5),
+        lambda: force_limited(bad, LIMITS),
+        lambda: voltage_limited(bad, LIMITS),
+        lambda: trim_limited(bad, 0.5),
         lambda: slew_limited(bad, 0.0, 40.0, 0.01),
         lambda: slew_limited(1.0, 0.0, 40.0, bad),
-        lambda: ramped(bad, 0.0, 200.0, 0.01),
+        lambda: ramp_limited(bad, 0.0, 200.0, 0.01),
         lambda: is_below_usable(bad, LIMITS),
     ):
         with pytest.raises(NotFiniteError):
@@ -40,10 +40,10 @@ def test_nothing_infinite_passes_a_limit(bad):
 
 
 def test_each_limit_says_that_it_acted():
-    assert force_ranged(72.0, LIMITS) == (50.0, LimitedBy.FORCE_RANGE)
-    assert force_ranged(12.0, LIMITS) == (12.0, LimitedBy.NONE)
-    assert voltage_ranged(9.5, LIMITS) == (9.0, LimitedBy.VOLTAGE_RANGE)
-    assert trim_ranged(-0.7, 0.5) == (-0.5, LimitedBy.TRIM_RANGE)
+    assert force_limited(72.0, LIMITS) == (50.0, LimitedBy.FORCE_RANGE)
+    assert force_limited(12.0, LIMITS) == (12.0, LimitedBy.NONE)
+    assert voltage_limited(9.5, LIMITS) == (9.0, LimitedBy.VOLTAGE_RANGE)
+    assert trim_limited(-0.7, 0.5) == (-0.5, LimitedBy.TRIM_RANGE)
     assert slew_limited(5.0, 1.0, 40.0, 0.01) == (pytest.approx(1.4), LimitedBy.VOLTAGE_SLEW)
     assert is_below_usable(0.4, LIMITS)
 
@@ -64,7 +64,7 @@ targets = st.floats(0.0, 9.0, allow_nan=False)
 
 @given(st.lists(st.tuples(times, targets), min_size=1, max_size=60))
 def test_no_pattern_of_calls_beats_the_slew_limit(calls):
-    stage, now_s = VoltageStage(LIMITS), 0.0
+    stage, now_s = VoltageLimiter(LIMITS), 0.0
     written = [(0.0, stage.voltage_v)]
     for dt_s, target_v in calls:
         now_s += dt_s
@@ -78,7 +78,7 @@ def test_no_pattern_of_calls_beats_the_slew_limit(calls):
 
 @given(st.lists(st.floats(0.0, 1e-4, allow_nan=False), min_size=50, max_size=50))
 def test_calls_in_quick_succession_earn_one_tick_at_most(gaps_s):
-    pace, claimed_s = Pace(), 0.0
+    pace, claimed_s = RateBudget(), 0.0
     for gap_s in gaps_s:
         pace.earn(gap_s)
         claimed_s += pace.available_s
@@ -87,7 +87,7 @@ def test_calls_in_quick_succession_earn_one_tick_at_most(gaps_s):
 
 
 def test_a_late_step_does_not_catch_up_in_one_jump():
-    stage = VoltageStage(LIMITS)
+    stage = VoltageLimiter(LIMITS)
     stage.earn(0.09)
     stage.drive(9.0)
     assert stage.voltage_v <= LIMITS.voltage_slew_v_per_s * 0.02 + 1e-9

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Trim
-from gateway.control.force_loop.feedforward import ForceLaw
+from gateway.control.force_loop.feedforward import Feedforward
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
@@ -101,7 +101,7 @@ def test_what_the_trim_learned_fades_with_the_travel_of_the_target():
 
 
 def test_a_vented_tool_starts_on_the_rising_branch_again():
-    law = ForceLaw(bsfm(span_n=6.0), settings().limits, 0.1)
+    law = Feedforward(bsfm(span_n=6.0), settings().limits, 0.1)
 
     def go(goal_n: float) -> float:
         for _ in range(100):

@@ -4,7 +4,7 @@ import pytest
 
 from gateway.bsfm import Bsfm, SlipStops
 from gateway.control import Controller
-from gateway.control.force_loop.feedforward import ForceLaw
+from gateway.control.force_loop.feedforward import Feedforward
 from tests.control.bench import Bench, bsfm, settings
 
 
@@ -20,11 +20,11 @@ def enabled(**plant: float) -> Bench:
     return bench
 
 
-def law(model: Bsfm) -> ForceLaw:
-    return ForceLaw(model, settings().limits, 0.1)
+def law(model: Bsfm) -> Feedforward:
+    return Feedforward(model, settings().limits, 0.1)
 
 
-def go(law: ForceLaw, *goals_n: float) -> float:
+def go(law: Feedforward, *goals_n: float) -> float:
     for goal_n in goals_n:
         while law.applied_n != goal_n:
             law.advance(goal_n, 100.0, 0.01)

@@ -6,7 +6,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control.controller import Controller
-from gateway.control.state_table import ENABLED_STATES, TRANSITIONS, Event, TransitionError, next_state
+from gateway.control.state_table import ENABLED_STATES, TRANSITIONS, StateEvent, TransitionError, next_state
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State, StatusBit
 from tests.control.bench import Bench, settings
@@ -20,30 +20,30 @@ def ready(**plant: float | bool) -> Bench:
 
 def test_a_pair_that_the_table_lacks_raises():
     with pytest.raises(TransitionError, match="FAULT has no event ENABLE"):
-        next_state(State.FAULT, Event.ENABLE)
+        next_state(State.FAULT, StateEvent.ENABLE)
     with pytest.raises(TransitionError):
-        next_state(State.FAULT, Event.FAILED)  # a second first cause
+        next_state(State.FAULT, StateEvent.FAILED)  # a second first cause
     with pytest.raises(TransitionError):
-        next_state(State.OFF, Event.MOVE)
+        next_state(State.OFF, StateEvent.MOVE)
 
 
 def test_every_enabled_state_can_be_left_by_disable_and_by_a_fault():
     for state in ENABLED_STATES:
-        assert TRANSITIONS[state, Event.DISABLE] is State.OFF
-        assert TRANSITIONS[state, Event.FAILED] is State.FAULT
+        assert TRANSITIONS[state, StateEvent.DISABLE] is State.OFF
+        assert TRANSITIONS[state, StateEvent.FAILED] is State.FAULT
 
 
 def test_every_pair_of_state_and_event_is_meant_so():
     """A dash is a pair that must not happen: it raises."""
     events = (
-        Event.ENABLE,
-        Event.DISABLE,
-        Event.WAIT,
-        Event.MOVE,
-        Event.SETTLE,
-        Event.FAILED,
-        Event.RESET,
-        Event.CALIBRATE,
+        StateEvent.ENABLE,
+        StateEvent.DISABLE,
+        StateEvent.WAIT,
+        StateEvent.MOVE,
+        StateEvent.SETTLE,
+        StateEvent.FAILED,
+        StateEvent.RESET,
+        StateEvent.CALIBRATE,
     )
     rows = {
         State.OFF: "ready - - - - fault - calibrating",
@@ -53,7 +53,7 @@ def test_every_pair_of_state_and_event_is_meant_so():
         State.FAULT: "- - - - - - off -",
         State.CALIBRATING: "- off - calibrating - fault - -",
     }
-    assert set(events) == set(Event)
+    assert set(events) == set(StateEvent)
     assert set(rows) == set(State)
     for state, row in rows.items():
         for event, name in zip(events, row.split(), strict=True):
@@ -75,7 +75,7 @@ def test_an_edge_that_was_not_asked_about_is_a_defect_and_no_silence():
 
 
 def test_only_reset_leaves_fault():
-    assert [event for state, event in TRANSITIONS if state is State.FAULT] == [Event.RESET]
+    assert [event for state, event in TRANSITIONS if state is State.FAULT] == [StateEvent.RESET]
 
 
 def test_start_is_off_at_the_safe_voltage_and_says_what_is_missing():

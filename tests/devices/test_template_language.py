@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.devices import TemplateError, ValueRefused
-from gateway.devices.checksum import sealed, unsealed
+from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.template import compile_template
 
 
@@ -130,12 +130,12 @@ def test_no_bytes_make_a_decoder_raise(data: bytes) -> None:
 
 @given(st.binary(max_size=40), st.sampled_from(["none", "dcon-sum", "xor"]))
 def test_a_checksum_opens_what_it_sealed(body: bytes, name: str) -> None:
-    assert unsealed(sealed(body, name), name) == body  # type: ignore[arg-type]
+    assert strip_checksum(add_checksum(body, name), name) == body  # type: ignore[arg-type]
 
 
 @given(st.binary(min_size=1, max_size=40), st.integers(0, 7), st.data())
 def test_a_flipped_bit_does_not_pass_a_checksum(body: bytes, bit: int, data: st.DataObject) -> None:
     for name in ("dcon-sum", "xor"):
-        sentence = bytearray(sealed(body, name))  # type: ignore[arg-type]
+        sentence = bytearray(add_checksum(body, name))  # type: ignore[arg-type]
         sentence[data.draw(st.integers(0, len(sentence) - 1))] ^= 1 << bit
-        assert unsealed(bytes(sentence), name) is None  # type: ignore[arg-type]
+        assert strip_checksum(bytes(sentence), name) is None  # type: ignore[arg-type]

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.devices import PacedWire, SerialSettings, heard_at
+from gateway.devices import PacedWire, SerialSettings, resample_at_baud
 from gateway.devices.wire import MOST_QUEUED_BYTES
 
 
@@ -63,8 +63,8 @@ def test_the_wire_does_not_grow_without_bound() -> None:
 
 @given(st.binary(max_size=60))
 def test_the_same_speed_hears_what_was_sent(data: bytes) -> None:
-    assert heard_at(data, 9600, 9600) == data
-    assert heard_at(data, 9600, 9700) == data  # 1 % off: within what a UART tolerates over one character
+    assert resample_at_baud(data, 9600, 9600) == data
+    assert resample_at_baud(data, 9600, 9700) == data  # 1 % off: within what a UART tolerates over one character
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_the_same_speed_hears_what_was_sent(data: bytes) -> None:
 )
 @pytest.mark.parametrize("line", [b"ST,GS,+0012.34kg\r\n", b"SET 512\r\n", b"512\r\n", b"0\r\n"])
 def test_another_speed_hears_garbage_and_always_the_same(line: bytes, sent: int, heard: int) -> None:
-    garbage = heard_at(line * 20, sent, heard)
-    assert garbage == heard_at(line * 20, sent, heard)
+    garbage = resample_at_baud(line * 20, sent, heard)
+    assert garbage == resample_at_baud(line * 20, sent, heard)
     assert line not in garbage
     assert b"\r\n" not in garbage

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from gateway.devices import Certainty, DeviceProfile, Role, SerialSettings, ValueRefused, output_device, output_host
-from gateway.devices.checksum import sealed, unsealed
+from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.exchange import Refusals, VoltageExchange, VoltageRange
 from gateway.devices.messages import Accepted, Garbage, ReadVoltage, Refused, SetVoltage
 
@@ -44,9 +44,9 @@ def test_the_checksum_is_the_sum_of_the_codes() -> None:
 
 
 def test_the_configuration_question_of_the_manual_has_this_checksum() -> None:
-    assert sealed(b"$012", "dcon-sum") == b"$012B7"
-    assert unsealed(b"$012B7", "dcon-sum") == b"$012"
-    assert unsealed(b"$012B8", "dcon-sum") is None
+    assert add_checksum(b"$012", "dcon-sum") == b"$012B7"
+    assert strip_checksum(b"$012B7", "dcon-sum") == b"$012"
+    assert strip_checksum(b"$012B8", "dcon-sum") is None
 
 
 def test_another_address_is_not_ours() -> None:

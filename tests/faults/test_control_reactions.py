@@ -5,7 +5,7 @@ from math import nan
 
 import pytest
 
-from gateway.bsfm import Status
+from gateway.bsfm import InverseStatus
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
@@ -315,8 +315,8 @@ def test_a_model_that_answers_nonsense_is_named():
     class Nonsense:
         reversal = Bench().controller._pursuit.law.model.reversal
 
-        def voltage_v(self, force_n: float, state: float) -> tuple[float, Status]:
-            return nan, Status.OK
+        def voltage_v(self, force_n: float, state: float) -> tuple[float, InverseStatus]:
+            return nan, InverseStatus.OK
 
         def force_n(self, voltage_v: float, state: float) -> float:
             return 0.0

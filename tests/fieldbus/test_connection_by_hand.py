@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.fieldbus.connection import BUFFER_BYTES
-from gateway.modbus import Adu, Fault, answer, pdu
+from gateway.modbus import Adu, RequestFault, answer, pdu
 from gateway.modbus.mbap import encode
 from gateway.modbus.memory import MemoryBank
 from tests.fieldbus.by_hand import READ, framed
@@ -235,7 +235,7 @@ def test_a_foreign_unit_is_told_to_the_bank_with_its_peer(stand, deliver):
     near, far = made.connect("10.0.0.5")
     deliver(near, far, framed(READ, unit=9) + framed(READ, unit=1))
     assert bytes(far.written[:9]) == bytes.fromhex("0001 0000 0003 09 83 0b")
-    assert heard == [(Fault.UNIT, 9, 0, "10.0.0.5")]
+    assert heard == [(RequestFault.UNIT, 9, 0, "10.0.0.5")]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.modbus import AnswerMismatch, Fault, ModbusError, Peer, RequestError, answer, answer_data
+from gateway.modbus import AnswerMismatch, ModbusError, Peer, RequestError, RequestFault, answer, answer_data
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.memory import MemoryBank
 from gateway.modbus.server import refuse_unit
@@ -31,7 +31,7 @@ class ListeningBank(FussyBank):
 
     def __init__(self) -> None:
         super().__init__()
-        self.heard: list[tuple[Fault, int, int | None, Peer]] = []
+        self.heard: list[tuple[RequestFault, int, int | None, Peer]] = []
 
     def refused(self, refusal: RequestError, peer: Peer) -> None:
         self.heard.append((refusal.fault, refusal.value, refusal.address, peer))
@@ -181,25 +181,25 @@ def test_a_diagnostic_request_without_whole_words_is_03(request_hex: str) -> Non
 
 
 FAULTS = [
-    ("03 0005 007e", Fault.QUANTITY, 126, 5),
-    ("03 0005 0000", Fault.QUANTITY, 0, 5),
-    ("10 0007 0001 03 000100", Fault.QUANTITY, 3, 7),
-    ("17 0001 0001 0002 007a f4" + 244 * "00", Fault.QUANTITY, 122, 2),
-    ("06 0007", Fault.QUANTITY, 3, 7),
-    ("06", Fault.QUANTITY, 1, None),
-    ("05 0003 1234", Fault.VALUE, 0x1234, 3),
-    ("07", Fault.FUNCTION, 7, None),
-    ("2b 0d 0000", Fault.FUNCTION, 43, None),
-    ("08 0001 0000", Fault.FUNCTION, 8, None),
-    ("2b 0e 05 00", Fault.VALUE, 5, None),
-    ("2b 0e 04 09", Fault.OBJECT, 9, None),
-    ("11 00", Fault.QUANTITY, 2, None),
+    ("03 0005 007e", RequestFault.QUANTITY, 126, 5),
+    ("03 0005 0000", RequestFault.QUANTITY, 0, 5),
+    ("10 0007 0001 03 000100", RequestFault.QUANTITY, 3, 7),
+    ("17 0001 0001 0002 007a f4" + 244 * "00", RequestFault.QUANTITY, 122, 2),
+    ("06 0007", RequestFault.QUANTITY, 3, 7),
+    ("06", RequestFault.QUANTITY, 1, None),
+    ("05 0003 1234", RequestFault.VALUE, 0x1234, 3),
+    ("07", RequestFault.FUNCTION, 7, None),
+    ("2b 0d 0000", RequestFault.FUNCTION, 43, None),
+    ("08 0001 0000", RequestFault.FUNCTION, 8, None),
+    ("2b 0e 05 00", RequestFault.VALUE, 5, None),
+    ("2b 0e 04 09", RequestFault.OBJECT, 9, None),
+    ("11 00", RequestFault.QUANTITY, 2, None),
 ]
 
 
 @pytest.mark.parametrize(("request_hex", "fault", "value", "address"), FAULTS)
 def test_what_the_protocol_refuses_the_bank_is_told_once(
-    request_hex: str, fault: Fault, value: int, address: int | None
+    request_hex: str, fault: RequestFault, value: int, address: int | None
 ) -> None:
     told = ListeningBank()
     answer(bytes.fromhex(request_hex), told, PEER)
@@ -216,7 +216,7 @@ def test_what_the_bank_refuses_itself_it_is_not_told_of() -> None:
 def test_a_foreign_unit_is_refused_with_its_number() -> None:
     told = ListeningBank()
     assert refuse_unit((9, P.read_request(3, 4, 1)), (1, 255), told, PEER) == bytes.fromhex("83 0b")
-    assert told.heard == [(Fault.UNIT, 9, 4, PEER)]
+    assert told.heard == [(RequestFault.UNIT, 9, 4, PEER)]
 
 
 def test_read_write_with_a_bad_read_half_writes_nothing() -> None:

@@ -6,8 +6,8 @@ import jsonschema
 import pytest
 import yaml
 
-from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles import ProfileError, schema
 from gateway.profiles.kinds.plans import load_plan, load_plan_fields, plain, plan_of, plan_text
 
@@ -19,14 +19,14 @@ PLAN = ExperimentPlan(
     by_hand=("turn the tool",),
     check=False,
     parts=(
-        Part(name="steps", why="they part lags", moves=(Move(do=Do.STEP, to_share=0.1 + 0.2, hold_s=1.0e-5),)),
+        Part(name="steps", why="they part lags", moves=(Move(do=MoveKind.STEP, to_share=0.1 + 0.2, hold_s=1.0e-5),)),
         Part(
             name="no",
             moves=(
-                Move(do=Do.RAMP, to_n=20.0, over_s=3.0),
-                Move(do=Do.LADDER, to_v=1.0, stairs=10, hold_s=0.5),
-                Move(do=Do.REVERSALS, size_share=0.1, times=3, over_s=0.4),
-                Move(do=Do.DWELL, hold_s=3.0),
+                Move(do=MoveKind.RAMP, to_n=20.0, over_s=3.0),
+                Move(do=MoveKind.LADDER, to_v=1.0, stairs=10, hold_s=0.5),
+                Move(do=MoveKind.REVERSALS, size_share=0.1, times=3, over_s=0.4),
+                Move(do=MoveKind.DWELL, hold_s=3.0),
             ),
         ),
     ),
@@ -58,7 +58,7 @@ def test_a_written_plan_is_valid_by_the_schema_and_a_stranger_is_not(tmp_path: P
 
 def test_a_ladder_says_no_more_than_its_file(tmp_path: Path) -> None:
     file = written(tmp_path, "groups: 5\nstep_v: 0.5\n")
-    assert load_plan(file) == RunPlan(groups=5, step_v=0.5)
+    assert load_plan(file) == CalibrationPlan(groups=5, step_v=0.5)
     assert load_plan_fields(file) == {"groups": 5, "step_v": 0.5}
 
 
@@ -96,4 +96,4 @@ def test_over_the_socket_the_first_fault_is_told_in_one_sentence() -> None:
         plan_of({"grups": 1})
     with pytest.raises(ValueError, match="groups true is not a whole number"):
         plan_of({"groups": True})
-    assert plan_of({}) == RunPlan()
+    assert plan_of({}) == CalibrationPlan()

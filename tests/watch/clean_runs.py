@@ -14,7 +14,7 @@ import numpy as np
 
 from gateway.control.runs.active_run import AnyPlan
 from gateway.control.runs.experiment_plan import ExperimentPlan
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.diagnosis.experiments import blocks as block
 from gateway.profiles import Rig
 from gateway.recording import Recorder
@@ -116,7 +116,7 @@ def _stairs(run: Run) -> None:
 
 def _ladder(run: Run) -> None:
     run.record()
-    run.conduct(RunPlan(step_v=0.5, groups=2, minor_points=20))
+    run.conduct(CalibrationPlan(step_v=0.5, groups=2, minor_points=20))
 
 
 def _plan(run: Run) -> None:

@@ -39,7 +39,7 @@ from paper.rigs import copy_of
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.branch_fit import fit
 from gateway.bsfm.ladder.measured_ladder import ladder_plan
-from gateway.bsfm.slip.slip_fit import Walk, fit_joint, fit_stops, judged, walk_of
+from gateway.bsfm.slip.slip_fit import Walk, compare_policies, fit_joint, fit_stops, walk_of
 from gateway.twin import Plant
 from gateway.twin.experiment import Dwell, Floats, settle, staircase
 
@@ -78,7 +78,7 @@ def calibrated(plant: Plant, seed: int) -> dict[str, Bsfm]:
     fits = [fit_stops(branches, [minor]), fit_joint(branches, [walk_of(ladder), minor])]
     if not fits[1].joint:
         raise SystemExit(f"copy {seed}: the joint fit led to no usable model")
-    return dict(zip(METHOD, (row.model for row in judged(branches, fits, minor, minor)), strict=True))
+    return dict(zip(METHOD, (row.model for row in compare_policies(branches, fits, minor, minor)), strict=True))
 
 
 def between(turns_n: Sequence[float]) -> list[float]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.control.force_loop.lead_compensator import Lead
+from gateway.control.force_loop.lead_compensator import LeadCompensator
 from paper.bounds import allowed_ratio, bound, delay_s, shaken_n
 from paper.comparison import ERROR_GOAL, SETTLING_GOAL, Comparison
 from paper.exercises import PACE_N_PER_S, UNBALANCE_N
@@ -50,7 +50,7 @@ def _settling(study: Study, comparison: Comparison) -> str:
 
 def _moving(study: Study, comparison: Comparison) -> str:
     chosen = settings(RESPONSE_LAG_S, TRIM)
-    left_s = 2 * LAG_S - Lead(chosen.lead, chosen.limits).gained_s
+    left_s = 2 * LAG_S - LeadCompensator(chosen.lead, chosen.limits).gained_s
     parts_n = [PACE_N_PER_S * seconds for seconds in (delay_s() + left_s, delay_s())]
     return (
         f"the wish moves, and being late is all there is: delay and what the lead leaves of the lags cost "

@@ -9,7 +9,7 @@ from typing import Final, Protocol
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.model import Bsfm
-from gateway.control import Controller, ControlSettings, Defaults, LeadSettings, Limits, Line, Supervision, Trim
+from gateway.control import Controller, ControlSettings, Defaults, LeadSettings, Limits, LineStatus, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -70,7 +70,7 @@ class Ours:
         now_s = self._ticks * TICK_S
         self._tell(desired_n, now_s)
         sample = ForceSample(measured_n, measured_n, Quality.OK, now_s)
-        output = self._controller.step(now_s, self._command, sample, Line(acknowledged_v=self._voltage_v))
+        output = self._controller.step(now_s, self._command, sample, LineStatus(acknowledged_v=self._voltage_v))
         if output.state is State.FAULT:
             raise RuntimeError("; ".join(output.events) or f"fault {output.fault}")
         self._ticks += 1

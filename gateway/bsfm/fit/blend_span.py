@@ -42,7 +42,7 @@ def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
     return np.array(errors)
 
 
-def chosen_span(branches: Branches, voltage_v: Floats, force_n: Floats) -> SpanChoice | None:
+def choose_span(branches: Branches, voltage_v: Floats, force_n: Floats) -> SpanChoice | None:
     """The span with the smallest error on the walk; None where the walk is too short to tell."""
     if len(voltage_v) < FEWEST_POINTS:
         return None

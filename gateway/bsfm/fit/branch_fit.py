@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.curve import ORDER_MAX
 from gateway.bsfm.fit.levenberg_marquardt import Effort
-from gateway.bsfm.fit.outliers import huber_weight, kept
-from gateway.bsfm.fit.projected_problem import Floats, Samples, merged
-from gateway.bsfm.fit.result import NOT_IDENTIFIABLE, FitResult, Form, ModelName, Ties, verdicts_of
-from gateway.bsfm.fit.solution import Solution, explored, refined
+from gateway.bsfm.fit.outliers import huber_weight, inlier_mask
+from gateway.bsfm.fit.projected_problem import Floats, Samples, merge_samples
+from gateway.bsfm.fit.result import NOT_IDENTIFIABLE, FitResult, ModelForm, ModelName, Ties, verdicts_of
+from gateway.bsfm.fit.solution import Solution, explore_starts, refine_solution
 from gateway.bsfm.fit.statistics import covariance_of, paper_norm, residuals_of
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 
@@ -55,12 +55,12 @@ def fit_orders(
 ) -> list[FitResult]:
     """Fits of several orders, ascending; each order starts from the one below it, too."""
     chosen = settings or FitSettings()
-    used = ladder.part(kept(ladder)) if chosen.outliers == "reject" else ladder
+    used = ladder.part(inlier_mask(ladder)) if chosen.outliers == "reject" else ladder
     results: list[FitResult] = []
     lower: Floats | None = None
     for order in sorted(orders):
-        form = Form(ModelName(model), order, Ties(ties))
-        solution, weight = solved_robustly(used, form, chosen, lower)
+        form = ModelForm(ModelName(model), order, Ties(ties))
+        solution, weight = solve_robustly(used, form, chosen, lower)
         lower = solution.log_weights
         result = result_of(used, form, branches_of(solution, *voltage_range(used, chosen)), lower, chosen)
         rows, residual = curve_rows(used, form), residual_n(used, result.branches)
@@ -69,17 +69,21 @@ def fit_orders(
     return results
 
 
-def solved_robustly(ladder: Ladder, form: Form, settings: FitSettings, lower: Floats | None) -> tuple[Solution, Floats]:
+def solve_robustly(
+    ladder: Ladder, form: ModelForm, settings: FitSettings, lower: Floats | None
+) -> tuple[Solution, Floats]:
     """The solution and the weights it was found with: the ladder's own, times Huber's if asked for."""
     own = own_weight(ladder)
     samples = split_samples(ladder, own, form, settings)
-    solution, weight = explored(samples, form, lower, settings.effort), own
+    solution, weight = explore_starts(samples, form, lower, settings.effort), own
     if settings.outliers != "huber":
         return solution, weight
     x0_v, x1_v = voltage_range(ladder, settings)
     for _ in range(HUBER_ROUNDS):
         weight = own * huber_weight(residual_n(ladder, branches_of(solution, x0_v, x1_v)))
-        solution = refined(split_samples(ladder, weight, form, settings), form, solution.log_weights, settings.effort)
+        solution = refine_solution(
+            split_samples(ladder, weight, form, settings), form, solution.log_weights, settings.effort
+        )
     return solution, weight
 
 
@@ -95,7 +99,7 @@ def voltage_range(ladder: Ladder, settings: FitSettings) -> tuple[float, float]:
     return x0_v, x1_v
 
 
-def split_samples(ladder: Ladder, weight: Floats, form: Form, settings: FitSettings) -> tuple[Samples, ...]:
+def split_samples(ladder: Ladder, weight: Floats, form: ModelForm, settings: FitSettings) -> tuple[Samples, ...]:
     """One Samples per curve of the form."""
     if not 1 <= form.order <= ORDER_MAX:
         raise ValueError(f"order {form.order}: 1 .. {ORDER_MAX} is allowed")
@@ -104,18 +108,18 @@ def split_samples(ladder: Ladder, weight: Floats, form: Form, settings: FitSetti
     return tuple(_samples(t, ladder, weight, mask, form) for mask in curve_rows(ladder, form))
 
 
-def curve_rows(ladder: Ladder, form: Form) -> list[NDArray[np.bool_]]:
+def curve_rows(ladder: Ladder, form: ModelForm) -> list[NDArray[np.bool_]]:
     """Which samples belong to each curve of the form."""
     if form.model.per_direction:
         return [ladder.direction == RISING, ladder.direction == FALLING]
     return [ladder.direction != 0]
 
 
-def _samples(t: Floats, ladder: Ladder, weight: Floats, mask: NDArray[np.bool_], form: Form) -> Samples:
+def _samples(t: Floats, ladder: Ladder, weight: Floats, mask: NDArray[np.bool_], form: ModelForm) -> Samples:
     name = "/".join(sorted({"rising" if d > 0 else "falling" for d in ladder.direction[mask].tolist()}, reverse=True))
     if not mask.any():
         raise ValueError(f"{form.model} needs both directions: the ladder goes one way only")
-    samples = merged(t[mask], ladder.force_n[mask], weight[mask])
+    samples = merge_samples(t[mask], ladder.force_n[mask], weight[mask])
     if len(samples.t) < form.order + 1:
         raise ValueError(f"order {form.order} needs {form.order + 1} different voltages: {name} has {len(samples.t)}")
     return samples
@@ -132,7 +136,9 @@ def residual_n(ladder: Ladder, branches: Branches) -> Floats:
     return np.asarray(ladder.force_n - np.where(ladder.direction == RISING, rising, falling))
 
 
-def result_of(ladder: Ladder, form: Form, branches: Branches, log_weights: Floats, settings: FitSettings) -> FitResult:
+def result_of(
+    ladder: Ladder, form: ModelForm, branches: Branches, log_weights: Floats, settings: FitSettings
+) -> FitResult:
     """Residuals and verdicts of given branches; nothing is claimed about their parameters."""
     residual = residual_n(ladder, branches)
     return FitResult(

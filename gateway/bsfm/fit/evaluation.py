@@ -18,10 +18,10 @@ from gateway.bsfm.fit.order_choice import Score, choose, score_orders
 from gateway.bsfm.fit.result import ModelName, Ties
 from gateway.bsfm.fit.usable_fit import fit_usable, is_moderate
 from gateway.bsfm.ladder.check import CheckedLadder
-from gateway.bsfm.ladder.fault import Flaw, LadderError
+from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
 from gateway.bsfm.ladder.measured_ladder import Ladder
 from gateway.bsfm.model import Bsfm
-from gateway.bsfm.slip.reversal_choice import ReversalChoice, chosen_reversal
+from gateway.bsfm.slip.reversal_choice import ReversalChoice, choose_reversal
 
 FOLDS: Final = 5
 POOR_SHARE: Final = 0.8  # held-out errors further apart than this are worth a constrained search
@@ -32,7 +32,7 @@ DEFAULT_SPAN_SHARE: Final = 0.2  # of the force range, where nothing identifies 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
+class FitRequest:
     """What to fit. reference_span_n: the active calibration's span, used where the walk is missing."""
 
     models: tuple[ModelName, ...] = tuple(ModelName)
@@ -56,7 +56,7 @@ class Evaluation:
     notes: tuple[str, ...]
 
 
-def evaluate(checked: CheckedLadder, question: Question) -> Evaluation:
+def evaluate(checked: CheckedLadder, question: FitRequest) -> Evaluation:
     """LadderError where nothing usable can be fitted."""
     ladder, said = _with_groups(checked.ladder)
     if not checked.closed:
@@ -68,7 +68,7 @@ def evaluate(checked: CheckedLadder, question: Question) -> Evaluation:
     chosen = choose(scores)
     if _is_poor(chosen, scores):
         chosen = _constrained(ladder, orders, question, settings, chosen, said)
-    reversal = chosen_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)
+    reversal = choose_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)
     span_n = reversal.span.span_n if reversal else _assumed_span(chosen, question, said)
     model = reversal.model if reversal else chosen.result.bsfm(span_n)
     return Evaluation(checked, tuple(scores), chosen, model, span_n, reversal, (*checked.notes, *said))
@@ -93,14 +93,14 @@ def _possible(ladder: Ladder, orders: Sequence[int], said: list[str]) -> list[in
     possible = [order for order in orders if 2 * order + 1 <= SPARING * stairs]
     if not possible:
         raise LadderError(
-            Flaw.TOO_SHORT, f"{stairs} stairs on a branch carry no order of {', '.join(map(str, orders))}"
+            LadderFlaw.TOO_SHORT, f"{stairs} stairs on a branch carry no order of {', '.join(map(str, orders))}"
         )
     if len(possible) < len(orders):
         said.append(f"{stairs} stairs on a branch: orders above {max(possible)} are not tried")
     return possible
 
 
-def _settings(ladder: Ladder, question: Question) -> FitSettings:
+def _settings(ladder: Ladder, question: FitRequest) -> FitSettings:
     outliers = "reject" if question.outliers == "reject" else "huber" if question.outliers == "huber" else "keep"
     ends_v = (float(ladder.voltage_v.min()), float(ladder.voltage_v.max()))
     return FitSettings(outliers=outliers, voltage_range_v=ends_v)  # type: ignore[arg-type]
@@ -117,7 +117,7 @@ def _may_drive(score: Score) -> bool:
 
 
 def _constrained(
-    ladder: Ladder, orders: Sequence[int], question: Question, settings: FitSettings, free: Score, said: list[str]
+    ladder: Ladder, orders: Sequence[int], question: FitRequest, settings: FitSettings, free: Score, said: list[str]
 ) -> Score:
     """The best BSFM that is held to what may drive a plant, where it beats the best free optimum that may."""
     found = []
@@ -129,7 +129,9 @@ def _constrained(
     smallest_n = min((result.rms_n for result in found), default=0.0)
     best = next((result for result in found if result.rms_n <= NEAR * smallest_n), None)
     if best is None and not _may_drive(free):
-        raise LadderError(Flaw.NO_FIT, "no fit of any model and order may drive a plant: see the verdicts in the table")
+        raise LadderError(
+            LadderFlaw.NO_FIT, "no fit of any model and order may drive a plant: see the verdicts in the table"
+        )
     if best is None or (_may_drive(free) and best.rms_n >= POOR_SHARE * free.heldout_rms_n):
         return free
     said.append(
@@ -147,7 +149,7 @@ def _to_move(chosen: Score, scores: Sequence[Score]) -> Branches:
     return min(lower, key=lambda score: score.heldout_n2).result.branches
 
 
-def _assumed_span(chosen: Score, question: Question, said: list[str]) -> float:
+def _assumed_span(chosen: Score, question: FitRequest, said: list[str]) -> float:
     low_n, high_n = chosen.result.bsfm(0.0).force_range_n
     if question.reference_span_n is not None:
         said.append(

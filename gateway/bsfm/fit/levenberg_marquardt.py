@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.bsfm.fit.projected_problem import Floats, Lanes, Problem
+from gateway.bsfm.fit.projected_problem import FitLanes, Floats, ProjectedProblem
 
 STEPS_MAX = 100
 RELATIVE_GAIN = 1.0e-9
@@ -67,7 +67,7 @@ class Effort:
     descending: int = 16
 
 
-def polished(problem: Problem, starts: Floats, effort: Effort) -> Lanes:
+def polish(problem: ProjectedProblem, starts: Floats, effort: Effort) -> FitLanes:
     """The lowest minimum reached from starts (k, d), as one lane."""
     best = lowest(descend(problem, starts, effort.ridge_n2, effort), 1)
     for _ in range(3):
@@ -82,7 +82,7 @@ def polished(problem: Problem, starts: Floats, effort: Effort) -> Lanes:
     return best
 
 
-def minima(problem: Problem, known: Floats, effort: Effort, count: int = 3) -> Floats:
+def minima(problem: ProjectedProblem, known: Floats, effort: Effort, count: int = 3) -> Floats:
     """Different minima (count or fewer, d), lowest first, from starts known (k, d) and from the spread ones."""
     curves = len(problem.curves)
     seeds = _spread(problem.unknowns, curves * effort.screened, effort.log_weight_max)
@@ -106,16 +106,18 @@ def pairs_of(rising: Floats, falling: Floats) -> Floats:
     return np.concatenate([np.repeat(rising, len(falling), axis=0), np.tile(falling, (len(rising), 1))], axis=1)
 
 
-def lowest(lanes: Lanes, count: int) -> Lanes:
+def lowest(lanes: FitLanes, count: int) -> FitLanes:
     return lanes.pick(np.argsort(lanes.cost, kind="stable")[:count])
 
 
-def descend(problem: Problem, starts: Floats, ridge: float, effort: Effort, steps: int = STEPS_MAX) -> Lanes:
+def descend(
+    problem: ProjectedProblem, starts: Floats, ridge: float, effort: Effort, steps: int = STEPS_MAX
+) -> FitLanes:
     """Down from each start to a local minimum of cost + ridge |theta|^2 within the box."""
     bound = effort.log_weight_max
     at = problem.evaluate(np.clip(starts, -bound, bound))
     damping = np.full(len(starts), 1.0e-3)
-    finished: list[Lanes] = []
+    finished: list[FitLanes] = []
     for _ in range(steps):
         trial = problem.evaluate(np.clip(at.theta + _step(problem, at, ridge, damping, bound), -bound, bound))
         before, after = _total(at, ridge), _total(trial, ridge)
@@ -130,11 +132,11 @@ def descend(problem: Problem, starts: Floats, ridge: float, effort: Effort, step
     return _joined([*finished, at])
 
 
-def _total(at: Lanes, ridge: float) -> Floats:
+def _total(at: FitLanes, ridge: float) -> Floats:
     return np.asarray(at.cost + ridge * (at.theta * at.theta).sum(axis=1))
 
 
-def _step(problem: Problem, at: Lanes, ridge: float, damping: Floats, bound: float) -> Floats:
+def _step(problem: ProjectedProblem, at: FitLanes, ridge: float, damping: Floats, bound: float) -> Floats:
     """The damped Gauss-Newton step; unknowns that push against the box stand still."""
     jacobian = problem.jacobian(at)
     transposed = jacobian.transpose(0, 2, 1)
@@ -146,6 +148,6 @@ def _step(problem: Problem, at: Lanes, ridge: float, damping: Floats, bound: flo
     return np.asarray(-np.linalg.solve(curvature, (gradient * free)[:, :, None])[:, :, 0])
 
 
-def _joined(lanes: list[Lanes]) -> Lanes:
-    names = Lanes.__slots__
-    return Lanes(*(np.concatenate([getattr(part, name) for part in lanes]) for name in names))
+def _joined(lanes: list[FitLanes]) -> FitLanes:
+    names = FitLanes.__slots__
+    return FitLanes(*(np.concatenate([getattr(part, name) for part in lanes]) for name in names))

@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.fit.branch_fit import FitSettings, branches_of, fit_orders, own_weight, residual_n, split_samples
-from gateway.bsfm.fit.outliers import kept
+from gateway.bsfm.fit.outliers import inlier_mask
 from gateway.bsfm.fit.result import FitResult, ModelName, Ties
-from gateway.bsfm.fit.solution import refined
+from gateway.bsfm.fit.solution import refine_solution
 from gateway.bsfm.ladder.measured_ladder import Ladder
 
 CERTAIN: Final = 2.0  # standard errors of the difference: nobody prefers more coefficients for less
@@ -54,7 +54,7 @@ def score_orders(
     if len(ladder.groups) < 2:
         raise ValueError("leaving a group out needs at least two groups: repeat the ladder")
     chosen, wanted = settings or FitSettings(), sorted(orders)
-    used = ladder.part(kept(ladder)) if chosen.outliers == "reject" else ladder
+    used = ladder.part(inlier_mask(ladder)) if chosen.outliers == "reject" else ladder
     results = [result for model in models for result in fit_orders(ladder, model, wanted, ties, chosen)]
     return [_score(used, result, chosen) for result in results]
 
@@ -92,7 +92,9 @@ def _heldout_n2(ladder: Ladder, group: int, result: FitResult, settings: FitSett
     """Mean square on one group of the fit to the others, found from the full fit's weights."""
     inside = ladder.group == group
     rest, form = ladder.part(~inside), result.form
-    solution = refined(split_samples(rest, own_weight(rest), form, settings), form, result.log_weights, settings.effort)
+    solution = refine_solution(
+        split_samples(rest, own_weight(rest), form, settings), form, result.log_weights, settings.effort
+    )
     curves = branches_of(solution, result.branches.rising.x0, result.branches.rising.x1)
     away = residual_n(ladder.part(inside), curves)
     return float(np.mean(away * away))

@@ -23,7 +23,7 @@ def rungs(ladder: Ladder) -> tuple[NDArray[np.intp], int]:
     return flat, int(flat.max()) + 1
 
 
-def kept(ladder: Ladder) -> NDArray[np.bool_]:
+def inlier_mask(ladder: Ladder) -> NDArray[np.bool_]:
     """False for readings far from the median of their rung."""
     index, count = rungs(ladder)
     order = np.argsort(index, kind="stable")

@@ -27,7 +27,7 @@ class Samples:
     weight: Floats
 
 
-def merged(t: Floats, force_n: Floats, weight: Floats) -> Samples:
+def merge_samples(t: Floats, force_n: Floats, weight: Floats) -> Samples:
     """One row per distinct t: least squares sees the same minimum, and ten groups cost as little as one."""
     places, index = np.unique(t, return_inverse=True)
     total = np.bincount(index, weight).astype(np.float64)
@@ -46,7 +46,7 @@ def bernstein(t: Floats, order: int) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Lanes:
+class FitLanes:
     """What is known at k thetas. design = q r; cost: weighted mean of squared residuals in N^2."""
 
     theta: Floats  # (k, d)
@@ -57,17 +57,17 @@ class Lanes:
     r: Floats  # (k, p, p)
     cost: Floats  # (k,)
 
-    def pick(self, lanes: Floats | NDArray[np.intp] | NDArray[np.bool_]) -> "Lanes":
-        return Lanes(*(getattr(self, field.name)[lanes] for field in fields(self)))
+    def pick(self, lanes: Floats | NDArray[np.intp] | NDArray[np.bool_]) -> "FitLanes":
+        return FitLanes(*(getattr(self, field.name)[lanes] for field in fields(self)))
 
-    def where(self, chosen: NDArray[np.bool_], other: "Lanes") -> "Lanes":
+    def where(self, chosen: NDArray[np.bool_], other: "FitLanes") -> "FitLanes":
         """Lane by lane: this one where chosen, else the other's."""
         names = [field.name for field in fields(self)]
         pairs = ((getattr(self, name), getattr(other, name)) for name in names)
-        return Lanes(*(np.where(chosen.reshape(-1, *(1,) * (a.ndim - 1)), a, b) for a, b in pairs))
+        return FitLanes(*(np.where(chosen.reshape(-1, *(1,) * (a.ndim - 1)), a, b) for a, b in pairs))
 
 
-class Problem:
+class ProjectedProblem:
     """One or two curves of one order. tied: the two share their end handles."""
 
     def __init__(self, curves: tuple[Samples, ...], order: int, tied: bool) -> None:
@@ -100,7 +100,7 @@ class Problem:
             design[:, rows, columns] = shares[:, rows] * self.root_weight[rows, None]
         return shares, design
 
-    def evaluate(self, theta: Floats) -> Lanes:
+    def evaluate(self, theta: Floats) -> FitLanes:
         """Best handles for each lane's weights, by QR of the weighted design with columns of equal length."""
         shares, design = self.designs(theta)
         lengths = np.sqrt((design * design).sum(axis=1))
@@ -108,9 +108,9 @@ class Problem:
         along = q.transpose(0, 2, 1) @ self._force
         residual = self._force - (q @ along[:, :, None])[:, :, 0]
         handles = np.linalg.solve(r, along[:, :, None])[:, :, 0] / lengths
-        return Lanes(theta, handles, residual, shares, q, r * lengths[:, None, :], (residual * residual).sum(axis=1))
+        return FitLanes(theta, handles, residual, shares, q, r * lengths[:, None, :], (residual * residual).sum(axis=1))
 
-    def jacobian(self, at: Lanes) -> Floats:
+    def jacobian(self, at: FitLanes) -> Floats:
         """d residual / d theta, (k, m, d)."""
         direct = self.sensitivity(at.shares, at.handles)
         inner = at.q.transpose(0, 2, 1) @ direct - np.linalg.solve(at.r.transpose(0, 2, 1), self._moved_normals(at))
@@ -131,7 +131,7 @@ class Problem:
             result[:, rows, c * self.order : (c + 1) * self.order] = inner * self.root_weight[rows, None]
         return result
 
-    def _moved_normals(self, at: Lanes) -> Floats:
+    def _moved_normals(self, at: FitLanes) -> Floats:
         """(d design / d theta_j)^T residual, one column per j: (k, p, d)."""
         result = np.zeros((len(at.theta), self.handle_count, self.unknowns))
         for c, (rows, columns) in enumerate(zip(self.rows, self.columns, strict=True)):
@@ -154,7 +154,7 @@ def _columns(curves: int, order: int, tied: bool) -> list[NDArray[np.intp]]:
     return [first, second]
 
 
-def raised(theta: Floats, by: int) -> Floats:
+def raise_order(theta: Floats, by: int) -> Floats:
     """theta (n,) of the same curve written `by` orders higher: a start that loses nothing."""
     weights = np.exp(np.concatenate([[0.0], theta]))
     for _ in range(by):

@@ -71,7 +71,7 @@ def missing(since_s: Floats, lag_s: float, second_lag_s: float) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredResponse:
     """response: None where it could not be measured; why_not: then the sentence."""
 
     response: Response | None
@@ -83,18 +83,18 @@ class Measured:
         return f"response: {self.response.source}" if self.response else self.why_not
 
 
-def measured_response(
+def measure_response(
     time_s: Floats,
     command_v: Floats,
     force_n: Floats,
     model: Bsfm,
     slew_v_per_s: float = inf,
     when: str = "",
-) -> Measured:
+) -> MeasuredResponse:
     """From the rows of a run. slew_v_per_s: how fast a command may rise, which the rows between do not show."""
     stairs = _stairs(time_s, command_v, force_n, model, slew_v_per_s)
     if len(stairs) < FEWEST_STAIRS:
-        return Measured(
+        return MeasuredResponse(
             None,
             f"the response was not measured: {len(stairs)} steps of {LEAST_STEP_N:g} N or more with enough readings, "
             f"{FEWEST_STAIRS} are needed",
@@ -105,8 +105,10 @@ def measured_response(
     found = _fitted(stairs, ratios)
     if not (0.0 <= found.dead_time_s < LONGEST_S and SHORTEST_LAG_S < found.lags_s < LONGEST_S):
         said = f"dead time {found.dead_time_s * 1e3:.0f} ms and lags of {found.lags_s * 1e3:.0f} ms in sum"
-        return Measured(None, f"the response was not measured: the steps give {said}, which no plant of this kind has")
-    return Measured(_told(found, stairs, when))
+        return MeasuredResponse(
+            None, f"the response was not measured: the steps give {said}, which no plant of this kind has"
+        )
+    return MeasuredResponse(_told(found, stairs, when))
 
 
 def _told(found: "_Fit", stairs: Sequence[Stair], when: str) -> Response:

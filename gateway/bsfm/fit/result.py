@@ -41,7 +41,7 @@ class Ties(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class ModelForm:
     """Which model of which order."""
 
     model: ModelName
@@ -118,7 +118,7 @@ class FitResult:
     residuals / number of points, data sets added), an extra for comparison with its tables: not newtons of anything.
     """
 
-    form: Form
+    form: ModelForm
     branches: Branches
     overall: Residuals
     rising: Residuals

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.bsfm.curve import RationalBezier
-from gateway.bsfm.fit.levenberg_marquardt import Effort, minima, pairs_of, polished
-from gateway.bsfm.fit.projected_problem import Floats, Lanes, Problem, Samples, merged, raised
-from gateway.bsfm.fit.result import Form
+from gateway.bsfm.fit.levenberg_marquardt import Effort, minima, pairs_of, polish
+from gateway.bsfm.fit.projected_problem import FitLanes, Floats, ProjectedProblem, Samples, merge_samples, raise_order
+from gateway.bsfm.fit.result import ModelForm
 
 EXPLORING_PLACES = 128  # distinct voltages per curve that the search for starts looks at
 
@@ -16,9 +16,9 @@ EXPLORING_PLACES = 128  # distinct voltages per curve that the search for starts
 class Solution:
     """The best of one form: its problems (one per set of curves that share handles), each with one lane."""
 
-    form: Form
-    problems: tuple[Problem, ...]
-    lanes: tuple[Lanes, ...]
+    form: ModelForm
+    problems: tuple[ProjectedProblem, ...]
+    lanes: tuple[FitLanes, ...]
 
     @property
     def log_weights(self) -> Floats:
@@ -33,14 +33,16 @@ class Solution:
         return found
 
 
-def explored(samples: tuple[Samples, ...], form: Form, lower: Floats | None, effort: Effort) -> Solution:
+def explore_starts(samples: tuple[Samples, ...], form: ModelForm, lower: Floats | None, effort: Effort) -> Solution:
     """The best solution from many starts. lower: log weights (curves, n) of a lower order."""
     if not form.model.rational:
-        return refined(samples, form, np.zeros((len(samples), form.order)), effort)
+        return refine_solution(samples, form, np.zeros((len(samples), form.order)), effort)
     coarse = tuple(_coarse(part, form.order) for part in samples)
-    raised_lower = None if lower is None else np.stack([raised(part, form.order - lower.shape[1]) for part in lower])
+    raised_lower = (
+        None if lower is None else np.stack([raise_order(part, form.order - lower.shape[1]) for part in lower])
+    )
     single = [
-        minima(Problem((part,), form.order, False), _known(raised_lower, c, form.order), effort)
+        minima(ProjectedProblem((part,), form.order, False), _known(raised_lower, c, form.order), effort)
         for c, part in enumerate(coarse)
     ]
     if not form.tied:
@@ -48,23 +50,23 @@ def explored(samples: tuple[Samples, ...], form: Form, lower: Floats | None, eff
     known = pairs_of(*single)
     if raised_lower is not None:
         known = np.concatenate([known, raised_lower.reshape(1, -1)])
-    return _solution(samples, form, [minima(Problem(coarse, form.order, True), known, effort)], effort)
+    return _solution(samples, form, [minima(ProjectedProblem(coarse, form.order, True), known, effort)], effort)
 
 
-def refined(samples: tuple[Samples, ...], form: Form, log_weights: Floats, effort: Effort) -> Solution:
+def refine_solution(samples: tuple[Samples, ...], form: ModelForm, log_weights: Floats, effort: Effort) -> Solution:
     """The solution nearest to known log weights (curves, order)."""
     starts = [log_weights.reshape(1, -1)] if form.tied else [part[None] for part in log_weights]
     return _solution(samples, form, starts, effort)
 
 
-def _solution(samples: tuple[Samples, ...], form: Form, starts: list[Floats], effort: Effort) -> Solution:
+def _solution(samples: tuple[Samples, ...], form: ModelForm, starts: list[Floats], effort: Effort) -> Solution:
     shared = [samples] if form.tied else [(part,) for part in samples]
-    problems = tuple(Problem(part, form.order, form.tied) for part in shared)
+    problems = tuple(ProjectedProblem(part, form.order, form.tied) for part in shared)
     if not form.model.rational:
         return Solution(
             form, problems, tuple(problem.evaluate(start) for problem, start in zip(problems, starts, strict=True))
         )
-    lanes = [polished(problem, start, effort) for problem, start in zip(problems, starts, strict=True)]
+    lanes = [polish(problem, start, effort) for problem, start in zip(problems, starts, strict=True)]
     return Solution(form, problems, tuple(lanes))
 
 
@@ -76,4 +78,4 @@ def _coarse(samples: Samples, order: int) -> Samples:
     """At most 128 places for the search of starts: voltages that were measured, not commanded, all differ."""
     if len(samples.t) <= max(EXPLORING_PLACES, 4 * order):
         return samples
-    return merged(np.round(samples.t * EXPLORING_PLACES) / EXPLORING_PLACES, samples.force_n, samples.weight)
+    return merge_samples(np.round(samples.t * EXPLORING_PLACES) / EXPLORING_PLACES, samples.force_n, samples.weight)

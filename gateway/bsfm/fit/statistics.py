@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.fit.outliers import rungs
-from gateway.bsfm.fit.projected_problem import Floats, Lanes, Problem
+from gateway.bsfm.fit.projected_problem import FitLanes, Floats, ProjectedProblem
 from gateway.bsfm.fit.result import NOT_IDENTIFIABLE, Covariance, Residuals
 from gateway.bsfm.fit.solution import Solution
 from gateway.bsfm.ladder.measured_ladder import Ladder
@@ -39,14 +39,14 @@ def covariance_of(
     return Covariance(tuple(names), _diagonal(blocks))
 
 
-def _variance(problem: Problem, residual_n: Floats, weight: Floats, solution: Solution) -> float:
+def _variance(problem: ProjectedProblem, residual_n: Floats, weight: Floats, solution: Solution) -> float:
     """Variance of one sample over the sum of weights, in the problem's normalisation."""
     free = problem.handle_count + (problem.unknowns if solution.form.model.rational else 0)
     spare = max(len(residual_n) - free, 1)
     return float(np.sum(weight * residual_n * residual_n) / weight.sum() / spare)
 
 
-def _block(problem: Problem, at: Lanes, variance: float, solution: Solution, box: float) -> Floats | None:
+def _block(problem: ProjectedProblem, at: FitLanes, variance: float, solution: Solution, box: float) -> Floats | None:
     jacobian = at.q[0] @ at.r[0]
     if solution.form.model.rational:
         jacobian = np.concatenate([jacobian, problem.sensitivity(at.shares, at.handles)[0]], axis=1)
@@ -61,7 +61,7 @@ def _block(problem: Problem, at: Lanes, variance: float, solution: Solution, box
     return None if np.any(errors > LOG_WEIGHT_ERROR_MAX) else block
 
 
-def _names(problem: Problem, curves: list[int], solution: Solution) -> list[str]:
+def _names(problem: ProjectedProblem, curves: list[int], solution: Solution) -> list[str]:
     branch = ["rising", "falling"] if solution.form.model.per_direction else ["pooled"]
     handles = {}
     for c, columns in zip(curves, problem.columns, strict=True):

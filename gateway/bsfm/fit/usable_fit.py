@@ -21,8 +21,8 @@ from gateway.bsfm.fit.branch_fit import (
     split_samples,
     voltage_range,
 )
-from gateway.bsfm.fit.outliers import huber_weight, kept
-from gateway.bsfm.fit.projected_problem import Floats, Problem, Samples
+from gateway.bsfm.fit.outliers import huber_weight, inlier_mask
+from gateway.bsfm.fit.projected_problem import Floats, ProjectedProblem, Samples
 from gateway.bsfm.fit.result import FitResult, ModelName, Ties
 from gateway.bsfm.ladder.measured_ladder import Ladder
 
@@ -35,12 +35,14 @@ PLACES = np.concatenate([[0.0, 1.0e-4], np.arange(1, 64) / 64, [1.0 - 1.0e-4, 1.
 class _Search:
     """Unknowns u: log weights (d,), then handles (p,). All constraints are linear in the curves' values at PLACES."""
 
-    def __init__(self, problem: Problem, floor_n: float, gap_n: float) -> None:
+    def __init__(self, problem: ProjectedProblem, floor_n: float, gap_n: float) -> None:
         """floor_n: least rise over the whole range; gap_n: least gap in the middle, closing as t (1-t) towards the ends."""
         self.problem, self.floor_n, self.gap_n = problem, floor_n, gap_n
         curves, m = len(problem.curves), len(PLACES)
         nothing = Samples(PLACES, np.zeros(m), np.ones(m))
-        self._probe = Problem((nothing,) * curves, problem.order, problem.columns[0][-1] == problem.columns[-1][-1])
+        self._probe = ProjectedProblem(
+            (nothing,) * curves, problem.order, problem.columns[0][-1] == problem.columns[-1][-1]
+        )
         self._unit = float(np.sqrt(curves * m))  # undoes the probe's own weighting
         rise = np.diff(np.eye(m), axis=0) / np.diff(PLACES)[:, None]
         self._rows = np.kron(np.eye(curves), rise)
@@ -82,11 +84,11 @@ def fit_usable(
     free = fit(ladder, model, order, ties, chosen)
     if free.verdicts.usable and is_moderate(free.branches):
         return free
-    used = ladder.part(kept(ladder)) if chosen.outliers == "reject" else ladder
+    used = ladder.part(inlier_mask(ladder)) if chosen.outliers == "reject" else ladder
     weight = own_weight(used)
     if chosen.outliers == "huber":
         weight = weight * huber_weight(residual_n(used, free.branches))
-    problem = Problem(split_samples(used, weight, free.form, chosen), order, free.form.tied)
+    problem = ProjectedProblem(split_samples(used, weight, free.form, chosen), order, free.form.tied)
     for margin in MARGINS:
         results = [_constrained(problem, start, margin, used, free, chosen) for start in _starts(problem, free)]
         usable = [result for result in results if result.verdicts.usable and is_moderate(result.branches)]
@@ -110,7 +112,7 @@ def _most_n(branches: Branches) -> float:
     )
 
 
-def _starts(problem: Problem, free: FitResult) -> list[Floats]:
+def _starts(problem: ProjectedProblem, free: FitResult) -> list[Floats]:
     """The free optimum, and straight lines of equal weights."""
     curves = (free.branches.rising, free.branches.falling)[: len(problem.curves)]
     own, line = np.zeros(problem.handle_count), np.zeros(problem.handle_count)
@@ -121,7 +123,7 @@ def _starts(problem: Problem, free: FitResult) -> list[Floats]:
 
 
 def _constrained(
-    problem: Problem, start: Floats, margin: float, ladder: Ladder, free: FitResult, settings: FitSettings
+    problem: ProjectedProblem, start: Floats, margin: float, ladder: Ladder, free: FitResult, settings: FitSettings
 ) -> FitResult:
     from scipy.optimize import minimize  # here: whoever only fits freely does not pay for it
 

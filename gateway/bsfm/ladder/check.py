@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
-from gateway.bsfm.ladder.fault import Flaw, LadderError
-from gateway.bsfm.ladder.labels import Labels, Parted, parted
+from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
+from gateway.bsfm.ladder.labels import Labels, LabelSplit, split_by_labels
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 from gateway.bsfm.ladder.rows import Rows, usable_rows
-from gateway.bsfm.ladder.settled_points import Points, settled_points
-from gateway.bsfm.ladder.sweeps import Sweeps, sweeps
+from gateway.bsfm.ladder.settled_points import Points, find_settled_points
+from gateway.bsfm.ladder.sweeps import SweepSplit, split_by_sweeps
 from gateway.bsfm.model import Bsfm
 
 LEAST_FORCE_SPAN_N: Final = 1.0
@@ -65,7 +65,7 @@ class CheckedLadder:
     only_walk: bool = False  # its ladder is the coarse cycle of a resumed run to which only the reversal part was left
 
 
-def checked_ladder(
+def check_ladder(
     columns: Mapping[str, Floats], facts: Mapping[str, object], expected: Expectation = NOTHING_KNOWN
 ) -> CheckedLadder:
     """The ladder in a table of the recording contract. LadderError with one sentence if it must not be fitted."""
@@ -78,7 +78,7 @@ def checked_ladder(
     said += [*rows.notes, *points.notes]
     _check_moves(points)
     _check_sign(points, slope_n_per_v)
-    walk = parted(points, labels, by_check=_is_only_walk(facts)) if labels else sweeps(points)
+    walk = split_by_labels(points, labels, by_check=_is_only_walk(facts)) if labels else split_by_sweeps(points)
     ladder = _whole_groups(walk)
     said += [*walk.left_out, *_check_scale(rows, slope_n_per_v, expected)]
     ladder, clipped = _without_saturated(ladder, expected.saturation_n)
@@ -96,12 +96,12 @@ def checked_ladder(
     )
 
 
-def joined(parts: Sequence[CheckedLadder]) -> CheckedLadder:
+def join_ladders(parts: Sequence[CheckedLadder]) -> CheckedLadder:
     """The groups of several recordings as one ladder; walk, noise and slope are the last one's."""
     ladders = [part.ladder for part in parts if not part.only_walk]
     if not ladders:
         said = "only the reversal part of a resumed run: the recordings with its groups must lie beside it"
-        raise LadderError(Flaw.CUT_SHORT, said)
+        raise LadderError(LadderFlaw.CUT_SHORT, said)
     if len(parts) == 1:
         return parts[0]
     firsts = np.cumsum([0, *(int(ladder.group.max()) + 1 for ladder in ladders[:-1])])
@@ -120,7 +120,7 @@ def _check_rig(facts: Mapping[str, object], expected: Expectation) -> list[str]:
     recorded = str(facts.get("rig", "")).strip()
     if expected.rig and recorded and recorded != expected.rig:
         raise LadderError(
-            Flaw.OTHER_RIG,
+            LadderFlaw.OTHER_RIG,
             f"recorded on rig {recorded}, asked for rig {expected.rig}: another cylinder makes another force from the same "
             f"voltage; give --rig {recorded} if that is the one meant",
         )
@@ -135,9 +135,9 @@ def _is_only_walk(facts: Mapping[str, object]) -> bool:
 
 def _points(rows: Rows, labels: Labels | None) -> Points:
     try:
-        return settled_points(rows.time_s, rows.command_v, rows.force_n, labels.stair if labels else None)
+        return find_settled_points(rows.time_s, rows.command_v, rows.force_n, labels.stair if labels else None)
     except ValueError as error:
-        raise LadderError(Flaw.NO_STAIRS, str(error)) from error
+        raise LadderError(LadderFlaw.NO_STAIRS, str(error)) from error
 
 
 def _slope(points: Points) -> float:
@@ -151,7 +151,7 @@ def _check_moves(points: Points) -> None:
     noise_n = points.noise_n if np.isfinite(points.noise_n) else 0.0
     if high_n - low_n < max(LEAST_FORCE_SPAN_N, NOISE_AT * noise_n):
         raise LadderError(
-            Flaw.FORCE_CONSTANT,
+            LadderFlaw.FORCE_CONSTANT,
             f"force stays within {low_n:.2f} .. {high_n:.2f} N while the command runs over {points.voltage_v.min():.2f} .. "
             f"{points.voltage_v.max():.2f} V: no air, no contact, or a dead load cell",
         )
@@ -160,22 +160,22 @@ def _check_moves(points: Points) -> None:
 def _check_sign(points: Points, slope_n_per_v: float) -> None:
     if slope_n_per_v < 0.0:
         raise LadderError(
-            Flaw.SIGN,
+            LadderFlaw.SIGN,
             f"A302 force falls by {-slope_n_per_v:.2f} N per volt: the cell's sign is inverted; set sign: -1 in the rig file "
             "(or swap the signal wires) and record again, or turn the sign of the column",
         )
 
 
-def _whole_groups(walk: Sweeps | Parted) -> Ladder:
+def _whole_groups(walk: SweepSplit | LabelSplit) -> Ladder:
     if walk.ladder is not None:
         return walk.ladder
-    if isinstance(walk, Sweeps) and min(walk.rising, walk.falling) < 3:
+    if isinstance(walk, SweepSplit) and min(walk.rising, walk.falling) < 3:
         raise LadderError(
-            Flaw.ONE_DIRECTION,
+            LadderFlaw.ONE_DIRECTION,
             f"one direction only: {walk.rising} rising and {walk.falling} falling stairs; friction makes two branches, so a "
             "ladder goes up and comes down again",
         )
-    raise LadderError(Flaw.CUT_SHORT, f"no whole group: {'; '.join(walk.left_out) or 'no full way up and down'}")
+    raise LadderError(LadderFlaw.CUT_SHORT, f"no whole group: {'; '.join(walk.left_out) or 'no full way up and down'}")
 
 
 def _check_scale(rows: Rows, slope_n_per_v: float, expected: Expectation) -> list[str]:
@@ -206,7 +206,7 @@ def _judge_ratio(ratio: float, against: str, unit_known: bool) -> list[str]:
     for factor, words, unit in ((1.0 / KGF_RATIO, "a tenth", "kgf"), (KGF_RATIO, "ten times", "N read as kgf")):
         if factor / KGF_SLACK <= ratio <= factor * KGF_SLACK and not unit_known:
             raise LadderError(
-                Flaw.UNIT,
+                LadderFlaw.UNIT,
                 f"A303 the force is {words} of what {against} (factor {ratio:.3g}): this looks like {unit}, off by 9.81; name "
                 "the unit (--force-unit kgf, or a column force_kgf), or say --force-unit N if it really is newtons",
             )
@@ -231,7 +231,9 @@ def _without_saturated(ladder: Ladder, saturation_n: float | None) -> tuple[Ladd
     left = ladder.part(~clipped)
     ways = [int((left.direction == way).sum()) for way in (RISING, FALLING)]
     if clipped.mean() > 0.5 or min(ways) < 6:
-        raise LadderError(Flaw.SATURATED, f"{said}: too little is left to fit; lower --v-max or use a larger cell")
+        raise LadderError(
+            LadderFlaw.SATURATED, f"{said}: too little is left to fit; lower --v-max or use a larger cell"
+        )
     return left, [f"{said}: these stairs are left out, the calibration ends at {left.voltage_v.max():.2f} V"]
 
 
@@ -260,7 +262,7 @@ def _check_increasing(ladder: Ladder) -> None:
         if dip_n > limit_n:
             peak = int(np.argmax(mean_n[: worst + 1]))
             raise LadderError(
-                Flaw.NOT_INCREASING,
+                LadderFlaw.NOT_INCREASING,
                 f"on the way {words} {mean_n[peak]:.2f} N at {voltage_v[peak]:.2f} V but only {mean_n[worst]:.2f} N at "
                 f"{voltage_v[worst]:.2f} V: a force that is not increasing with voltage has no inverse; slipping tool, leak, "
                 "or a jam at one place",

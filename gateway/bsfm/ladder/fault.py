@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 
-class Flaw(StrEnum):
+class LadderFlaw(StrEnum):
     """Why a ladder was refused, for programs."""
 
     COLUMNS = "columns"
@@ -26,6 +26,6 @@ class Flaw(StrEnum):
 class LadderError(ValueError):
     """Refused; nothing was made of the data."""
 
-    def __init__(self, flaw: Flaw, sentence: str) -> None:
+    def __init__(self, flaw: LadderFlaw, sentence: str) -> None:
         super().__init__(sentence)
         self.flaw = flaw

@@ -78,7 +78,7 @@ class Labels:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Parted:
+class LabelSplit:
     """ladder: whole groups, or the check's cycle where it is asked for; None where there are none."""
 
     ladder: Ladder | None
@@ -87,7 +87,7 @@ class Parted:
     left_out: tuple[str, ...]
 
 
-def parted(points: Points, labels: Labels, *, by_check: bool = False) -> Parted:
+def split_by_labels(points: Points, labels: Labels, *, by_check: bool = False) -> LabelSplit:
     """The points of a labelled recording. labels: of its rows; by_check: of a run that had only the reversal part left."""
     at = {int(labels.stair[row]): k for k, row in enumerate(points.row.tolist())}  # the last point of a stair counts
     masks = [labels.phase == CHECK] if by_check else [labels.group == group for group in labels.whole_groups]
@@ -96,7 +96,7 @@ def parted(points: Points, labels: Labels, *, by_check: bool = False) -> Parted:
     walk = (
         [*range(walk[0] - 1, walk[0]), *walk] if walk and walk[0] > 0 else walk
     )  # its first point says where it began
-    return Parted(_ladder(points, found), points.voltage_v[walk], points.force_n[walk], _left_out(labels))
+    return LabelSplit(_ladder(points, found), points.voltage_v[walk], points.force_n[walk], _left_out(labels))
 
 
 def _ladder(points: Points, groups: list[list[int]]) -> Ladder | None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
-from gateway.bsfm.ladder.fault import Flaw, LadderError
+from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
 from gateway.units import NEWTON_PER_UNIT
 
 FORCE_UNITS: Final = {unit.lower(): factor for unit, factor in NEWTON_PER_UNIT.items()} | {
@@ -47,13 +47,14 @@ def usable_rows(columns: Mapping[str, Floats], facts: Mapping[str, object], forc
     missing = [name for name in ("time_s", "command_v") if name not in columns]
     if missing:
         raise LadderError(
-            Flaw.COLUMNS,
+            LadderFlaw.COLUMNS,
             f"no column {' and '.join(missing)}: a ladder has time_s, command_v and force_n; {_there(columns)}",
         )
     time_s, command_v, force = (columns[name] for name in ("time_s", "command_v", force_name))
     if len(time_s) < FEWEST_ROWS:
         raise LadderError(
-            Flaw.TOO_SHORT, f"{len(time_s)} rows: a ladder goes up and down in stairs, {FEWEST_ROWS} rows are the least"
+            LadderFlaw.TOO_SHORT,
+            f"{len(time_s)} rows: a ladder goes up and down in stairs, {FEWEST_ROWS} rows are the least",
         )
     keep, dropped = _kept(columns, time_s, command_v, force)
     pressure = columns.get("pressure_kpa")
@@ -82,14 +83,16 @@ def _force_column(
         name for name in columns if name.startswith("force_") and name.removeprefix("force_").lower() in FORCE_UNITS
     ]
     if not names:
-        raise LadderError(Flaw.COLUMNS, f"no column force_n (or force_kgf, force_g, force_lbf); {_there(columns)}")
+        raise LadderError(
+            LadderFlaw.COLUMNS, f"no column force_n (or force_kgf, force_g, force_lbf); {_there(columns)}"
+        )
     name = "force_n" if "force_n" in names else names[0]
     written = force_unit or facts.get("force_unit") or (None if name == "force_n" else name.removeprefix("force_"))
     if written is None:
         return name, 1.0, False, []
     unit = str(written).strip()
     if unit.lower() not in FORCE_UNITS:
-        raise LadderError(Flaw.UNIT, f"force unit {unit!r} is none of {', '.join(FORCE_UNITS)}")
+        raise LadderError(LadderFlaw.UNIT, f"force unit {unit!r} is none of {', '.join(FORCE_UNITS)}")
     factor = FORCE_UNITS[unit.lower()]
     said = [] if factor == 1.0 else [f"forces are in {unit} and were turned into newtons (1 {unit} = {factor:.5g} N)"]
     return name, factor, True, said
@@ -115,10 +118,10 @@ def _kept(
     keep = finite & forward & ~overloaded
     if (~finite).mean() > LARGEST_BAD_SHARE:
         raise LadderError(
-            Flaw.NOT_FINITE, f"{said[0].removesuffix(': left out')}: too many to guess around; record again"
+            LadderFlaw.NOT_FINITE, f"{said[0].removesuffix(': left out')}: too many to guess around; record again"
         )
     if int(keep.sum()) < FEWEST_ROWS:
-        raise LadderError(Flaw.TOO_SHORT, f"{int(keep.sum())} usable rows are left: {'; '.join(said)}")
+        raise LadderError(LadderFlaw.TOO_SHORT, f"{int(keep.sum())} usable rows are left: {'; '.join(said)}")
     return keep, said
 
 
@@ -127,18 +130,18 @@ def _check_roles(rows: Rows) -> None:
     low_v, high_v = float(rows.command_v.min()), float(rows.command_v.max())
     if _look_swapped(rows.command_v, rows.force_n):
         raise LadderError(
-            Flaw.SWAPPED,
+            LadderFlaw.SWAPPED,
             f"command_v ({low_v:.3g} .. {high_v:.3g}) looks like a force and force_n ({rows.force_n.min():.3g} .. "
             f"{rows.force_n.max():.3g}) like the stairs of a command: columns swapped; change the two names in the header",
         )
     if high_v - low_v < 0.1:
         raise LadderError(
-            Flaw.COMMAND_CONSTANT,
+            LadderFlaw.COMMAND_CONSTANT,
             f"command_v stays within {low_v:.3f} .. {high_v:.3f} V: nothing was tried, so nothing can be fitted",
         )
     if high_v > LARGEST_COMMAND_V or low_v < -0.5:
         raise LadderError(
-            Flaw.COLUMNS,
+            LadderFlaw.COLUMNS,
             f"command_v runs from {low_v:.3g} to {high_v:.3g}: 0 .. 10 V is a command; millivolts, percent, or the force?",
         )
 

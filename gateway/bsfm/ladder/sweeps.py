@@ -21,7 +21,7 @@ FEWEST_MINOR_RUNS: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Sweep:
     """Points first .. last (inclusive) in one direction; first is the turning point where it begins."""
 
     first: int
@@ -35,7 +35,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sweeps:
+class SweepSplit:
     """ladder: whole groups; minor_v, minor_n: the walk of partial reversals, may be empty; runs: rising and falling ones
     with stairs enough; left_out: sentences about what is not in it."""
 
@@ -47,7 +47,7 @@ class Sweeps:
     left_out: tuple[str, ...]
 
 
-def sweeps(points: Points) -> Sweeps:
+def split_by_sweeps(points: Points) -> SweepSplit:
     """Groups and minor loops. ladder is None where no whole group is found: `left_out`, `rising` and `falling` say why."""
     runs = _runs(points.voltage_v)
     fine, coarse = _without_coarse(runs)
@@ -55,7 +55,7 @@ def sweeps(points: Points) -> Sweeps:
     minor = _minor_runs(others, pairs)
     said = [*_settling(coarse, points), *_cut([run for run in others if run not in minor], points)]
     walk = slice(minor[0].first, minor[-1].last + 1) if minor else slice(0, 0)
-    return Sweeps(
+    return SweepSplit(
         _ladder(points, pairs) if pairs else None,
         points.voltage_v[walk],
         points.force_n[walk],
@@ -65,12 +65,12 @@ def sweeps(points: Points) -> Sweeps:
     )
 
 
-def _runs(voltage_v: Floats) -> list[Run]:
+def _runs(voltage_v: Floats) -> list[Sweep]:
     """Stretches of one direction. Where the turning point was read twice each run gets its own reading."""
     low, high = float(voltage_v.min()), float(voltage_v.max())
     margin_v = (1.0 - FULL_SHARE) * (high - low)
     ends_v = (low + margin_v, high - margin_v)
-    runs: list[Run] = []
+    runs: list[Sweep] = []
     first = direction = 0
     was_still = False
     for k, step_v in enumerate(np.diff(voltage_v).tolist(), start=1):
@@ -82,16 +82,16 @@ def _runs(voltage_v: Floats) -> list[Run]:
     return [*runs, _run(voltage_v, first, len(voltage_v) - 1, direction, ends_v)] if direction else []
 
 
-def _run(voltage_v: Floats, first: int, last: int, direction: int, ends_v: tuple[float, float]) -> Run:
+def _run(voltage_v: Floats, first: int, last: int, direction: int, ends_v: tuple[float, float]) -> Sweep:
     bottom, top = (first, last) if direction == RISING else (last, first)
     full = bool(voltage_v[bottom] <= ends_v[0] and voltage_v[top] >= ends_v[1])
-    return Run(first, last, direction, full and last - first >= FEWEST_STAIRS)
+    return Sweep(first, last, direction, full and last - first >= FEWEST_STAIRS)
 
 
-def _paired(runs: list[Run]) -> tuple[list[tuple[Run, Run]], list[Run]]:
+def _paired(runs: list[Sweep]) -> tuple[list[tuple[Sweep, Sweep]], list[Sweep]]:
     """Full runs there and back, and the runs that are in no such pair."""
-    pairs: list[tuple[Run, Run]] = []
-    others: list[Run] = []
+    pairs: list[tuple[Sweep, Sweep]] = []
+    others: list[Sweep] = []
     k = 0
     while k < len(runs):
         if k + 1 < len(runs) and runs[k].full and runs[k + 1].full and runs[k].direction != runs[k + 1].direction:
@@ -103,27 +103,27 @@ def _paired(runs: list[Run]) -> tuple[list[tuple[Run, Run]], list[Run]]:
     return pairs, others
 
 
-def _without_coarse(runs: list[Run]) -> tuple[list[Run], list[Run]]:
+def _without_coarse(runs: list[Sweep]) -> tuple[list[Sweep], list[Sweep]]:
     """Runs without the full ones that have far fewer stairs than others of their direction, and those."""
     usual = {way: max((run.stairs for run in runs if run.full and run.direction == way), default=0) for way in (1, -1)}
     coarse = [run for run in runs if run.full and run.stairs < COARSE_SHARE * usual[run.direction]]
     return [run for run in runs if run not in coarse], coarse
 
 
-def _settling(coarse: list[Run], points: Points) -> list[str]:
+def _settling(coarse: list[Sweep], points: Points) -> list[str]:
     if not coarse:
         return []
     stairs = sum(run.stairs for run in coarse)
     return [f"a coarse cycle of {stairs} stairs from row {points.row[coarse[0].first]} settled the friction: left out"]
 
 
-def _minor_runs(others: list[Run], pairs: list[tuple[Run, Run]]) -> list[Run]:
+def _minor_runs(others: list[Sweep], pairs: list[tuple[Sweep, Sweep]]) -> list[Sweep]:
     after = pairs[-1][1].last if pairs else -1
     walk = [run for run in others if run.first >= after]
     return walk if pairs and len(walk) >= FEWEST_MINOR_RUNS else []
 
 
-def _cut(left: list[Run], points: Points) -> list[str]:
+def _cut(left: list[Sweep], points: Points) -> list[str]:
     return [
         f"from row {points.row[run.first]} the voltage goes {'up' if run.direction == RISING else 'down'} from "
         f"{points.voltage_v[run.first]:.3g} to {points.voltage_v[run.last]:.3g} V only: a group cut short, left out"
@@ -131,7 +131,7 @@ def _cut(left: list[Run], points: Points) -> list[str]:
     ]
 
 
-def _ladder(points: Points, pairs: list[tuple[Run, Run]]) -> Ladder:
+def _ladder(points: Points, pairs: list[tuple[Sweep, Sweep]]) -> Ladder:
     index: list[int] = []
     direction: list[int] = []
     group: list[int] = []
@@ -142,5 +142,5 @@ def _ladder(points: Points, pairs: list[tuple[Run, Run]]) -> Ladder:
     return Ladder(points.voltage_v[index], points.force_n[index], np.array(direction), np.array(group))
 
 
-def _count(runs: list[Run], direction: int) -> int:
+def _count(runs: list[Sweep], direction: int) -> int:
     return sum(run.stairs for run in runs if run.direction == direction and run.stairs >= FEWEST_STAIRS)

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.branches import Branches
-from gateway.bsfm.fit.blend_span import SpanChoice, chosen_span, command_error_n
+from gateway.bsfm.fit.blend_span import SpanChoice, choose_span, command_error_n
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.measured_ladder import Ladder
 from gateway.bsfm.model import Bsfm
@@ -34,9 +34,9 @@ class ReversalChoice:
     slip_heldout_n: float
 
 
-def chosen_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> ReversalChoice | None:
+def choose_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> ReversalChoice | None:
     """None where the walk is too short for anything."""
-    span = chosen_span(branches, volts, newtons)
+    span = choose_span(branches, volts, newtons)
     if span is None:
         return None
     blend = Bsfm(branches, LinearBlend(span.span_n))
@@ -46,14 +46,14 @@ def chosen_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: 
     if errors_n[1] >= BETTER_SHARE * errors_n[0]:
         return ReversalChoice(blend, span, None, *errors_n)
     slip = fit_joint(branches, [walk_of(ladder), Walk(volts, newtons)])
-    carried = chosen_span(slip.branches, volts, newtons)
+    carried = choose_span(slip.branches, volts, newtons)
     return ReversalChoice(slip.model, carried or span, slip, *errors_n)
 
 
 def _held_out(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> tuple[float, float]:
     """RMS of blend and stops on the second half. Both walk through the first, so that they remember what came before."""
     half = len(volts) // 2
-    span = chosen_span(branches, volts[:half], newtons[:half])
+    span = choose_span(branches, volts[:half], newtons[:half])
     try:
         slip = fit_joint(branches, [walk_of(ladder), Walk(volts[:half], newtons[:half])])
     except ValueError:  # no loop between the branches that stops could select in

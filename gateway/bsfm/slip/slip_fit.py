@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.branches import Branches
-from gateway.bsfm.fit.blend_span import chosen_span, command_error_n
+from gateway.bsfm.fit.blend_span import choose_span, command_error_n
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.fit.result import verdicts_of
 from gateway.bsfm.fit.usable_fit import is_moderate
@@ -57,7 +57,7 @@ class SlipFit:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class PolicyError:
     """One policy on a walk: RMS and largest error of the command in N, and its model."""
 
     policy: str
@@ -106,12 +106,12 @@ def residuals_n(model: Bsfm, walk: Walk) -> Floats:
     return problem.errors_n(model.branches, np.array(model.reversal.shares))
 
 
-def judged(branches: Branches, fits: Sequence[SlipFit], training: Walk, held_out: Walk) -> list[Judged]:
+def compare_policies(branches: Branches, fits: Sequence[SlipFit], training: Walk, held_out: Walk) -> list[PolicyError]:
     """Switched branches, the blend with its best span on `training`, and each slip fit, all on `held_out`.
 
-    Judged as control would use them (blend_span.command_error_n): driven by the forces, told in newtons.
+    PolicyError as control would use them (blend_span.command_error_n): driven by the forces, told in newtons.
     """
-    choice = chosen_span(branches, training.voltage_v, training.force_n)
+    choice = choose_span(branches, training.voltage_v, training.force_n)
     models = [("branches switched", Bsfm(branches, LinearBlend(0.0)))]
     if choice:
         models.append((f"linear blend over {choice.span_n:g} N", Bsfm(branches, LinearBlend(choice.span_n))))
@@ -119,9 +119,9 @@ def judged(branches: Branches, fits: Sequence[SlipFit], training: Walk, held_out
     return [_judge(policy, model, held_out) for policy, model in models]
 
 
-def _judge(policy: str, model: Bsfm, walk: Walk) -> Judged:
+def _judge(policy: str, model: Bsfm, walk: Walk) -> PolicyError:
     error_n = command_error_n(model, walk.voltage_v, walk.force_n)
-    return Judged(policy, float(np.sqrt(np.mean(error_n**2))), float(np.abs(error_n).max()), model)
+    return PolicyError(policy, float(np.sqrt(np.mean(error_n**2))), float(np.abs(error_n).max()), model)
 
 
 def _radii_v(branches: Branches) -> Floats:

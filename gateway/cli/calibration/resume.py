@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.bsfm.ladder.check import checked_ladder
+from gateway.bsfm.ladder.check import check_ladder
 from gateway.bsfm.ladder.fault import LadderError
 from gateway.bsfm.ladder.labels import Labels
 from gateway.cli import exit_codes
@@ -81,7 +81,7 @@ def _beside(path: Path, number: int) -> Recording | None:
 
 def _whole_groups(recording: Recording | None) -> int:
     try:
-        checked = checked_ladder(recording.columns, recording.header) if recording else None
+        checked = check_ladder(recording.columns, recording.header) if recording else None
     except LadderError:
         return 0
     return 0 if checked is None or checked.only_walk else len(checked.ladder.groups)

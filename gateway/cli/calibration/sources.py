@@ -34,7 +34,7 @@ class Look:
 
 
 class LocalRun:
-    """plan: fields of RunPlan or ExperimentPlan; earlier: recordings that it goes on from; name: of the calibration."""
+    """plan: fields of CalibrationPlan or ExperimentPlan; earlier: recordings that it goes on from; name: of the calibration."""
 
     def __init__(self, state: Path, plan: dict[str, Any], earlier: list[int], name: str = "") -> None:
         self._state = state

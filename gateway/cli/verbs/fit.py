@@ -92,7 +92,7 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
 
 def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
     """Everything that can be wrong with the data, as exit code 65."""
-    from gateway.bsfm.fit.evaluation import Question
+    from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
     from gateway.bsfm.ladder.fault import LadderError
     from gateway.recording.tables.mapping_file import column_mapping
@@ -106,7 +106,7 @@ def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
         )
     mapping = column_mapping(options["columns"])
     models = tuple(ModelName(model) for model in options["models"])
-    question = Question(
+    question = FitRequest(
         models=models, orders=options["orders"], ties=Ties(options["ties"]), outliers=options["outliers"]
     )
     background = Background(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])

@@ -7,7 +7,7 @@ command-nonlinearity). A model that was calibrated on a straight map keeps its v
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.bsfm import Bsfm, Status
+from gateway.bsfm import Bsfm, InverseStatus
 
 _ROUNDS: Final = 30
 _CLOSE_V: Final = 1.0e-9
@@ -58,7 +58,7 @@ class SentBsfm(Bsfm):
     def __post_init__(self) -> None:
         """The inner model was proven when it was made; the loop has no time to prove it again."""
 
-    def voltage_v(self, force_n: float, state: float) -> tuple[float, Status]:
+    def voltage_v(self, force_n: float, state: float) -> tuple[float, InverseStatus]:
         voltage_v, status = Bsfm.voltage_v(self, force_n, state)
         return self.command.sent_v(voltage_v) if self.command else voltage_v, status
 
@@ -78,7 +78,7 @@ class SentBsfm(Bsfm):
         return self.command.straight_v(voltage_v) if self.command else voltage_v
 
 
-def sent(model: Bsfm, command: CommandMap | None) -> Bsfm:
+def apply_command_map(model: Bsfm, command: CommandMap | None) -> Bsfm:
     """The model with its volts as they are sent; the same object where the map is straight."""
     if command is None:
         return model

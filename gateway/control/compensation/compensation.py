@@ -41,7 +41,7 @@ class OutsideForce:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Timing:
+class TimingCompensation:
     """Of the rig as it is: transport delay and the sum of all lags behind it; more_*: what the settings do not know of."""
 
     delay_s: float
@@ -81,7 +81,7 @@ class Compensation:
     cell: CellMap | None = None
     command: CommandMap | None = None
     outside: OutsideForce | None = None
-    timing: Timing | None = None
+    timing: TimingCompensation | None = None
     acts: tuple[str, ...] = ()
     limited: tuple[tuple[str, str], ...] = field(default=())
 

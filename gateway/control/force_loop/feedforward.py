@@ -10,17 +10,17 @@ rising branch, because it slides outwards.
 from math import isfinite
 from typing import Final
 
-from gateway.bsfm import RISING, Bsfm, Status
+from gateway.bsfm import RISING, Bsfm, InverseStatus
 from gateway.control.demand import Demand
-from gateway.control.force_loop.transport_delay import Delayed
-from gateway.control.limits import TICK_S, Pace, is_below_usable, narrowed, ramped
+from gateway.control.force_loop.transport_delay import TransportDelay
+from gateway.control.limits import TICK_S, RateBudget, is_below_usable, narrow_limits, ramp_limited
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
 _CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
 APPROACH_N: Final = 1.0  # above what friction keeps: a vented tool moves
 LEAST_SLOPE_N_PER_V: Final = 1.0  # a flatter model is a model's end, not a plant's
-_OK: Final = Status.OK
+_OK: Final = InverseStatus.OK
 
 
 class ModelError(Exception):
@@ -33,7 +33,7 @@ class Approach:
     def __init__(self) -> None:
         self._touched_s: float | None = None
 
-    def goal(self, now_s: float, demand: Demand, touching: bool, law: "ForceLaw") -> tuple[float, float]:
+    def goal(self, now_s: float, demand: Demand, touching: bool, law: "Feedforward") -> tuple[float, float]:
         """(goal N, rate N/s) for this step."""
         applied_n = law.applied_n
         if not touching:
@@ -48,7 +48,7 @@ class Approach:
         return demand.force_n, min(demand.ramp_n_per_s, rise_n / max(left_s, TICK_S))
 
 
-class ForceLaw:
+class Feedforward:
     """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers."""
 
     def __init__(
@@ -58,16 +58,16 @@ class ForceLaw:
         the applied target on a ramp, because the plant arrives so much later."""
         self.model = model
         self._rig_limits = limits
-        self._limits = narrowed(limits, model.limits_n)
+        self._limits = narrow_limits(limits, model.limits_n)
         self._lag_s = response_lag_s
-        self._delayed = Delayed(delay_s)
+        self._delayed = TransportDelay(delay_s)
         self._ahead_s = ahead_s
         self.reset()
 
     def retime(self, response_lag_s: float, delay_s: float, ahead_s: float) -> None:
         """Another response from now on."""
         self._lag_s, self._ahead_s = response_lag_s, ahead_s
-        self._delayed = Delayed(delay_s)
+        self._delayed = TransportDelay(delay_s)
         self._delayed.restart(self.applied_n)
 
     def reset(self) -> None:
@@ -75,7 +75,7 @@ class ForceLaw:
         self.applied_n = self.aimed_n = self.reference_n = 0.0
         self._delayed.restart(0.0)
         self._memory = self.model.reversal.start()
-        self._pace = Pace()
+        self._pace = RateBudget()
         self._carry_over_v = 0.0
 
     @property
@@ -95,7 +95,7 @@ class ForceLaw:
             return
         before_v, _ = self.feedforward(gravity_n)
         self.model, self._memory = model, model.reversal.at(self.blend)
-        self._limits = narrowed(self._rig_limits, model.limits_n)
+        self._limits = narrow_limits(self._rig_limits, model.limits_n)
         after_v, _ = self.feedforward(gravity_n)
         self._carry_over_v += before_v - after_v
 
@@ -104,10 +104,10 @@ class ForceLaw:
         the slide: the payload's weight, forces from outside."""
         self._pace.earn(dt_s)
         last_n = self.applied_n
-        self.applied_n = ramped(goal_n, last_n, rate_n_per_s, self._pace.available_s)
+        self.applied_n = ramp_limited(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
         self._pace.spend(moved_n, rate_n_per_s)
-        aimed_n, self.aimed_n = self.aimed_n, ramped(goal_n, self.applied_n, rate_n_per_s, self._ahead_s)
+        aimed_n, self.aimed_n = self.aimed_n, ramp_limited(goal_n, self.applied_n, rate_n_per_s, self._ahead_s)
         self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
         heard_n = self._delayed.advance(self.applied_n, dt_s)
         self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)

@@ -12,20 +12,20 @@ from math import inf
 from typing import Final
 
 from gateway.bsfm import Bsfm
-from gateway.control.compensation.compensation import Timing
+from gateway.control.compensation.compensation import TimingCompensation
 from gateway.control.demand import Demand
-from gateway.control.force_loop.feedforward import Approach, ForceLaw
-from gateway.control.force_loop.lag_inverse import Push
-from gateway.control.force_loop.lead_compensator import Lead
+from gateway.control.force_loop.feedforward import Approach, Feedforward
+from gateway.control.force_loop.lag_inverse import LagInverse
+from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.trim import TrimIntegral
-from gateway.control.force_loop.voltage_limits import VoltageStage, strongest
-from gateway.control.inputs import Line
+from gateway.control.force_loop.voltage_limits import VoltageLimiter, strongest
+from gateway.control.inputs import LineStatus
 from gateway.control.limits import TICK_S
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
-from gateway.control.state_table import Event
-from gateway.control.supervision.in_band import Band
+from gateway.control.state_table import StateEvent
+from gateway.control.supervision.in_band import InBandTimer
 from gateway.registers.words import LimitedBy, Mode
 
 QUIET_N: Final = 3.0
@@ -34,7 +34,7 @@ _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mod
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class LoopInputs:
     """What one step knows. expected_n: the model's contact force at the lagged voltage; held_back: the first rise looks
     wrong; outside_n: contact force that neither slide nor payload gives (compensation)."""
 
@@ -47,19 +47,19 @@ class Moment:
     outside_n: float = 0.0
 
 
-class Pursuit:
+class ForceLoop:
     """Owns the applied target, the trim, the band and the voltage on the output."""
 
-    def __init__(self, settings: ControlSettings, model: Bsfm, timing: Timing | None = None) -> None:
+    def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing = timing
         self._tune(settings)
-        self.law = ForceLaw(model, settings.limits, *self._course(settings))
-        self.stage = VoltageStage(settings.limits)
+        self.law = Feedforward(model, settings.limits, *self._course(settings))
+        self.stage = VoltageLimiter(settings.limits)
         self.feedforward_v = 0.0
         self.limited_by = LimitedBy.NONE
         self._approach = Approach()
-        self._band = Band(settings.supervision.unreachable_s)
-        self._answer = Band(settings.supervision.unreachable_s)
+        self._band = InBandTimer(settings.supervision.unreachable_s)
+        self._answer = InBandTimer(settings.supervision.unreachable_s)
         self._was_touching = False
         self._wanted_v = 0.0
 
@@ -74,14 +74,17 @@ class Pursuit:
         law.retime(*self._course(settings))
 
     def _tune(self, settings: ControlSettings) -> None:
-        """Lead and trim by the measured response where there is one, else by the rig file."""
+        """LeadCompensator and trim by the measured response where there is one, else by the rig file."""
         self._measured, self._lead_settings, self._still_s = settings.timing, settings.lead, 0.0
-        self.lead: Lead | Push
+        self.lead: LeadCompensator | LagInverse
         self.trim: TrimIntegral | MeasuredTrim
         if self._measured:
-            self.lead, self.trim = Push(settings.lead, settings.limits), MeasuredTrim(settings.trim, self._measured)
+            self.lead, self.trim = (
+                LagInverse(settings.lead, settings.limits),
+                MeasuredTrim(settings.trim, self._measured),
+            )
         else:
-            self.lead, self.trim = Lead(settings.lead, settings.limits), TrimIntegral(settings.trim)
+            self.lead, self.trim = LeadCompensator(settings.lead, settings.limits), TrimIntegral(settings.trim)
 
     def _course(self, settings: ControlSettings) -> tuple[float, float, float]:
         """How the force follows the target: lag, dead time before it, and how far the aim runs ahead on a ramp."""
@@ -90,7 +93,7 @@ class Pursuit:
             return max(TICK_S, measured.landing_s), measured.dead_time_s, measured.landing_s
         delay_s, lags_s = (timing.delay_s, timing.lags_s) if timing else (0.0, settings.supervision.response_lag_s)
         # the trim compares with a force that comes as much sooner as the lead makes it: it must not learn the push
-        gained_s = self.lead.gained_s if isinstance(self.lead, Lead) else 0.0
+        gained_s = self.lead.gained_s if isinstance(self.lead, LeadCompensator) else 0.0
         return max(TICK_S, lags_s - gained_s), delay_s, 0.0
 
     @property
@@ -101,12 +104,12 @@ class Pursuit:
     def unreachable(self) -> bool:
         return self._band.unreachable or self._answer.unreachable
 
-    def elapse(self, dt_s: float, line: Line) -> None:
+    def elapse(self, dt_s: float, line: LineStatus) -> None:
         """dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags hears what the wire
         has really taken, where that is known: it carries one setting at a time."""
         self.stage.earn(dt_s)
         self.lead.advance(self.stage.voltage_v if line.sent_v is None else line.sent_v, dt_s)
-        if isinstance(self.lead, Push):
+        if isinstance(self.lead, LagInverse):
             self.lead.know_wire(line.wire_s)
 
     def rest(self) -> None:
@@ -119,7 +122,7 @@ class Pursuit:
         self._answer.restart()
         self.feedforward_v, self.limited_by = 0.0, LimitedBy.NONE
 
-    def step(self, demand: Demand, moment: Moment) -> Event:
+    def step(self, demand: Demand, moment: LoopInputs) -> StateEvent:
         """Moves the output. NotFiniteError and ModelError are the caller's to turn into faults."""
         event = self._force(demand, moment) if demand.mode is Mode.FORCE else self._voltage(demand, moment)
         self._was_touching = moment.touching
@@ -134,7 +137,7 @@ class Pursuit:
         self.feedforward_v = voltage_v
         self.limited_by = self.stage.drive(voltage_v)
 
-    def _force(self, demand: Demand, moment: Moment) -> Event:
+    def _force(self, demand: Demand, moment: LoopInputs) -> StateEvent:
         law = self.law
         goal_n, rate_n_per_s = self._approach.goal(moment.now_s, demand, moment.touching, law)
         if moment.held_back:
@@ -156,11 +159,11 @@ class Pursuit:
 
     def _led_v(self, wanted_v: float) -> float:
         self._wanted_v = wanted_v
-        if isinstance(self.lead, Push):
+        if isinstance(self.lead, LagInverse):
             return self.lead.led_v(wanted_v, self.stage.voltage_v)
         return self.lead.led_v(wanted_v)
 
-    def _learn(self, moment: Moment, moved_n: float, given_n: float) -> None:
+    def _learn(self, moment: LoopInputs, moved_n: float, given_n: float) -> None:
         law, trim = self.law, self.trim
         trim.travel(moved_n)
         if law.applied_n <= 0.0:
@@ -170,7 +173,7 @@ class Pursuit:
         elif self._may_learn(moment) and abs(law.applied_n - law.reference_n) < QUIET_N:
             trim.integrate(law.reference_n - moment.reading.contact_n, moment.reading.interval_s)
 
-    def _learn_measured(self, trim: MeasuredTrim, moment: Moment, given_n: float) -> None:
+    def _learn_measured(self, trim: MeasuredTrim, moment: LoopInputs, given_n: float) -> None:
         law, measured = self.law, self._measured
         assert measured
         slope_n_per_v = law.slope_n_per_v(given_n) if moment.reading.is_new else 1.0
@@ -183,26 +186,26 @@ class Pursuit:
         elif self._may_learn(moment):
             trim.integrate(law.reference_n - moment.reading.contact_n, slope_n_per_v, moment.reading.interval_s)
 
-    def _may_learn(self, moment: Moment) -> bool:
+    def _may_learn(self, moment: LoopInputs) -> bool:
         free = self.limited_by is LimitedBy.NONE or self.limited_by is LimitedBy.TRIM_RANGE  # of the step before
         return moment.touching and moment.reading.is_new and moment.reading.is_usable and free
 
-    def _judge_force(self, demand: Demand, moment: Moment, goal_n: float) -> Event:
+    def _judge_force(self, demand: Demand, moment: LoopInputs, goal_n: float) -> StateEvent:
         applied_n, tolerance_n = self.law.applied_n, demand.tolerance_n
         if demand.force_n <= 0.0:
             self._band.restart()
-            return Event.WAIT if applied_n <= 0.0 else Event.MOVE
+            return StateEvent.WAIT if applied_n <= 0.0 else StateEvent.MOVE
         if abs(goal_n - applied_n) > tolerance_n:
             self._band.restart()
-            return Event.MOVE
+            return StateEvent.MOVE
         inside = moment.touching and abs(demand.force_n - applied_n) <= tolerance_n
         inside = inside and abs(moment.reading.contact_n - demand.force_n) <= tolerance_n
         self._band.update(moment.now_s, inside, demand.in_band_time_s)
         if self._band.in_band:
-            return Event.SETTLE
-        return Event.MOVE if moment.touching or applied_n != goal_n else Event.WAIT
+            return StateEvent.SETTLE
+        return StateEvent.MOVE if moment.touching or applied_n != goal_n else StateEvent.WAIT
 
-    def _voltage(self, demand: Demand, moment: Moment) -> Event:
+    def _voltage(self, demand: Demand, moment: LoopInputs) -> StateEvent:
         self.trim.reset()
         self.law.take_over(moment.expected_n)
         self.feedforward_v = demand.voltage_v
@@ -212,6 +215,6 @@ class Pursuit:
         self._answer.update(moment.now_s, answered, inf)
         if moving or demand.voltage_v <= 0.0:
             self._band.restart()
-            return Event.MOVE if moving else Event.WAIT
+            return StateEvent.MOVE if moving else StateEvent.WAIT
         self._band.update(moment.now_s, True, demand.in_band_time_s)
-        return Event.SETTLE if self._band.in_band else Event.MOVE
+        return StateEvent.SETTLE if self._band.in_band else StateEvent.MOVE

@@ -45,7 +45,7 @@ class Pulses(NamedTuple):
     b3: float
 
 
-class Push:
+class LagInverse:
     """first_v, second_v: where the model's lags are."""
 
     def __init__(self, settings: LeadSettings, limits: Limits) -> None:

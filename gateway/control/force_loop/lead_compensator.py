@@ -19,7 +19,7 @@ _SHORTEST_S: Final = 2.0 * TICK_S  # a faster model would chatter between two ti
 _EQUAL_V: Final = 1.0e-3  # below what an output can resolve: no push, the wish itself
 
 
-class Lead:
+class LeadCompensator:
     """first_v and second_v: where the model's lags are. With both lags 0 the wish passes unchanged."""
 
     def __init__(self, settings: LeadSettings, limits: Limits) -> None:

@@ -19,8 +19,8 @@ target has moved by more than NEW_TARGET_N, and says so.
 from math import exp, sqrt
 from typing import Final
 
-from gateway.control.limits import trim_ranged
-from gateway.control.settings import Timing, Trim
+from gateway.control.limits import trim_limited
+from gateway.control.settings import LoopTiming, Trim
 from gateway.registers.words import LimitedBy
 
 SMOOTHING_S: Final = 0.15
@@ -40,7 +40,7 @@ class MeasuredTrim:
     """value_v is added to the feedforward; limited_by says whether it stands at its limit; hunted: it stands still because its
     corrections kept changing sign."""
 
-    def __init__(self, settings: Trim, timing: Timing) -> None:
+    def __init__(self, settings: Trim, timing: LoopTiming) -> None:
         self._settings = settings
         self._timing = timing
         self._noise_n2 = 0.0
@@ -69,7 +69,7 @@ class MeasuredTrim:
 
     def resume(self, value_v: float) -> None:
         """Go on from a correction that another trim has learned."""
-        self.value_v, self.limited_by = trim_ranged(value_v, self._settings.limit_v)
+        self.value_v, self.limited_by = trim_limited(value_v, self._settings.limit_v)
         self._own_v = self._anchor_v = self.value_v
 
     def travel(self, moved_n: float) -> None:
@@ -124,7 +124,7 @@ class MeasuredTrim:
             return
         pace_per_s = self._timing.integral_per_s * SLOWER**self._turns
         wanted_v = self.value_v + pace_per_s * error_n / slope_n_per_v * interval_s
-        self.value_v, self.limited_by = trim_ranged(wanted_v, self._settings.limit_v)
+        self.value_v, self.limited_by = trim_limited(wanted_v, self._settings.limit_v)
         self._anchor_v, self._anchor_n, self._going_then = self.value_v, self._at_n, self._going
         self._own_v = self.value_v - self._common_here_v()
 

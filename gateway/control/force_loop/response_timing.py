@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import Final
 
 from gateway.bsfm.model import Response
-from gateway.control.force_loop.lag_inverse import Push
-from gateway.control.settings import ControlSettings, LeadSettings, ResponseSource, Timing
+from gateway.control.force_loop.lag_inverse import LagInverse
+from gateway.control.settings import ControlSettings, LeadSettings, LoopTiming, ResponseSource
 
 LAMBDA_SHARE: Final = 1.1  # of dead time and landing
 HELD_S: Final = 0.01  # by which tick and sample are late, on average
@@ -31,9 +31,9 @@ def timing_of(response: Response | None, settings: ControlSettings) -> ControlSe
         return replace(settings, timing=None)
     lags_s = response.lag_s + response.second_lag_s
     lead = LeadSettings(lag_s=_within(response.lag_s), second_lag_s=min(LONGEST_LAG_S, response.second_lag_s))
-    landing_s = Push(lead, settings.limits).landing_s
+    landing_s = LagInverse(lead, settings.limits).landing_s
     slow_s = response.dead_time_s + landing_s + HELD_S
-    timing = Timing(
+    timing = LoopTiming(
         dead_time_s=response.dead_time_s,
         lag_s=lead.lag_s,
         second_lag_s=lead.second_lag_s,

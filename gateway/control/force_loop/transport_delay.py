@@ -3,7 +3,7 @@
 from collections import deque
 
 
-class Delayed:
+class TransportDelay:
     """delay_s 0: the value itself. Time passes in `advance`, in steps of any size."""
 
     def __init__(self, delay_s: float) -> None:

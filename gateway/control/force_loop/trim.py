@@ -9,7 +9,7 @@ the width of the friction.
 
 from math import exp
 
-from gateway.control.limits import trim_ranged
+from gateway.control.limits import trim_limited
 from gateway.control.settings import Trim
 from gateway.registers.words import LimitedBy
 
@@ -27,7 +27,7 @@ class TrimIntegral:
 
     def resume(self, value_v: float) -> None:
         """Go on from a correction that another trim has learned."""
-        self.value_v, self.limited_by = trim_ranged(value_v, self._settings.limit_v)
+        self.value_v, self.limited_by = trim_limited(value_v, self._settings.limit_v)
 
     def travel(self, moved_n: float) -> None:
         """The applied target moved by so much, N."""
@@ -40,4 +40,4 @@ class TrimIntegral:
         zone_n = self._settings.dead_zone_n
         beyond_n = error_n - max(-zone_n, min(zone_n, error_n))
         wanted_v = self.value_v + self._settings.gain_v_per_n_s * beyond_n * interval_s
-        self.value_v, self.limited_by = trim_ranged(wanted_v, self._settings.limit_v)
+        self.value_v, self.limited_by = trim_limited(wanted_v, self._settings.limit_v)

@@ -10,25 +10,25 @@ from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
-from gateway.control.force_loop.force_loop import Pursuit
+from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
-from gateway.control.runs.ladder_run import LadderRow, LadderRun, LadderStep
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.ladder_run import LadderRow, LadderRun, RunStep
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
-from gateway.control.supervision.fault_detection import Finding
-from gateway.control.supervision.force_ceiling import Ceiling
-from gateway.control.supervision.plausibility import ModelResponse
+from gateway.control.supervision.fault_detection import StopCause
+from gateway.control.supervision.force_ceiling import ForceCeiling
+from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.registers.words import CalibrationPhase
 
-AnyPlan: TypeAlias = RunPlan | ExperimentPlan
+AnyPlan: TypeAlias = CalibrationPlan | ExperimentPlan
 AnyRun: TypeAlias = LadderRun | ExperimentRun
 
 _PHASES: Final = {phase: phase.name.lower().replace("_", " ") for phase in CalibrationPhase}
 
 
-class Calibrating:
+class ActiveRun:
     """phase and progress stay after the end. model: what the check of the next run compares with; cell_n: cell force of the
     last step, without the payload's weight; target_n: what the model expects of the voltage that the run wants; is_local
     stays until the output is off; said: a sentence for the log; refused: why the last plan asked for was not begun."""
@@ -96,23 +96,23 @@ class Calibrating:
         self.eta_s, self.target_n = self.run.eta_s, 0.0
         self._ceiling = self._new_ceiling()
 
-    def climb(self, now_s: float, reading: Reading, pursuit: Pursuit, response: ModelResponse) -> Finding | None:
+    def climb(self, now_s: float, reading: Reading, pursuit: ForceLoop, response: ExpectedForce) -> StopCause | None:
         """One step of the run, through the voltage stage; what ended it (a fault, or a sentence), None while it goes on."""
         run = self.run
         assert run
         self.cell_n = reading.cell_n
         if self._stop_asked:
-            return Finding(FaultCode.NONE, self._stop_asked)
+            return StopCause(FaultCode.NONE, self._stop_asked)
         step = run.step(now_s, reading)
         self.phase, self.progress, self.eta_s = step.phase, step.progress, step.eta_s
         self.last_row = step.row or self.last_row
         if run.found:
             return run.found
         if run.is_done:
-            return Finding(FaultCode.NONE, run.ended)
+            return StopCause(FaultCode.NONE, run.ended)
         voltage_v = self._below_ceiling(now_s, reading, step, pursuit.stage.voltage_v)
         if voltage_v is None:
-            return Finding(FaultCode.NONE, self._too_high(step.voltage_v, "the run is stopped"))
+            return StopCause(FaultCode.NONE, self._too_high(step.voltage_v, "the run is stopped"))
         self.target_n = max(0.0, run.model.force_n(voltage_v, run.direction))
         pursuit.follow(voltage_v, response.force_n(run.direction), run.direction)
         return None
@@ -138,11 +138,11 @@ class Calibrating:
 
     # -- the rig's largest force
 
-    def _new_ceiling(self) -> Ceiling:
+    def _new_ceiling(self) -> ForceCeiling:
         limits = self._settings.limits
-        return Ceiling(limits.force_max_n, self.model, limits.safe_voltage_v)
+        return ForceCeiling(limits.force_max_n, self.model, limits.safe_voltage_v)
 
-    def _below_ceiling(self, now_s: float, reading: Reading, step: LadderStep, present_v: float) -> float | None:
+    def _below_ceiling(self, now_s: float, reading: Reading, step: RunStep, present_v: float) -> float | None:
         """The voltage that this step may put out; None where the run cannot go on without passing the ceiling. What has
         to be left out of a ladder is left out from its next step on."""
         run, ceiling = self.run, self._ceiling

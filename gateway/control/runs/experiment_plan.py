@@ -22,7 +22,7 @@ MOST_SEGMENTS: Final = 20_000
 Seconds = Annotated[float, Ge(0), Le(3600)]
 
 
-class Do(StrEnum):
+class MoveKind(StrEnum):
     """What a move does, from the level where the one before has ended (the first from the lowest)."""
 
     STEP = "step"  # at once to a level, then hold_s there
@@ -37,7 +37,7 @@ class Move:
     """One item of a part. A level is given in one of three ways, a size in one of two."""
 
     __pydantic_config__ = STRICT
-    do: Do
+    do: MoveKind
     to_share: Annotated[float, Ge(0), Le(1)] | None = None  # of the range that the rig may use
     to_n: Annotated[float, Ge(0)] | None = None  # by the rising branch of the calibration in use
     to_v: Annotated[float, Ge(0)] | None = None
@@ -51,9 +51,9 @@ class Move:
     @property
     def duration_s(self) -> float:
         over_s, hold_s = self.over_s or 0.0, self.hold_s or 0.0
-        if self.do is Do.LADDER:
+        if self.do is MoveKind.LADDER:
             return (self.stairs or 0) * hold_s
-        if self.do is Do.REVERSALS:
+        if self.do is MoveKind.REVERSALS:
             return 2.0 * (self.times or 0) * (over_s + hold_s)
         return over_s + hold_s
 
@@ -96,20 +96,20 @@ class ExperimentPlan:
 
 _LEVEL: Final = ("to_share", "to_n", "to_v")
 _SIZE: Final = ("size_share", "size_v")
-_NEEDED: Final[dict[Do, tuple[tuple[str, ...], ...]]] = {
-    Do.STEP: (_LEVEL,),
-    Do.DWELL: (("hold_s",),),
-    Do.RAMP: (_LEVEL, ("over_s",)),
-    Do.LADDER: (_LEVEL, ("stairs",), ("hold_s",)),
-    Do.REVERSALS: (_SIZE, ("times",)),
+_NEEDED: Final[dict[MoveKind, tuple[tuple[str, ...], ...]]] = {
+    MoveKind.STEP: (_LEVEL,),
+    MoveKind.DWELL: (("hold_s",),),
+    MoveKind.RAMP: (_LEVEL, ("over_s",)),
+    MoveKind.LADDER: (_LEVEL, ("stairs",), ("hold_s",)),
+    MoveKind.REVERSALS: (_SIZE, ("times",)),
 }
 """One of each group must stand there."""
-_ALLOWED: Final[dict[Do, tuple[str, ...]]] = {
-    Do.STEP: ("hold_s",),
-    Do.DWELL: (),
-    Do.RAMP: ("hold_s",),
-    Do.LADDER: (),
-    Do.REVERSALS: ("over_s", "hold_s"),
+_ALLOWED: Final[dict[MoveKind, tuple[str, ...]]] = {
+    MoveKind.STEP: ("hold_s",),
+    MoveKind.DWELL: (),
+    MoveKind.RAMP: ("hold_s",),
+    MoveKind.LADDER: (),
+    MoveKind.REVERSALS: ("over_s", "hold_s"),
 }
 """May stand there besides."""
 
@@ -127,7 +127,7 @@ def move_faults(move: Move) -> Iterator[tuple[str, str]]:
             yield "", f"a {move.do} needs {' or '.join(group)}"
         for name in chosen[1:]:
             yield name, f"{chosen[0]} is given already: one of the two"
-    if move.do is Do.REVERSALS and not move.duration_s:
+    if move.do is MoveKind.REVERSALS and not move.duration_s:
         yield "", "reversals take no time: give hold_s or over_s"
 
 

@@ -10,11 +10,11 @@ from typing import Final
 from gateway.bsfm import Bsfm
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_schedule import Schedule, segments_of
-from gateway.control.runs.ladder_run import LadderRun, LadderStep
-from gateway.control.runs.ladder_stairs import RunPlan, check_stairs
+from gateway.control.runs.ladder_run import LadderRun, RunStep
+from gateway.control.runs.ladder_stairs import CalibrationPlan, check_stairs
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
-from gateway.control.supervision.fault_detection import Finding
+from gateway.control.supervision.fault_detection import StopCause
 from gateway.registers.words import CalibrationPhase
 
 
@@ -29,13 +29,13 @@ class ExperimentRun:
         self.schedule = Schedule(segments_of(plan, limits, model), limits.safe_voltage_v)
         top_v = self.schedule.top_v
         stairs = check_stairs(top_v, model) if plan.check and top_v > limits.safe_voltage_v else ()
-        self._check = LadderRun(RunPlan(), settings, model, stairs)
+        self._check = LadderRun(CalibrationPlan(), settings, model, stairs)
         self._rest_v = limits.safe_voltage_v
         self._began_s: float | None = None
         self._elapsed_s = 0.0
 
     @property
-    def found(self) -> Finding | None:
+    def found(self) -> StopCause | None:
         return self._check.found
 
     @property
@@ -65,7 +65,7 @@ class ExperimentRun:
         """What is said at its end."""
         return f"info experiment {self.plan.name} done: {len(self.plan.parts)} parts, {self.schedule.duration_s:.0f} s"
 
-    def step(self, now_s: float, reading: Reading) -> LadderStep:
+    def step(self, now_s: float, reading: Reading) -> RunStep:
         """reading: of this moment."""
         if not self._check.is_done or self._check.is_waiting:
             checked = self._check.step(now_s, reading)
@@ -76,4 +76,4 @@ class ExperimentRun:
         self._elapsed_s = now_s - self._began_s
         volts = self._rest_v if self.is_done else self.schedule.voltage_v(self._elapsed_s)
         progress = min(1.0, self._elapsed_s / self.schedule.duration_s)
-        return LadderStep(volts, CalibrationPhase.EXPERIMENT, progress, self.eta_s)
+        return RunStep(volts, CalibrationPhase.EXPERIMENT, progress, self.eta_s)

@@ -7,8 +7,8 @@ from itertools import accumulate, pairwise
 from math import isfinite
 from typing import Final
 
-from gateway.bsfm import Bsfm, Status
-from gateway.control.runs.experiment_plan import MOST_SEGMENTS, Do, ExperimentPlan, Move, plan_faults
+from gateway.bsfm import Bsfm, InverseStatus
+from gateway.control.runs.experiment_plan import MOST_SEGMENTS, ExperimentPlan, Move, MoveKind, plan_faults
 from gateway.control.runs.ladder_stairs import highest_voltage_v
 from gateway.control.settings import Limits
 
@@ -47,7 +47,7 @@ class _Range:
 
     def _of_force(self, force_n: float) -> tuple[float, str]:
         volts, status = self.model.branches.rising.inverse(force_n)
-        if status is Status.HIGH:
+        if status is InverseStatus.HIGH:
             raise ValueError(
                 f"{force_n:g} N, allowed up to {self.model.branches.rising.value(self.top_v):.1f} N (calibration in use)"
             )
@@ -86,11 +86,11 @@ def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segm
 
 def _moved(move: Move, at_v: float, usable: _Range, part: int) -> Iterator[Segment]:
     over_s, hold_s = move.over_s or 0.0, move.hold_s or 0.0
-    if move.do is Do.DWELL:
+    if move.do is MoveKind.DWELL:
         yield Segment(at_v, 0.0, hold_s, part)
-    elif move.do is Do.REVERSALS:
+    elif move.do is MoveKind.REVERSALS:
         yield from _swings(move, at_v, usable, part)
-    elif move.do is Do.LADDER:
+    elif move.do is MoveKind.LADDER:
         goal_v, stairs = usable.level_v(move), move.stairs or 1
         for k in range(1, stairs + 1):
             yield Segment(at_v + (goal_v - at_v) * k / stairs, 0.0, hold_s, part)

@@ -17,10 +17,10 @@ from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.messages import gain_sentence, ladder_silent_sentence, sign_sentence
 from gateway.control.runs.ladder_pace import LadderPace, Trace
-from gateway.control.runs.ladder_stairs import RunPlan, Stair, stairs_of
+from gateway.control.runs.ladder_stairs import CalibrationPlan, PlannedStair, stairs_of
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
-from gateway.control.supervision.fault_detection import Finding
+from gateway.control.supervision.fault_detection import StopCause
 from gateway.registers.words import CalibrationPhase
 
 ZERO_S: Final = 0.6
@@ -37,13 +37,13 @@ LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = 0.3, 3.0, 0.1
 class LadderRow(NamedTuple):
     """One settled stair. force_n: mean of the window, zeroed cell force; settled: False if it was left unsettled."""
 
-    stair: Stair
+    stair: PlannedStair
     force_n: float
     dwell_s: float
     settled: bool
 
 
-class LadderStep(NamedTuple):
+class RunStep(NamedTuple):
     """What one step answers. progress: 0 .. 1; row: of a stair that has just ended."""
 
     voltage_v: float
@@ -59,11 +59,15 @@ class LadderRun:
     end_phase: Final = CalibrationPhase.FITTING
 
     def __init__(
-        self, plan: RunPlan, settings: ControlSettings, model: Bsfm, stairs: tuple[Stair, ...] | None = None
+        self,
+        plan: CalibrationPlan,
+        settings: ControlSettings,
+        model: Bsfm,
+        stairs: tuple[PlannedStair, ...] | None = None,
     ) -> None:
         self.plan = plan
         self.stairs = stairs_of(plan, settings.limits, model) if stairs is None else stairs
-        self.found: Finding | None = None
+        self.found: StopCause | None = None
         self.noise_n = self.rest_n = 0.0
         self.unsettled = 0
         self.done = 0
@@ -121,10 +125,10 @@ class LadderRun:
         return bool(left)
 
     @property
-    def _stair(self) -> Stair:
+    def _stair(self) -> PlannedStair:
         return self.stairs[min(self.done, len(self.stairs) - 1)]
 
-    def step(self, now_s: float, reading: Reading) -> LadderStep:
+    def step(self, now_s: float, reading: Reading) -> RunStep:
         """reading: of this moment; only new usable ones count."""
         if self._began_s is None:
             self._began_s = now_s
@@ -147,7 +151,7 @@ class LadderRun:
         self._window.clear()
         self._trace.clear()
 
-    def _zero(self, now_s: float) -> LadderStep:
+    def _zero(self, now_s: float) -> RunStep:
         """Rest force and noise, once the force of before has left: else its way down would count as both."""
         assert self._began_s is not None
         window, waited_s = self._window, now_s - self._began_s
@@ -218,15 +222,15 @@ class LadderRun:
         if expected_n < LEAST_EXPECTED_N or LOWEST_SHARE * expected_n <= rise_n <= HIGHEST_SHARE * expected_n:
             return
         if rise_n <= -LOWEST_SHARE * expected_n:
-            self.found = Finding(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
+            self.found = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
         elif rise_n < SILENT_SHARE * expected_n:
-            self.found = Finding(FaultCode.NONE, ladder_silent_sentence(volts, rise_n, expected_n))
+            self.found = StopCause(FaultCode.NONE, ladder_silent_sentence(volts, rise_n, expected_n))
         else:
-            self.found = Finding(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
+            self.found = StopCause(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
 
-    def _answer(self, row: LadderRow | None) -> LadderStep:
+    def _answer(self, row: LadderRow | None) -> RunStep:
         if self._stair_s is None or not self.stairs:
-            return LadderStep(self._rest_v, CalibrationPhase.ZERO, 0.0, self.eta_s)
+            return RunStep(self._rest_v, CalibrationPhase.ZERO, 0.0, self.eta_s)
         progress = self.done / len(self.stairs)
         volts = self._rest_v if self.is_done else self._stair.voltage_v
-        return LadderStep(volts, self._stair.phase, progress, self.eta_s, row)
+        return RunStep(volts, self._stair.phase, progress, self.eta_s, row)

@@ -26,7 +26,7 @@ MOST_STAIRS: Final = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunPlan:
+class CalibrationPlan:
     """v_max_v None: as high as model and limits allow. first_group: a resumed run goes on from there; as large as groups where
     only the reversal part is missing. tare: take the rest force as zero first. minor_points: 0 leaves the reversal part out.
     response_steps: large steps behind it, for dead time and lags; 0 leaves them out."""
@@ -41,11 +41,11 @@ class RunPlan:
     tare: bool = False
 
 
-QUICK: Final = RunPlan(step_v=defaults.QUICK_LADDER_STEP_V, groups=1, minor_points=32)
+QUICK: Final = CalibrationPlan(step_v=defaults.QUICK_LADDER_STEP_V, groups=1, minor_points=32)
 
 
 @dataclass(frozen=True, slots=True)
-class Stair:
+class PlannedStair:
     """Where to go, from which side, and what for. group: -1 outside the ladder."""
 
     voltage_v: float
@@ -54,7 +54,7 @@ class Stair:
     phase: CalibrationPhase
 
 
-def stairs_of(plan: RunPlan, limits: Limits, model: Bsfm) -> tuple[Stair, ...]:
+def stairs_of(plan: CalibrationPlan, limits: Limits, model: Bsfm) -> tuple[PlannedStair, ...]:
     """The whole run. ValueError with a sentence for a plan that the rig does not allow."""
     top_v = _top(plan.v_max_v, limits, model)
     _check(plan, top_v)
@@ -63,7 +63,7 @@ def stairs_of(plan: RunPlan, limits: Limits, model: Bsfm) -> tuple[Stair, ...]:
     return (
         *check_stairs(top_v, model),
         *(
-            Stair(volts, way, group, CalibrationPhase.LADDER)
+            PlannedStair(volts, way, group, CalibrationPhase.LADDER)
             for volts, way, group in groups
             if group >= plan.first_group
         ),
@@ -104,7 +104,7 @@ def _top(asked_v: float | None, limits: Limits, model: Bsfm) -> float:
     return asked_v
 
 
-def _check(plan: RunPlan, top_v: float) -> None:
+def _check(plan: CalibrationPlan, top_v: float) -> None:
     if not (isfinite(plan.step_v) and 0.01 <= plan.step_v <= top_v / 3.0):
         raise ValueError(
             f"step = {plan.step_v:g} V, allowed 0.01 .. {top_v / 3.0:.2f} V (three stairs each way at least)"
@@ -120,15 +120,17 @@ def _check(plan: RunPlan, top_v: float) -> None:
         raise ValueError(f"{2.0 * top_v / plan.step_v * plan.groups:.0f} stairs: at most {MOST_STAIRS}")
 
 
-def check_stairs(top_v: float, model: Bsfm) -> tuple[Stair, ...]:
+def check_stairs(top_v: float, model: Bsfm) -> tuple[PlannedStair, ...]:
     """The coarse cycle at the beginning of a run, up to top_v."""
     first_v, _ = model.branches.rising.inverse(FIRST_STAIR_N + model.branches.rising.value(0.0))
     voltages = [min(first_v, 0.2 * top_v), *(share * top_v for share in CHECK_SHARES)]
     ways = [RISING if b > a else FALLING for a, b in zip([0.0, *voltages], voltages, strict=False)]
-    return tuple(Stair(volts, way, -1, CalibrationPhase.CHECK) for volts, way in zip(voltages, ways, strict=True))
+    return tuple(
+        PlannedStair(volts, way, -1, CalibrationPhase.CHECK) for volts, way in zip(voltages, ways, strict=True)
+    )
 
 
-def _minor_stairs(top_v: float, points: int) -> tuple[Stair, ...]:
+def _minor_stairs(top_v: float, points: int) -> tuple[PlannedStair, ...]:
     if points == 0:
         return ()
     ways = list(pairwise(TURNS))
@@ -137,15 +139,15 @@ def _minor_stairs(top_v: float, points: int) -> tuple[Stair, ...]:
     for a, b in ways:
         count = max(1, round(points * abs(b - a) / travel))
         stairs += [(a + (b - a) * (k + 1) / count, RISING if b > a else FALLING) for k in range(count)]
-    return tuple(Stair(share * top_v, way, -1, CalibrationPhase.MINOR_LOOPS) for share, way in stairs)
+    return tuple(PlannedStair(share * top_v, way, -1, CalibrationPhase.MINOR_LOOPS) for share, way in stairs)
 
 
-def _response_stairs(top_v: float, plan: RunPlan) -> tuple[Stair, ...]:
+def _response_stairs(top_v: float, plan: CalibrationPlan) -> tuple[PlannedStair, ...]:
     """Part of the walk of partial reversals, and only behind it: their settled ends are points of it like any other."""
     if plan.minor_points == 0:
         return ()
     shares = [TURNS[-1], *(RESPONSE_SHARES[k % len(RESPONSE_SHARES)] for k in range(plan.response_steps))]
     return tuple(
-        Stair(share * top_v, RISING if share > before else FALLING, -1, CalibrationPhase.MINOR_LOOPS)
+        PlannedStair(share * top_v, RISING if share > before else FALLING, -1, CalibrationPhase.MINOR_LOOPS)
         for before, share in pairwise(shares)
     )

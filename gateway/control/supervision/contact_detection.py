@@ -14,7 +14,7 @@ _RELEASE_S: Final = 0.1
 _RELEASE_SHARE: Final = 0.5
 
 
-class ContactSense:
+class ContactDetector:
     """threshold_n: contact force from which the tool counts as touching (rig default contact_threshold_n)."""
 
     def __init__(self, threshold_n: float) -> None:

@@ -10,19 +10,19 @@ from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
-from gateway.control.inputs import Line
+from gateway.control.inputs import LineStatus
 from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
-from gateway.control.supervision.plausibility import ModelResponse, RiseCheck
-from gateway.control.supervision.stuck_sensor import FrozenWatch
+from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
+from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 
 _STUCK_S: Final = 1.0
 _FAR_OFF: Final = 3.0  # measured over expected force that points at the cell rather than at the process
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class StopCause:
     """A first cause and its sentence."""
 
     fault: FaultCode
@@ -36,31 +36,31 @@ _LINE_WORDS: Final = {
 }
 
 
-def finding(fault: FaultCode, detail: str) -> Finding:
-    return Finding(fault, fault_sentence(fault, detail))
+def stop_cause(fault: FaultCode, detail: str) -> StopCause:
+    return StopCause(fault, fault_sentence(fault, detail))
 
 
-def _lateness(line: Line, allowed_s: float) -> Finding:
+def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
     """Our defect, or the machine's load: the larger part of the lateness tells."""
     seen = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
     dropped = "what arrived meanwhile was dropped"
     if line.waited_s is None:
-        return finding(FaultCode.LOOP_STALLED, f"{seen}: the machine is overloaded; {dropped}")
+        return stop_cause(FaultCode.LOOP_STALLED, f"{seen}: the machine is overloaded; {dropped}")
     waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"
     if line.waited_s < 0.5 * line.late_s:
-        return finding(FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or a defect of ours; {dropped}")
+        return stop_cause(FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or a defect of ours; {dropped}")
     cure = "the machine is too busy: end other programs, or `run --realtime`"
-    return finding(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {cure}; {dropped}")
+    return stop_cause(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {cure}; {dropped}")
 
 
-class Supervisor:
+class FaultDetector:
     """Counts on every new sample; `first_cause` is asked once per step while enabled."""
 
     def __init__(self, settings: ControlSettings) -> None:
         self._limits = settings.limits
         self._bounds = settings.supervision
         self.rise = RiseCheck(settings.defaults.contact_threshold_n)
-        self._frozen = FrozenWatch(settings.supervision)
+        self._frozen = StuckSensorCheck(settings.supervision)
         self._over = 0
         self._response_fault = FaultCode.NONE
         self._stuck_s = 0.0
@@ -72,7 +72,7 @@ class Supervisor:
         self._response_fault = FaultCode.NONE
         self._over = 0
 
-    def observe(self, reading: Reading, response: ModelResponse, blend: float, touching: bool) -> None:
+    def observe(self, reading: Reading, response: ExpectedForce, blend: float, touching: bool) -> None:
         """Every new sample, enabled or not."""
         self.rise.smooth(reading)
         self._frozen.observe(reading, response, touching)
@@ -89,7 +89,7 @@ class Supervisor:
     def is_stuck(self) -> bool:
         return self._stuck_s >= _STUCK_S
 
-    def enable_block(self, now_s: float, reading: Reading, line: Line) -> RefusalReason:
+    def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         """Why an enable would be refused now, apart from a latched fault."""
         if line.fault or self._is_silent(now_s, line):
             return RefusalReason.OUTPUT_FAULT
@@ -99,47 +99,49 @@ class Supervisor:
             return RefusalReason.NOT_READY
         return RefusalReason.NONE
 
-    def first_cause(self, now_s: float, reading: Reading, line: Line, expected_n: float) -> Finding | None:
+    def first_cause(self, now_s: float, reading: Reading, line: LineStatus, expected_n: float) -> StopCause | None:
         """expected_n: the model's rise, for the sentences."""
         return self._of_line(now_s, line) or self._of_cell(reading, line) or self._of_force(reading, expected_n)
 
-    def _is_silent(self, now_s: float, line: Line) -> bool:
+    def _is_silent(self, now_s: float, line: LineStatus) -> bool:
         since_s = line.unanswered_since_s
         return since_s is not None and now_s - since_s > self._bounds.output_timeout_s
 
-    def _of_line(self, now_s: float, line: Line) -> Finding | None:
+    def _of_line(self, now_s: float, line: LineStatus) -> StopCause | None:
         if line.late_s > self._bounds.stall_s:
             return _lateness(line, self._bounds.stall_s)
         if line.fault:
-            return finding(line.fault, _LINE_WORDS.get(line.fault, "reported by the output line"))
+            return stop_cause(line.fault, _LINE_WORDS.get(line.fault, "reported by the output line"))
         if self._is_silent(now_s, line):
             bound_ms = self._bounds.output_timeout_s * 1e3
-            return finding(
+            return stop_cause(
                 FaultCode.OUTPUT_SILENT, f"no answer from the output device for {bound_ms:.0f} ms: power or wires"
             )
         return None
 
-    def _of_cell(self, reading: Reading, line: Line) -> Finding | None:
+    def _of_cell(self, reading: Reading, line: LineStatus) -> StopCause | None:
         if line.cell_lost:
-            return finding(FaultCode.CELL_LOST, "the load cell's port went away: check the plug; it reopens by itself")
+            return stop_cause(
+                FaultCode.CELL_LOST, "the load cell's port went away: check the plug; it reopens by itself"
+            )
         if not reading.is_fresh:
             seen = f"last sample {reading.age_s * 1e3:.0f} ms old, allowed {self._bounds.sample_timeout_s * 1e3:.0f} ms"
-            return finding(FaultCode.SAMPLE_STALE, f"{seen}: power, wires or stream mode of the amplifier")
+            return stop_cause(FaultCode.SAMPLE_STALE, f"{seen}: power, wires or stream mode of the amplifier")
         if not (reading.is_usable or reading.overload):
-            return finding(FaultCode.NOT_FINITE, "the load cell's reading is not a number")
+            return stop_cause(FaultCode.NOT_FINITE, "the load cell's reading is not a number")
         return None
 
-    def _of_force(self, reading: Reading, expected_n: float) -> Finding | None:
+    def _of_force(self, reading: Reading, expected_n: float) -> StopCause | None:
         if self._over >= self._limits.over_force_samples:
-            return finding(FaultCode.OVER_FORCE, self._over_words(reading, expected_n))
+            return stop_cause(FaultCode.OVER_FORCE, self._over_words(reading, expected_n))
         if words := self._frozen.words:
             self._frozen.tripped()
             said = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
-            return finding(FaultCode.SAMPLE_FROZEN, said)
+            return stop_cause(FaultCode.SAMPLE_FROZEN, said)
         if self._response_fault is FaultCode.SIGN_INVERTED:
-            return Finding(FaultCode.SIGN_INVERTED, sign_sentence(self.rise.measured_rise_n, expected_n))
+            return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self.rise.measured_rise_n, expected_n))
         if self._response_fault is FaultCode.GAIN_WRONG:
-            return Finding(FaultCode.GAIN_WRONG, gain_sentence(self.rise.measured_rise_n, expected_n))
+            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self.rise.measured_rise_n, expected_n))
         return None
 
     def _over_words(self, reading: Reading, expected_n: float) -> str:

@@ -18,7 +18,7 @@ _LEAST_MARGIN_N: Final = 0.4
 _SIGMAS: Final = 3.0
 
 
-class Ceiling:
+class ForceCeiling:
     """force_max_n: contact force that the rig allows; model: the calibration in use."""
 
     def __init__(self, force_max_n: float, model: Bsfm, rest_v: float) -> None:

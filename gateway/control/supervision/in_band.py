@@ -8,7 +8,7 @@ the same wait in vain, longer.
 from math import inf
 
 
-class Band:
+class InBandTimer:
     """unreachable_s: how long out of band until the target counts as unreachable. Times are monotonic seconds."""
 
     def __init__(self, unreachable_s: float) -> None:

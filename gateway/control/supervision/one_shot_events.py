@@ -3,9 +3,9 @@
 from math import isfinite, nan
 from typing import Final
 
-from gateway.control.force_loop.force_loop import Moment, Pursuit
+from gateway.control.force_loop.force_loop import ForceLoop, LoopInputs
 from gateway.control.force_loop.measured_trim import MOST_TURNS, MeasuredTrim
-from gateway.control.inputs import Line
+from gateway.control.inputs import LineStatus
 from gateway.control.messages import hunting_sentence, stuck_sentence, unreachable_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.unreachable_force import Evidence
@@ -14,7 +14,7 @@ _LEARNING: Final = 0.02  # of each new ratio of pressure to voltage
 _LEAST_V: Final = 0.2
 
 
-class Telling:
+class OneShotEvents:
     """stuck_n: measured at the safe voltage, from which a force counts as stuck."""
 
     def __init__(self, stuck_n: float) -> None:
@@ -28,11 +28,11 @@ class Telling:
         """At enable."""
         self._was_right = False
 
-    def hear(self, line: Line) -> None:
+    def hear(self, line: LineStatus) -> None:
         """What the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
 
-    def unreachable(self, pursuit: Pursuit, measured_n: float, moment: Moment, events: list[str]) -> None:
+    def unreachable(self, pursuit: ForceLoop, measured_n: float, moment: LoopInputs, events: list[str]) -> None:
         """After each step in force or voltage mode."""
         if pursuit.unreachable and not self.said_unreachable:
             events.append(unreachable_sentence(self._evidence(pursuit.stage.voltage_v, measured_n, moment.expected_n)))
@@ -59,7 +59,7 @@ class Telling:
             was_right=self._was_right,
         )
 
-    def hunting(self, pursuit: Pursuit, events: list[str]) -> None:
+    def hunting(self, pursuit: ForceLoop, events: list[str]) -> None:
         trim = pursuit.trim
         hunted = isinstance(trim, MeasuredTrim) and trim.hunted
         if hunted and not self._said_hunting:

@@ -24,7 +24,7 @@ _HIGHEST_SHARE: Final = 3.0
 _SLACK_N: Final = 1.0
 
 
-class ModelResponse:
+class ExpectedForce:
     """What the model expects now: both branches at the lagged voltage, N of cell force above rest."""
 
     def __init__(self, model: Bsfm, lag_s: float, rest_v: float) -> None:
@@ -100,7 +100,7 @@ class RiseCheck:
         """The zero moved: what was measured before reads that much less now."""
         self.smooth_n -= moved_n
 
-    def judge(self, response: "ModelResponse", blend: float, touching: bool, interval_s: float) -> FaultCode:
+    def judge(self, response: "ExpectedForce", blend: float, touching: bool, interval_s: float) -> FaultCode:
         """One more new sample against the rise that the model expects at this blend state."""
         expected_n = response.rise_n(blend)
         rise_n = self.measured_rise_n

@@ -37,7 +37,7 @@ def power(share: float) -> float:
     return min(2.0, 1.15 + 1.25 * share)
 
 
-class CellNoise:
+class RepeatedReadings:
     """Fed with every usable sample; `limit` equal samples in a row are more than the cell gives while it is alive."""
 
     def __init__(self) -> None:

@@ -12,21 +12,21 @@ from typing import Final
 
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import Supervision
-from gateway.control.supervision.plausibility import ModelResponse
-from gateway.control.supervision.repeated_readings import CellNoise
+from gateway.control.supervision.plausibility import ExpectedForce
+from gateway.control.supervision.repeated_readings import RepeatedReadings
 
 _QUANTA: Final = 5.0
 _WIDER_LOOP: Final = 0.5  # friction may have grown by this share of the loop since the calibration
 
 
-class FrozenWatch:
+class StuckSensorCheck:
     """Fed with every reading; `is_frozen` after each."""
 
     def __init__(self, supervision: Supervision) -> None:
         self._frozen_s = supervision.frozen_s
         self._least_change_n = _QUANTA * supervision.sample_quantum_n
         self._told_limit = supervision.frozen_equal_samples
-        self._noise = CellNoise()
+        self._noise = RepeatedReadings()
         self._value_n = inf
         self._slack_n = 0.0
         self.start()
@@ -41,7 +41,7 @@ class FrozenWatch:
         self._same_s = 0.0
         self._least_n, self._most_n = -inf, inf
 
-    def observe(self, reading: Reading, response: ModelResponse, touching: bool) -> None:
+    def observe(self, reading: Reading, response: ExpectedForce, touching: bool) -> None:
         """One more new reading."""
         if reading.is_usable:
             self._noise.observe(reading.raw_n, reading.interval_s, touching)

@@ -8,25 +8,25 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from gateway.catalogue.effect import PartName
-from gateway.control.runs.experiment_plan import Do, Move, Part
+from gateway.control.runs.experiment_plan import Move, MoveKind, Part
 
 LEVELS: Final = (0.2, 0.45, 0.75)
 
 
 def _step(level: float, hold_s: float) -> Move:
-    return Move(do=Do.STEP, to_share=round(level, 4), hold_s=hold_s)
+    return Move(do=MoveKind.STEP, to_share=round(level, 4), hold_s=hold_s)
 
 
 def _ramp(level: float, over_s: float, hold_s: float = 0.5) -> Move:
-    return Move(do=Do.RAMP, to_share=round(level, 4), over_s=over_s, hold_s=hold_s)
+    return Move(do=MoveKind.RAMP, to_share=round(level, 4), over_s=over_s, hold_s=hold_s)
 
 
 def _ladder(level: float, stairs: int, hold_s: float) -> Move:
-    return Move(do=Do.LADDER, to_share=round(level, 4), stairs=stairs, hold_s=hold_s)
+    return Move(do=MoveKind.LADDER, to_share=round(level, 4), stairs=stairs, hold_s=hold_s)
 
 
 def _swing(size: float, times: int, over_s: float | None, hold_s: float | None = None) -> Move:
-    return Move(do=Do.REVERSALS, size_share=size, times=times, over_s=over_s and round(over_s, 3), hold_s=hold_s)
+    return Move(do=MoveKind.REVERSALS, size_share=size, times=times, over_s=over_s and round(over_s, 3), hold_s=hold_s)
 
 
 def _dwells() -> Iterator[Move]:
@@ -68,7 +68,7 @@ def _rests() -> Iterator[Move]:
     """Rests of different length, each followed by the same slow ramp, there and back."""
     yield _step(0.3, 1.0)
     for k, rest_s in enumerate((0.5, 10.0, 2.0, 20.0, 5.0, 1.0)):
-        yield Move(do=Do.DWELL, hold_s=rest_s)
+        yield Move(do=MoveKind.DWELL, hold_s=rest_s)
         yield _ramp(0.3 if k % 2 else 0.6, 3.0, 0.0)
 
 

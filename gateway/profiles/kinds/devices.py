@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.devices import DeviceProfile, Role, cell_device, output_host
-from gateway.devices.rehearsal import rehearsed
+from gateway.devices.rehearsal import rehearse
 from gateway.profiles.strict_yaml.faults import Fault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
@@ -21,5 +21,5 @@ def read_device(document: Document) -> tuple[DeviceProfile | None, list[Fault]]:
         _MAKE[device.role](device)
     except ValueError as error:
         return None, [document.fault(("codec",) if "codec" in str(error) else (), str(error))]
-    faults = [document.fault(place, told) for place, told in rehearsed(device)]
+    faults = [document.fault(place, told) for place, told in rehearse(device)]
     return (None, faults) if faults else (device, [])

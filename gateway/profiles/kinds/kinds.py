@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from gateway.bsfm.model import Calibration
 from gateway.control.runs.experiment_plan import ExperimentPlan
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.devices import DeviceProfile
 from gateway.profiles.rigs.rig_file import RigFile
 from gateway.twin import Plant
@@ -27,7 +27,7 @@ _TYPES: Final[dict[str, tuple[type, ...]]] = {
     "device": (DeviceProfile,),
     "plant": (Plant,),
     "calibration": (Calibration,),
-    "plan": (ExperimentPlan, RunPlan),
+    "plan": (ExperimentPlan, CalibrationPlan),
 }
 _MAP_KEYS: Final = frozenset(("blocks", "version"))
 

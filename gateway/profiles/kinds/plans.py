@@ -11,14 +11,14 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
-from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part, plan_faults
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part, plan_faults
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles.load import asked_for, open_profile
 from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError, printable
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
-AnyPlan: TypeAlias = RunPlan | ExperimentPlan
+AnyPlan: TypeAlias = CalibrationPlan | ExperimentPlan
 
 _EXPERIMENT_KEYS: Final = frozenset(entry.name for entry in fields(ExperimentPlan)) - {"tare"}
 _SCHEMA_LINE: Final = "# force-gateway schema plan > plan.json gives editors the schema\n"
@@ -50,7 +50,7 @@ def read_plan(document: Document) -> AnyPlan:
     if _EXPERIMENT_KEYS & set(document.value):
         plan, faults = _experiment(document)
     else:
-        plan, faults = build(RunPlan, document)
+        plan, faults = build(CalibrationPlan, document)
     if plan is None or faults:
         raise ProfileError(faults)
     return plan
@@ -110,7 +110,7 @@ def _scalar(value: object) -> str:
     """Plain for numbers and kinds of moves; a text is double-quoted, for it may hold any sign."""
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, (Do, int)):
+    if isinstance(value, (MoveKind, int)):
         return str(value)
     if isinstance(value, float):
         mantissa, exponent, power = repr(value).partition("e")

@@ -13,7 +13,7 @@ from typing import Any, Final
 from gateway.catalogue.catalogue import EFFECTS
 from gateway.catalogue.effect import By, Effect
 from gateway.control.compensation.command_map import CommandMap
-from gateway.control.compensation.compensation import Compensation, OutsideForce, Timing
+from gateway.control.compensation.compensation import Compensation, OutsideForce, TimingCompensation
 from gateway.control.compensation.load_cell import CellMap
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
@@ -22,7 +22,7 @@ MASTER_INPUTS: Final = ("tilt_deg",)
 """What a master can tell a running gateway (the command block)."""
 
 ALL_INPUTS: Final = ("tilt_deg", "temperature_c", "feed_mm_s")
-"""What a program that runs the controller itself can tell it (gateway.control.Line)."""
+"""What a program that runs the controller itself can tell it (gateway.control.LineStatus)."""
 
 CALIBRATE: Final = "it is the calibration's: `force-gateway calibrate` measures it"
 
@@ -167,9 +167,9 @@ def _outside(plant: Plant, names: tuple[str, ...]) -> OutsideForce:
     )
 
 
-def _timing(base: Plant, extended: Plant) -> Timing:
+def _timing(base: Plant, extended: Plant) -> TimingCompensation:
     before, now = base.regulator, extended.regulator
-    return Timing(
+    return TimingCompensation(
         delay_s=now.delay_s,
         lags_s=now.lag_s + now.second_lag_s + extended.cell.filter_s,
         more_s=_answer_s(extended) - _answer_s(base),

@@ -8,7 +8,7 @@ from typing import Final
 
 from gateway import defaults
 from gateway.bsfm.model import Bsfm, Calibration, Response
-from gateway.control.compensation.command_map import sent
+from gateway.control.compensation.command_map import apply_command_map
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
@@ -101,7 +101,7 @@ class Rig:
     def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
         """The calibration's model as control uses it here: a bent command map is straightened, but for a calibration that was
         made on this very rig, for that has measured it."""
-        return model if calibration.rig == self.name else sent(model, self.compensation.command)
+        return model if calibration.rig == self.name else apply_command_map(model, self.compensation.command)
 
     def response_of(self, calibration: Calibration) -> Response | None:
         """How this rig follows, as the calibration measured it; None for one that another rig was measured with."""

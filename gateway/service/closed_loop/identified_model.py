@@ -18,7 +18,7 @@ from gateway.bsfm.branches import Branches
 from gateway.bsfm.fit.branch_fit import FitSettings, fit_orders
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
-from gateway.bsfm.slip.reversal_choice import chosen_reversal
+from gateway.bsfm.slip.reversal_choice import choose_reversal
 from gateway.control.compensation.compensation import Compensation
 from gateway.twin import Contact, Friction, LoadCell, Plant, Regulator, Twin
 from gateway.twin.experiment import Dwell, staircase
@@ -108,7 +108,7 @@ def _identified(still: Plant, top_v: float) -> Bsfm:
     foot_v = branches.rising.x0
     minor_v = _stairs_between([foot_v + turn * (top_v - foot_v) for turn in TURNS], top_v / MINOR_STAIRS)
     minor_n = staircase(conditioned(still, top_v), minor_v, DWELL)
-    choice = chosen_reversal(branches, ladder, minor_v, minor_n)
+    choice = choose_reversal(branches, ladder, minor_v, minor_n)
     if choice is None:
         raise ValueError("the walk of partial reversals is too short for a model")
     return choice.model

@@ -9,7 +9,7 @@ import numpy as np
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.projected_problem import Floats
-from gateway.control import Compensation, Controller, ControlSettings, Line, sent
+from gateway.control import Compensation, Controller, ControlSettings, LineStatus, apply_command_map
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -53,13 +53,13 @@ class Loop:
         self._voltage_v = 0.0
         self._controller = Controller(
             driver.settings,
-            sent(driver.model, driver.compensation.command),
+            apply_command_map(driver.model, driver.compensation.command),
             calibration_id=1,
             compensation=driver.compensation,
         )
         self._inputs = inputs
         self._command, self._sample = Command(), ForceSample(0.0, 0.0, Quality.OK, 0.0)
-        self._line = Line(acknowledged_v=0.0)
+        self._line = LineStatus(acknowledged_v=0.0)
         self.fault = ""
 
     def tick(self, time_s: float, force_n: float, schedule: Schedule) -> float:
@@ -80,7 +80,7 @@ class Loop:
             getattr(around, name) if name in self._inputs else None
             for name in ("temperature_c", "feed_mm_s", "tilt_deg")
         )
-        self._line = Line(acknowledged_v=0.0, temperature_c=_known(temperature_c), feed_mm_s=_known(feed_mm_s))
+        self._line = LineStatus(acknowledged_v=0.0, temperature_c=_known(temperature_c), feed_mm_s=_known(feed_mm_s))
         return 0.0 if tilt_deg is None else radians(tilt_deg)
 
     def _write(self, time_s: float, force_n: float, tilt_rad: float) -> None:

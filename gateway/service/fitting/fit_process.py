@@ -21,7 +21,7 @@ from gateway.processes import priority
 def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]:
     """{"stored": number, "report": path, "document": path}, the same with "rejected" and a sentence in "refused" for a fit that
     is kept but not offered, or {"refused": sentence}."""
-    from gateway.bsfm.fit.evaluation import Question
+    from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.ladder.fault import LadderError
     from gateway.calibrations.store import CalibrationStore, StoreError
     from gateway.profiles import ProfileError, load_rig
@@ -33,7 +33,7 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
         rig = load_rig(rig_name)
         store = CalibrationStore(state, rig.calibration)
         standing = store.standing().calibration or rig.calibration
-        question = Question(reference_span_n=standing.blend_span_n)
+        question = FitRequest(reference_span_n=standing.blend_span_n)
         fit = fit_recording(read_source(recording), question, Background(rig=rig_name, state=state))
         fresh = calibration_of(fit, rig.load_cell.range_n)
         number = store.number_of(fresh.data_sha256)

@@ -12,10 +12,10 @@ from hashlib import sha256
 from pathlib import Path
 
 from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, validate_coefficients
-from gateway.bsfm.fit.evaluation import Evaluation, Question, evaluate
-from gateway.bsfm.fit.response_fit import Measured
+from gateway.bsfm.fit.evaluation import Evaluation, FitRequest, evaluate
+from gateway.bsfm.fit.response_fit import MeasuredResponse
 from gateway.bsfm.ladder.check import CheckedLadder
-from gateway.bsfm.ladder.fault import Flaw, LadderError
+from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
 from gateway.recording import Recording
 from gateway.reports.fit.document import Document, document_of
 from gateway.reports.fit.page import fit_page
@@ -32,10 +32,10 @@ class LadderFit:
     evaluation: Evaluation
     document: Document
     verdict: Verdict
-    measured: Measured
+    measured: MeasuredResponse
 
 
-def fit_recording(recording: Recording, question: Question, background: Background, name: str = "") -> LadderFit:
+def fit_recording(recording: Recording, question: FitRequest, background: Background, name: str = "") -> LadderFit:
     """Check, fit, hold out, choose, judge. name: the user's, empty for the one given when it was recorded. LadderError with a
     sentence where the data must not be fitted."""
     evaluation = evaluate(checked_source(recording, background), question)
@@ -61,7 +61,7 @@ def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
     coefficients = Coefficients.of(fit.evaluation.model.branches, fit.evaluation.span_n)
     faults = validate_coefficients(coefficients, CoefficientLimits(cell_range_n=cell_range_n))
     if faults:
-        raise LadderError(Flaw.NO_FIT, f"E401 the chosen model may not drive the rig: {faults[0].text}")
+        raise LadderError(LadderFlaw.NO_FIT, f"E401 the chosen model may not drive the rig: {faults[0].text}")
     return Calibration(
         number=0,
         name=fit.document["name"],

@@ -6,7 +6,7 @@ from typing import Final
 
 from gateway import defaults
 from gateway.bsfm import Calibration
-from gateway.bsfm.ladder.check import CheckedLadder, Expectation, checked_ladder, joined
+from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, join_ladders
 from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
@@ -65,7 +65,7 @@ def checked_source(recording: Recording, background: Background) -> CheckedLadde
     """The ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
     expected, said = expectation(recording, background)
     recordings = with_earlier(recording)
-    checked = joined([checked_ladder(part.columns, part.header, expected) for part in recordings])
+    checked = join_ladders([check_ladder(part.columns, part.header, expected) for part in recordings])
     told = dict.fromkeys(note for part in recordings for note in part.notes)
     return replace(checked, notes=(*told, *said, *checked.notes))
 

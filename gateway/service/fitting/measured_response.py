@@ -3,7 +3,7 @@
 from math import inf
 
 from gateway.bsfm.fit.evaluation import Evaluation
-from gateway.bsfm.fit.response_fit import Measured, measured_response
+from gateway.bsfm.fit.response_fit import MeasuredResponse, measure_response
 from gateway.bsfm.ladder.fault import LadderError
 from gateway.bsfm.ladder.rows import usable_rows
 from gateway.recording import Recording
@@ -14,18 +14,18 @@ NOT_OURS = (
 )
 
 
-def response_of(recording: Recording, evaluation: Evaluation) -> Measured:
+def response_of(recording: Recording, evaluation: Evaluation) -> MeasuredResponse:
     """Dead time and lags by the steps of a run; without a response, and with the reason, where they do not show. A calibration
     is as good without."""
     header = recording.header
     if "ladder" not in header:
-        return Measured(None, NOT_OURS)
+        return MeasuredResponse(None, NOT_OURS)
     rig, _ = known_rig(str(header.get("rig", "")), str(header.get("rig_file", "")))
     slew_v_per_s = rig.control.limits.voltage_slew_v_per_s if rig else inf
     try:
         rows = usable_rows(recording.columns, header)
     except LadderError as error:
-        return Measured(None, f"the response was not measured: {error}")
+        return MeasuredResponse(None, f"the response was not measured: {error}")
     day = str(header.get("started_utc", ""))[:10]
     when = f" on {day}" if day else ""
-    return measured_response(rows.time_s, rows.command_v, rows.force_n, evaluation.model, slew_v_per_s, when)
+    return measure_response(rows.time_s, rows.command_v, rows.force_n, evaluation.model, slew_v_per_s, when)

@@ -15,7 +15,7 @@ from math import nan
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
-from gateway.control.inputs import Line, Output
+from gateway.control.inputs import LineStatus, Output
 from gateway.devices.messages import ForceSample
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
@@ -135,8 +135,8 @@ class Gateway:
             return None
         return waited_s - self._last_waited_s
 
-    def _line(self, now_s: float) -> Line:
-        return Line(
+    def _line(self, now_s: float) -> LineStatus:
+        return LineStatus(
             acknowledged_v=self.output.acknowledged_v,
             unanswered_since_s=self.output.unanswered_since_s,
             fault=self.output_lost or self.output.fault,

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from gateway.bsfm.fit.branch_fit import FitSettings, fit, fit_orders, residual_n
 from gateway.bsfm.fit.levenberg_marquardt import Effort
-from gateway.bsfm.fit.projected_problem import Problem, bernstein, merged
+from gateway.bsfm.fit.projected_problem import ProjectedProblem, bernstein, merge_samples
 from gateway.bsfm.fit.result import Covariance, ModelName
 from gateway.bsfm.ladder.measured_ladder import Ladder
 
@@ -74,8 +74,8 @@ def test_the_analytic_jacobian_is_the_difference_quotient(curves, loops):
     ladder = loops["slip"](3)
     masks = [ladder.direction > 0, ladder.direction < 0][:curves]
     weight = 1.0 + 0.5 * np.sin(np.arange(len(ladder)))
-    samples = tuple(merged(spread_share(ladder)[m], ladder.force_n[m], weight[m]) for m in masks)
-    problem = Problem(samples, 4, tied=curves == 2)
+    samples = tuple(merge_samples(spread_share(ladder)[m], ladder.force_n[m], weight[m]) for m in masks)
+    problem = ProjectedProblem(samples, 4, tied=curves == 2)
     theta = np.random.default_rng(0).normal(size=(3, 4 * curves))
     steps = 1e-6 * np.eye(4 * curves)
     quotient = np.stack(

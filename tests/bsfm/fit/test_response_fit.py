@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
-from gateway.bsfm.fit.response_fit import Measured, measured_response, missing
+from gateway.bsfm.fit.response_fit import MeasuredResponse, measure_response, missing
 
 LEVELS_V = (0.0, 2.0, 4.0, 6.0, 2.0, 6.0, 4.0, 2.0, 4.0, 6.0, 2.0, 6.0, 4.0, 2.0)
 HELD_S = 2.0
@@ -57,7 +57,7 @@ class Plant:
 
 def run(
     dead_time_s: float, lag_s: float, second_lag_s: float, rate_hz: float = 100.0, noise_n: float = 0.1
-) -> Measured:
+) -> MeasuredResponse:
     """Steps between three levels, as a run's recording has them; the fit is given another, bent model."""
     plant, rng, step_s = Plant(dead_time_s, lag_s, second_lag_s), Random(4), 0.005
     rows, sent, sample_s, level, changed_s = [], [(0.0, 0.0)], 0.0, 0, 0.0
@@ -72,7 +72,7 @@ def run(
                 sent.append((now_s, LEVELS_V[level]))
             rows.append((now_s, LEVELS_V[level], force_n + rng.gauss(0.0, noise_n)))
     table = np.array(rows)
-    return measured_response(table[:, 0], table[:, 1], table[:, 2], model(bow_n=1.5))
+    return measure_response(table[:, 0], table[:, 1], table[:, 2], model(bow_n=1.5))
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_the_source_tells_from_what_and_how_sure():
 def test_a_record_without_large_steps_gives_no_response_but_a_sentence():
     time_s = np.arange(0.0, 20.0, 0.01)
     command_v = 2.0 + 0.1 * (time_s % 4.0 > 2.0)
-    found = measured_response(time_s, command_v, 15.0 + command_v, model())
+    found = measure_response(time_s, command_v, 15.0 + command_v, model())
     assert found.response is None
     assert "not measured: 0 steps" in found.told
 
@@ -120,7 +120,7 @@ def test_a_record_without_large_steps_gives_no_response_but_a_sentence():
 def test_a_force_that_does_not_follow_gives_no_response():
     time_s = np.arange(0.0, 40.0, 0.02)
     command_v = np.where(time_s % 4.0 > 2.0, 5.0, 1.0)
-    found = measured_response(time_s, command_v, np.full_like(time_s, 12.0), model())
+    found = measure_response(time_s, command_v, np.full_like(time_s, 12.0), model())
     assert found.response is None
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
-from gateway.bsfm.ladder.check import CheckedLadder, Expectation, checked_ladder, joined
-from gateway.bsfm.ladder.fault import Flaw, LadderError
+from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, join_ladders
+from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
 
 TOP_V, STEP_V, NEWTON_PER_VOLT = 8.0, 0.4, 8.0
@@ -39,7 +39,7 @@ def recorded(voltages: list[float], dwell_s: float = 0.4, noise_n: float = 0.1, 
 
 
 def judged(table: Table, expected: Expectation = KNOWN, **facts: str) -> CheckedLadder:
-    return checked_ladder(table, ON_DEMO | facts, expected)
+    return check_ladder(table, ON_DEMO | facts, expected)
 
 
 def refused(table: Table, expected: Expectation = KNOWN, **facts: str) -> LadderError:
@@ -75,14 +75,14 @@ def test_a_coarse_cycle_before_the_ladder_is_left_out_and_said() -> None:
 
 def test_a_resumed_reversal_part_adds_its_walk_and_no_group() -> None:
     cycle, walk = [0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0], [2.8, 5.6, 4.0, 2.0, 3.6, 4.8, 3.2, 1.0]
-    rest = checked_ladder(recorded(cycle + walk), ON_DEMO | {"ladder": {"first_group": 2, "groups": 2}}, KNOWN)
+    rest = check_ladder(recorded(cycle + walk), ON_DEMO | {"ladder": {"first_group": 2, "groups": 2}}, KNOWN)
     assert rest.only_walk
-    whole = joined([judged(recorded(stairs(2))), rest])
+    whole = join_ladders([judged(recorded(stairs(2))), rest])
     assert whole.ladder.groups == (0, 1)
     assert len(whole.ladder) == 2 * 41, "the coarse cycle is no group"
     assert whole.minor_v == pytest.approx([0.0, *walk])
     with pytest.raises(LadderError, match="must lie beside it"):
-        joined([rest])
+        join_ladders([rest])
 
 
 def test_one_row_per_stair_is_paired_by_its_turns_whichever_row_the_force_stands_in() -> None:
@@ -110,25 +110,25 @@ def with_force(change: Callable[[np.ndarray], np.ndarray]) -> Table:
 
 def test_three_samples_are_no_ladder() -> None:
     error = refused({name: values[:3] for name, values in recorded(stairs()).items()})
-    assert error.flaw is Flaw.TOO_SHORT
+    assert error.flaw is LadderFlaw.TOO_SHORT
     assert "3 rows" in str(error)
 
 
 def test_one_direction_only_is_refused() -> None:
     error = refused(recorded(stairs(1)[:21]))
-    assert error.flaw is Flaw.ONE_DIRECTION
+    assert error.flaw is LadderFlaw.ONE_DIRECTION
     assert "20 rising and 0 falling" in str(error)
 
 
 def test_constant_force_is_not_called_a_model() -> None:
     error = refused(with_force(lambda force: np.full_like(force, 2.0)))
-    assert error.flaw is Flaw.FORCE_CONSTANT
+    assert error.flaw is LadderFlaw.FORCE_CONSTANT
     assert "no air, no contact, or a dead load cell" in str(error)
 
 
 def test_constant_command_is_refused() -> None:
     table = recorded(stairs())
-    assert refused(table | {"command_v": np.full_like(table["force_n"], 3.0)}).flaw is Flaw.COMMAND_CONSTANT
+    assert refused(table | {"command_v": np.full_like(table["force_n"], 3.0)}).flaw is LadderFlaw.COMMAND_CONSTANT
 
 
 def test_swapped_columns_are_named_in_fine_and_in_coarse_tables() -> None:
@@ -137,13 +137,13 @@ def test_swapped_columns_are_named_in_fine_and_in_coarse_tables() -> None:
     ladder = judged(table).ladder
     coarse = refused({"time_s": np.arange(len(ladder)) * 1.0, "command_v": ladder.force_n, "force_n": ladder.voltage_v})
     for error in (fine, coarse):
-        assert error.flaw is Flaw.SWAPPED
+        assert error.flaw is LadderFlaw.SWAPPED
         assert "change the two names" in str(error)
 
 
 def test_an_inverted_sign_says_how_to_put_it_right() -> None:
     error = refused(with_force(lambda force: -force))
-    assert error.flaw is Flaw.SIGN
+    assert error.flaw is LadderFlaw.SIGN
     assert "sign: -1" in str(error)
 
 
@@ -153,7 +153,7 @@ def test_kgf_instead_of_newton_is_seen_against_the_model_and_against_the_pressur
     by_model = refused(table)
     by_pressure = refused(table | {"pressure_kpa": pressure}, Expectation(area_mm2=100.0))
     for error in (by_model, by_pressure):
-        assert error.flaw is Flaw.UNIT
+        assert error.flaw is LadderFlaw.UNIT
         assert "kgf" in str(error)
 
 
@@ -179,7 +179,7 @@ def test_a_saturated_cell_costs_its_stairs_only() -> None:
 
 
 def test_a_cell_saturated_for_most_of_the_way_is_refused() -> None:
-    assert refused(with_force(lambda force: np.minimum(force, 20.0))).flaw is Flaw.SATURATED
+    assert refused(with_force(lambda force: np.minimum(force, 20.0))).flaw is LadderFlaw.SATURATED
 
 
 def test_a_group_cut_short_is_left_out_and_alone_it_is_refused() -> None:
@@ -187,7 +187,7 @@ def test_a_group_cut_short_is_left_out_and_alone_it_is_refused() -> None:
     checked = judged(recorded(stairs(2) + cut))
     assert checked.ladder.groups == (0, 1)
     assert any("cut short" in note for note in checked.notes)
-    assert refused(recorded(cut)).flaw is Flaw.CUT_SHORT
+    assert refused(recorded(cut)).flaw is LadderFlaw.CUT_SHORT
 
 
 def test_rows_without_numbers_are_left_out_with_the_first_one_named() -> None:
@@ -203,7 +203,7 @@ def test_rows_without_numbers_are_left_out_with_the_first_one_named() -> None:
 def test_a_table_of_mostly_nothing_is_refused() -> None:
     table = recorded(stairs())
     table["force_n"][::3] = np.nan
-    assert refused(table).flaw is Flaw.NOT_FINITE
+    assert refused(table).flaw is LadderFlaw.NOT_FINITE
 
 
 def test_repeated_and_late_rows_are_left_out() -> None:
@@ -215,20 +215,20 @@ def test_a_force_that_dips_on_the_way_up_has_no_inverse() -> None:
     table = recorded(stairs())
     dip = (table["command_v"] > 4.0) & (table["command_v"] < 5.5)
     error = refused(table | {"force_n": np.where(dip, table["force_n"] - 12.0, table["force_n"])})
-    assert error.flaw is Flaw.NOT_INCREASING
+    assert error.flaw is LadderFlaw.NOT_INCREASING
     assert "has no inverse" in str(error)
 
 
 def test_another_rigs_file_is_refused_by_name() -> None:
     error = refused(recorded(stairs()), Expectation(rig="irc5-cell"))
-    assert error.flaw is Flaw.OTHER_RIG
+    assert error.flaw is LadderFlaw.OTHER_RIG
     assert "--rig demo" in str(error)
 
 
 def test_a_ramp_is_not_a_ladder() -> None:
     time_s = np.arange(1000) * 0.01
     volts = 4.0 - 4.0 * np.cos(time_s)
-    assert refused({"time_s": time_s, "command_v": volts, "force_n": 8.0 * volts}).flaw is Flaw.NO_STAIRS
+    assert refused({"time_s": time_s, "command_v": volts, "force_n": 8.0 * volts}).flaw is LadderFlaw.NO_STAIRS
 
 
 def test_missing_columns_are_told_with_those_that_are_there() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.bsfm.fit.outliers import huber_weight, kept
+from gateway.bsfm.fit.outliers import huber_weight, inlier_mask
 from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
 
 
@@ -54,19 +54,19 @@ def test_rows_and_columns_are_the_same_ladder_and_cannot_be_changed():
 
 def test_planted_outliers_are_found_and_clean_data_keeps_all(loops):
     ladder = loops["smooth"](1)
-    assert kept(ladder).all()
+    assert inlier_mask(ladder).all()
     force = np.array(ladder.force_n)
     force[[17, 500, 903]] += (3.0, -4.0, 9.0)
     spoiled = Ladder(ladder.voltage_v, force, ladder.direction, ladder.group)
-    assert np.flatnonzero(~kept(spoiled)).tolist() == [17, 500, 903]
+    assert np.flatnonzero(~inlier_mask(spoiled)).tolist() == [17, 500, 903]
 
 
 def test_coarse_counts_are_not_outliers_and_single_readings_are_kept(loops):
     ladder = loops["smooth"](2, noise_n=0.02)
     coarse = Ladder(ladder.voltage_v, np.round(ladder.force_n, 1), ladder.direction, ladder.group)
-    assert kept(coarse).all()
+    assert inlier_mask(coarse).all()
     once = ladder.part(ladder.group == 0)
-    assert kept(once).all()
+    assert inlier_mask(once).all()
 
 
 def test_huber_plays_down_what_is_far():

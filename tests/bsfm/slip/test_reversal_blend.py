@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gateway.bsfm import Branches, Bsfm, Calibration, DeadBand, Direction, LinearBlend, RationalBezier, Status
+from gateway.bsfm import Branches, Bsfm, Calibration, DeadBand, Direction, InverseStatus, LinearBlend, RationalBezier
 
 RISING = RationalBezier(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.9, 1.2))
 FALLING = RationalBezier(0.0, 5.0, (0.5, 22.0, 38.0), (1.0, 1.1, 1.2))
@@ -77,9 +77,9 @@ def test_halfway_the_voltage_is_halfway(model):
 
 @pytest.mark.parametrize("state", [-1.0, -0.3, 1.0])
 def test_beyond_the_range_the_model_holds_the_end_and_says_so(model, state):
-    assert model.voltage_v(0.4, state) == (0.0, Status.LOW)
-    assert model.voltage_v(38.1, state) == (5.0, Status.HIGH)
-    assert model.voltage_v(38.0, state)[1] is Status.OK
+    assert model.voltage_v(0.4, state) == (0.0, InverseStatus.LOW)
+    assert model.voltage_v(38.1, state) == (5.0, InverseStatus.HIGH)
+    assert model.voltage_v(38.0, state)[1] is InverseStatus.OK
     assert (model.force_range_n, model.voltage_range_v) == ((0.5, 38.0), (0.0, 5.0))
 
 
@@ -87,10 +87,10 @@ def test_a_branch_that_is_clamped_alone_is_reported_only_when_it_takes_part():
     free = RationalBezier(0.0, 5.0, (2.0, 20.0, 40.0), (1.0, 1.0, 1.0))
     model = Bsfm(Branches(RISING, free), LinearBlend(3.0))
     assert model.force_range_n == (2.0, 38.0)
-    assert model.voltage_v(1.0, 1.0)[1] is Status.OK
-    assert model.voltage_v(1.0, 0.0)[1] is Status.LOW
-    assert model.voltage_v(39.0, -1.0)[1] is Status.OK
-    assert model.voltage_v(39.0, 0.5)[1] is Status.HIGH
+    assert model.voltage_v(1.0, 1.0)[1] is InverseStatus.OK
+    assert model.voltage_v(1.0, 0.0)[1] is InverseStatus.LOW
+    assert model.voltage_v(39.0, -1.0)[1] is InverseStatus.OK
+    assert model.voltage_v(39.0, 0.5)[1] is InverseStatus.HIGH
 
 
 def test_nan_and_states_outside_the_blend_are_refused(model):

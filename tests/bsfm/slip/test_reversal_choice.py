@@ -7,7 +7,7 @@ import pytest
 
 from gateway.bsfm import Branches, Bsfm, RationalBezier, SlipStops
 from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
-from gateway.bsfm.slip.reversal_choice import chosen_reversal
+from gateway.bsfm.slip.reversal_choice import choose_reversal
 
 BRANCHES = Branches(
     RationalBezier(0.0, 8.0, (0.0, 20.0, 64.0), (1.0, 1.0, 1.0)),
@@ -38,7 +38,7 @@ def ladder() -> Ladder:
 
 
 def test_a_walk_of_slip_stops_is_recognised_as_one() -> None:
-    choice = chosen_reversal(BRANCHES, ladder(), *walk(TURNS_N))
+    choice = choose_reversal(BRANCHES, ladder(), *walk(TURNS_N))
     assert choice is not None
     assert choice.slip is not None
     assert choice.slip_heldout_n < 0.9 * choice.blend_heldout_n
@@ -48,16 +48,16 @@ def test_a_walk_of_slip_stops_is_recognised_as_one() -> None:
 def test_a_short_walk_identifies_the_blend_alone_and_none_nothing() -> None:
     volts, forces = walk(TURNS_N, 1)
     volts, forces = volts[:10], forces[:10]
-    choice = chosen_reversal(BRANCHES, ladder(), volts, forces)
+    choice = choose_reversal(BRANCHES, ladder(), volts, forces)
     assert choice is not None
     assert choice.slip is None
     assert np.isnan(choice.slip_heldout_n)
-    assert chosen_reversal(BRANCHES, ladder(), volts[:3], forces[:3]) is None
+    assert choose_reversal(BRANCHES, ladder(), volts[:3], forces[:3]) is None
 
 
 def test_one_curve_for_both_ways_has_nothing_to_select() -> None:
     one = Branches(BRANCHES.rising, BRANCHES.rising)
-    choice = chosen_reversal(one, ladder(), *walk(TURNS_N))
+    choice = choose_reversal(one, ladder(), *walk(TURNS_N))
     assert choice is not None
     assert choice.slip is None
     assert choice.model.branches == one
@@ -65,4 +65,4 @@ def test_one_curve_for_both_ways_has_nothing_to_select() -> None:
 
 @pytest.mark.parametrize("points", [0, 2])
 def test_nothing_is_chosen_from_nothing(points: int) -> None:
-    assert chosen_reversal(BRANCHES, ladder(), np.zeros(points), np.zeros(points)) is None
+    assert choose_reversal(BRANCHES, ladder(), np.zeros(points), np.zeros(points)) is None

@@ -15,7 +15,15 @@ from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
 from gateway.bsfm.slip import slip_fit
 from gateway.bsfm.slip.problem import SlipProblem, branches_of, free_numbers, inverses, places
 from gateway.bsfm.slip.search import SlipSearch
-from gateway.bsfm.slip.slip_fit import SLOPE_FLOOR_N_PER_V, Walk, fit_joint, fit_stops, judged, residuals_n, walk_of
+from gateway.bsfm.slip.slip_fit import (
+    SLOPE_FLOOR_N_PER_V,
+    Walk,
+    compare_policies,
+    fit_joint,
+    fit_stops,
+    residuals_n,
+    walk_of,
+)
 
 RISING = RationalBezier(0.0, 5.0, (0.8, 17.0, 39.0), (1.0, 1.0, 1.1))
 FALLING = RationalBezier(0.0, 5.0, (0.8, 25.0, 43.0), (1.0, 1.0, 1.0))
@@ -95,7 +103,7 @@ def test_the_searchs_gradient_is_that_of_its_residuals(order) -> None:
 def test_on_another_walk_slip_beats_the_blend_and_the_blend_beats_switching() -> None:
     training, other = walk(TURNS_V, 1), walk(OTHER_TURNS_V, 2)
     slip = fit_joint(tied(), [walk_of(ladder()), training])
-    switched, blend, stops = judged(tied(), [slip], training, other)
+    switched, blend, stops = compare_policies(tied(), [slip], training, other)
     assert "switched" in switched.policy and "blend" in blend.policy and "joint" in stops.policy
     assert 3.0 * stops.rms_n < blend.rms_n < 0.5 * switched.rms_n
     assert isinstance(blend.model.reversal, LinearBlend) and stops.model == slip.model

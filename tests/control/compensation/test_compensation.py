@@ -14,10 +14,10 @@ from gateway.control import (
     Controller,
     LeadSettings,
     OutsideForce,
-    Timing,
-    sent,
+    TimingCompensation,
+    apply_command_map,
 )
-from gateway.control.force_loop.transport_delay import Delayed
+from gateway.control.force_loop.transport_delay import TransportDelay
 from tests.control.bench import Bench, bsfm, settings
 
 FORCES_N = (0.0, 5.0, 18.0, 40.0, 22.0, 30.0, 9.0, 0.0)
@@ -30,7 +30,7 @@ def voltages(compensation: Compensation | None) -> list[tuple[float, float]]:
     bench = Bench(seed=3)
     if compensation is not None:
         bench.controller = Controller(
-            bench.settings, sent(bsfm(), compensation.command), calibration_id=1, compensation=compensation
+            bench.settings, apply_command_map(bsfm(), compensation.command), calibration_id=1, compensation=compensation
         )
     bench.run(0.1)
     bench.enable()
@@ -47,7 +47,7 @@ def test_compensating_nothing_changes_no_bit(compensation):
 
 def test_the_null_compensation_hands_the_same_model_and_settings_back():
     model, control = bsfm(), settings()
-    assert sent(model, NO_COMPENSATION.command) is model
+    assert apply_command_map(model, NO_COMPENSATION.command) is model
     assert NO_COMPENSATION.settings(control) is control
     assert NO_COMPENSATION.is_null
     assert not NOTHING.is_null
@@ -101,7 +101,7 @@ def test_what_is_sent_arrives_as_it_was_meant(voltage_v, bow, s):
 
 def test_a_model_of_straight_volts_answers_in_sent_volts():
     command, plain = CommandMap(bow=0.06, s=0.0), bsfm()
-    model = sent(plain, command)
+    model = apply_command_map(plain, command)
     for force_n in (3.0, 20.0, 45.0):
         straight_v, _ = plain.voltage_v(force_n, 0.5)
         volts, _ = model.voltage_v(force_n, 0.5)
@@ -125,7 +125,7 @@ def test_what_nobody_tells_adds_nothing():
 
 @given(steps_ms=st.lists(st.integers(0, 40), min_size=1, max_size=60))
 def test_a_delayed_value_is_heard_as_late_as_the_delay_however_time_is_cut(steps_ms):
-    delayed, now_ms = Delayed(0.1), 0
+    delayed, now_ms = TransportDelay(0.1), 0
     for step_ms in steps_ms:
         now_ms += step_ms
         heard_ms = delayed.advance(float(now_ms), step_ms * 1e-3)
@@ -134,8 +134,8 @@ def test_a_delayed_value_is_heard_as_late_as_the_delay_however_time_is_cut(steps
 
 
 def test_no_delay_hears_at_once_and_a_restart_forgets():
-    assert Delayed(0.0).advance(7.0, 0.0) == 7.0
-    delayed = Delayed(0.05)
+    assert TransportDelay(0.0).advance(7.0, 0.0) == 7.0
+    delayed = TransportDelay(0.05)
     delayed.advance(3.0, 0.01)
     delayed.restart(9.0)
     assert delayed.advance(4.0, 0.04) == 9.0
@@ -144,7 +144,7 @@ def test_no_delay_hears_at_once_and_a_restart_forgets():
 
 def test_a_slower_rig_gets_longer_lags_more_patience_and_a_gentler_trim():
     control = settings(response_lag_s=0.2)
-    slower = Timing(delay_s=0.2, lags_s=0.3, more_s=0.2, more_lag_s=0.05).settings(control)
+    slower = TimingCompensation(delay_s=0.2, lags_s=0.3, more_s=0.2, more_lag_s=0.05).settings(control)
     assert slower.supervision.response_lag_s == pytest.approx(0.4)
     assert slower.trim.gain_v_per_n_s == pytest.approx(0.5 * control.trim.gain_v_per_n_s)
     assert slower.lead == LeadSettings()  # a lead that is off stays off
@@ -153,7 +153,7 @@ def test_a_slower_rig_gets_longer_lags_more_patience_and_a_gentler_trim():
 def test_a_trim_that_knows_the_delay_does_not_overshoot_what_it_waits_for():
     """The rig hears 0.2 s late and its settings say 0.12 s: only the timing differs between the two runs."""
 
-    def worst_n(timing: Timing | None) -> float:
+    def worst_n(timing: TimingCompensation | None) -> float:
         bench = Bench(seed=4, delay_s=0.2, friction_n=0.5)
         compensation = Compensation(timing=timing)
         bench.controller = Controller(bench.settings, bsfm(), calibration_id=1, compensation=compensation)
@@ -166,5 +166,5 @@ def test_a_trim_that_knows_the_delay_does_not_overshoot_what_it_waits_for():
         assert not any(record.output.fault for record in bench.history)
         return max(record.force_n for record in bench.history[seen:]) - 30.0
 
-    known = Timing(delay_s=0.2, lags_s=0.1, more_s=0.18)
+    known = TimingCompensation(delay_s=0.2, lags_s=0.1, more_s=0.18)
     assert worst_n(known) < 0.6 * worst_n(None)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gateway.control import LeadSettings, Limits
-from gateway.control.force_loop.lag_inverse import Push
-from gateway.control.force_loop.voltage_limits import VoltageStage
+from gateway.control.force_loop.lag_inverse import LagInverse
+from gateway.control.force_loop.voltage_limits import VoltageLimiter
 from tests.control.foreign.course import _settled_s
 from tests.control.foreign.machine import Machine
 
@@ -18,14 +18,14 @@ BAND_V = 0.0625  # half a newton on a plant of 8 N/V
 
 
 class Loop:
-    """Push, output stage and wire, and two real lags behind them. off: of the lags that the push believes in."""
+    """LagInverse, output stage and wire, and two real lags behind them. off: of the lags that the push believes in."""
 
     def __init__(
         self, lag_s: float, second_lag_s: float, at_v: float = 0.0, wire_s: float = 0.03, off: float = 1.0
     ) -> None:
-        self.push = Push(LeadSettings(lag_s=off * lag_s, second_lag_s=off * second_lag_s), LIMITS)
+        self.push = LagInverse(LeadSettings(lag_s=off * lag_s, second_lag_s=off * second_lag_s), LIMITS)
         self.push.know_wire(wire_s)
-        self.stage = VoltageStage(LIMITS)
+        self.stage = VoltageLimiter(LIMITS)
         self.push.first_v = self.push.second_v = self.stage.voltage_v = at_v
         self.first_v = self.second_v = self.sent_v = at_v
         self.shares = [1.0 - exp(-0.001 / max(lag, 1.0e-9)) for lag in (lag_s, second_lag_s)]

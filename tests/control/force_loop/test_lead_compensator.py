@@ -7,8 +7,8 @@ from random import Random
 import pytest
 
 from gateway.control import ControlSettings, LeadSettings, Limits, Trim
-from gateway.control.force_loop.lead_compensator import Lead
-from gateway.control.force_loop.voltage_limits import VoltageStage
+from gateway.control.force_loop.lead_compensator import LeadCompensator
+from gateway.control.force_loop.voltage_limits import VoltageLimiter
 from gateway.control.settings import ResponseSource
 from gateway.registers.words import LimitedBy
 from tests.control.bench import Bench, settings
@@ -22,10 +22,10 @@ TICK_S = 0.01
 
 
 class Loop:
-    """Lead and output stage, and two real lags behind them."""
+    """LeadCompensator and output stage, and two real lags behind them."""
 
     def __init__(self, lead: LeadSettings, limits: Limits = LIMITS) -> None:
-        self.lead, self.stage = Lead(lead, limits), VoltageStage(limits)
+        self.lead, self.stage = LeadCompensator(lead, limits), VoltageLimiter(limits)
         self.first_v = self.second_v = 0.0
         self.limited_by = LimitedBy.NONE
 
@@ -50,7 +50,7 @@ def with_lead(**lags: float) -> ControlSettings:
 
 
 def test_off_equals_absent():
-    lead, rng = Lead(LeadSettings(), LIMITS), Random(1)
+    lead, rng = LeadCompensator(LeadSettings(), LIMITS), Random(1)
     for _ in range(100):
         wanted_v = rng.uniform(-1.0, 10.0)
         lead.advance(rng.uniform(0.0, 8.0), rng.uniform(0.0, 0.02))
@@ -96,7 +96,9 @@ def test_two_lags_settle_in_less_than_seven_tenths_of_the_time(from_v, to_v):
 def test_the_response_neither_passes_the_target_nor_depends_on_how_the_lags_are_named():
     loop = Loop(TWO)
     assert max(loop.step(3.0) for _ in range(200)) < 3.06
-    one, other = (Lead(LeadSettings(lag_s=a, second_lag_s=b), LIMITS) for a, b in ((0.05, 0.09), (0.09, 0.05)))
+    one, other = (
+        LeadCompensator(LeadSettings(lag_s=a, second_lag_s=b), LIMITS) for a, b in ((0.05, 0.09), (0.09, 0.05))
+    )
     assert (one.led_v(2.0), one.gained_s) == (other.led_v(2.0), other.gained_s)
 
 
@@ -114,7 +116,7 @@ def test_nothing_winds_up_behind_a_clip_or_a_slow_slew():
 
 
 def test_calls_microseconds_apart_change_nothing():
-    often, seldom = Lead(TWO, LIMITS), Lead(TWO, LIMITS)
+    often, seldom = LeadCompensator(TWO, LIMITS), LeadCompensator(TWO, LIMITS)
     for _ in range(1000):
         often.advance(4.0, 1e-6)
     seldom.advance(4.0, 1e-3)
@@ -124,7 +126,7 @@ def test_calls_microseconds_apart_change_nothing():
 
 @pytest.mark.parametrize("second_lag_s", [0.072 * (1 - 1e-5), 0.072 * (1 - 1e-7), 0.0])
 def test_the_model_is_exact_for_lags_that_are_nearly_equal_and_for_one(second_lag_s):
-    lead = Lead(LeadSettings(lag_s=0.072, second_lag_s=second_lag_s), LIMITS)
+    lead = LeadCompensator(LeadSettings(lag_s=0.072, second_lag_s=second_lag_s), LIMITS)
     lead.advance(1.0, 0.072)
     assert lead.second_v == pytest.approx(1.0 - 2.0 / exp(1.0) if second_lag_s else 1.0 - 1.0 / exp(1.0), abs=1e-4)
 

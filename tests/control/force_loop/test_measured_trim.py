@@ -6,10 +6,10 @@ import pytest
 
 from gateway.control import Trim
 from gateway.control.force_loop.measured_trim import MOST_TURNS, NEW_TARGET_N, MeasuredTrim
-from gateway.control.settings import Timing
+from gateway.control.settings import LoopTiming
 from gateway.registers.words import LimitedBy
 
-TIMING = Timing(dead_time_s=0.08, lag_s=0.07, second_lag_s=0.07, landing_s=0.07, integral_per_s=3.0, patience_s=0.1)
+TIMING = LoopTiming(dead_time_s=0.08, lag_s=0.07, second_lag_s=0.07, landing_s=0.07, integral_per_s=3.0, patience_s=0.1)
 SLOPE_N_PER_V = 8.0
 SAMPLE_S = 0.01
 

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.bsfm.model import Response
 from gateway.control import Trim
-from gateway.control.force_loop.lag_inverse import Push
+from gateway.control.force_loop.lag_inverse import LagInverse
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.settings import LeadSettings, ResponseSource
 from tests.control.bench import Bench, bsfm, settings
@@ -25,7 +25,7 @@ def margin(response: Response, off: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Gain margin of the trim's loop on a plant whose gain, dead time and lags are off by these factors."""
     timing = timing_of(response, settings()).timing
     assert timing
-    push = Push(LeadSettings(lag_s=timing.lag_s, second_lag_s=timing.second_lag_s), settings().limits)
+    push = LagInverse(LeadSettings(lag_s=timing.lag_s, second_lag_s=timing.second_lag_s), settings().limits)
 
     def loop(w: float) -> complex:
         s = 1j * w

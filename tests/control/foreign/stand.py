@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from gateway.bsfm import Bsfm
-from gateway.bsfm.fit.evaluation import Question
+from gateway.bsfm.fit.evaluation import FitRequest
 from gateway.bsfm.model import Calibration, Response
-from gateway.control import Controller, ControlSettings, Defaults, Limits, Line, Output, Supervision, Trim
-from gateway.control.runs.ladder_stairs import QUICK, RunPlan
+from gateway.control import Controller, ControlSettings, Defaults, Limits, LineStatus, Output, Supervision, Trim
+from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import Recording
 from gateway.registers.command import Command
@@ -78,7 +78,7 @@ class Stand:
             self.now_s,
             self.command,
             self.sample,
-            Line(acknowledged_v=0.0, sent_v=self._sent_v, wire_s=2.0 * self.machine.wire_s),
+            LineStatus(acknowledged_v=0.0, sent_v=self._sent_v, wire_s=2.0 * self.machine.wire_s),
         )
         self.output, self.wanted_v = output, output.voltage_v
         self.events.extend(output.events)
@@ -141,7 +141,7 @@ class Calibrated:
         return self.calibration.response
 
 
-def calibrated(machine: Machine, started_with: Bsfm, plan: RunPlan = QUICK, seed: int = 1) -> Calibrated:
+def calibrated(machine: Machine, started_with: Bsfm, plan: CalibrationPlan = QUICK, seed: int = 1) -> Calibrated:
     """An ordinary run of the product on this machine, and the product's fit of it."""
     controller = Controller(settings(), started_with, calibration_id=1)
     stand = Stand(machine, controller, seed)
@@ -154,5 +154,5 @@ def calibrated(machine: Machine, started_with: Bsfm, plan: RunPlan = QUICK, seed
         stand.run(0.1)
     facts = {"rig": "foreign", "rig_fingerprint": "", "force_unit": "N", "ladder": asdict(plan)}
     recording = Recording(Path("foreign.fgr"), facts, stand.columns(), len(stand.rows), False)
-    fit = fit_recording(recording, Question(), Background())
+    fit = fit_recording(recording, FitRequest(), Background())
     return Calibrated(machine, calibration_of(fit, 98.0), stand.now_s)

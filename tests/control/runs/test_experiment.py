@@ -3,7 +3,7 @@
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part, plan_faults
+from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part, plan_faults
 from gateway.control.runs.experiment_schedule import Schedule, segments_of
 from gateway.control.runs.ladder_stairs import highest_voltage_v
 from gateway.registers.words import CalibrationPhase, State
@@ -22,10 +22,10 @@ def schedule(*moves: Move) -> Schedule:
 
 
 SHORT = plan(
-    Move(do=Do.STEP, to_v=3.0, hold_s=0.5),
-    Move(do=Do.RAMP, to_v=5.0, over_s=1.0, hold_s=0.3),
-    Move(do=Do.LADDER, to_v=4.0, stairs=4, hold_s=0.2),
-    Move(do=Do.REVERSALS, size_v=1.0, times=2, over_s=0.4, hold_s=0.1),
+    Move(do=MoveKind.STEP, to_v=3.0, hold_s=0.5),
+    Move(do=MoveKind.RAMP, to_v=5.0, over_s=1.0, hold_s=0.3),
+    Move(do=MoveKind.LADDER, to_v=4.0, stairs=4, hold_s=0.2),
+    Move(do=MoveKind.REVERSALS, size_v=1.0, times=2, over_s=0.4, hold_s=0.1),
 )
 
 
@@ -42,49 +42,55 @@ def test_the_time_of_a_plan_is_known_without_a_rig() -> None:
 
 
 def test_a_dwell_stays_where_the_move_before_has_ended() -> None:
-    moved = schedule(Move(do=Do.STEP, to_share=0.5, hold_s=1.0), Move(do=Do.DWELL, hold_s=2.0))
+    moved = schedule(Move(do=MoveKind.STEP, to_share=0.5, hold_s=1.0), Move(do=MoveKind.DWELL, hold_s=2.0))
     assert moved.voltage_v(2.5) == pytest.approx(0.5 * TOP_V)
 
 
 def test_newtons_are_those_of_the_rising_branch() -> None:
-    moved = schedule(Move(do=Do.STEP, to_n=20.0, hold_s=1.0))
+    moved = schedule(Move(do=MoveKind.STEP, to_n=20.0, hold_s=1.0))
     assert bsfm().branches.rising.value(moved.voltage_v(0.5)) == pytest.approx(20.0)
 
 
 @pytest.mark.parametrize(
     ("moves", "sentence"),
     [
-        ((Move(do=Do.STEP, to_v=9.5),), "move 1 (step): 9.5 V, allowed 0 .. 6.98 V (about 0 .. 49 N)"),
-        ((Move(do=Do.STEP, to_n=70.0),), "70 N, allowed up to"),
-        ((Move(do=Do.STEP, to_v=6.5), Move(do=Do.REVERSALS, size_v=2.0, times=1, hold_s=1.0)), "2 V around 6.5 V"),
-        ((Move(do=Do.STEP, to_v=0.2), Move(do=Do.REVERSALS, size_v=1.0, times=1, hold_s=1.0)), "1 V around 0.2 V"),
+        ((Move(do=MoveKind.STEP, to_v=9.5),), "move 1 (step): 9.5 V, allowed 0 .. 6.98 V (about 0 .. 49 N)"),
+        ((Move(do=MoveKind.STEP, to_n=70.0),), "70 N, allowed up to"),
+        (
+            (Move(do=MoveKind.STEP, to_v=6.5), Move(do=MoveKind.REVERSALS, size_v=2.0, times=1, hold_s=1.0)),
+            "2 V around 6.5 V",
+        ),
+        (
+            (Move(do=MoveKind.STEP, to_v=0.2), Move(do=MoveKind.REVERSALS, size_v=1.0, times=1, hold_s=1.0)),
+            "1 V around 0.2 V",
+        ),
     ],
 )
 def test_beyond_the_rigs_limits_a_plan_is_refused_and_never_clipped(moves: tuple[Move, ...], sentence: str) -> None:
     with pytest.raises(ValueError, match="plan a plan, part one, move") as refused:
-        segments_of(plan(*moves, Move(do=Do.DWELL, hold_s=1.0)), LIMITS, bsfm())
+        segments_of(plan(*moves, Move(do=MoveKind.DWELL, hold_s=1.0)), LIMITS, bsfm())
     assert sentence in str(refused.value)
 
 
 @pytest.mark.parametrize(
     ("move", "key", "sentence"),
     [
-        (Move(do=Do.STEP), "", "needs to_share or to_n or to_v"),
-        (Move(do=Do.STEP, to_v=1.0, to_n=2.0, hold_s=1.0), "to_v", "to_n is given already"),
-        (Move(do=Do.RAMP, to_v=1.0), "", "needs over_s"),
-        (Move(do=Do.DWELL, hold_s=1.0, times=2), "times", "means nothing in a dwell"),
-        (Move(do=Do.REVERSALS, size_v=1.0, times=2), "", "take no time"),
+        (Move(do=MoveKind.STEP), "", "needs to_share or to_n or to_v"),
+        (Move(do=MoveKind.STEP, to_v=1.0, to_n=2.0, hold_s=1.0), "to_v", "to_n is given already"),
+        (Move(do=MoveKind.RAMP, to_v=1.0), "", "needs over_s"),
+        (Move(do=MoveKind.DWELL, hold_s=1.0, times=2), "times", "means nothing in a dwell"),
+        (Move(do=MoveKind.REVERSALS, size_v=1.0, times=2), "", "take no time"),
     ],
 )
 def test_a_move_without_its_sense_is_told_with_its_place(move: Move, key: str, sentence: str) -> None:
-    path, told = next(plan_faults(plan(move, Move(do=Do.DWELL, hold_s=1.0))))
+    path, told = next(plan_faults(plan(move, Move(do=MoveKind.DWELL, hold_s=1.0))))
     assert path == ("parts", 0, "moves", 0, *((key,) if key else ()))
     assert sentence in told
 
 
 def test_an_empty_plan_and_an_endless_one_are_refused() -> None:
     assert [path for path, _ in plan_faults(ExperimentPlan(name="x", parts=()))] == [("parts",)]
-    endless = plan(Move(do=Do.REVERSALS, size_share=0.1, times=1000, hold_s=3600.0))
+    endless = plan(Move(do=MoveKind.REVERSALS, size_share=0.1, times=1000, hold_s=3600.0))
     assert "allowed up to 7200 s" in next(plan_faults(endless))[1]
 
 

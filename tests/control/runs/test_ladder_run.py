@@ -9,16 +9,16 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.control import ControlSettings
 from gateway.control.runs.ladder_run import GUESSED_DWELL_S, MOST_DWELL_S, LadderRow, LadderRun
-from gateway.control.runs.ladder_stairs import QUICK, RunPlan, highest_voltage_v, stairs_of
+from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan, highest_voltage_v, stairs_of
 from gateway.control.sample_conditioning import Reading
 from gateway.registers.words import CalibrationPhase, ControlBit, State
 from tests.control.bench import Bench, bsfm, settings
 
-SHORT = RunPlan(step_v=2.0, groups=2, minor_points=13, response_steps=3)
+SHORT = CalibrationPlan(step_v=2.0, groups=2, minor_points=13, response_steps=3)
 LONG_S = 120.0
 
 
-def begun(bench: Bench, plan: RunPlan = SHORT) -> Bench:
+def begun(bench: Bench, plan: CalibrationPlan = SHORT) -> Bench:
     bench.run(0.5)
     bench.controller.calibrating.ask(plan)
     bench.run(0.05)
@@ -37,7 +37,7 @@ def finished(bench: Bench) -> Bench:
     return bench
 
 
-def rows_of(bench: Bench, plan: RunPlan) -> list[LadderRow]:
+def rows_of(bench: Bench, plan: CalibrationPlan) -> list[LadderRow]:
     begun(bench, plan)
     rows: list[LadderRow] = []
     while bench.controller.calibrating.running:
@@ -264,21 +264,21 @@ def test_the_top_stays_below_the_over_force_trip() -> None:
     top_v = highest_voltage_v(limits, model)
     assert model.force_n(top_v, -1.0) <= 0.93 * limits.over_force_n + 0.5
     with pytest.raises(ValueError, match=r"over-force trips at 45 N"):
-        stairs_of(RunPlan(v_max_v=8.0), replace(limits, over_force_n=45.0), model)
+        stairs_of(CalibrationPlan(v_max_v=8.0), replace(limits, over_force_n=45.0), model)
 
 
 @pytest.mark.parametrize(
     ("plan", "words"),
     [
-        (RunPlan(step_v=0.0), "step = 0 V, allowed"),
-        (RunPlan(step_v=float("nan")), "step = nan V"),
-        (RunPlan(v_max_v=12.0), "allowed up to 9 V"),
-        (RunPlan(groups=0), "groups = 0"),
-        (RunPlan(minor_points=-1), "minor_points = -1"),
-        (RunPlan(step_v=0.01, groups=50), "at most 20000"),
+        (CalibrationPlan(step_v=0.0), "step = 0 V, allowed"),
+        (CalibrationPlan(step_v=float("nan")), "step = nan V"),
+        (CalibrationPlan(v_max_v=12.0), "allowed up to 9 V"),
+        (CalibrationPlan(groups=0), "groups = 0"),
+        (CalibrationPlan(minor_points=-1), "minor_points = -1"),
+        (CalibrationPlan(step_v=0.01, groups=50), "at most 20000"),
     ],
 )
-def test_a_plan_that_the_rig_does_not_allow_is_refused_in_words(plan: RunPlan, words: str) -> None:
+def test_a_plan_that_the_rig_does_not_allow_is_refused_in_words(plan: CalibrationPlan, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         stairs_of(plan, settings().limits, bsfm())
 
@@ -286,7 +286,7 @@ def test_a_plan_that_the_rig_does_not_allow_is_refused_in_words(plan: RunPlan, w
 def test_the_minor_walk_never_spans_the_loop_and_has_the_points_asked_for() -> None:
     stairs = [
         s
-        for s in stairs_of(RunPlan(response_steps=0), settings().limits, bsfm())
+        for s in stairs_of(CalibrationPlan(response_steps=0), settings().limits, bsfm())
         if s.phase is CalibrationPhase.MINOR_LOOPS
     ]
     assert len(stairs) == pytest.approx(150, abs=5)
@@ -306,4 +306,4 @@ def test_beyond_the_calibrations_own_range_the_force_is_expected_to_go_on_rising
     limits = replace(settings().limits, over_force_n=60.0)
     assert bsfm().voltage_range_v[1] == 8.0
     with pytest.raises(ValueError, match="makes 63 N"):
-        stairs_of(RunPlan(v_max_v=8.9), limits, bsfm())
+        stairs_of(CalibrationPlan(v_max_v=8.9), limits, bsfm())

@@ -9,9 +9,9 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.control import Supervision
 from gateway.control.sample_conditioning import Reading
-from gateway.control.supervision.plausibility import ModelResponse
-from gateway.control.supervision.repeated_readings import CellNoise, power
-from gateway.control.supervision.stuck_sensor import FrozenWatch
+from gateway.control.supervision.plausibility import ExpectedForce
+from gateway.control.supervision.repeated_readings import RepeatedReadings, power
+from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 from gateway.registers.words import State
 from tests.control.bench import Bench, bsfm, has_fault
 
@@ -47,8 +47,8 @@ class Watched:
     """A watch of its own under a force that does not change."""
 
     def __init__(self, **supervision: object) -> None:
-        self.watch = FrozenWatch(Supervision(**supervision))  # type: ignore[arg-type]
-        self._response = ModelResponse(bsfm(), 0.1, 0.0)
+        self.watch = StuckSensorCheck(Supervision(**supervision))  # type: ignore[arg-type]
+        self._response = ExpectedForce(bsfm(), 0.1, 0.0)
 
     def after(self, cell: Cell, seconds: float, touching: bool = True) -> float:
         """Seconds until the cell is called frozen, inf where it is not."""
@@ -109,7 +109,7 @@ def test_less_than_one_false_alarm_in_10_000_hours(rate_hz: float, budget: int) 
     """The limits are learned from a seeded cell; how often normal noise reaches them, at its worst place, is exact."""
     alarms = 0.0
     for counts in COUNTS:
-        noise, cell = CellNoise(), Cell(counts, seed=round(100 * counts), rate_hz=rate_hz)
+        noise, cell = RepeatedReadings(), Cell(counts, seed=round(100 * counts), rate_hz=rate_hz)
         for _ in range(round(40 * budget) * 100):
             noise.observe(cell.value_n(), 1.0 / rate_hz, True)
         stays = within(-0.5, 0.5, counts)

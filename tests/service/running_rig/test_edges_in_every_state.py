@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.registers.words import CalibrationPhase, State
 from tests.control.bench import settings
 from tests.service.running_rig.simulated_rig import (
@@ -37,7 +37,7 @@ def rack(leased: bool) -> Rack:
 
 def local(leased: bool) -> Rack:
     begun = rack(leased)
-    begun.controller.calibrating.ask(RunPlan())
+    begun.controller.calibrating.ask(CalibrationPlan())
     return begun.until(State.CALIBRATING).run(2.5)
 
 

@@ -10,8 +10,8 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
-from gateway.control.runs.experiment_plan import Do, ExperimentPlan, Move, Part
-from gateway.control.runs.ladder_stairs import RunPlan
+from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles import load_calibration
 from gateway.registers.refusal import Refusal
 from gateway.registers.words import CalibrationPhase, State
@@ -30,7 +30,7 @@ from tests.service.running_rig.simulated_rig import (
 
 LEASE_S = 0.35
 RAMP_N_PER_S = 40.0
-SHORT = RunPlan(step_v=0.5, groups=1, minor_points=12)
+SHORT = CalibrationPlan(step_v=0.5, groups=1, minor_points=12)
 
 
 def leased() -> Rack:
@@ -42,7 +42,7 @@ def with_ramp(force_ramp_n_per_s: float = RAMP_N_PER_S) -> Rack:
     return Rack(replace(control, defaults=replace(control.defaults, force_ramp_n_per_s=force_ramp_n_per_s)))
 
 
-def locally(rack: Rack, plan: RunPlan | ExperimentPlan = SHORT) -> Rack:
+def locally(rack: Rack, plan: CalibrationPlan | ExperimentPlan = SHORT) -> Rack:
     rack.controller.calibrating.ask(plan)
     return rack.until(State.CALIBRATING)
 
@@ -200,7 +200,7 @@ def test_a_ladder_never_measures_more_than_the_rig_allows_and_goes_on_below(gain
 
 @pytest.mark.parametrize("check", [True, False])
 def test_an_experiment_ends_where_it_would_pass_the_rigs_force(check: bool) -> None:
-    climbs = Move(do=Do.RAMP, to_share=1.0, over_s=8.0, hold_s=5.0)
+    climbs = Move(do=MoveKind.RAMP, to_share=1.0, over_s=8.0, hold_s=5.0)
     plan = ExperimentPlan(name="up", check=check, parts=(Part(name="up", moves=(climbs,)),))
     rack = locally(Rack(with_limits(settings(), force_max_n=40.0), gain_n_per_v=10.0), plan)
     rack.until(State.OFF, 30.0)
