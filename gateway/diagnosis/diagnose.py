@@ -17,16 +17,17 @@ from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
 from gateway.diagnosis.input_checks import Suspect, suspects
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.noise import Whitener, fast_noise_n, white
+from gateway.diagnosis.noise import Whitener, fast_noise_n, timing_weights, white
 from gateway.diagnosis.notes import blind, nothing_to_switch_off, strange_area
 from gateway.diagnosis.residual_tests import screen
 from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdict
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
-from gateway.diagnosis.search.bench import MOTIONS, Bench
+from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.direct_evidence import Direct, coarse, repeats, spikes
 from gateway.diagnosis.search.initial_friction import felt
 from gateway.diagnosis.search.levenberg_marquardt import Fitted
 from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.recording_drive import MOTIONS
 from gateway.diagnosis.search.search import search
 from gateway.diagnosis.verdict import judged
 from gateway.twin.plant import Plant, with_value
@@ -74,13 +75,13 @@ def diagnose(
     bench, base, found_direct = _direct(bench, base, whiten, max(options.quantum_n, given.cell.quantum_n))
     if options.late_s > 0.0 or any(each.even_s for each in measurements):
         simulated_n = bench.simulate([base.point])[0]
-        bench.doubt_times(
-            simulated_n, _chance_s(measurements, options.late_s), fast_noise_n(base.residual_n[bench.judged])
-        )
+        noise_n = fast_noise_n(base.residual_n[bench.judged])
+        chance_s = _chance_s(measurements, options.late_s)
+        whiten = replace(whiten, weights=timing_weights(bench, simulated_n, chance_s, noise_n))
         base = refit(bench, base, whiten)
     effects = _competitors(base.free, hidden, options.late_s)
     found = search(bench, base, effects, whiten, account)
-    left = screen(bench, found.fitted, found.whiten, [each.leftover for each in found.nameless])
+    left = screen(found.bench, found.fitted, found.whiten, [each.leftover for each in found.nameless])
     account("screen")
     result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
     account("judgement")
@@ -110,7 +111,7 @@ def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
 
 def _unjudged(measurements: Sequence[Measurement], given: Plant, suspected: tuple[Suspect, ...]) -> Diagnosis:
     """The answer where columns are wrong: what stands in them, and no cause."""
-    bench = Bench(measurements)
+    bench = bench_of(measurements)
     simulated_n = bench.simulate([Point(_prepared(given, frozenset()), tuple(0.0 for _ in measurements))])[0]
     rms_n = float(np.std((bench.measured_n - simulated_n)[bench.judged]))
     floor_n = min(fast_noise_n(bench.measured_n[bench.judged]), rms_n)
@@ -181,7 +182,7 @@ def _based(
     motions = MOTIONS if measured else MOTIONS[:1]
     tries = []
     for motion in motions:
-        bench = Bench(measurements, motion)
+        bench = bench_of(measurements, motion)
         whiten = white(bench, bench.measured_n)
         free = base_parameters(bench, hidden - {"coulomb-friction"}, late_s)  # friction tells which way is which
         tries.append((fit_base(bench, start, free, whiten), motion, bench, whiten))
@@ -189,7 +190,8 @@ def _based(
     free = base_parameters(bench, hidden, late_s)
     if free != fitted.free[: len(free)] or hidden - {"coulomb-friction"} != hidden:
         fitted = fit_base(bench, start, free, whiten)
-    return bench, felt(bench, fitted, whiten), whiten
+    bench, fitted = felt(bench, fitted, whiten)
+    return bench, fitted, whiten
 
 
 def _direct(
@@ -202,7 +204,7 @@ def _direct(
     for direct in (spikes(bench, base.residual_n, quantum_n), None if lattice else repeats(bench, base.residual_n)):
         if direct is not None:
             found.append(direct)
-            bench.leave_out(direct.rows)
+            bench = bench.without_rows(direct.rows)
             base = refit(bench, base, whiten)
     return bench, base, tuple(found)
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.bench import Bench, Segment
 
 _LEAST_LEFT: Final = 0.15
 _BINS: Final = 64
@@ -34,38 +34,59 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Whitener:
-    """One noise per segment of a bench."""
+    """How residuals are weighted: one noise per segment of a bench, and a weight (rows,) for each row.
 
-    bench: Bench
+    A row weighs less where its own time is in doubt while the force moves; 1 where its time is known.
+    """
+
+    segments: tuple[Segment, ...]
     noises: tuple[Noise, ...]
+    weights: Floats
 
     def __call__(self, vectors: Floats) -> Floats:
         """Whitened vectors (..., rows)."""
         white = np.empty_like(vectors)
-        for segment, noise in zip(self.bench.segments, self.noises, strict=True):
-            part = vectors[..., segment.rows] * self.bench.weights[segment.rows]
+        for segment, noise in zip(self.segments, self.noises, strict=True):
+            part = vectors[..., segment.rows] * self.weights[segment.rows]
             white[..., segment.rows] = np.fft.irfft(np.fft.rfft(part) * noise.weights, part.shape[-1])
         return white
+
+    @property
+    def knows_times(self) -> bool:
+        """Are all rows taken to be read when they say?"""
+        return bool(np.all(self.weights == 1.0))
 
     @property
     def floor_n(self) -> float:
         """Standard deviation of the force's noise over all recordings, N."""
         forces = [
             (noise.total_n**2, segment.rows.stop - segment.rows.start)
-            for segment, noise in zip(self.bench.segments, self.noises, strict=True)
+            for segment, noise in zip(self.segments, self.noises, strict=True)
             if segment.is_force
         ]
         return float(np.sqrt(sum(power * rows for power, rows in forces) / sum(rows for _, rows in forces)))
 
 
-def white(bench: Bench, residual_n: Floats) -> Whitener:
-    """A first guess, before anything is known: each segment white, with the size of its fastest part."""
+def white(bench: Bench, residual_n: Floats, weights: Floats | None = None) -> Whitener:
+    """Return a first guess, before anything is known: each segment white, with the size of its fastest part.
+
+    weights: of the rows; None: all alike.
+    """
     noises = []
     for segment in bench.segments:
         sigma = fast_noise_n(residual_n[segment.rows][bench.usable[segment.rows]])
         lines = (segment.rows.stop - segment.rows.start) // 2 + 1
         noises.append(Noise(sigma, sigma, np.full(lines, 1.0 / sigma)))
-    return Whitener(bench, tuple(noises))
+    return Whitener(bench.segments, tuple(noises), np.ones(bench.rows) if weights is None else weights)
+
+
+def timing_weights(bench: Bench, simulated_n: Floats, late_s: float, noise_n: float) -> Floats:
+    """Return weights (rows,) of readings that come early or late by chance, by `late_s` (standard deviation).
+
+    While the force moves they say less. noise_n: standard deviation of a reading at rest.
+    """
+    slope = bench.slope_n_per_s(simulated_n)
+    return np.asarray(1.0 / np.sqrt(1.0 + (slope * late_s / noise_n) ** 2))
 
 
 def fast_noise_n(values: Floats) -> float:
@@ -76,18 +97,18 @@ def fast_noise_n(values: Floats) -> float:
     return float(max(spread, 1.0e-3 * float(np.std(values)), 1.0e-9))
 
 
-def coloured(bench: Bench, remainder_n: Floats, basis: Floats) -> Whitener:
-    """Noise of what is left after the orthonormal columns `basis` (k, rows) were fitted.
+def coloured(bench: Bench, remainder_n: Floats, basis: Floats, weights: Floats) -> Whitener:
+    """Return the noise of what is left after the orthonormal columns `basis` (k, rows) were fitted; weights of the rows.
 
     They took most at the slow end, where trends and steps live: each line of the periodogram is divided by the share
     that they left there, or the noise would look too small just where false causes are likeliest.
     """
     noises = []
     for segment in bench.segments:
-        part, usable = remainder_n[segment.rows] * bench.weights[segment.rows], bench.usable[segment.rows]
+        part, usable = remainder_n[segment.rows] * weights[segment.rows], bench.usable[segment.rows]
         taken = np.sum(np.abs(np.fft.rfft(basis[:, segment.rows])) ** 2, axis=0) / part.size
         noises.append(_fit(part, np.clip(1.0 - taken, _LEAST_LEFT, 1.0) * max(float(np.mean(usable)), 0.05)))
-    return Whitener(bench, tuple(noises))
+    return Whitener(bench.segments, tuple(noises), weights)
 
 
 def _fit(part: Floats, left: Floats) -> Noise:

@@ -96,14 +96,15 @@ def screen(bench: Bench, fitted: Fitted, whiten: Whitener, given: Sequence[Lefto
         leftovers.append(answer.leftover)
         taken = np.vstack([fitted.jacobian, bench.reduced(answer.question.columns)])
         fitted = Fitted(fitted.point, fitted.free, fitted.residual_n, fitted.chi2, taken)
-    return (*leftovers, *_unsteady(bench, whiten(fitted.residual_n)))
+    return (*leftovers, *_unsteady(bench, fitted, whiten))
 
 
-def _unsteady(bench: Bench, white: Floats) -> Iterator[Leftover]:
+def _unsteady(bench: Bench, fitted: Fitted, whiten: Whitener) -> Iterator[Leftover]:
     """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
-    times_are_sure = bool(np.all(bench.weights == 1.0)) and all(map(_evenly_sampled, bench.measurements))
+    white = whiten(fitted.residual_n)
+    times_are_sure = whiten.knows_times and all(map(_evenly_sampled, bench.measurements))
     for segment in bench.segments:
         if segment.is_force:
             part = white[segment.rows]

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +10,9 @@ import pytest
 
 from gateway.catalogue.sensing import DRIFT, ZERO_PER_K
 from gateway.diagnosis import BY_NAME, Diagnosis, Measurement, Options, diagnose
-from gateway.diagnosis.noise import coloured, white
+from gateway.diagnosis.noise import coloured, timing_weights, white
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
-from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
 from gateway.diagnosis.search.normal_equations import Normal, held_out
 from gateway.diagnosis.search.parameters import Point
@@ -63,7 +63,7 @@ def short(constant_n: float = 0.0, columns: tuple[str, ...] = (), *, seed: int =
 
 def linear_problem(rng: np.random.Generator) -> tuple[Bench, Fitted]:
     """A bench with a model of three columns at its optimum, where a search always asks."""
-    bench = Bench([short()])
+    bench = bench_of([short()])
     jacobian = bench.reduced(rng.normal(size=(3, bench.rows)) * np.array([[1.0e-3], [1.0], [1.0e4]]))
     residual = bench.reduced(rng.normal(size=bench.rows))
     residual -= jacobian.T @ np.linalg.lstsq(jacobian.T, residual, rcond=None)[0]
@@ -89,7 +89,7 @@ def test_held_out_is_leaving_out_and_fitting_again() -> None:
 def quiet_bench(rows: int = 12000) -> Bench:
     """A minute without anything, for noise alone."""
     time_s = np.arange(rows) / 200.0
-    return Bench([measurement(time_s, np.zeros(rows), np.zeros(rows) + 1.0e-3 * np.arange(rows), {})])
+    return bench_of([measurement(time_s, np.zeros(rows), np.zeros(rows) + 1.0e-3 * np.arange(rows), {})])
 
 
 def coloured_noise(rng: np.random.Generator, rows: int) -> tuple[Floats, Floats]:
@@ -105,7 +105,7 @@ def test_a_known_spectrum_is_recovered_and_whitened(seed: int) -> None:
     """White level, total and the whole curve within 20 % in amplitude; whitened, every part of the band has variance 1."""
     bench = quiet_bench()
     noise_n, level = coloured_noise(np.random.default_rng(seed), bench.rows)
-    whiten = coloured(bench, noise_n, np.empty((0, bench.rows)))
+    whiten = coloured(bench, noise_n, np.empty((0, bench.rows)), np.ones(bench.rows))
     found = whiten.noises[0]
     assert found.white_n == pytest.approx(0.1, rel=0.2)
     assert whiten.floor_n == pytest.approx(float(np.std(noise_n)), rel=0.2)
@@ -120,7 +120,7 @@ def test_a_known_spectrum_is_recovered_and_whitened(seed: int) -> None:
 def test_white_noise_stays_white_under_its_whitening() -> None:
     bench = quiet_bench()
     noise_n = np.random.default_rng(7).normal(0.0, 0.3, bench.rows)
-    whiten = coloured(bench, noise_n, np.empty((0, bench.rows)))
+    whiten = coloured(bench, noise_n, np.empty((0, bench.rows)), np.ones(bench.rows))
     assert whiten.noises[0].white_n == pytest.approx(0.3, rel=0.05)
     assert whiten.noises[0].total_n == pytest.approx(0.3, rel=0.05)
     np.testing.assert_allclose(whiten(noise_n), noise_n / 0.3, atol=0.5)
@@ -133,7 +133,7 @@ def test_a_linear_problem_is_solved_in_one_wave() -> None:
     machine = plant({"cell.drift_n_per_s": 0.05, "cell.zero_n_per_k": -0.3})
     volts = command_v(time_s)
     force_n = readings_n(machine, time_s, volts, columns) + np.random.default_rng(8).normal(0.0, 0.1, time_s.size)
-    bench = Bench([measurement(time_s, volts, force_n, columns)])
+    bench = bench_of([measurement(time_s, volts, force_n, columns)])
     whiten = white(bench, bench.measured_n)
     start = Problem(Point(MACHINE, (0.0,)), (DRIFT, ZERO_PER_K))
     (found,) = refine(bench, [start], whiten, waves=1)
@@ -202,7 +202,7 @@ def test_a_shift_in_time_changes_nothing() -> None:
 
 def test_recordings_with_their_own_offsets_share_one_model(plain: Diagnosis) -> None:
     two = [short(), short(-7.0, seed=5)]
-    bench = Bench(two)
+    bench = bench_of(two)
     whiten = white(bench, bench.measured_n)
     base = fit_base(bench, DEFAULT_PLANT, base_parameters(bench, frozenset()), whiten)
     assert base.point.offsets_n[0] - base.point.offsets_n[1] == pytest.approx(7.0, abs=0.05)
@@ -244,3 +244,31 @@ def test_a_step_of_the_command_is_met_to_a_tenth_of_a_tooth() -> None:
     found = diagnose([recorded({"regulator.command_step_v": 0.0179}, noise_n=0.05, seed=6)])
     assert [cause.name for cause in found.causes] == ["command-quantisation"]
     assert found.causes[0].parameters["command_step_v"].value == pytest.approx(0.0179, rel=3e-4)
+
+
+def test_a_bench_is_a_value_that_no_step_of_a_search_changes() -> None:
+    """What leaves rows or columns out gives another bench; what was weighed before stays as it was."""
+    rng = np.random.default_rng(6)
+    bench, fitted = linear_problem(rng)
+    columns, rows = rng.normal(size=(2, bench.rows)), np.arange(bench.rows) == 1500
+    whiten = white(bench, fitted.residual_n)
+    before = bench.usable.copy(), bench.reduced(columns), whiten(fitted.residual_n)
+    fewer = bench.without_rows(rows).without_columns(columns)
+    np.testing.assert_array_equal(bench.usable, before[0])
+    np.testing.assert_array_equal(bench.reduced(columns), before[1])
+    np.testing.assert_array_equal(whiten(fitted.residual_n), before[2])
+    assert int(bench.judged.sum()) == int(fewer.judged.sum()) + 1
+    assert float(np.abs(fewer.reduced(columns)).max()) < 1e-9 * float(np.abs(before[1]).max())
+    with pytest.raises(FrozenInstanceError):
+        bench.usable = ~rows  # type: ignore[misc]
+
+
+def test_rows_whose_times_are_in_doubt_weigh_less_only_while_the_force_moves() -> None:
+    bench, fitted = linear_problem(np.random.default_rng(7))
+    ramp_n = np.where(bench.time_s() > 10.0, bench.time_s(), 10.0)
+    weights = timing_weights(bench, ramp_n, late_s=0.1, noise_n=0.1)
+    assert weights[100] == 1.0
+    assert weights[1500] == pytest.approx(1.0 / np.sqrt(2.0))
+    whiten = white(bench, fitted.residual_n, weights)
+    assert not whiten.knows_times
+    assert white(bench, fitted.residual_n).knows_times

@@ -66,7 +66,7 @@ def _simulated(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Fl
     and not of the tool along the workpiece: as in a diagnosis, the way that fits best is taken."""
     import numpy as np
 
-    from gateway.diagnosis.search.bench import MOTIONS, drive_of
+    from gateway.diagnosis.search.recording_drive import MOTIONS, drive_of
     from gateway.twin.replay.drive import Motion
     from gateway.twin.replay.replay import Replay
 

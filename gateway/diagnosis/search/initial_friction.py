@@ -16,9 +16,10 @@ import numpy as np
 from gateway.catalogue.effect import Parameter
 from gateway.diagnosis.measurement import Flags, Floats
 from gateway.diagnosis.noise import Whitener, white
-from gateway.diagnosis.search.bench import Bench, begins_at_rest
+from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
 from gateway.diagnosis.search.parameters import Point, StrainOf
+from gateway.diagnosis.search.recording_drive import begins_at_rest
 from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import Strains
 
@@ -77,18 +78,18 @@ def _costs(bench: Bench, residual: Floats) -> list[float]:
     return costs
 
 
-def felt(bench: Bench, fitted: Fitted, whiten: Whitener) -> Fitted:
-    """The same fit without strains that its recording does not feel; marks the rows that feel them as young."""
+def felt(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[Bench, Fitted]:
+    """The same fit without strains that its recording does not feel, on a bench whose young rows are those that feel them."""
     offsets = len(fitted.point.offsets_n)
     columns = whiten(fitted.jacobian)
     kept = [
         not isinstance(parameter, StrainOf) or float(np.sum(column**2)) > _FELT
         for parameter, column in zip(fitted.free, columns[offsets:], strict=True)
     ]
-    bench.young = _young(bench, fitted, whiten)
     free = tuple(parameter for parameter, keep in zip(fitted.free, kept, strict=True) if keep)
     rows = [True] * offsets + kept
-    return replace(fitted, free=free, jacobian=fitted.jacobian[np.array(rows)])
+    young = replace(bench, young=_young(bench, fitted, whiten))
+    return young, replace(fitted, free=free, jacobian=fitted.jacobian[np.array(rows)])
 
 
 def _young(bench: Bench, fitted: Fitted, whiten: Whitener) -> Flags:

@@ -62,8 +62,10 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What the search ends with. nameless: dependences taken out; first: the contest beside the base model alone."""
+    """What the search ends with. bench: that of the search without what the nameless dependences explain; first: the contest
+    beside the base model alone."""
 
+    bench: Bench
     base: Fitted
     fitted: Fitted
     accepted: tuple[Accepted, ...]
@@ -95,7 +97,7 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
         strongest = contest.winner if saved > 0.0 else None
         if answer is not None and _stands_beside(answer, strongest, explained):
             nameless.append(answer)
-            bench.take_out(answer.question.columns)
+            bench = bench.without_columns(answer.question.columns)
             fitted = refit(bench, fitted, whiten)
         elif winner is None or saved == 0.0:
             break
@@ -112,7 +114,7 @@ def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whiten
     if len(accepted) > 1:
         fitted, accepted = _exchanged(bench, fitted, base, accepted, effects, whiten)
         clock("exchange")
-    return Found(base, fitted, tuple(accepted), tuple(nameless), whiten, first, contest)
+    return Found(bench, base, fitted, tuple(accepted), tuple(nameless), whiten, first, contest)
 
 
 def _opened(
@@ -125,12 +127,12 @@ def _opened(
     """
     scene = scene_of(bench, fitted, whiten)
     found = wave(bench, fitted, effects, scene)
-    whiten = coloured(bench, *remainder(found, fitted))
+    whiten = coloured(bench, *remainder(found, fitted), whiten.weights)
     fitted = refit(bench, fitted, whiten)
     contest = hold(bench, fitted, effects, scene, whiten)
     if contest.finalists and contest.winner.fitted.chi2 > _DISCREPANT * int(bench.usable.sum()):
         best = min((each.fitted for each in contest.finalists), key=lambda each: bench.rms_n(each.residual_n))
-        whiten = coloured(bench, best.residual_n, orthonormal(best.jacobian))
+        whiten = coloured(bench, best.residual_n, orthonormal(best.jacobian), whiten.weights)
         fitted = refit(bench, fitted, whiten, waves=5)
         contest = hold(bench, fitted, effects, scene, whiten)
     return fitted, whiten, contest

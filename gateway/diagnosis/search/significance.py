@@ -95,10 +95,9 @@ def doubt(accepted: Accepted, gain: Gain) -> str:
 def _reported(bench: Bench, found: Found) -> Reported:
     """Every model twice, whitened and plain; the kind whose extended model predicts better.
 
-    Dependences without a name count again: the reported errors are those of the simulation, and of nothing beside it.
+    Dependences without a name count here: the reported errors are those of the simulation, and of nothing beside it.
     """
-    bench.put_back()
-    plain = white(bench, found.fitted.residual_n)
+    plain = white(bench, found.fitted.residual_n, found.whiten.weights)
     models = [found.base, found.fitted, *(_without(each, found) for each in found.accepted)]
     problems = [Problem(each.point, each.free) for each in models]
     kinds = [(found.whiten, refine(bench, problems, found.whiten, waves=3)), (plain, _plainly(bench, problems, plain))]
