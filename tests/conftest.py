@@ -6,15 +6,17 @@ import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """A shell's background job inherits an ignored SIGINT, and so would every process under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    config.pluginmanager.register(GroupsStayTogether())
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -23,24 +25,99 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+BEHIND_REAL_TIME = 5
+"""Nice value of the workers that run what waits for no clock."""
+
 REAL_TIME = ("end_to_end", "ports")
 """Folders whose tests start processes or wait for real lines: one worker runs them one after the other, so that their
 bounds in seconds do not compete with each other."""
 
+SLOW = (
+    "service/closed_loop/test_study.py",
+    "service/fitting/test_interrupted_ladder.py",
+    "diagnosis/test_each_effect_is_found.py",
+    "watch/test_watch_in_virtual_time.py",
+    "paper/test_paper_report.py",
+)
+"""Files of more than ten seconds of processor: begun first, so that none is left to one worker at the end."""
 
-def pytest_itemcollected(item: pytest.Item) -> None:
-    """Here and not with the whole list: the workers read the groups before a conftest may change that."""
-    folder = item.path.relative_to(item.config.rootpath / "tests").parts[0]
-    item.add_marker(pytest.mark.xdist_group("real time" if folder in REAL_TIME else item.path.stem))
+SPREAD = "hidden_effects/test_hidden_effects.py::test_a_recording_gets_an_answer["
+"""Two minutes of processor, of which all workers take their share: each of these tests is a group of its own."""
+
+
+def group_of(nodeid: str) -> str:
+    """What one worker runs in one piece: a file, whose fixtures are then made once, or everything in real time."""
+    name = nodeid.removeprefix("tests/")
+    if name.startswith(SPREAD):
+        return name
+    path = name.partition("::")[0]
+    return "real time" if path.partition("/")[0] in REAL_TIME else path
+
+
+def begun_at(nodeid: str) -> int:
+    """Rank of a test's group among the workers' work: real time takes longest and waits most, then what is slow."""
+    order = ("real time", SPREAD, *SLOW)
+    group = SPREAD if nodeid.removeprefix("tests/").startswith(SPREAD) else group_of(nodeid)
+    return order.index(group) if group in order else len(order)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Our own groups: xdist 3.8 passes its `xdist_group` through a field that pytest 9.2 no longer has, and in silence
+    groups nothing (pytest-xdist issue 1386)."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByGroup(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return group_of(nodeid)
+
+    config.option.loadscopereorder = False  # not by the number of tests: our order
+    return ByGroup(config, log)
+
+
+class GroupsStayTogether:
+    """Fails a run in which a group was spread over workers: everything would pass, only slower and less surely."""
+
+    def __init__(self) -> None:
+        self.workers: dict[str, set[str]] = {}
+        self.lost_one = False
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if worker := getattr(report, "worker_id", None):
+            self.workers.setdefault(group_of(report.nodeid), set()).add(worker)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, error: object) -> None:
+        self.lost_one |= bool(error)  # its work went to another one
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        spread = [] if self.lost_one else [group for group, workers in self.workers.items() if len(workers) > 1]
+        if spread:
+            raise pytest.UsageError(f"not kept on one worker: {spread[:5]}")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: begun_at(item.nodeid))  # stable: within a group nothing moves
     if config.getoption("--long"):
         return
     skip = pytest.mark.skip(reason="needs the bigger budget: ./tools/test --long")
     for item in items:
         if "long" in item.keywords:
             item.add_marker(skip)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Workers of pure tests step back behind the one that is held to seconds."""
+    if hasattr(item.config, "workerinput") and group_of(item.nodeid) != "real time":
+        os.setpriority(os.PRIO_PROCESS, 0, max(BEHIND_REAL_TIME, os.getpriority(os.PRIO_PROCESS, 0)))
+
+
+@pytest.fixture(scope="session")
+def run_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all workers of this run share, and no other run: for what is worth making once (with a lock)."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if hasattr(request.config, "workerinput") else own
 
 
 @pytest.fixture

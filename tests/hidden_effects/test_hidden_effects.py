@@ -2,9 +2,11 @@
 
 The push gate asks nineteen, drawn from a printed seed (another: HIDDEN_EFFECTS_SEED); --long asks for every effect twenty
 times, 300 nulls, and twos and threes, and leaves its lines in HIDDEN_EFFECTS_RESULTS (else beside the test's own files).
-Both run `tools/hidden_effects`, as anybody can. The bars of a sample are wider than those of DIAGNOSIS, which --long holds.
+Anybody gets the same answers from `tools/hidden_effects --gate`. The bars of a sample are wider than those of DIAGNOSIS, which
+--long holds.
 """
 
+import fcntl
 import json
 import os
 import subprocess
@@ -14,7 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from judge.cases import Plan, cases, gate_sample
 from judge.engine import missing
+from judge.running import run_one
 from judge.table import HIDDEN, lied, table, with_failure
 
 TOOL = Path(__file__).parents[2] / "tools" / "hidden_effects"
@@ -39,13 +43,50 @@ def share(rows: Sequence[Row], kinds: Sequence[str], hit: Callable[[Row], bool])
     return sum(map(hit, asked)) / len(asked)
 
 
+def answer(number: int, folder: Path, wait: bool = True) -> Row | None:
+    """Row of the sample's recording, diagnosed once in a run whichever worker asks first.
+
+    None where another worker is at it and nobody wants to wait. A worker that dies at it lets go of the lock.
+    """
+    row = folder / f"{number}.json"
+    with (folder / f"{number}.lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return None
+        if not row.exists():
+            found = run_one(gate_sample(int(SEED))[number], "python")
+            row.with_suffix(".part").write_text(json.dumps(found), encoding="utf-8")
+            row.with_suffix(".part").rename(row)
+        return dict(json.loads(row.read_text(encoding="utf-8")))
+
+
 @pytest.fixture(scope="module")
-def sample(tmp_path_factory: pytest.TempPathFactory) -> list[Row]:
-    return run(tmp_path_factory.mktemp("hidden") / "gate.jsonl", "--gate")
+def answers(run_folder: Path) -> Path:
+    folder = run_folder / "hidden"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sample(answers: Path) -> list[Row]:
+    """All of it: first what nobody has begun, then what others end."""
+    numbers = range(len(gate_sample(int(SEED))))
+    for number in numbers:
+        answer(number, answers, wait=False)
+    return [row for number in numbers if (row := answer(number, answers))]
+
+
+@pytest.mark.parametrize("number", range(19))
+def test_a_recording_gets_an_answer(number: int, answers: Path) -> None:
+    """Each for itself, so that all workers are at the sample."""
+    row = answer(number, answers)
+    print(f"seed {SEED}: {row}")
+    assert row is not None and "failed" not in row
 
 
 def test_every_recording_gets_an_answer_in_time(sample: list[Row]) -> None:
-    assert [row for row in sample if "failed" in row] == []
+    assert len(sample) == 19 and [row for row in sample if "failed" in row] == []
     assert sum(row.get("processor_s", 0.0) for row in sample) / 2.0 < GATE_BOUND_S
 
 
@@ -64,6 +105,15 @@ def test_nothing_is_found_in_nothing(sample: list[Row]) -> None:
 def test_a_cause_outside_the_catalogue_is_described_and_not_confirmed(sample: list[Row]) -> None:
     assert share(sample, ["outside"], lied) == 0.0, table(sample)
     assert share(sample, ["outside"], lambda row: row["described"]) >= 0.5, table(sample)
+
+
+def test_the_tool_with_two_processes_writes_the_rows_of_one(tmp_path: Path) -> None:
+    """With an engine that says nothing, so that only the harness is asked."""
+    words = ("--engine", "silent", "--effects", "linear-drift,null,offset-step", "--sizes", "1", "--table")
+    timeless = [{k: v for k, v in row.items() if not k.endswith("_s")} for row in run(tmp_path / "rows.jsonl", *words)]
+    asked = cases(Plan(("linear-drift", "null", "offset-step"), first_seed=int(SEED), sizes=(1.0,)))
+    expected = [{k: v for k, v in run_one(case, "silent").items() if not k.endswith("_s")} for case in asked]
+    assert sorted(timeless, key=str) == sorted(json.loads(json.dumps(expected)), key=str)
 
 
 @pytest.mark.long
