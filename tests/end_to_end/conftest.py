@@ -50,11 +50,11 @@ class RunningGateway:
                 return status
             assert time.monotonic() < deadline_s, f"not within {within_s} s: {status}"
 
-    def said(self, words: str, within_s: float = 2.0) -> str:
-        """The line on the gateway's stderr that holds these words."""
+    def said(self, words: str, within_s: float = 2.0, *, after: int = 0) -> str:
+        """The last line on the gateway's stderr that holds these words; after: that many lines are of earlier."""
         deadline_s = time.monotonic() + within_s
         while True:
-            lines = [line for line in self.log.read_text().splitlines() if words in line]
+            lines = [line for line in self.log.read_text().splitlines()[after:] if words in line]
             if lines:
                 return lines[-1]
             assert time.monotonic() < deadline_s, f"{words!r} was not said: {self.log.read_text()}"

@@ -30,14 +30,14 @@ SWAPPED = float_words(12.0)[::-1]
     ],
 )
 def test_a_refusal_is_an_exception_a_register_and_a_sentence(rested, address, words, code, label, said):
-    before = rested.words(0, 13)
+    before, earlier = rested.words(0, 13), len(rested.log.read_text().splitlines())
     write = rested.client.write_register if len(words) == 1 else rested.client.write_registers
     refused = write(address, words[0] if len(words) == 1 else words, device_id=1)
     assert refused.isError()
     assert refused.exception_code == code
     assert rested.words(0, 13) == before, "a refused frame leaves no trace"
     assert rested.words(118, 1) == [address]
-    sentence = rested.said(label)
+    sentence = rested.said(label, after=earlier)
     for part in said:
         assert part.lower() in sentence.lower(), sentence
     assert "127.0.0.1" in sentence, "who it was"
