@@ -11,7 +11,7 @@ from gateway.bsfm.coefficients import CoefficientFault, CoefficientLimits, Coeff
 from gateway.bsfm.curve import ORDER_MAX, RationalBezier
 from gateway.bsfm.inverse import InverseStatus
 from gateway.bsfm.model import Bsfm, Calibration, Response
-from gateway.bsfm.slip.reversal import FALLING, RISING, DeadBand, Direction, LinearBlend, Memory, Reversal
+from gateway.bsfm.slip.reversal import FALLING, RISING, LinearBlend, Memory, Reversal
 from gateway.bsfm.slip.slip_stops import SlipStops
 from gateway.bsfm.validate import validate, validate_coefficients
 
@@ -27,8 +27,6 @@ __all__ = [
     "CoefficientReason",
     "Coefficients",
     "Crossing",
-    "DeadBand",
-    "Direction",
     "InverseStatus",
     "LinearBlend",
     "Memory",

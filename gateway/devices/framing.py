@@ -27,11 +27,6 @@ class LineSplitter:
         self._buffer = b""
         self._is_skipping = False
 
-    @property
-    def pending(self) -> int:
-        """Bytes of an unfinished line."""
-        return len(self._buffer)
-
     def forget(self) -> int:
         """Drop the unfinished line; how many bytes that was."""
         dropped, self._buffer, self._is_skipping = len(self._buffer), b"", False

@@ -8,7 +8,6 @@ from struct import Struct
 from typing import Final, NamedTuple
 
 HEADER: Final = Struct(">HHHB")  # transaction, protocol, length of what follows it, unit
-LONGEST_FRAME: Final = 6 + 254
 _SHORTEST_LENGTH: Final = 2  # unit and function
 _LONGEST_LENGTH: Final = 254  # unit and a PDU of 253
 

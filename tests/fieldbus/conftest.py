@@ -13,7 +13,7 @@ from gateway.fieldbus.connection import Connection, Shared
 from gateway.fieldbus.limits import LogGate
 from gateway.fieldbus.peers import Peers
 from gateway.modbus import Peer
-from gateway.modbus.memory import MemoryBank
+from tests.modbus.memory_bank import MemoryBank
 
 
 class HandClock:

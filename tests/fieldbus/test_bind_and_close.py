@@ -9,8 +9,8 @@ import pytest
 
 from gateway.fieldbus import BindError, ModbusTcpServer, ServerSettings
 from gateway.modbus import pdu
-from gateway.modbus.memory import MemoryBank
 from tests.fieldbus.by_hand import READ, READ_ANSWER, end_of, exchange, framed
+from tests.modbus.memory_bank import MemoryBank
 
 
 def test_closing_leaves_nothing_behind_and_frees_the_port(run: Any, serve: Any) -> None:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from gateway.fieldbus.connection import BUFFER_BYTES
 from gateway.modbus import Adu, RequestFault, answer, pdu
 from gateway.modbus.mbap import encode
-from gateway.modbus.memory import MemoryBank
 from tests.fieldbus.by_hand import READ, framed
+from tests.modbus.memory_bank import MemoryBank
 
 FAR = "192.0.2.7"
 

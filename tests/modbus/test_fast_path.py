@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from gateway.modbus import Adu, FramingLost, MbapFramer, Peer, answer
 from gateway.modbus.fast import whole_answer, whole_read_answer
 from gateway.modbus.mbap import encode
-from gateway.modbus.memory import MemoryBank
+from tests.modbus.memory_bank import MemoryBank
 
 PEER = Peer("127.0.0.1", 4711)
 UNITS = frozenset((0, 1, 255))

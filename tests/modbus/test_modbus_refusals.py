@@ -4,10 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.modbus import AnswerMismatch, ModbusError, Peer, RequestError, RequestFault, answer, answer_data
+from gateway.modbus import ModbusError, Peer, RequestError, RequestFault, answer
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.memory import MemoryBank
 from gateway.modbus.server import refuse_unit
+from tests.modbus.host_answers import AnswerMismatch, answer_data
+from tests.modbus.memory_bank import MemoryBank
 
 PEER = Peer("127.0.0.1", 4711)
 FORBIDDEN_WORD = bytes.fromhex("dead")

@@ -6,7 +6,7 @@ from itertools import pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gateway.bsfm import Branches, Bsfm, DeadBand, Direction, LinearBlend, RationalBezier
+from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 
 MANY = settings(derandomize=True, deadline=None, max_examples=200)
 RISING = RationalBezier(0.0, 5.0, (0.0, 14.0, 38.0), (1.0, 0.9, 1.2))
@@ -75,23 +75,3 @@ def test_blended_voltage_lies_between_the_branches(force, state):
 def test_on_a_branch_force_and_voltage_invert_each_other(force, state):
     voltage, _ = MODEL.voltage_v(force, state)
     assert math.isclose(MODEL.force_n(voltage, state), force, abs_tol=1e-12)
-
-
-@MANY
-@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=40), st.floats(0.0, 10.0))
-def test_held_force_is_never_further_away_than_half_the_dead_band(path, width):
-    held, band = path[0], DeadBand(width)
-    for force in path:
-        held = band.advance(held, force)
-        assert abs(held - force) <= width / 2 * (1 + 1e-12) + 1e-9
-        assert width > 0.0 or held == force
-
-
-@MANY
-@given(st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=60), st.sampled_from([1, -1]))
-def test_noise_within_the_dead_band_never_turns_the_direction(noise, sign):
-    direction, band = Direction(sign, 20.0), DeadBand(2.0)
-    direction = direction.advance(20.0 + 1.5 * sign, band)  # the last movement, of noise 0
-    for each in noise:
-        direction = direction.advance(20.0 + 1.5 * sign + each, band)
-        assert direction.sign == sign

@@ -26,6 +26,7 @@ from time import monotonic
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+sys.path[:0] = [str(ROOT)]
 GOALS = {"ours on uvloop": 0.9, "ours on asyncio": 0.75}
 CPU_GOAL = 1.2
 YARDSTICK = "libmodbus (C)"
@@ -43,7 +44,7 @@ def real_bank() -> object:
 
 async def serve_ours(bank: str) -> None:
     from gateway.fieldbus import ModbusTcpServer, ServerSettings
-    from gateway.modbus.memory import MemoryBank
+    from tests.modbus.memory_bank import MemoryBank
 
     data = real_bank() if bank == "real" else MemoryBank(2000)
     server = ModbusTcpServer(

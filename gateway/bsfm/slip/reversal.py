@@ -9,9 +9,6 @@ says the share s. LinearBlend remembers s alone, gateway.bsfm.slip.slip_stops on
 the calibration
 ladder starts, because that is where the policy's branches are true: for two branches that a ladder was fitted to, on the
 rising one.
-
-Noise is kept out before the blend by a dead band, which is a play operator on the force itself: `held` follows the
-force only when it leaves held +- width/2. Width 0 follows exactly.
 """
 
 from dataclasses import dataclass
@@ -78,40 +75,6 @@ class LinearBlend:
         if abs(delta_n) >= self.span_n:  # all the way; also keeps 2 df / span finite
             return RISING if delta_n > 0.0 else FALLING
         return _clipped(state + 2.0 * delta_n / self.span_n)
-
-
-@dataclass(frozen=True, slots=True)
-class DeadBand:
-    """width_n: noise, peak to peak, that must not turn the direction round."""
-
-    width_n: float
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.width_n) and self.width_n >= 0.0):
-            raise ValueError(f"dead band {self.width_n!r} N: 0 or more is needed")
-
-    def advance(self, held_n: float, force_n: float) -> float:
-        """What the blend may take for the force: held_n while force_n stays within half a width of it."""
-        if not (isfinite(held_n) and isfinite(force_n)):
-            raise ValueError(f"held {held_n!r} N, force {force_n!r} N: not finite")
-        if self.width_n == 0.0:
-            return force_n
-        return max(force_n - self.width_n / 2, min(force_n + self.width_n / 2, held_n))
-
-
-@dataclass(frozen=True, slots=True)
-class Direction:
-    """Which way the force last moved: sign +1 rising or -1 falling, and the held force behind the dead band."""
-
-    sign: int = 1
-    held_n: float = 0.0
-
-    def advance(self, force_n: float, dead_band: DeadBand) -> "Direction":
-        """The direction after a new force. A movement within the dead band, or none, keeps it."""
-        held_n = dead_band.advance(self.held_n, force_n)
-        if held_n == self.held_n:
-            return self
-        return Direction(1 if held_n > self.held_n else -1, held_n)
 
 
 def _clipped(state: float) -> float:

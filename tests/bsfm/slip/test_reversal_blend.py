@@ -1,10 +1,10 @@
-"""Reversals: the play operator, the dead band before it, and the two-branch model that uses them."""
+"""Reversals: the play operator, and the two-branch model that uses them."""
 
 import math
 
 import pytest
 
-from gateway.bsfm import Branches, Bsfm, Calibration, DeadBand, Direction, InverseStatus, LinearBlend, RationalBezier
+from gateway.bsfm import Branches, Bsfm, Calibration, InverseStatus, LinearBlend, RationalBezier
 
 RISING = RationalBezier(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.9, 1.2))
 FALLING = RationalBezier(0.0, 5.0, (0.5, 22.0, 38.0), (1.0, 1.1, 1.2))
@@ -39,29 +39,10 @@ def test_what_is_not_finite_is_refused_instead_of_clipped(bad):
         LinearBlend(3.0).advance(0.0, bad)
     with pytest.raises(ValueError, match="not finite"):
         LinearBlend(3.0).advance(bad, 0.0)
-    with pytest.raises(ValueError, match="not finite"):
-        DeadBand(1.0).advance(0.0, bad)
-    for kind in (LinearBlend, DeadBand):
-        with pytest.raises(ValueError, match="0 or more"):
-            kind(bad)
-        with pytest.raises(ValueError, match="0 or more"):
-            kind(-1.0)
-
-
-def test_noise_inside_the_dead_band_does_not_turn_the_direction():
-    direction, band = Direction(), DeadBand(0.2)
-    for force in (1.0, 5.0, 4.95, 5.02, 4.91, 5.0):
-        direction = direction.advance(force, band)
-    assert direction.sign == 1
-    assert direction.advance(4.7, band).sign == -1
-
-
-def test_a_dead_band_of_zero_follows_exactly():
-    direction, band = Direction(), DeadBand(0.0)
-    assert band.advance(3.0, 0.1 + 0.2) == 0.1 + 0.2
-    for force, sign in ((5.0, 1), (math.nextafter(5.0, 0.0), -1), (math.nextafter(5.0, 0.0), -1), (5.0, 1)):
-        direction = direction.advance(force, band)
-        assert (direction.sign, direction.held_n) == (sign, force)
+    with pytest.raises(ValueError, match="0 or more"):
+        LinearBlend(bad)
+    with pytest.raises(ValueError, match="0 or more"):
+        LinearBlend(-1.0)
 
 
 def test_at_the_two_ends_of_the_blend_the_model_is_one_branch(model):

@@ -1,7 +1,6 @@
 """The host's view of an answer: does it belong to the request, and what does it carry.
 
-No transaction logic here: a host that speaks RTU has one request outstanding, one that speaks TCP compares transaction
-ids itself.
+No transaction logic here: a client compares transaction ids itself.
 """
 
 from gateway.modbus.bits import unpack_bits

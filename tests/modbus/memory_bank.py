@@ -1,6 +1,6 @@
 """A bank without meaning: words and bits from address 0 on, all readable and writable.
 
-For simulated RTU devices, benches and tests; the gateway's own bank, with names, owners and limits, is in gateway.registers.
+For tests and benches; the gateway's own bank, with names, owners and limits, is in gateway.registers.
 """
 
 from collections.abc import Mapping, Sequence
