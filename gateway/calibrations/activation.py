@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 
 from gateway.bsfm import Bsfm, Calibration, CoefficientLimits, Coefficients, validate_coefficients
-from gateway.calibrations.selection import Pointer
+from gateway.calibrations.selection import SelectionState
 from gateway.calibrations.store import UNKNOWN_N, CalibrationStore, StoreError
 from gateway.registers.upload.coefficients import CoefficientSet
 from gateway.registers.upload.staging import Staged, StagedFault
@@ -17,17 +17,17 @@ from gateway.registers.words import NO_NOTICE, CommitNotice
 
 
 @dataclass(frozen=True, slots=True)
-class InUse:
+class ActiveCalibration:
     """A calibration, its model (ready, for the loop has no time to prove one), and the selection that made it active.
     notice: what a master should know of the commit that led to it."""
 
     calibration: Calibration
     model: Bsfm
-    pointer: Pointer
+    pointer: SelectionState
     notice: CommitNotice = NO_NOTICE
 
 
-class NotFit(Exception):  # noqa: N818  no failure of ours
+class UnusableCalibration(Exception):  # noqa: N818  no failure of ours
     """A calibration that this rig cannot take."""
 
     def __init__(self, fault: StagedFault) -> None:
@@ -36,7 +36,7 @@ class NotFit(Exception):  # noqa: N818  no failure of ours
 
 
 class Activation:
-    """The store as one rig may use it. Methods raise NotFit and StoreError, and nothing has changed then."""
+    """The store as one rig may use it. Methods raise UnusableCalibration and StoreError, and nothing has changed then."""
 
     def __init__(self, store: CalibrationStore, limits: CoefficientLimits) -> None:
         self.store = store
@@ -47,29 +47,29 @@ class Activation:
         fault = self._fault(calibration)
         return f"E401 calibration {calibration.number}: {fault.text}" if fault else ""
 
-    def take_offered(self, number: int, *, force: bool = False) -> InUse:
+    def take_offered(self, number: int, *, force: bool = False) -> ActiveCalibration:
         """Select a calibration that a person asks for. force: one that its fit's verdict has rejected, too."""
         rejected = self.store.load(number).rejected
         if rejected and not force:
             raise StoreError("E436", f"calibration {number} was rejected: {rejected}; --force uses it all the same")
         return self.take(number)
 
-    def take(self, number: int | None, slot: int | None = None) -> InUse:
+    def take(self, number: int | None, slot: int | None = None) -> ActiveCalibration:
         """Select a calibration that is there, None: the built-in one."""
         calibration = self.store.built_in if number is None else self.store.load(number)
         if calibration is None:
             raise StoreError("E433", "the built-in calibration of this rig is not known here")
         if (fault := self._fault(calibration)) is not None:
-            raise NotFit(fault)
+            raise UnusableCalibration(fault)
         model = calibration.model()
-        return InUse(calibration, model, self.store.use(number, slot))
+        return ActiveCalibration(calibration, model, self.store.use(number, slot))
 
-    def take_back(self) -> InUse:
+    def take_back(self) -> ActiveCalibration:
         """Select what was in use before."""
         previous = self.store.previous()
         return self.take(previous.number, previous.slot)
 
-    def take_uploaded(self, fresh: Calibration, slot: int, known: Pointer) -> InUse:
+    def take_uploaded(self, fresh: Calibration, slot: int, known: SelectionState) -> ActiveCalibration:
         """Store an uploaded set, fill its slot and select it. One that is known already, word for word, keeps its number, its
         name and all that the words do not carry: what is in use before all, then what is in the slot."""
         for number in dict.fromkeys((known.active.number, known.slots[slot] or None, None, *self._like(fresh))):
@@ -99,7 +99,7 @@ class Activation:
         return None
 
 
-def uploaded(staged: Staged, *, name: str, rig: str, date_utc: str, source: str) -> Calibration:
+def make_uploaded(staged: Staged, *, name: str, rig: str, date_utc: str, source: str) -> Calibration:
     """A checked set as a calibration. What it was fitted to is not known here: no residuals, and the hash is the set's."""
     coefficients = staged.coefficients
     fresh = Calibration(

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.processes.durable_file import put, remove, sealed, unsealed
+from gateway.processes.durable_file import add_checksum, remove_if_possible, verify_checksum, write_durably
 from gateway.registers.upload.staging import SLOTS
 from gateway.registers.upload.staging_block import NO_SLOT
 
@@ -40,7 +40,7 @@ BUILT_IN: Final = Selection()
 
 
 @dataclass(frozen=True, slots=True)
-class Pointer:
+class SelectionState:
     """active: what is in use; previous: what a rollback brings back; slots: number of the calibration in each, OWN for the
     rig's built-in one, None where it is empty."""
 
@@ -60,7 +60,7 @@ class Pointer:
         number = self.slots[slot]
         return None if number is None else Selection(number or None, slot)
 
-    def with_active(self, selection: Selection, previous: Selection) -> "Pointer":
+    def with_active(self, selection: Selection, previous: Selection) -> "SelectionState":
         """What holds after a change; a selection with a slot fills that slot."""
         slots = list(self.slots)
         if selection.slot is not None:
@@ -68,32 +68,32 @@ class Pointer:
         return replace(self, active=selection, previous=previous, slots=tuple(slots))
 
 
-def read_pointer(directory: Path) -> tuple[Pointer, tuple[str, ...]]:
+def read_selection(directory: Path) -> tuple[SelectionState, tuple[str, ...]]:
     """The newest whole generation, and a sentence for each newer one that is not. Nothing stored is generation 0."""
     damaged: list[str] = []
     for generation, name in reversed(_generations(directory)):
         try:
-            pointer = _parsed((directory / name).read_bytes(), generation)
+            pointer = _parse_state((directory / name).read_bytes(), generation)
         except (OSError, ValueError) as error:
             damaged.append(f"{directory / name} {_words(error)}")
             continue
         told = f"the generation before it is used ({generation})"
         return pointer, tuple(f"E432 {sentence}; {told}" for sentence in damaged)
     told = "no whole one is left, the rig's built-in calibration is used"
-    return Pointer(), tuple(f"E432 {sentence}; {told}" for sentence in damaged)
+    return SelectionState(), tuple(f"E432 {sentence}; {told}" for sentence in damaged)
 
 
-def write_pointer(directory: Path, descriptor: int, pointer: Pointer) -> Pointer:
+def write_selection(directory: Path, descriptor: int, pointer: SelectionState) -> SelectionState:
     """The pointer as the next generation, durable when this returns; OSError, and nothing has changed, when not.
 
     pointer.generation is that of the one which it follows.
     """
     before = _generations(directory)
     fresh = replace(pointer, generation=1 + max((number for number, _ in before), default=0))
-    put(descriptor, f"active.{fresh.generation:06d}", sealed(json.dumps(asdict(fresh)) + "\n"))
+    write_durably(descriptor, f"active.{fresh.generation:06d}", add_checksum(json.dumps(asdict(fresh)) + "\n"))
     for number, name in before:
         if number != pointer.generation:
-            remove(descriptor, name)
+            remove_if_possible(descriptor, name)
     return fresh
 
 
@@ -106,11 +106,11 @@ def _generations(directory: Path) -> list[tuple[int, str]]:
     return sorted((int(match[1]), name) for name in names if (match := _NAME.fullmatch(name)))
 
 
-def _parsed(data: bytes, generation: int) -> Pointer:
+def _parse_state(data: bytes, generation: int) -> SelectionState:
     """ValueError for anything that this module has not written."""
     try:
-        facts = json.loads(unsealed(data))
-        pointer = Pointer(
+        facts = json.loads(verify_checksum(data))
+        pointer = SelectionState(
             facts["generation"], _selection(facts["active"]), _selection(facts["previous"]), tuple(facts["slots"])
         )
     except (KeyError, TypeError) as error:

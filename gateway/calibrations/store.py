@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Final
 
 from gateway.bsfm.model import Calibration, Response
-from gateway.calibrations.selection import BUILT_IN, OWN, Pointer, Selection, read_pointer, write_pointer
-from gateway.processes.durable_file import locked, make_directory, put, sealed, unsealed
+from gateway.calibrations.selection import BUILT_IN, OWN, Selection, SelectionState, read_selection, write_selection
+from gateway.processes.durable_file import add_checksum, lock_directory, make_directory, verify_checksum, write_durably
 from gateway.profiles import ProfileError
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.strict_yaml.text import parse
@@ -39,7 +39,7 @@ class StoreError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CalibrationEntry:
     """One file of the store; calibration None and a sentence in fault when it is damaged."""
 
     number: int
@@ -48,16 +48,16 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class StartingSelection:
     """What is in use. calibration None: the built-in one, of a rig that the store was not told. notes: what was passed over."""
 
     calibration: Calibration | None
     selection: Selection
-    pointer: Pointer
+    pointer: SelectionState
     notes: tuple[str, ...] = ()
 
 
-Entries = list[Entry]
+Entries = list[CalibrationEntry]
 Numbers = list[int]
 
 
@@ -73,11 +73,11 @@ class CalibrationStore:
         one that could not be read back or when the disk refuses."""
         try:
             make_directory(self.directory)
-            with locked(self.directory) as descriptor:
+            with lock_directory(self.directory) as descriptor:
                 number = self._next_number()
-                put(descriptor, _file_name(number), _readable(replace(calibration, number=number)))
+                write_durably(descriptor, _file_name(number), _encode_checked(replace(calibration, number=number)))
         except OSError as error:
-            raise _not_stored(error) from error
+            raise _store_error(error) from error
         return number
 
     def list(self) -> Entries:
@@ -89,13 +89,13 @@ class CalibrationStore:
         keep the loop waiting. Nothing is checked, so `load` what is found; what cannot be read is passed over."""
         for number in reversed(self._numbers()):
             with contextlib.suppress(OSError, ValueError, TypeError):
-                yield number, _glanced((self.directory / _file_name(number)).read_text(encoding="utf-8"))
+                yield number, _parse_unchecked((self.directory / _file_name(number)).read_text(encoding="utf-8"))
 
     def load(self, number: int) -> Calibration:
         """A calibration by its number, that of the built-in one included. StoreError when it is not there or damaged."""
         path = self.directory / _file_name(number)
         try:
-            calibration = _parsed(path.read_bytes(), path)
+            calibration = _parse_checked(path.read_bytes(), path)
         except FileNotFoundError:
             return self._built_in(number)
         except OSError as error:
@@ -108,24 +108,24 @@ class CalibrationStore:
         """The calibration that was made of these very data, None where there is none."""
         return next((e.number for e in self.list() if e.calibration and e.calibration.data_sha256 == data_sha256), None)
 
-    def standing(self, why_not: Callable[[Calibration], str] = lambda calibration: "") -> Standing:
+    def standing(self, why_not: Callable[[Calibration], str] = lambda calibration: "") -> StartingSelection:
         """What is in use: the active one, else the previous, else the built-in. why_not: a sentence for one that is not
         fit for this rig, empty for one that is."""
         pointer, notes = self._pointer()
         for selection in (pointer.active, pointer.previous):
             if selection.number is None:
-                return Standing(self.built_in, selection, pointer, notes)
+                return StartingSelection(self.built_in, selection, pointer, notes)
             try:
                 calibration = self.load(selection.number)
                 fault = why_not(calibration)
             except StoreError as error:
                 fault = str(error)
             if not fault:
-                return Standing(calibration, selection, pointer, notes)
+                return StartingSelection(calibration, selection, pointer, notes)
             notes = (*notes, f"{fault}; the one before it is used instead of calibration {selection.number}")
-        return Standing(self.built_in, BUILT_IN, pointer, notes)
+        return StartingSelection(self.built_in, BUILT_IN, pointer, notes)
 
-    def use(self, number: int | None, slot: int | None = None) -> Pointer:
+    def use(self, number: int | None, slot: int | None = None) -> SelectionState:
         """From now on this calibration is in use, None: the built-in one; a slot given is filled with it. StoreError, and
         nothing has changed, for one that cannot be loaded or when the disk refuses."""
         if number is not None and self.load(number) is self.built_in:
@@ -134,7 +134,7 @@ class CalibrationStore:
             raise StoreError("E433", f"slot {slot}: there are 0 .. {SLOTS - 1}")
         return self._change(Selection(number, slot))
 
-    def rollback(self) -> Pointer:
+    def rollback(self) -> SelectionState:
         """Back to what was in use before the last change; a second one goes forth again. StoreError as `use`."""
         previous = self.previous()
         return self.use(previous.number, previous.slot)
@@ -153,37 +153,39 @@ class CalibrationStore:
         number = self._pointer()[0].slots[slot]
         return self.built_in.number if number == OWN and self.built_in else number
 
-    def _change(self, selection: Selection) -> Pointer:
+    def _change(self, selection: Selection) -> SelectionState:
         try:
             make_directory(self.directory)
-            with locked(self.directory) as descriptor:
-                pointer, _ = read_pointer(self.directory)
+            with lock_directory(self.directory) as descriptor:
+                pointer, _ = read_selection(self.directory)
                 changed = pointer.with_active(selection, self._to_go_back_to(pointer, selection))
-                return write_pointer(self.directory, descriptor, changed)
+                return write_selection(self.directory, descriptor, changed)
         except OSError as error:
-            raise _not_stored(error) from error
+            raise _store_error(error) from error
 
-    def _to_go_back_to(self, pointer: Pointer, selection: Selection) -> Selection:
+    def _to_go_back_to(self, pointer: SelectionState, selection: Selection) -> Selection:
         """What is in use now, unless it is damaged or is chosen again: then what could be gone back to stays."""
         active = pointer.active
         if active.number == selection.number or (active.number is not None and self._entry(active.number).fault):
             return pointer.previous
         return active
 
-    def _pointer(self) -> tuple[Pointer, tuple[str, ...]]:
+    def _pointer(self) -> tuple[SelectionState, tuple[str, ...]]:
         try:
-            with locked(self.directory, shared=True):
-                return read_pointer(self.directory)
+            with lock_directory(self.directory, shared=True):
+                return read_selection(self.directory)
         except FileNotFoundError:
-            return Pointer(), ()
+            return SelectionState(), ()
         except OSError as error:
-            return Pointer(), (f"E432 {self.directory} cannot be read: {error.strerror}; built-in calibration used",)
+            return SelectionState(), (
+                f"E432 {self.directory} cannot be read: {error.strerror}; built-in calibration used",
+            )
 
-    def _entry(self, number: int) -> Entry:
+    def _entry(self, number: int) -> CalibrationEntry:
         try:
-            return Entry(number, self.load(number))
+            return CalibrationEntry(number, self.load(number))
         except StoreError as error:
-            return Entry(number, None, str(error))
+            return CalibrationEntry(number, None, str(error))
 
     def _built_in(self, number: int) -> Calibration:
         if self.built_in is not None and self.built_in.number == number:
@@ -196,7 +198,7 @@ class CalibrationStore:
         return sorted(int(match[1]) for name in names if (match := _NAME.fullmatch(name)))
 
     def _next_number(self) -> int:
-        spoken_of, _ = read_pointer(self.directory)
+        spoken_of, _ = read_selection(self.directory)
         number = 1 + max(0, *self._numbers(), *spoken_of.numbers, self.built_in.number if self.built_in else 0)
         if number > _LAST:
             raise StoreError(
@@ -210,7 +212,7 @@ def as_text(calibration: Calibration) -> str:
     return "".join(f"{name}: {json.dumps(value, ensure_ascii=False)}\n" for name, value in asdict(calibration).items())
 
 
-def _glanced(text: str) -> Calibration:
+def _parse_unchecked(text: str) -> Calibration:
     """`as_text` backwards, for what it has written alone. ValueError or TypeError for anything else."""
     lines = (line.partition(": ") for line in text.splitlines() if not line.startswith("#"))
     facts = {name: json.loads(value) for name, _, value in lines}
@@ -219,10 +221,10 @@ def _glanced(text: str) -> Calibration:
     return Calibration(**facts, response=Response(**response) if response else None)
 
 
-def _readable(calibration: Calibration) -> bytes:
+def _encode_checked(calibration: Calibration) -> bytes:
     """A calibration's file. StoreError for one that could not be read back as it is."""
-    data = sealed(as_text(calibration))
-    if _parsed(data, Path(calibration.name)) != calibration:
+    data = add_checksum(as_text(calibration))
+    if _parse_checked(data, Path(calibration.name)) != calibration:
         raise StoreError("E432", f"{calibration.name} holds a number that no file can")
     return data
 
@@ -231,14 +233,14 @@ def _file_name(number: int) -> str:
     return f"{number:04d}.yaml"
 
 
-def _not_stored(error: OSError) -> StoreError:
+def _store_error(error: OSError) -> StoreError:
     return StoreError("E431", f"calibration not stored: {error.strerror or error}")
 
 
-def _parsed(data: bytes, path: Path) -> Calibration:
+def _parse_checked(data: bytes, path: Path) -> Calibration:
     """The calibration of a file's bytes. StoreError for anything but what was sealed."""
     try:
-        unsealed(data)
+        verify_checksum(data)
         calibration, faults = read_calibration(parse(data, str(path)))
     except ValueError as error:
         raise StoreError("E432", f"{path} {error}") from None

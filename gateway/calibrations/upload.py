@@ -19,11 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from gateway.calibrations.activation import Activation, InUse, NotFit, uploaded
-from gateway.calibrations.store import Standing, StoreError
+from gateway.calibrations.activation import Activation, ActiveCalibration, UnusableCalibration, make_uploaded
+from gateway.calibrations.store import StartingSelection, StoreError
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
-from gateway.processes.disk_worker import Apart, Done, Work
+from gateway.processes.disk_worker import DiskWorker, Done, Work
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.upload.coefficients import HEAD_WORDS
@@ -50,21 +50,21 @@ class UploadRules:
         return cls(rig_name=rig_name, commit_address=commit, select_address=select, today=today)
 
 
-class Upload:
+class UploadService:
     """on_use: called in the loop with what is in use from now on. apart: runs work elsewhere and comes back."""
 
     def __init__(
         self,
         staging: StagingBlock,
         activation: Activation,
-        standing: Standing,
+        standing: StartingSelection,
         rules: UploadRules,
         log: Callable[[str, str], None],
     ) -> None:
         if standing.calibration is None:
             raise ValueError("a gateway has a calibration, at least the rig's own")
-        self.on_use: Callable[[InUse], None] = lambda in_use: None
-        self._thread = Apart()
+        self.on_use: Callable[[ActiveCalibration], None] = lambda in_use: None
+        self._thread = DiskWorker()
         self.apart: Callable[[Work, Done], None] = self._thread
         self._staging = staging
         self._activation = activation
@@ -100,7 +100,7 @@ class Upload:
         if isinstance(found, Exception):
             self._fail(found)
         elif isinstance(found, StagedFault):
-            self._fail(NotFit(found))
+            self._fail(UnusableCalibration(found))
         else:
             self._notice = CommitNotice.WITHOUT_STOPS if found.without_stops else NO_NOTICE
             if action is CommitAction.DRY_RUN:
@@ -109,7 +109,7 @@ class Upload:
                 self._take(found, peer)
 
     def _take(self, found: Staged, peer: Peer) -> None:
-        fresh = uploaded(
+        fresh = make_uploaded(
             found,
             name=f"slot-{found.slot}",
             rig=self._rules.rig_name,
@@ -178,18 +178,18 @@ class Upload:
         if isinstance(result, Exception):
             self._fail(result)
             return
-        taken: InUse = result
+        taken: ActiveCalibration = result
         self._calibration = taken.calibration
         self._pointer = taken.pointer
         self.on_use(taken)
         self._notice |= taken.notice
-        self._end(CommitStatus.COMMITTED, self._told(_described(taken)))
+        self._end(CommitStatus.COMMITTED, self._told(_describe_active(taken)))
 
     def _fail(self, error: Exception) -> None:
-        """NotFit and StoreError are answers; anything else is our defect, which must not stop the control."""
+        """UnusableCalibration and StoreError are answers; anything else is our defect, which must not stop the control."""
         index, reason, active = _NO_COEFFICIENT, int(UploadReason.DEFECT), self._calibration.number
         self._notice = NO_NOTICE
-        if isinstance(error, NotFit):
+        if isinstance(error, UnusableCalibration):
             index, reason, sentence = error.fault.index, int(error.fault.reason), error.fault.sentence(active)
         elif isinstance(error, StoreError):
             sentence = f"{error}; active set {active} unchanged"
@@ -215,7 +215,7 @@ class Upload:
         return f"info {self._doing}: {what}{known}"
 
 
-def _described(taken: InUse) -> str:
+def _describe_active(taken: ActiveCalibration) -> str:
     """`calibration 17 (slot-3) in use, slot 3: bsfm n=2, slip, 7 stops, 1.2 .. 65.1 N`."""
     calibration, slot = taken.calibration, taken.pointer.active.slot
     where = "" if slot is None else f", slot {slot}"

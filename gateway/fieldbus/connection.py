@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Protocol, cast
 
-from gateway.fieldbus.limits import LogGate
+from gateway.fieldbus.limits import LogLimiter
 from gateway.fieldbus.peers import Peers, address_of
 from gateway.fieldbus.settings import ServerSettings
 from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
@@ -42,13 +42,13 @@ class Clock(Protocol):
 
 
 @dataclass(slots=True)
-class Shared:
+class ServerState:
     """What all connections of one server share."""
 
     bank: DataBank
     settings: ServerSettings
     clock: Clock
-    log: LogGate
+    log: LogLimiter
     peers: Peers
     on_peer_closed: Callable[[Peer], None]
     connections: set["Connection"] = field(default_factory=set)
@@ -59,7 +59,7 @@ class Shared:
 class Connection(asyncio.BufferedProtocol):
     """Made by the server for each accepted socket. The server calls sweep() and abort(), the transport the rest."""
 
-    def __init__(self, shared: Shared) -> None:
+    def __init__(self, shared: ServerState) -> None:
         self._shared = shared
         self._buffer = bytearray(BUFFER_BYTES)
         self._view = memoryview(self._buffer)

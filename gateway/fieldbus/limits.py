@@ -36,7 +36,7 @@ class RequestRate:
         return self._tokens >= self._most
 
 
-class LogGate:
+class LogLimiter:
     """At most ten lines a second of each cause reach the sink; the next line that does tells how many did not."""
 
     __slots__ = ("_sink", "_windows")

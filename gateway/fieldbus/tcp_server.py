@@ -8,8 +8,8 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from gateway.fieldbus.connection import Clock, Connection, Shared, Timer
-from gateway.fieldbus.limits import LogGate
+from gateway.fieldbus.connection import Clock, Connection, ServerState, Timer
+from gateway.fieldbus.limits import LogLimiter
 from gateway.fieldbus.peers import Peers, is_loopback
 from gateway.fieldbus.settings import ServerSettings
 from gateway.modbus.peer import Peer
@@ -42,9 +42,9 @@ class ModbusTcpServer:
         self._bank = bank
         self._settings = settings
         self._on_peer_closed = on_peer_closed
-        self._log = LogGate(log)
+        self._log = LogLimiter(log)
         self._clock = clock
-        self._shared: Shared | None = None
+        self._shared: ServerState | None = None
         self._listener: asyncio.Server | None = None
         self._sweep_timer: Timer | None = None
 
@@ -64,7 +64,7 @@ class ModbusTcpServer:
         loop = asyncio.get_running_loop()
         clock: Clock = self._clock or loop
         peers = Peers(self._settings, guarded=not loopback)
-        shared = Shared(self._bank, self._settings, clock, self._log, peers, self._on_peer_closed)
+        shared = ServerState(self._bank, self._settings, clock, self._log, peers, self._on_peer_closed)
         self._listener = await loop.create_server(lambda: Connection(shared), host, port)
         self._shared = shared
         self._sweep()
@@ -84,7 +84,7 @@ class ModbusTcpServer:
             await self._end_connections(self._shared)
         await listener.wait_closed()
 
-    async def _end_connections(self, shared: Shared) -> None:
+    async def _end_connections(self, shared: ServerState) -> None:
         gone = asyncio.get_running_loop().create_future()
         shared.on_last_gone = lambda: None if gone.done() else gone.set_result(None)
         for connection in tuple(shared.connections):

@@ -41,7 +41,7 @@ class PortError(Exception):
         return 77 if self.code == "E101" else 69
 
 
-def number_of(error: Exception) -> int | None:
+def errno_of(error: Exception) -> int | None:
     """The errno of any of the three families: termios.error keeps it in args, pyserial sometimes only in its text."""
     number = getattr(error, "errno", None)
     if number is None and error.args and isinstance(error.args[0], int):
@@ -49,21 +49,21 @@ def number_of(error: Exception) -> int | None:
     return number
 
 
-def why_closed(path: str, error: Exception, present: Sequence[str]) -> PortError:
+def explain_open_failure(path: str, error: Exception, present: Sequence[str]) -> PortError:
     """The reason why a port did not open. present: the ports that are there, by-id names where they exist."""
-    number = number_of(error)
+    number = errno_of(error)
     if number in _DENIED:
         return PortError("E101", _permission(path))
     if number in _ABSENT:
         return PortError("E102", _missing(path, present))
     if number in _HELD:
-        return PortError("E103", _held(path))
+        return PortError("E103", _held_by_other(path))
     return PortError("E102", f"{path} does not open as a serial port: {error}")
 
 
-def why_lost(path: str, error: Exception | None) -> PortError:
+def explain_loss(path: str, error: Exception | None) -> PortError:
     """The reason why an open port is gone."""
-    reason = f" ({os.strerror(number)})" if error and (number := number_of(error)) else ""
+    reason = f" ({os.strerror(number)})" if error and (number := errno_of(error)) else ""
     return PortError("E102", f"{path} is gone{reason}: unplugged? It is reopened as soon as it is back")
 
 
@@ -91,7 +91,7 @@ def _missing(path: str, present: Sequence[str]) -> str:
     return f"{path} is not there. Present: {', '.join(present)}{meant}"
 
 
-def _held(path: str) -> str:
+def _held_by_other(path: str) -> str:
     holders = [holder for holder in holders_of(path) if holder.is_locking] or holders_of(path)
     if not holders:
         return f"{path} is held by another process, of another user (sudo fuser {path} names it); stop that one first"

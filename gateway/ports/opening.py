@@ -8,7 +8,7 @@ from typing import Final
 import serial
 
 from gateway.devices import SerialSettings
-from gateway.ports.errors import SERIAL_FAILURES, why_closed
+from gateway.ports.errors import SERIAL_FAILURES, explain_open_failure
 from gateway.ports.listing import present_paths
 
 _PARITY: Final = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
@@ -22,18 +22,18 @@ def open_descriptor(path: str, settings: SerialSettings) -> int:
     which pyserial tolerates.
     """
     try:
-        return _opened(path, settings)
+        return _open_quietly(path, settings)
     except (*SERIAL_FAILURES, ValueError) as error:  # ValueError: a baud rate that termios does not know
-        raise why_closed(path, error, present_paths()) from error
+        raise explain_open_failure(path, error, present_paths()) from error
 
 
-def _opened(path: str, settings: SerialSettings) -> int:
+def _open_quietly(path: str, settings: SerialSettings) -> int:
     try:
-        port = _configured(path, settings)
+        port = _open_configured(path, settings)
     except termios.error as error:
         if error.args[0] != errno.EINVAL or not os.path.realpath(path).startswith("/dev/pts/"):
             raise
-        port = _configured(
+        port = _open_configured(
             path, SerialSettings(baud=settings.baud)
         )  # a pty has no frame, and refuses to be told of one
     try:
@@ -48,7 +48,7 @@ def _opened(path: str, settings: SerialSettings) -> int:
     return descriptor
 
 
-def _configured(path: str, settings: SerialSettings) -> serial.Serial:
+def _open_configured(path: str, settings: SerialSettings) -> serial.Serial:
     return serial.Serial(
         path,
         settings.baud,

@@ -16,7 +16,7 @@ import termios
 from typing import Final
 
 from gateway.devices import SerialSettings
-from gateway.ports.errors import SERIAL_FAILURES, PortError, why_lost
+from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_loss
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
 from gateway.ports.opening import open_descriptor
@@ -97,7 +97,7 @@ class SerialPort:
         was, self._path = self._path, path
         if not self._is_wanted or (path == was and self.is_open and not self._identity.is_gone):
             return
-        self._lose(why_lost(was, None))
+        self._lose(explain_loss(was, None))
         self._identity.take(path)
         self._stop_reopening()
         self._reopen()
@@ -113,7 +113,7 @@ class SerialPort:
         except BlockingIOError:
             sent = 0
         except OSError as error:
-            self._fail(why_lost(self._path, error))
+            self._fail(explain_loss(self._path, error))
             return False
         if sent < len(data):
             asyncio.get_running_loop().add_writer(self._descriptor, self._on_writable)
@@ -142,7 +142,7 @@ class SerialPort:
         try:
             await self.drain(deadline_s)
         except SERIAL_FAILURES as error:
-            raise why_lost(self._path, error) from error
+            raise explain_loss(self._path, error) from error
 
     def close(self) -> None:
         """Blocks for at most 0.25 s, and only while bytes are on their way."""
@@ -167,12 +167,12 @@ class SerialPort:
         except BlockingIOError:
             return
         except OSError as error:
-            self._lose(why_lost(self._path, error))
+            self._lose(explain_loss(self._path, error))
             return
         if chunk:
             self._on_bytes(chunk, monotonic_s())
         else:
-            self._lose(why_lost(self._path, None))
+            self._lose(explain_loss(self._path, None))
 
     def _on_writable(self) -> None:
         try:
@@ -180,7 +180,7 @@ class SerialPort:
         except BlockingIOError:
             return
         except OSError as error:
-            self._lose(why_lost(self._path, error))
+            self._lose(explain_loss(self._path, error))
             return
         if not self._unsent:
             asyncio.get_running_loop().remove_writer(self._descriptor)

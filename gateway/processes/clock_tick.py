@@ -31,7 +31,7 @@ def _create_timerfd(period_s: float) -> int:
     return fd
 
 
-class Tick:
+class ClockTick:
     """Calls on_tick(expirations, late_s) every period; expirations > 1 means that ticks were missed, late_s is how long
     after its time the newest one is served."""
 

@@ -11,7 +11,7 @@ Done = Callable[[Any], None]
 """done(result), or done(exception) when the work raised one."""
 
 
-class Apart:
+class DiskWorker:
     """One thread; what it is given runs one after the other. Called in a running loop, where `done` is called back."""
 
     def __init__(self) -> None:

@@ -21,7 +21,7 @@ _SEAL: Final = b"# crc32 %08x of all that follows\n"
 
 
 @contextlib.contextmanager
-def locked(directory: Path, *, shared: bool = False) -> Iterator[int]:
+def lock_directory(directory: Path, *, shared: bool = False) -> Iterator[int]:
     """The directory's descriptor, while no other holder changes it. FileNotFoundError when there is none."""
     descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
@@ -46,7 +46,7 @@ def make_directory(directory: Path) -> None:
         raise
 
 
-def put(directory: int, name: str, data: bytes) -> None:
+def write_durably(directory: int, name: str, data: bytes) -> None:
     """`name`, which is new in this directory, holds `data` durably. OSError, and it is not there, when that fails."""
     try:
         _write(directory, name + _FRESH, data)
@@ -54,23 +54,23 @@ def put(directory: int, name: str, data: bytes) -> None:
         os.fsync(directory)
     except OSError:
         for left in (name, name + _FRESH):
-            remove(directory, left)
+            remove_if_possible(directory, left)
         raise
 
 
-def remove(directory: int, name: str) -> None:
+def remove_if_possible(directory: int, name: str) -> None:
     """Away with a file that means nothing; if it cannot be removed it stays."""
     with contextlib.suppress(OSError):
         os.unlink(name, dir_fd=directory)
 
 
-def sealed(text: str) -> bytes:
+def add_checksum(text: str) -> bytes:
     """The text with the CRC-32 of its bytes in a line before it."""
     data = text.encode()
     return _SEAL % crc32(data) + data
 
 
-def unsealed(data: bytes) -> bytes:
+def verify_checksum(data: bytes) -> bytes:
     """What `sealed` was given. ValueError with a sentence for a torn, altered or foreign file."""
     first, _, rest = data.partition(b"\n")
     if first + b"\n" == _SEAL % crc32(rest):

@@ -31,7 +31,7 @@ _LONGEST_TEXT: Final = 16_000
 _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
-class Event(NamedTuple):
+class EventRecord(NamedTuple):
     """time: ISO 8601, UTC, milliseconds; code: None where the sentence has none; source: control, guardian, watch or,
     of a simulated rig, rig."""
 
@@ -50,41 +50,41 @@ def severity_of(code: str | None) -> str:
     return WARNING if code.startswith("W") or code in WARNING_ALARMS else ERROR
 
 
-def event_of(time_s: float, source: str, group: str, sentence: str) -> Event:
+def make_event(time_s: float, source: str, group: str, sentence: str) -> EventRecord:
     """From what the house says to a record. group: the cause, and what else lines are limited by (`refusal 10.0.0.5`)."""
     found = _CODE.match(sentence)
     code = found[1] if found else None
     text = sentence[found.end() :] if found else sentence.removeprefix(_INFO_PREFIX)
     if len(text) > _LONGEST_TEXT:
         text = f"{text[:_LONGEST_TEXT]} ... ({len(text) - _LONGEST_TEXT} more characters)"
-    return Event(utc(time_s), severity_of(code), code, group.partition(" ")[0], text, source)
+    return EventRecord(utc_text(time_s), severity_of(code), code, group.partition(" ")[0], text, source)
 
 
-def utc(time_s: float) -> str:
+def utc_text(time_s: float) -> str:
     """`2026-11-22T10:31:47.123Z`, from seconds since the epoch. These texts sort as the times do."""
     return datetime.fromtimestamp(time_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
-def record(event: Event) -> bytes:
+def encode_event(event: EventRecord) -> bytes:
     """One line of the file: a JSON object in ASCII, with its newline."""
     return json.dumps(event._asdict()).encode("ascii") + b"\n"
 
 
-def event_in(line: bytes) -> Event | None:
+def parse_event(line: bytes) -> EventRecord | None:
     """The last whole record of a line, None where there is none: a writer that was killed leaves the start of one."""
     start = line.rfind(RECORD_START)
     if start < 0:
         return None
     try:
         fields: dict[str, Any] = json.loads(line[start:])
-        event = Event(**fields)
+        event = EventRecord(**fields)
     except (ValueError, TypeError, RecursionError):
         return None
     is_whole = all(isinstance(part, str) for name, part in fields.items() if name != "code")
     return event if is_whole and (event.code is None or isinstance(event.code, str)) else None
 
 
-def line_of(event: Event) -> str:
+def format_event(event: EventRecord) -> str:
     """For people: time, severity, cause, code, sentence. What follows a sentence's first line is indented; signs that
     would move a terminal's cursor are spelled out."""
     code = f"{event.code} " if event.code else ""

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Final, Self
 
-from gateway.processes.event import Event, event_in
+from gateway.processes.event import EventRecord, parse_event
 
 NAME: Final = "events.jsonl"
 LONGEST_BYTES: Final = 4 << 20
@@ -69,7 +69,7 @@ class EventFile:
             if self._is_named():
                 for number in range(KEPT, 0, -1):
                     with contextlib.suppress(FileNotFoundError):
-                        _numbered(self._path, number - 1).replace(_numbered(self._path, number))
+                        _rotated_path(self._path, number - 1).replace(_rotated_path(self._path, number))
         self.close()
 
 
@@ -84,7 +84,7 @@ class EventReader:
         self._stream: IO[bytes] | None = None
         self._rest = b""
 
-    def kept(self) -> Iterator[Event]:
+    def kept(self) -> Iterator[EventRecord]:
         old = _open_files(self._path)
         self._stream = old.pop() if old else None
         with contextlib.ExitStack() as stack:
@@ -94,7 +94,7 @@ class EventReader:
                 yield from _events(stream)
         yield from self.more()
 
-    def more(self) -> Iterator[Event]:
+    def more(self) -> Iterator[EventRecord]:
         """What has been written since, also to a file that has been begun anew since."""
         while True:
             fresh = self._fresh()  # looked for first: what comes into the old file after its new name is read below
@@ -115,7 +115,7 @@ class EventReader:
             self._stream.close()
             self._stream = None
 
-    def _whole_lines(self) -> Iterator[Event]:
+    def _whole_lines(self) -> Iterator[EventRecord]:
         if self._stream is not None:
             *lines, self._rest = (self._rest + self._stream.read()).split(b"\n")
             yield from _events(lines)
@@ -132,9 +132,9 @@ class EventReader:
         return None
 
 
-def _events(lines: Iterable[bytes]) -> Iterator[Event]:
+def _events(lines: Iterable[bytes]) -> Iterator[EventRecord]:
     for line in lines:
-        if (event := event_in(line)) is not None:
+        if (event := parse_event(line)) is not None:
             yield event
 
 
@@ -144,12 +144,12 @@ def _open_files(path: Path) -> list[IO[bytes]]:
     opened: dict[tuple[int, int], IO[bytes]] = {}
     for number in range(KEPT + 1):
         with contextlib.suppress(FileNotFoundError):
-            stream = _numbered(path, number).open("rb")
+            stream = _rotated_path(path, number).open("rb")
             status = os.fstat(stream.fileno())
             if opened.setdefault((status.st_dev, status.st_ino), stream) is not stream:
                 stream.close()
     return list(reversed(opened.values()))
 
 
-def _numbered(path: Path, number: int) -> Path:
+def _rotated_path(path: Path, number: int) -> Path:
     return path.with_name(f"{path.name}.{number}") if number else path

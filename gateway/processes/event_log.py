@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, Self
 
-from gateway.processes.event import Event, event_of, line_of, record
+from gateway.processes.event import EventRecord, encode_event, format_event, make_event
 from gateway.processes.event_file import EventFile
 
 LINES_PER_S: Final = 10
@@ -42,12 +42,14 @@ class EventLog:
         wall: Callable[[], float] = time.time,
     ) -> None:
         self._clock, self._wall, self._source = clock, wall, source
-        self._windows: dict[str, _Window] = {}
+        self._windows: dict[str, _RateWindow] = {}
         self._lock = threading.Lock()
         to_terminal = write or sys.stderr.write
-        self._terminal = Drain("terminal", lambda event: to_terminal(line_of(event) + "\n"), self._tell_left_out)
+        self._terminal = QueuedWriter(
+            "terminal", lambda event: to_terminal(format_event(event) + "\n"), self._tell_left_out
+        )
         self._file = file
-        self._disk = Drain("events", _Disk(file, self._terminal.put, self._event)) if file else None
+        self._disk = QueuedWriter("events", _EventFileWriter(file, self._terminal.put, self._event)) if file else None
 
     def __call__(self, cause: str, sentence: str) -> None:
         self._say(self._source, cause, sentence)
@@ -76,7 +78,7 @@ class EventLog:
         if self._file and self._disk and not self._disk.is_alive:
             self._file.close()
 
-    def _drains(self) -> tuple["Drain", ...]:
+    def _drains(self) -> tuple["QueuedWriter", ...]:
         return (self._terminal, self._disk) if self._disk else (self._terminal,)
 
     def _say(self, source: str, cause: str, sentence: str) -> None:
@@ -87,7 +89,7 @@ class EventLog:
                 if window is None and len(self._windows) >= _MOST_CAUSES:
                     self._forget_old(now_s)
                 self._put_left_out(cause, window)
-                self._windows[cause] = window = _Window(now_s, source)
+                self._windows[cause] = window = _RateWindow(now_s, source)
             window.count += 1
             window.sentence = sentence
         if window.count <= LINES_PER_S:
@@ -101,7 +103,7 @@ class EventLog:
                 if at_the_end or now_s - window.began_s >= 1.0:
                     self._put_left_out(cause, self._windows.pop(cause))
 
-    def _put_left_out(self, cause: str, window: "_Window | None") -> None:
+    def _put_left_out(self, cause: str, window: "_RateWindow | None") -> None:
         """With the code of what is left out, so that it is found where that is looked for."""
         if window is not None and window.count > LINES_PER_S:
             code = self._event(cause, window.sentence).code
@@ -112,16 +114,16 @@ class EventLog:
         recent = {cause: window for cause, window in self._windows.items() if now_s - window.began_s < 1.0}
         self._windows = recent if len(recent) < _MOST_CAUSES else {}
 
-    def _event(self, cause: str, sentence: str, source: str = "") -> Event:
-        return event_of(self._wall(), source or self._source, cause, sentence)
+    def _event(self, cause: str, sentence: str, source: str = "") -> EventRecord:
+        return make_event(self._wall(), source or self._source, cause, sentence)
 
-    def _put(self, event: Event) -> None:
+    def _put(self, event: EventRecord) -> None:
         for drain in self._drains():
             drain.put(event)
 
 
 @dataclass(slots=True)
-class _Window:
+class _RateWindow:
     """One second of one cause: how many lines it had, and the last of them."""
 
     began_s: float
@@ -130,7 +132,7 @@ class _Window:
     sentence: str = ""
 
 
-class Drain:
+class QueuedWriter:
     """A queue and the thread that empties it into `write`, whose OSError and ValueError (a terminal that is gone) nobody minds.
 
     What does not fit in the queue is left out; the registers still show the cause. each_round: called when nothing has come
@@ -138,11 +140,11 @@ class Drain:
     """
 
     def __init__(
-        self, name: str, write: Callable[[Event], object], each_round: Callable[[], None] | None = None
+        self, name: str, write: Callable[[EventRecord], object], each_round: Callable[[], None] | None = None
     ) -> None:
         self._write = write
         self._each_round = each_round
-        self._events: queue.Queue[Event | None] = queue.Queue(_LONGEST_QUEUE)
+        self._events: queue.Queue[EventRecord | None] = queue.Queue(_LONGEST_QUEUE)
         self._thread = threading.Thread(target=self._run, name=f"event-log {name}", daemon=True)
 
     @property
@@ -152,7 +154,7 @@ class Drain:
     def start(self) -> None:
         self._thread.start()
 
-    def put(self, event: Event) -> None:
+    def put(self, event: EventRecord) -> None:
         with contextlib.suppress(queue.Full):
             self._events.put_nowait(event)
 
@@ -176,16 +178,18 @@ class Drain:
                 self._write(event)
 
 
-class _Disk:
+class _EventFileWriter:
     """Events to the file; the first that it does not take raises the alarm, the first that it takes again ends it."""
 
-    def __init__(self, file: EventFile, alarm: Callable[[Event], None], event: Callable[[str, str], Event]) -> None:
+    def __init__(
+        self, file: EventFile, alarm: Callable[[EventRecord], None], event: Callable[[str, str], EventRecord]
+    ) -> None:
         self._file, self._alarm, self._event = file, alarm, event
         self._lost = 0
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, event: EventRecord) -> None:
         try:
-            self._file.append(record(event))
+            self._file.append(encode_event(event))
         except OSError as error:
             self._lost += 1
             if self._lost == 1:
@@ -194,4 +198,4 @@ class _Disk:
             return
         if self._lost:
             lost, self._lost = self._lost, 0
-            self._file.append(record(self._event("events", f"E150 {lost} events were not kept before this one")))
+            self._file.append(encode_event(self._event("events", f"E150 {lost} events were not kept before this one")))

@@ -38,7 +38,7 @@ _NO_DESCRIPTOR_S: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class SocketLimits:
     """idle_s: from one whole answer to the next whole request. spared_s: nobody who spoke within it makes room for another."""
 
     callers: int = 32
@@ -59,14 +59,14 @@ class JsonLineServer:
         path: Path,
         handlers: dict[str, Handler],
         log: Callable[[str, str], None] = lambda cause, sentence: None,
-        limits: Limits | None = None,
+        limits: SocketLimits | None = None,
     ) -> None:
-        self.limits = limits or Limits()
+        self.limits = limits or SocketLimits()
         self._path = path
         self._handlers = handlers
         self._log = log
         self._listener: socket.socket | None = None
-        self._callers: dict[_Caller, None] = {}  # in the order in which they last spoke
+        self._callers: dict[_Client, None] = {}  # in the order in which they last spoke
         self._queue: deque[Callable[[], None]] = deque()
         self._turn: asyncio.TimerHandle | None = None
         self._sweep_timer: asyncio.TimerHandle | None = None
@@ -152,7 +152,7 @@ class JsonLineServer:
         if len(self._callers) >= self.limits.callers and not self._make_room():
             _say_and_close(peer, f"{self.limits.callers} connections are open, the most allowed: try again")
             return
-        caller = _Caller(self, peer)
+        caller = _Client(self, peer)
         self.spoke(caller)
         caller.listen()
 
@@ -164,12 +164,12 @@ class JsonLineServer:
         silent.dismiss("others are waiting, and nothing was asked here for longest")
         return True
 
-    def spoke(self, caller: "_Caller") -> None:
+    def spoke(self, caller: "_Client") -> None:
         caller.spoke_s = self.loop.time()
         self._callers.pop(caller, None)
         self._callers[caller] = None
 
-    def left(self, caller: "_Caller") -> None:
+    def left(self, caller: "_Client") -> None:
         self._callers.pop(caller, None)
 
     def _sweep(self) -> None:
@@ -209,7 +209,7 @@ class JsonLineServer:
             return _error(str(error))
 
 
-class _Caller:
+class _Client:
     """One connection: reads, waits for its turn, has one line answered, waits until the answer is taken."""
 
     def __init__(self, server: JsonLineServer, peer: socket.socket) -> None:

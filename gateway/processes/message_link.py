@@ -33,7 +33,7 @@ _MOST_DESCRIPTORS: Final = 4
 _FLAGS: Final = socket.MSG_DONTWAIT | getattr(socket, "MSG_CMSG_CLOEXEC", 0)  # a port's lock is no child's inheritance
 
 
-class NonsenseError(ValueError):
+class ProtocolError(ValueError):
     """What came is no message of this protocol: a defect of the sender, which cannot be relied on any more."""
 
 
@@ -50,7 +50,7 @@ class Message:
                 os.close(self.descriptors.pop())
 
 
-def pair() -> tuple[socket.socket, socket.socket]:
+def create_link() -> tuple[socket.socket, socket.socket]:
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
@@ -64,7 +64,7 @@ def send(link: socket.socket, tag: str, body: dict[str, Any] | None = None, *des
 def receive(link: socket.socket) -> Message | None:
     """The next message, None at the end of the line; a reset of a killed peer is an end too, behind its last words.
 
-    BlockingIOError when there is none yet, NonsenseError for what is not of this protocol.
+    BlockingIOError when there is none yet, ProtocolError for what is not of this protocol.
     """
     try:
         data, ancillary, flags, _ = _received(link)
@@ -78,7 +78,7 @@ def receive(link: socket.socket) -> Message | None:
         return None
     try:
         message.tag, message.body = chr(data[0]), _body(data, flags)
-    except NonsenseError:
+    except ProtocolError:
         message.drop_descriptors()
         raise
     return message
@@ -95,7 +95,7 @@ def _received(link: socket.socket) -> tuple[bytes, list[tuple[int, int, bytes]],
 
 def _body(data: bytes, flags: int) -> dict[str, Any]:
     if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
-        raise NonsenseError(f"a message of {chr(data[0])!r} lost its end")
+        raise ProtocolError(f"a message of {chr(data[0])!r} lost its end")
     if len(data) == 1:
         return {}
     try:
@@ -103,7 +103,7 @@ def _body(data: bytes, flags: int) -> dict[str, Any]:
     except ValueError:
         body = None
     if not isinstance(body, dict):
-        raise NonsenseError(f"a message of {chr(data[0])!r} without its fields")
+        raise ProtocolError(f"a message of {chr(data[0])!r} without its fields")
     return body
 
 

@@ -22,7 +22,7 @@ HELPER_NICE: Final = 10  # fit, watch
 _AUTOGROUP: Final = Path("/proc/self/autogroup")
 
 
-def take(nice: int) -> int:
+def set_nice(nice: int) -> int:
     """Take this nice value, or the nearest one that is allowed; what the process has then."""
     has = os.getpriority(os.PRIO_PROCESS, 0)
     if has > 0 and nice < has:
@@ -35,11 +35,11 @@ def take(nice: int) -> int:
     return os.getpriority(os.PRIO_PROCESS, 0)
 
 
-def run_behind_others() -> None:
+def lower_priority() -> None:
     """Out of a parent's real-time class, and behind everybody else: for what calculates."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    take(HELPER_NICE)
+    set_nice(HELPER_NICE)
 
 
 def _lowest_allowed() -> int:

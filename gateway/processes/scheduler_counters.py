@@ -18,7 +18,7 @@ _CURE: Final = ": the machine is too busy; end other programs, `run --realtime`,
 
 
 @dataclass(frozen=True, slots=True)
-class Turns:
+class ProcessorTime:
     """What a process has had until now, in seconds."""
 
     on_cpu_s: float = 0.0
@@ -32,12 +32,12 @@ class Silence:
 
     silent_s: float
     bound_s: float
-    turns: Turns | None
+    turns: ProcessorTime | None
     state: str
     was_late: bool
 
 
-class TurnsOf:
+class SchedulerCounters:
     """Reads one process's counters. A kernel without them, or a process that is gone, gives None."""
 
     def __init__(self, pid: int, proc: Path = Path("/proc")) -> None:
@@ -46,13 +46,13 @@ class TurnsOf:
         with contextlib.suppress(OSError):
             self._descriptor = os.open(proc / str(pid) / "schedstat", os.O_RDONLY | os.O_CLOEXEC)
 
-    def read(self) -> Turns | None:
+    def read(self) -> ProcessorTime | None:
         """1.5 us: cheap enough for every heartbeat."""
         try:
             on_cpu_ns, waited_ns = os.pread(self._descriptor, 64, 0).split()[:2]
         except (OSError, ValueError):
             return None
-        return Turns(int(on_cpu_ns) * 1e-9, int(waited_ns) * 1e-9)
+        return ProcessorTime(int(on_cpu_ns) * 1e-9, int(waited_ns) * 1e-9)
 
     def waited_s(self) -> float | None:
         turns = self.read()
@@ -71,13 +71,13 @@ class TurnsOf:
             self._descriptor = -1
 
 
-def since(before: Turns | None, now: Turns | None) -> Turns | None:
+def time_between(before: ProcessorTime | None, now: ProcessorTime | None) -> ProcessorTime | None:
     if before is None or now is None:
         return None
-    return Turns(now.on_cpu_s - before.on_cpu_s, now.waited_s - before.waited_s)
+    return ProcessorTime(now.on_cpu_s - before.on_cpu_s, now.waited_s - before.waited_s)
 
 
-def judged(silence: Silence, load: str) -> Ending:
+def explain_silence(silence: Silence, load: str) -> Ending:
     """The cause of a silence: what took the largest part of it. load: of the machine, in words."""
     seen = f"control process stalled: {_ms(silence.silent_s)} without a tick, allowed {_ms(silence.bound_s)} (stall_s)"
     if silence.state and silence.state in _STOPPED_STATES:

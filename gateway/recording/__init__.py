@@ -7,7 +7,7 @@ its module: `measurement.measurement_of` (numpy), `mapping_file.column_mapping` 
 
 from gateway.recording.errors import RecordingError
 from gateway.recording.export import export_csv, export_parquet, write_csv
-from gateway.recording.reader import Entry, Recording, find_recording, list_recordings, read_recording
+from gateway.recording.reader import Recording, RecordingEntry, find_recording, list_recordings, read_recording
 from gateway.recording.recorder import Recorder
 from gateway.recording.tables.any_table import read_table
 from gateway.recording.tables.column_mapping import ColumnMapping, ColumnSource
@@ -15,9 +15,9 @@ from gateway.recording.tables.column_mapping import ColumnMapping, ColumnSource
 __all__ = [
     "ColumnMapping",
     "ColumnSource",
-    "Entry",
     "Recorder",
     "Recording",
+    "RecordingEntry",
     "RecordingError",
     "export_csv",
     "export_parquet",

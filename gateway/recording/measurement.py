@@ -13,12 +13,12 @@ import numpy as np
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
-from gateway.recording.tables.column_mapping import EXAMPLE, listed, quantity_of
+from gateway.recording.tables.column_mapping import EXAMPLE, join_names, quantity_of
 from gateway.recording.tables.columns import SENT
-from gateway.recording.tables.covariates import covariates, filled_in, is_constant, is_ours
-from gateway.recording.tables.even_rows import evened
-from gateway.recording.tables.judged_rows import repeated_readings, valid_by_quality
-from gateway.recording.tables.time_axis import TimeAxis, time_axis
+from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
+from gateway.recording.tables.even_rows import resample_evenly
+from gateway.recording.tables.judged_rows import flag_repeated, valid_by_quality
+from gateway.recording.tables.time_axis import TimeAxis, check_time_axis
 from gateway.units import linear_conversion
 
 FEWEST_ROWS: Final = 50
@@ -35,18 +35,18 @@ _METRE: Final = linear_conversion("length", "mm", "m")[0]
 def measurement_of(recording: Recording) -> Measurement:
     """The checked measurement. RecordingError in the user's words, with row and column where there is one."""
     _check_columns(recording)
-    axis = time_axis(recording)
-    columns, told = _measured({name: values[axis.kept] for name, values in recording.columns.items()})
+    axis = check_time_axis(recording)
+    columns, told = _replace_absurd({name: values[axis.kept] for name, values in recording.columns.items()})
     notes = [*recording.notes, *axis.notes, *told]
-    usable, told = _usable(columns, axis)
+    usable, told = _usable_rows(columns, axis)
     notes += told
     drive, driven, told = _drive(columns, axis.time_s)
     notes += told
     usable &= driven
     _check_enough(recording, axis, usable, notes)
-    repeated, told = repeated_readings(columns["force_n"])
+    repeated, told = flag_repeated(columns["force_n"])
     position_m, said = _position_m(columns, axis.time_s)
-    others, heard = covariates(columns, axis.time_s, columns["force_n"])
+    others, heard = extract_covariates(columns, axis.time_s, columns["force_n"])
     heard += _suspicious(columns["force_n"][usable], {name: values[usable] for name, values in drive.items()})
     found = Measurement(
         name=recording.path.name,
@@ -60,7 +60,7 @@ def measurement_of(recording: Recording) -> Measurement:
         covariates=others,
         notes=(*notes, *told, *said, *heard),
     )
-    return evened(found, *(columns[name] for name in SENT)) if set(SENT) <= set(columns) else found
+    return resample_evenly(found, *(columns[name] for name in SENT)) if set(SENT) <= set(columns) else found
 
 
 def _check_columns(recording: Recording) -> None:
@@ -71,14 +71,14 @@ def _check_columns(recording: Recording) -> None:
         missing.append("command_v (or pressure_kpa)")
     if missing:
         raise RecordingError(
-            f"{recording.path}: no column {' and no column '.join(missing)}; there: {listed(list(names))}."
-            f"{_meant(recording, missing)} Say which is which: {EXAMPLE}"
+            f"{recording.path}: no column {' and no column '.join(missing)}; there: {join_names(list(names))}."
+            f"{_suggest_columns(recording, missing)} Say which is which: {EXAMPLE}"
         )
     if recording.rows < FEWEST_ROWS:
         raise RecordingError(f"{recording.path}: {recording.rows} rows: {_NEEDED}")
 
 
-def _meant(recording: Recording, missing: list[str]) -> str:
+def _suggest_columns(recording: Recording, missing: list[str]) -> str:
     """A column that has the name in another unit: time_ms for time_s."""
     wanted = {name.split(" ")[0] for name in missing} | (
         {"pressure_kpa"} if "command_v (or pressure_kpa)" in missing else set()
@@ -94,7 +94,7 @@ def _meant(recording: Recording, missing: list[str]) -> str:
     return f" Meant is probably --columns {','.join(near)}." if near else ""
 
 
-def _measured(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
+def _replace_absurd(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
     """The columns with NaN where a number is none of a measurement, and a sentence for each such column."""
     notes = []
     for name, values in columns.items():
@@ -118,13 +118,13 @@ def _suspicious(force_n: Floats, drive: Mapping[str, Floats]) -> list[str]:
     return [f"force_n falls as command_v rises (correlation {alike:.2f}): the cell's sign turned, or the wrong column?"]
 
 
-def _usable(columns: Mapping[str, Floats], axis: TimeAxis) -> tuple[Flags, list[str]]:
+def _usable_rows(columns: Mapping[str, Floats], axis: TimeAxis) -> tuple[Flags, list[str]]:
     """A finite, valid reading, not too soon after a gap."""
     read = np.isfinite(columns["force_n"])
     notes = [] if read.all() else [f"{int((~read).sum())} rows without a force are not judged"]
     usable = read & ~axis.after_gap
     if "quality" in columns:
-        valid, told = valid_by_quality(columns["quality"], is_ours(columns))
+        valid, told = valid_by_quality(columns["quality"], is_own_recording(columns))
         return usable & valid, notes + told
     return usable, notes
 
@@ -136,20 +136,20 @@ def _drive(columns: Mapping[str, Floats], time_s: Floats) -> tuple[dict[str, Flo
     driven = np.zeros(time_s.size, dtype=bool)
     command_v = columns.get("command_v")
     if command_v is not None and np.isfinite(command_v).any():
-        drive["command_v"], driven, notes = _held(command_v)
+        drive["command_v"], driven, notes = _hold_command(command_v)
     elif command_v is not None:
         notes.append("command_v holds no value and was left out")
     pressure_kpa = columns.get("pressure_kpa")
     if pressure_kpa is None or not np.isfinite(pressure_kpa).any():
         return drive, driven, notes + ([] if pressure_kpa is None else ["pressure_kpa holds no value and was left out"])
     known = np.isfinite(pressure_kpa)
-    drive["pressure_pa"] = (pressure_kpa if known.all() else filled_in(pressure_kpa, time_s)) * _PASCAL
+    drive["pressure_pa"] = (pressure_kpa if known.all() else interpolate_missing(pressure_kpa, time_s)) * _PASCAL
     if not known.all():
         notes.append(f"pressure_kpa is missing in {int((~known).sum())} rows: drawn straight from those around")
     return drive, driven if "command_v" in drive else known, notes
 
 
-def _held(command_v: Floats) -> tuple[Floats, Flags, list[str]]:
+def _hold_command(command_v: Floats) -> tuple[Floats, Flags, list[str]]:
     """A command stands until the next one: a row without one has the one before."""
     known = np.isfinite(command_v)
     latest = np.maximum.accumulate(np.where(known, np.arange(command_v.size), -1))
@@ -172,7 +172,7 @@ def _position_m(columns: Mapping[str, Floats], time_s: Floats) -> tuple[Floats |
     if known.all():
         return values * _METRE, []
     told = f"position_mm is missing in {int((~known).sum())} rows: drawn straight from those around"
-    return filled_in(values, time_s) * _METRE, [told]
+    return interpolate_missing(values, time_s) * _METRE, [told]
 
 
 def _check_enough(recording: Recording, axis: TimeAxis, usable: Flags, notes: list[str]) -> None:

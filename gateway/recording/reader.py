@@ -45,7 +45,7 @@ class Recording:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class RecordingEntry:
     """One line of `recordings list`. fault: why the file cannot be read, empty when it can."""
 
     number: int
@@ -72,7 +72,7 @@ def read_recording(path: Path) -> Recording:
     return Recording(path, header, columns, len(table), bool(notes), notes)
 
 
-def list_recordings(state_directory: Path) -> list[Entry]:
+def list_recordings(state_directory: Path) -> list[RecordingEntry]:
     """The recordings of one state directory by number; unreadable ones are listed with their fault."""
     paths = [path for path in (state_directory / "recordings").glob(f"*{SUFFIX}") if path.stem.isdigit()]
     return [_entry(path) for path in sorted(paths, key=lambda path: int(path.stem))]
@@ -87,17 +87,19 @@ def find_recording(state_directory: Path, number: int) -> Path:
     raise RecordingError(f"no recording {number} in {path.parent}; there: {present}")
 
 
-def _entry(path: Path) -> Entry:
+def _entry(path: Path) -> RecordingEntry:
     number, size_bytes = int(path.stem), path.stat().st_size
     try:
         data = memoryview(path.read_bytes())
         header, offset = _header(data, path)
     except (RecordingError, OSError) as error:
-        return Entry(number, path, {}, 0, 0.0, size_bytes, True, str(error))
+        return RecordingEntry(number, path, {}, 0, 0.0, size_bytes, True, str(error))
     row_size = len(header["columns"]) * _ROW_ITEM
     batches, notes = _all_batches(data, offset, row_size)
     rows = sum(batch.rows for batch in batches)
-    return Entry(number, path, header, rows, _duration_s(data, header, batches, row_size), size_bytes, bool(notes))
+    return RecordingEntry(
+        number, path, header, rows, _duration_s(data, header, batches, row_size), size_bytes, bool(notes)
+    )
 
 
 def _duration_s(data: memoryview, header: dict[str, Any], batches: list[Batch], row_size: int) -> float:

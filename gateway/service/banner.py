@@ -24,7 +24,7 @@ class Ready:
     notes: tuple[str, ...] = ()
 
 
-def info(ready: Ready) -> dict[str, Any]:
+def ready_fields(ready: Ready) -> dict[str, Any]:
     """The JSON line's fields, without the pids, which the guardian knows."""
     return {
         "ready": True,
@@ -36,7 +36,7 @@ def info(ready: Ready) -> dict[str, Any]:
     }
 
 
-def banner(ready: Ready) -> str:
+def format_banner(ready: Ready) -> str:
     rig, (host, port) = ready.rig, ready.modbus
     calibration = rig.calibration
     what = f"simulated, seed {rig.seed}" if rig.simulated else "real devices"
@@ -45,8 +45,8 @@ def banner(ready: Ready) -> str:
     lines = [
         f"force-gateway {VERSION} · rig {rig.name} ({what}) · calibration {calibration.name}: {calibration.kind}",
         f"  modbus tcp   {host}:{port}   units {units}      register table: force-gateway registers",
-        f"  output       {ready.output_port:<16} {output.device.name} {output.baud}  {_said(ready.voltage_v, 'V', 3)}",
-        f"  load cell    {ready.cell_port:<16} {cell.device.name} {cell.baud}  {_said(ready.force_n, 'N', 2)}",
+        f"  output       {ready.output_port:<16} {output.device.name} {output.baud}  {_reading(ready.voltage_v, 'V', 3)}",
+        f"  load cell    {ready.cell_port:<16} {cell.device.name} {cell.baud}  {_reading(ready.force_n, 'N', 2)}",
         f"  lease        {_lease(rig)}",
         *(f"  {'' if index else 'try':<12} {line}" for index, line in enumerate(try_lines(rig, host, port))),
         *(f"  note         {note}" for note in ready.notes),
@@ -60,7 +60,7 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
 
     A rig with a lease needs a heartbeat, which mbpoll has none of. A rig that names its master lets nobody else command.
     """
-    host = _reached_at(host, rig)
+    host = _reachable_host(host, rig)
     unit = defaults.UNIT_ID if defaults.UNIT_ID in rig.network.units else rig.network.units[0]
     where = "" if (host, port) == (defaults.HOST, defaults.MODBUS_PORT) else f" --gateway {_in_url(host)}:{port}"
     where += "" if unit == defaults.UNIT_ID else f" --unit {unit}"
@@ -78,7 +78,7 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
     )
 
 
-def _reached_at(host: str, rig: Rig) -> str:
+def _reachable_host(host: str, rig: Rig) -> str:
     """An address that takes connections: a server on all of them is reached at its loopback, where that may connect."""
     loopback = {"0.0.0.0": defaults.HOST, "::": "::1"}.get(host)
     if loopback is None:
@@ -101,7 +101,7 @@ def _force_to_try_n(rig: Rig) -> float:
     return round(middle_n) if low_n <= round(middle_n) <= high_n else round(middle_n, 2)
 
 
-def _said(value: float | None, unit: str, digits: int) -> str:
+def _reading(value: float | None, unit: str, digits: int) -> str:
     return "silent" if value is None else f"ok   {value:.{digits}f} {unit}"
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 
-class RunFlag:
+class CleanShutdownMarker:
     def __init__(self, state: Path) -> None:
         self._path = state / "running"
 

@@ -26,7 +26,7 @@ from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.recorded_row import COLUMNS
-from gateway.service.running_rig.running_rig import Cell, StartError
+from gateway.service.running_rig.running_rig import RunningRig, StartError
 
 EXIT_DEFECT, EXIT_DEVICE, EXIT_CONFIGURATION = 1, 69, 78
 
@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> int:
     link = socket.socket(fileno=int(arguments[0]))
     link.setblocking(False)
     options = json.loads(arguments[1])
-    priority.take(priority.LOOP_NICE)
+    priority.set_nice(priority.LOOP_NICE)
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
             rig = load(options)
@@ -44,12 +44,12 @@ def main(arguments: list[str]) -> int:
                 return runner.run(run(rig, options, link, log, notes))
         except ProfileError as error:
             faults = "\n".join(str(fault) for fault in error.faults)
-            return _not_started(log, faults, EXIT_CONFIGURATION, f"E151 the rig file has faults:\n{faults}")
+            return _report_start_failure(log, faults, EXIT_CONFIGURATION, f"E151 the rig file has faults:\n{faults}")
         except (StartError, PortError) as error:
-            return _not_started(log, str(error), error.exit_code, str(error))
+            return _report_start_failure(log, str(error), error.exit_code, str(error))
 
 
-def _not_started(log: EventLog, sentence: str, exit_code: int, event: str) -> int:
+def _report_start_failure(log: EventLog, sentence: str, exit_code: int, event: str) -> int:
     """A person in front of the terminal is told as by any verb; the file keeps it for whoever looks later."""
     print(sentence, file=sys.stderr)
     log.note("start", event)
@@ -76,7 +76,7 @@ def sample_ring(descriptor: int | None) -> SampleRing | None:
     return None
 
 
-def watch_wanted(rig: Rig, ring: SampleRing | None) -> dict[str, Any] | None:
+def watch_arguments(rig: Rig, ring: SampleRing | None) -> dict[str, Any] | None:
     """What the guardian tells the residual watch; None where there is none to start."""
     if not rig.is_watched or ring is None:
         return None
@@ -99,7 +99,7 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
     if ports is None:
         return EXIT_DEVICE
-    cell = Cell(rig, ports, Path(options["state"]), guardian, log)
+    cell = RunningRig(rig, ports, Path(options["state"]), guardian, log)
     cell.ring = sample_ring(options["ring"])
     guardian.on_ports = cell.move_ports
     try:
@@ -110,12 +110,12 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         gc.collect()
         gc.freeze()
         announcement = {
-            "banner": banner.banner(ready),
-            "info": banner.info(ready),
-            "watch": watch_wanted(rig, cell.ring),
+            "banner": banner.format_banner(ready),
+            "info": banner.ready_fields(ready),
+            "watch": watch_arguments(rig, cell.ring),
         }
         guardian.ready(announcement, rig.control.supervision.stall_s)
-        await _first_of(guardian.told_to_stop, cell.failed)
+        await _wait_first(guardian.told_to_stop, cell.failed)
         if cell.failed.is_set():
             return EXIT_DEFECT
         if not guardian.is_gone:
@@ -126,7 +126,7 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     return 0
 
 
-async def _first_of(*events: asyncio.Event) -> None:
+async def _wait_first(*events: asyncio.Event) -> None:
     waiting = [asyncio.ensure_future(event.wait()) for event in events]
     await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
     for task in waiting:

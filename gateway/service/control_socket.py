@@ -11,30 +11,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gateway.calibrations.upload import Upload
+from gateway.calibrations.upload import UploadService
 from gateway.processes.json_socket import Handler, JsonLineServer
 from gateway.registers import RegisterBank
-from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.published_status import LoopHealth
 from gateway.service.running_rig.recordings import Recordings
-from gateway.service.socket_requests import Ask, CalibrationRequest, RecordRequest, read
-from gateway.service.watch_reports import WatchDesk
+from gateway.service.socket_requests import CalibrationRequest, EmptyRequest, RecordRequest, parse_request
+from gateway.service.watch_reports import WatchReports
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class RunningParts:
     """Who answers: the parts of a running gateway that its tools may ask."""
 
     bank: RegisterBank
     recordings: Recordings
     health: LoopHealth
-    upload: Upload
-    ladder: LadderKeeper
-    watch: WatchDesk
+    upload: UploadService
+    ladder: CalibrationRuns
+    watch: WatchReports
 
 
 class ControlSocket(JsonLineServer):
-    def __init__(self, state: Path, asked: Asked, log: Callable[[str, str], None]) -> None:
+    def __init__(self, state: Path, asked: RunningParts, log: Callable[[str, str], None]) -> None:
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,
@@ -48,7 +48,7 @@ class ControlSocket(JsonLineServer):
         self._asked = asked
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:
-        is_on = read(RecordRequest, request).on
+        is_on = parse_request(RecordRequest, request).on
         if is_on is None:
             return self._asked.recordings.status()
         return self._asked.recordings.start() if is_on else self._asked.recordings.stop()
@@ -56,7 +56,7 @@ class ControlSocket(JsonLineServer):
     def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
         """{"use": number} (with "force": true a rejected one, too) or {"rollback": true} begin a change; neither tells what is
         in use and how the last one went."""
-        asked = read(CalibrationRequest, request)
+        asked = parse_request(CalibrationRequest, request)
         if asked.rollback:
             return self._asked.upload.rollback()
         return (
@@ -64,21 +64,21 @@ class ControlSocket(JsonLineServer):
         )
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
-        read(Ask, request)
+        parse_request(EmptyRequest, request)
         bank = self._asked.bank
         writers = {name: {"peer": str(peer), "time_s": at_s} for name, (peer, at_s) in bank.last_writer.items()}
         return {"owner": bank.owner, "writers": writers}
 
     def _last_refusal(self, request: dict[str, Any]) -> dict[str, Any]:
         """What the last-refusal registers stand for, in the gateway's own words; empty before the first."""
-        read(Ask, request)
+        parse_request(EmptyRequest, request)
         refusal = self._asked.bank.last_refusal
         if refusal is None:
             return {"sentence": ""}
         return {"address": refusal.address, "reason": int(refusal.reason), "sentence": refusal.sentence}
 
     def _health_figures(self, request: dict[str, Any]) -> dict[str, Any]:
-        read(Ask, request)
+        parse_request(EmptyRequest, request)
         health = self._asked.health
         return {
             "ticks": health.ticks,

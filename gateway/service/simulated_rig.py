@@ -31,14 +31,14 @@ from gateway.devices.messages import (
 from gateway.ports import PacedPty
 from gateway.processes import message_link as guardian_link
 from gateway.processes import priority
-from gateway.processes.clock_tick import Tick
+from gateway.processes.clock_tick import ClockTick
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.json_socket import JsonLineServer
 from gateway.profiles import Rig, load_rig
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
-from gateway.service.socket_requests import FaultRequest, read
+from gateway.service.socket_requests import FaultRequest, parse_request
 from gateway.twin import Plant, Twin
 from gateway.twin.plant import with_value
 
@@ -112,7 +112,7 @@ class SimulatedRig:
 
         ValueError on an unknown name, or a value that no plant has.
         """
-        asked = read(FaultRequest, request)
+        asked = parse_request(FaultRequest, request)
         name, is_on = asked.name, asked.on
         match name:
             case "no-air" | "no-contact" | "sign-inverted":
@@ -125,7 +125,7 @@ class SimulatedRig:
             case "output-cut":
                 self.is_output_cut = is_on
             case "plant":
-                self._change_plant(_changed(self._plant, asked.values) if is_on else self._plant)
+                self._change_plant(_change_plant(self._plant, asked.values) if is_on else self._plant)
             case _:
                 raise ValueError(
                     f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, cell-frozen, "
@@ -155,7 +155,7 @@ class SimulatedRig:
         self._set_twin_faults()
 
 
-def _changed(plant: Plant, values: Mapping[str, float]) -> Plant:
+def _change_plant(plant: Plant, values: Mapping[str, float]) -> Plant:
     """The plant with some numbers changed, by `section.field`; ValueError for what it does not have, or cannot be."""
     for path, value in values.items():
         section, _, field = path.partition(".")
@@ -172,7 +172,7 @@ def _changed(plant: Plant, values: Mapping[str, float]) -> Plant:
     return plant
 
 
-def _pty(device: DeviceProfile, on_bytes: Callable[[bytes, float], None]) -> PacedPty:
+def _make_pty(device: DeviceProfile, on_bytes: Callable[[bytes, float], None]) -> PacedPty:
     serial = device.serial
     return PacedPty(serial.baud, on_bytes=on_bytes, bits_per_character=serial.bits_per_character)
 
@@ -181,8 +181,8 @@ async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> No
     """Run until the guardian's end of the link closes."""
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
-    output_pty = _pty(rig.output.device, lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s))
-    cell_pty = _pty(rig.load_cell.device, lambda chunk, now_s: simulated.on_cell_bytes(chunk, now_s))
+    output_pty = _make_pty(rig.output.device, lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s))
+    cell_pty = _make_pty(rig.load_cell.device, lambda chunk, now_s: simulated.on_cell_bytes(chunk, now_s))
     simulated = SimulatedRig(rig, send_output=output_pty.send, send_cell=cell_pty.send, now_s=time.monotonic())
     faults = JsonLineServer(state / "rig.sock", {"fault": simulated.fault}, log)
 
@@ -193,7 +193,7 @@ async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> No
         if cell_pty.backlog_s * rate_hz < 1.0:
             simulated.stream(time.monotonic())
 
-    tick = Tick(1.0 / rate_hz, on_tick) if rate_hz else None
+    tick = ClockTick(1.0 / rate_hz, on_tick) if rate_hz else None
     output_pty.open()
     cell_pty.open()
     if unserved := await faults.start():
@@ -215,7 +215,7 @@ def main(arguments: list[str]) -> int:
     link = socket.socket(fileno=int(arguments[0]))
     options = json.loads(arguments[1])
     state = Path(options["state"])
-    priority.take(priority.RIG_NICE)
+    priority.set_nice(priority.RIG_NICE)
     with EventLog(source="rig", file=EventFile(state)) as log:
         asyncio.run(serve(load_rig(options["rig"], simulated=True), link, state, log))
     return 0

@@ -23,7 +23,7 @@ _STRICT: Final = {"extra": "forbid", "allow_inf_nan": False}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ask:
+class EmptyRequest:
     """Nothing but the verb."""
 
     __pydantic_config__ = _STRICT
@@ -81,7 +81,7 @@ class FaultRequest:
 
 
 for _shape in (
-    Ask,
+    EmptyRequest,
     RecordRequest,
     CalibrationRequest,
     CalibrateRequest,
@@ -93,7 +93,7 @@ for _shape in (
     adapter(_shape)
 
 
-def read(shape: type[Shape], request: Mapping[str, Any]) -> Shape:
+def parse_request(shape: type[Shape], request: Mapping[str, Any]) -> Shape:
     """The request without its verb as `shape`. ValueError names the first key that does not fit."""
     asked = {key: value for key, value in request.items() if key != "do"}
     for key, value in asked.items():

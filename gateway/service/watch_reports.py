@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.residual_cause import ResidualCause
-from gateway.service.running_rig.gateway_core import Gateway, Log
-from gateway.service.socket_requests import ResidualRequest, read
+from gateway.service.running_rig.gateway_core import ControlLoop, Log
+from gateway.service.socket_requests import ResidualRequest, parse_request
 
 Answer = dict[str, Any]
 COUNTERS: Final = ("looks", "judged", "skipped", "cpu_s", "rms_n", "floor_n", "pause_s")
@@ -19,10 +19,10 @@ _LONGEST_SENTENCE: Final = 500
 _LARGEST_COUNT: Final = 1.0e15
 
 
-class WatchDesk:
+class WatchReports:
     """Called from the loop only. clock: monotonic seconds."""
 
-    def __init__(self, gateway: Gateway, clock: Callable[[], float], log: Log) -> None:
+    def __init__(self, gateway: ControlLoop, clock: Callable[[], float], log: Log) -> None:
         self._gateway = gateway
         self._clock = clock
         self._log = log
@@ -33,7 +33,7 @@ class WatchDesk:
 
     def answer(self, request: Answer) -> Answer:
         """{"cause": number, "sentence": text, "counters": {...}} tells; without a cause it is asked. ValueError refuses."""
-        told = read(ResidualRequest, request)
+        told = parse_request(ResidualRequest, request)
         if told.cause is not None:
             self._hear(told.cause, told)
         return self.figures() | {"sentence": self._sentence}

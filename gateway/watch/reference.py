@@ -34,7 +34,7 @@ _STILL_V: Final = 0.02
 
 
 @dataclass(slots=True)
-class Reference:
+class WatchReference:
     """plant: without noise. is_settled: what the lines add is known."""
 
     plant: Plant

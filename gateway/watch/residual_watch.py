@@ -13,10 +13,10 @@ from typing import Final
 
 from gateway.recording.ring import RingReader
 from gateway.registers.residual_cause import ResidualCause
-from gateway.watch.reference import Reference
-from gateway.watch.warning_filter import Finding, Opinion
+from gateway.watch.reference import WatchReference
+from gateway.watch.warning_filter import WarningFilter, WindowVerdict
 from gateway.watch.window import Window, window_of
-from gateway.watch.window_verdict import Diagnose, finding_of
+from gateway.watch.window_verdict import Diagnose, judge_window
 
 _LEAST_EXCITATION_V: Final = 0.2
 _LEAST_MOVES: Final = 4
@@ -31,7 +31,7 @@ _OF_TOLERANCE: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class WatchSettings:
     """window_s, every_s: of the rig file. tolerance_n: the rig's band, of which a quarter matters."""
 
     window_s: float
@@ -43,21 +43,26 @@ class Watch:
     """clock: monotonic seconds, for the pauses between searches."""
 
     def __init__(
-        self, ring: RingReader, reference: Reference, setup: Setup, diagnose: Diagnose, clock: Callable[[], float]
+        self,
+        ring: RingReader,
+        reference: WatchReference,
+        setup: WatchSettings,
+        diagnose: Diagnose,
+        clock: Callable[[], float],
     ) -> None:
         self._ring = ring
         self._reference = reference
         self._setup = setup
         self._diagnose = diagnose
         self._clock = clock
-        self._opinion = Opinion()
+        self._opinion = WarningFilter()
         self._search_s = 0.0
         self._healthy_s = -inf
         self.why_skipped = ""
         self.counters: dict[str, float] = {"looks": 0, "judged": 0, "skipped": 0}
 
     @property
-    def standing(self) -> Finding:
+    def standing(self) -> WindowVerdict:
         """What is to be published."""
         return self._opinion.standing
 
@@ -83,7 +88,7 @@ class Watch:
 
     def _healthy(self, window: Window) -> None:
         self._healthy_s = window.end_s
-        self._opinion.hear(Finding(excitation_v=window.excitation_v))
+        self._opinion.hear(WindowVerdict(excitation_v=window.excitation_v))
 
     def _search(self, window: Window) -> None:
         """In what is younger than the last healthy window, once that is half a window."""
@@ -104,7 +109,7 @@ class Watch:
         found = self._diagnose([window.measurement], self._reference.plant)
         if not self._reference.is_settled:
             self._reference.settle(found)
-        finding = finding_of(window, found, self._reference, _OF_TOLERANCE * self._setup.tolerance_n)
+        finding = judge_window(window, found, self._reference, _OF_TOLERANCE * self._setup.tolerance_n)
         if finding.cause is ResidualCause.NONE:
             self._reference.learn(window, self._reference.rms_n(window))
             self._healthy_s = window.end_s

@@ -13,7 +13,7 @@ _AS_GOOD: Final = 0.5  # share of the convicting window's excitation from which 
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class WindowVerdict:
     """What one window says. excitation_v: how much the command moved in it; others: names it could not tell apart."""
 
     cause: ResidualCause = ResidualCause.NONE
@@ -21,23 +21,23 @@ class Finding:
     excitation_v: float = 0.0
     others: tuple[str, ...] = ()
 
-    def agrees_with(self, other: "Finding") -> bool:
+    def agrees_with(self, other: "WindowVerdict") -> bool:
         """The same cause, or one of a group that both windows cannot tell apart."""
         return self.cause is other.cause or (self.cause.effect in other.others and other.cause.effect in self.others)
 
 
-AGREEMENT: Final = Finding()
+AGREEMENT: Final = WindowVerdict()
 
 
 @dataclass(slots=True)
-class Opinion:
+class WarningFilter:
     """standing: what is published. convictions: how many windows in a row have said the same."""
 
-    standing: Finding = AGREEMENT
+    standing: WindowVerdict = AGREEMENT
     convictions: int = 0
-    _last: Finding = AGREEMENT
+    _last: WindowVerdict = AGREEMENT
 
-    def hear(self, finding: Finding) -> None:
+    def hear(self, finding: WindowVerdict) -> None:
         """One judged window."""
         if finding.cause is ResidualCause.NONE:
             self._acquit(finding)
@@ -52,8 +52,8 @@ class Opinion:
         else:
             self.convictions = 1
             if self.standing.cause is ResidualCause.NONE:
-                self.standing = Finding(ResidualCause.UNKNOWN, finding.sentence, finding.excitation_v)
+                self.standing = WindowVerdict(ResidualCause.UNKNOWN, finding.sentence, finding.excitation_v)
 
-    def _acquit(self, finding: Finding) -> None:
+    def _acquit(self, finding: WindowVerdict) -> None:
         if finding.excitation_v >= _AS_GOOD * self._last.excitation_v:
             self.standing, self._last, self.convictions = AGREEMENT, AGREEMENT, 0

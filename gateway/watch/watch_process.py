@@ -33,9 +33,9 @@ _LONGEST_ANSWER: Final = 1 << 16
 _FIRST_AMONG_THE_KILLED: Final = "900"
 
 
-def lower_priority() -> None:
+def yield_to_others() -> None:
     """Behind everybody else in processor time and memory; one thread for the mathematics."""
-    priority.run_behind_others()
+    priority.lower_priority()
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     with contextlib.suppress(OSError):
@@ -44,7 +44,7 @@ def lower_priority() -> None:
         os.environ[name] = "1"
 
 
-def end_with(link: socket.socket) -> None:
+def exit_with_guardian(link: socket.socket) -> None:
     """A thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does."""
 
     def wait() -> None:
@@ -55,7 +55,7 @@ def end_with(link: socket.socket) -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def tell(state: Path, message: dict[str, Any]) -> None:
+def report_to_control(state: Path, message: dict[str, Any]) -> None:
     """Say it to control; a control that is being restarted hears it the next time."""
     with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as control:
         control.settimeout(_ANSWER_S)
@@ -64,19 +64,19 @@ def tell(state: Path, message: dict[str, Any]) -> None:
         control.recv(_LONGEST_ANSWER)
 
 
-def watch_of(ring: RingReader, options: dict[str, Any]) -> "Watch":
+def make_watch(ring: RingReader, options: dict[str, Any]) -> "Watch":
     """The watch over the rig's plant. Everything heavy is imported here."""
     from gateway.profiles import load_rig
-    from gateway.watch.reference import Reference
-    from gateway.watch.residual_watch import Setup, Watch
+    from gateway.watch.reference import WatchReference
+    from gateway.watch.residual_watch import Watch, WatchSettings
 
     rig = load_rig(options["rig"], simulated=options["simulated"])
     assert rig.plant is not None  # or nobody had started us
-    setup = Setup(options["window_s"], options["every_s"], rig.control.defaults.in_band_tolerance_n)
-    return Watch(ring, Reference(rig.plant), setup, diagnosed, time.monotonic)
+    setup = WatchSettings(options["window_s"], options["every_s"], rig.control.defaults.in_band_tolerance_n)
+    return Watch(ring, WatchReference(rig.plant), setup, diagnose_window, time.monotonic)
 
 
-def diagnosed(measurements: "Sequence[Measurement]", plant: "Plant") -> "Diagnosis":
+def diagnose_window(measurements: "Sequence[Measurement]", plant: "Plant") -> "Diagnosis":
     from gateway.diagnosis import Options, diagnose
 
     return diagnose(measurements, plant, Options(is_own=True))
@@ -91,7 +91,7 @@ def run(options: dict[str, Any]) -> None:
     """Look, tell, sleep; for ever."""
     ring, state, every_s = RingReader(options["ring"]), Path(options["state"]), options["every_s"]
     time.sleep(options["window_s"])
-    watch = watch_of(ring, options)
+    watch = make_watch(ring, options)
     while True:
         began_s = time.process_time()
         watch.look()
@@ -100,13 +100,13 @@ def run(options: dict[str, Any]) -> None:
         counters = watch.counters | {"cpu_s": time.process_time(), "pause_s": rest_s}
         counters = {name: value for name, value in counters.items() if isfinite(value)}  # JSON has no NaN
         standing = watch.standing
-        tell(state, {"cause": int(standing.cause), "sentence": standing.sentence, "counters": counters})
+        report_to_control(state, {"cause": int(standing.cause), "sentence": standing.sentence, "counters": counters})
         time.sleep(rest_s)
 
 
 def main(arguments: list[str]) -> int:
-    lower_priority()
-    end_with(socket.socket(fileno=int(arguments[0])))
+    yield_to_others()
+    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
     run(json.loads(arguments[1]))
     return 0
 

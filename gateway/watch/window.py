@@ -43,11 +43,11 @@ def window_of(data: bytes, columns: tuple[str, ...], window_s: float) -> Window 
     """The window that ends with the newest row; a sentence where there is nothing to judge."""
     table = np.frombuffer(data, dtype="<f8").reshape(-1, len(columns))
     rows = {name: table[:, index] for index, name in enumerate(columns)}
-    rows = _unbroken(rows)
+    rows = _after_last_gap(rows)
     time_s = rows["time_s"]
     if time_s.size < 2 or time_s[-1] - time_s[0] < window_s * _ALMOST + _SETTLED_S:
         return "the run is younger than the window"
-    first = _first(rows["command_v"], time_s, window_s)
+    first = _first_replayed_row(rows["command_v"], time_s, window_s)
     rows = {name: values[first:].copy() for name, values in rows.items()}
     window = rows["time_s"] >= max(time_s[-1] - window_s, rows["time_s"][0] + _SETTLED_S)
     judged = window & ~_faulty(rows)
@@ -77,7 +77,7 @@ def _measurement(rows: dict[str, Floats], judged: Flags) -> Measurement | str:
     return replace(found, force_n=np.where(found.usable, found.force_n, 0.0))
 
 
-def _unbroken(rows: dict[str, Floats]) -> dict[str, Floats]:
+def _after_last_gap(rows: dict[str, Floats]) -> dict[str, Floats]:
     """What follows the last gap, or the last time that runs backwards."""
     steps_s = np.diff(rows["time_s"])
     breaks = np.flatnonzero((steps_s > _GAP_S) | (steps_s < 0.0))
@@ -85,19 +85,21 @@ def _unbroken(rows: dict[str, Floats]) -> dict[str, Floats]:
     return {name: values[first:] for name, values in rows.items()}
 
 
-def _first(command_v: Floats, time_s: Floats, window_s: float) -> int:
+def _first_replayed_row(command_v: Floats, time_s: Floats, window_s: float) -> int:
     """The row where the replay begins."""
     begin_s = time_s[-1] - window_s
     stop = max(1, int(np.searchsorted(time_s, begin_s - _SETTLED_S)))
     start = int(np.searchsorted(time_s, begin_s - LEAD_S))
     held = max(1, int(np.searchsorted(time_s, time_s[0] + _SETTLED_S)))
-    resting = np.flatnonzero(_held(command_v[start:stop] <= _OFF_V, held) >= held)  # a dip of the command is no rest
+    resting = np.flatnonzero(
+        _moving_sum(command_v[start:stop] <= _OFF_V, held) >= held
+    )  # a dip of the command is no rest
     if resting.size:
         return start + held - 1 + int(resting[-1])
-    return start + int(np.argmax(_held(command_v[start : stop + held], held)[: stop - start]))
+    return start + int(np.argmax(_moving_sum(command_v[start : stop + held], held)[: stop - start]))
 
 
-def _held(values: Floats | Flags, rows: int) -> Floats:
+def _moving_sum(values: Floats | Flags, rows: int) -> Floats:
     """Sums over so many rows, from each row on."""
     return np.convolve(values, np.ones(rows), mode="valid") if values.size >= rows else np.zeros(1)
 

@@ -17,8 +17,8 @@ from gateway.diagnosis import Diagnosis, Measurement
 from gateway.diagnosis.result import Gain
 from gateway.registers.residual_cause import ResidualCause
 from gateway.twin.plant import Plant, with_value
-from gateway.watch.reference import Reference, residuals, rms_of
-from gateway.watch.warning_filter import Finding
+from gateway.watch.reference import WatchReference, residuals, rms_of
+from gateway.watch.warning_filter import WindowVerdict
 from gateway.watch.window import Window
 
 Diagnose = Callable[[Sequence[Measurement], Plant], Diagnosis]
@@ -35,7 +35,7 @@ _OF_TWO_CLOCKS: Final = ("clock-offset", "clock-skew")
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class PlantChange:
     """A named difference from the reference: what it was, what it is, and what it does to the force."""
 
     name: str
@@ -44,21 +44,21 @@ class Change:
     force_n: float = 0.0
 
 
-def finding_of(window: Window, found: Diagnosis, reference: Reference, least_n: float) -> Finding:
+def judge_window(window: Window, found: Diagnosis, reference: WatchReference, least_n: float) -> WindowVerdict:
     """The strongest difference of this window from the reference; least_n: what a difference must do to the force, N."""
     excess_n = excess_of(window, reference)
-    changes = [change for change in weighed(window, found, reference.plant) if change.force_n >= least_n]
+    changes = [change for change in weigh_changes(window, found, reference.plant) if change.force_n >= least_n]
     if changes and excess_n >= least_n:
         best = max(changes, key=lambda change: change.force_n)
         sentence = _sentence(best, found.plant, reference.plant)
-        return Finding(ResidualCause.of_effect(best.name), sentence, window.excitation_v, best.others)
+        return WindowVerdict(ResidualCause.of_effect(best.name), sentence, window.excitation_v, best.others)
     if excess_n >= _WITHOUT_A_NAME * least_n:
-        sentence = f"{_DIFFERS} {excess_n:.2f} N (rms): {_described(found)}"
-        return Finding(ResidualCause.UNKNOWN, sentence, window.excitation_v)
-    return Finding(excitation_v=window.excitation_v)
+        sentence = f"{_DIFFERS} {excess_n:.2f} N (rms): {_describe_leftover(found)}"
+        return WindowVerdict(ResidualCause.UNKNOWN, sentence, window.excitation_v)
+    return WindowVerdict(excitation_v=window.excitation_v)
 
 
-def excess_of(window: Window, reference: Reference) -> float:
+def excess_of(window: Window, reference: WatchReference) -> float:
     """What of the residual is neither usual nor the readings' own noise, N: that is seen in their second differences."""
     rms_n, usual_n = reference.rms_n(window), reference.floor_n(window) or 0.0
     force_n = window.measurement.force_n[window.measurement.usable]
@@ -66,7 +66,7 @@ def excess_of(window: Window, reference: Reference) -> float:
     return sqrt(max(rms_n**2 - max(noise_n, usual_n) ** 2, 0.0))
 
 
-def _described(found: Diagnosis) -> str:
+def _describe_leftover(found: Diagnosis) -> str:
     """What no effect explains, in the words of the screen."""
     if found.suspects:
         return found.suspects[0].sentence
@@ -76,34 +76,34 @@ def _described(found: Diagnosis) -> str:
     return f"{left.shape}, depending on {left.depends_on}"
 
 
-def weighed(window: Window, found: Diagnosis, plant: Plant) -> list[Change]:
+def weigh_changes(window: Window, found: Diagnosis, plant: Plant) -> list[PlantChange]:
     """Every change that the diagnosis found, with its weight: no more than it saves in rows that its fit did not see."""
-    changes = [Change(name, (parameter,)) for name, parameter in BASE.items()]
+    changes = [PlantChange(name, (parameter,)) for name, parameter in BASE.items()]
     for cause in found.causes:
         parameters = tuple((each.section, name, each.unit) for name, each in cause.parameters.items())
-        changes.append(Change(_possible(cause.name, cause.group), parameters, cause.group))
-    undone = [_undone(found.plant, plant, change) for change in changes]
+        changes.append(PlantChange(_plausible_name(cause.name, cause.group), parameters, cause.group))
+    undone = [_undo_change(found.plant, plant, change) for change in changes]
     forces = residuals(window.measurement, [found.plant, *undone])
     refit_n = sqrt(max(rms_of(window.measurement, plant) ** 2 - rms_of(window.measurement, found.plant) ** 2, 0.0))
-    most_n = [refit_n] * len(BASE) + [min(_saved_n(cause.gain), refit_n) for cause in found.causes]
+    most_n = [refit_n] * len(BASE) + [min(_gain_n(cause.gain), refit_n) for cause in found.causes]
     weights = np.minimum(np.std(forces[1:] - forces[0], axis=1), most_n)
     return [
-        Change(change.name, change.parameters, change.others, float(weight))
+        PlantChange(change.name, change.parameters, change.others, float(weight))
         for change, weight in zip(changes, weights, strict=True)
     ]
 
 
-def _saved_n(gain: Gain) -> float:
+def _gain_n(gain: Gain) -> float:
     return sqrt(max(gain.held_out_rms_before_n**2 - gain.held_out_rms_after_n**2, 0.0))
 
 
-def _possible(name: str, group: Sequence[str]) -> str:
+def _plausible_name(name: str, group: Sequence[str]) -> str:
     """One clock stamps readings and commands here, so that a late reading is a late machine."""
     others = [other for other in group if other not in _OF_TWO_CLOCKS]
     return others[0] if name in _OF_TWO_CLOCKS and others else name
 
 
-def _undone(found: Plant, plant: Plant, change: Change) -> Plant:
+def _undo_change(found: Plant, plant: Plant, change: PlantChange) -> Plant:
     for section, name, _ in change.parameters:
         found = with_value(found, section, name, getattr(getattr(plant, section), name))
     return found
@@ -112,7 +112,7 @@ def _undone(found: Plant, plant: Plant, change: Change) -> Plant:
 _DIFFERS: Final = "the force differs from the rig's plant by"
 
 
-def _sentence(change: Change, found: Plant, plant: Plant) -> str:
+def _sentence(change: PlantChange, found: Plant, plant: Plant) -> str:
     """`the force differs from the rig's plant by 0.85 N (rms): coulomb-friction, coulomb_n 1 -> 2.4 N`."""
     values = ", ".join(
         f"{name} {getattr(getattr(plant, section), name):.4g} -> {getattr(getattr(found, section), name):.4g} {unit}"

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.calibrations.selection import BUILT_IN
 from gateway.calibrations.store import CalibrationStore, StoreError
-from gateway.processes.durable_file import sealed, unsealed
+from gateway.processes.durable_file import add_checksum, verify_checksum
 from tests.calibrations.coefficients import calibration, mark_of
 from tests.calibrations.store_bench import OWN, active_mark, used_store
 
@@ -28,10 +28,10 @@ def damages(data: bytes, rng: Random) -> Iterator[bytes]:
         altered[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
         yield bytes(altered)
     yield bytes(len(data))
-    yield sealed("number: [\n")
-    yield sealed("\xff\udcff".encode("utf-8", "replace").decode())
-    yield sealed("[]")
-    yield sealed(json.dumps({"generation": 2, "active": {"number": 2}}))
+    yield add_checksum("number: [\n")
+    yield add_checksum("\xff\udcff".encode("utf-8", "replace").decode())
+    yield add_checksum("[]")
+    yield add_checksum(json.dumps({"generation": 2, "active": {"number": 2}}))
 
 
 def test_a_damaged_calibration_in_use_gives_way_to_the_one_before_it(used):
@@ -105,5 +105,5 @@ def test_a_file_under_another_number_is_no_calibration(used):
 )
 def test_only_what_was_sealed_is_unsealed(data):
     with pytest.raises(ValueError, match=r"crc32|empty"):
-        unsealed(data + b"x" if data.startswith(b"# crc32") else data)
-    assert unsealed(sealed("é\n")) == "é\n".encode()
+        verify_checksum(data + b"x" if data.startswith(b"# crc32") else data)
+    assert verify_checksum(add_checksum("é\n")) == "é\n".encode()

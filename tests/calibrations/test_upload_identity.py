@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, Response, validate_coefficients
-from gateway.calibrations.activation import uploaded
+from gateway.calibrations.activation import make_uploaded
 from gateway.calibrations.store import StoreError
 from gateway.profiles import load_calibration
 from gateway.registers import RegisterMap
@@ -182,7 +182,7 @@ def test_whatever_a_calibration_is_its_words_make_the_same_words_again(given_set
     assume(not validate_coefficients(Coefficients.of_calibration(given_set), limits))
     found = check_staged(staged(CoefficientSet.of_calibration(given_set), slot=1), limits)
     assert isinstance(found, Staged), found
-    again = uploaded(found, name="x", rig="", date_utc="", source="")
+    again = make_uploaded(found, name="x", rig="", date_utc="", source="")
     assert CoefficientSet.of_calibration(again).to_words() == CoefficientSet.of_calibration(given_set).to_words()
     assert model_hash(again) == model_hash(given_set)
     again.model()

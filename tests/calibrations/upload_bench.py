@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from gateway.bsfm import Calibration, CoefficientLimits
-from gateway.calibrations.activation import Activation, InUse
+from gateway.calibrations.activation import Activation, ActiveCalibration
 from gateway.calibrations.store import CalibrationStore
-from gateway.calibrations.upload import Upload, UploadRules
+from gateway.calibrations.upload import UploadRules, UploadService
 from gateway.modbus import Peer
 from gateway.registers import BankRules, Refusal, RegisterBank, RegisterMap
 from gateway.registers.upload.coefficients import CoefficientSet, words_of_block
@@ -32,7 +32,7 @@ class Bench:
     own: Calibration = OWN
     work: list[tuple[Callable[[], Any], Callable[[Any], None]]] = field(default_factory=list)
     log: list[str] = field(default_factory=list)
-    used: list[InUse] = field(default_factory=list)
+    used: list[ActiveCalibration] = field(default_factory=list)
     shown: list[CommitStatus] = field(default_factory=list)  # what a master reads in the moment of each
 
     def __post_init__(self) -> None:
@@ -42,7 +42,7 @@ class Bench:
         activation = Activation(self.store, CoefficientLimits(cell_range_n=100.0))
         self.standing = self.store.standing(activation.why_not)
         upload_rules = UploadRules.of("demo", self.register_map, lambda: "2026-11-22")
-        self.upload = Upload(
+        self.upload = UploadService(
             self.bank.staging,
             activation,
             self.standing,
@@ -54,7 +54,7 @@ class Bench:
         assert self.standing.calibration
         self.bank.set_active_model(self.standing.calibration, self.standing.selection.slot_word)
 
-    def _on_use(self, taken: InUse) -> None:
+    def _on_use(self, taken: ActiveCalibration) -> None:
         self.used.append(taken)
         self.shown.append(self.status)
         self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)

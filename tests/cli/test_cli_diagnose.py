@@ -21,7 +21,7 @@ from gateway.cli.diagnosis.outputs import write_all
 from gateway.diagnosis.result import Diagnosis, Verdict
 from gateway.profiles import load_plant, root
 from gateway.recording import Recorder
-from gateway.service.closed_loop.study import ClosedLoop
+from gateway.service.closed_loop.study import ClosedLoopGain
 from gateway.twin import Plant
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
 
@@ -239,7 +239,7 @@ def test_the_closed_loop_is_measured_only_when_asked_and_told_everywhere(
     tmp_path: Path, call: Call, engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, report = table(tmp_path / "a.csv"), tmp_path / "out.html"
-    gain = ClosedLoop(
+    gain = ClosedLoopGain(
         before_rms_n=1.2, after_rms_n=0.3, before_max_n=4.0, after_max_n=1.0, before_settled_s=0.6, after_settled_s=0.3,
         rms_ratio=0.25, rms_ratio_ci95=(0.2, 0.3), seeds=(0, 1), compensated=("friction",), not_compensated=(),
     )  # fmt: skip
@@ -256,7 +256,7 @@ def test_the_closed_loop_is_measured_only_when_asked_and_told_everywhere(
 def test_a_loop_that_could_not_be_closed_says_why(
     tmp_path: Path, call: Call, engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refused(base: Plant, extended: Plant, rig: object) -> ClosedLoop:
+    def refused(base: Plant, extended: Plant, rig: object) -> ClosedLoopGain:
         raise ValueError("the curve is not increasing")
 
     monkeypatch.setattr("gateway.service.closed_loop.study.closed_loop_gain", refused)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.cli.verbs import events as verb
-from gateway.processes.event import event_of, record, utc
+from gateway.processes.event import encode_event, make_event, utc_text
 from gateway.processes.event_file import EventFile
 
 NOON_S = 1_795_348_800.0
@@ -25,7 +25,7 @@ def state(tmp_path: Path, monkeypatch) -> Path:
     (tmp_path / "state").mkdir()
     file = EventFile(tmp_path / "state")
     for at_s, source, cause, sentence in SAID:
-        file.append(record(event_of(NOON_S + at_s, source, cause, sentence)))
+        file.append(encode_event(make_event(NOON_S + at_s, source, cause, sentence)))
     file.close()
     return tmp_path / "state"
 
@@ -94,7 +94,7 @@ def test_a_time_that_is_none_is_told(wrong: str, state: Path, call) -> None:
 def test_rotated_files_are_read_and_a_torn_line_is_not(state: Path, call) -> None:
     path = state / "events.jsonl"
     whole = path.read_bytes()
-    (state / "events.jsonl.1").write_bytes(record(event_of(NOON_S - 9000, "control", "x", "E402 before")))
+    (state / "events.jsonl.1").write_bytes(encode_event(make_event(NOON_S - 9000, "control", "x", "E402 before")))
     path.write_bytes(whole + whole[:50])
     answer = call("events", "--state", state, "--json")
     assert codes(answer.output) == ["E402", None, "W204", "A345", "A401"]
@@ -113,7 +113,7 @@ def test_following_shows_what_comes(state: Path, call, monkeypatch) -> None:
         if slept.is_set():
             raise KeyboardInterrupt
         slept.set()
-        file.append(record(event_of(NOON_S, "control", "x", "A313 too much force")))
+        file.append(encode_event(make_event(NOON_S, "control", "x", "A313 too much force")))
 
     monkeypatch.setattr(verb.time, "sleep", meanwhile)
     answer = call("events", "--state", state, "--follow", "--json", "--severity", "error")
@@ -141,5 +141,5 @@ def test_a_file_that_gets_another_name_during_a_backup_is_no_failure(
 
 
 def test_times_sort_as_texts() -> None:
-    assert utc(0.0) == "1970-01-01T00:00:00.000Z"
-    assert utc(NOON_S) < utc(NOON_S + 0.001) < utc(NOON_S + 86400)
+    assert utc_text(0.0) == "1970-01-01T00:00:00.000Z"
+    assert utc_text(NOON_S) < utc_text(NOON_S + 0.001) < utc_text(NOON_S + 86400)

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from gateway.bsfm import CoefficientLimits
-from gateway.calibrations.activation import Activation, InUse
+from gateway.calibrations.activation import Activation, ActiveCalibration
 from gateway.calibrations.store import CalibrationStore, as_text
-from gateway.calibrations.upload import Upload, UploadRules
+from gateway.calibrations.upload import UploadRules, UploadService
 from gateway.cli.master.upload import place
 from gateway.modbus import MbapFramer, Peer, answer
 from gateway.profiles import load_calibration
@@ -34,7 +34,7 @@ class Gateway:
         self.store = CalibrationStore(state, OWN)
         activation = Activation(self.store, CoefficientLimits(cell_range_n=100.0))
         self.log: list[str] = []
-        self.upload = Upload(
+        self.upload = UploadService(
             self.bank.staging,
             activation,
             self.store.standing(),
@@ -45,7 +45,7 @@ class Gateway:
         self.bank.set_active_model(OWN)
         self.bank.publish(Status(calibration_id=1))
 
-    def _on_use(self, taken: InUse) -> None:
+    def _on_use(self, taken: ActiveCalibration) -> None:
         self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
         self.bank.publish(Status(calibration_id=taken.calibration.number))
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis import Measurement
-from gateway.recording.tables.judged_rows import repeated_readings
+from gateway.recording.tables.judged_rows import flag_repeated
 from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 from gateway.twin.replay.replay import Drive, Replay
 from gateway.twin.surroundings import Surroundings
@@ -117,7 +117,7 @@ def measurement(time_s: Floats, volts: Floats | None, force_n: Floats, columns: 
         time_s=time_s,
         force_n=force_n,
         usable=np.isfinite(force_n),
-        repeated=repeated_readings(force_n)[0],
+        repeated=flag_repeated(force_n)[0],
         command_v=volts,
         position_m=None if position_mm is None else position_mm * 1.0e-3,
         covariates=others,

@@ -19,9 +19,9 @@ from gateway.profiles import load_rig
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.twin.plant import with_value
-from gateway.watch.reference import Reference
-from gateway.watch.residual_watch import Setup, Watch
-from gateway.watch.watch_process import diagnosed
+from gateway.watch.reference import WatchReference
+from gateway.watch.residual_watch import Watch, WatchSettings
+from gateway.watch.watch_process import diagnose_window
 from tests.watch.clean_runs import KINDS, recorded, rows_of
 
 NOISE_N = 0.12  # of the demo rig's cell
@@ -87,7 +87,9 @@ def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     ring, plant = Ring(rows_of(kind, seed, lasts_s)), load_rig("demo").plant
     assert plant is not None
-    watch = Watch(ring, Reference(plant), Setup(window_s, 0.5 * window_s, 1.0), diagnosed, lambda: ring.now_s)  # type: ignore[arg-type]
+    watch = Watch(
+        ring, WatchReference(plant), WatchSettings(window_s, 0.5 * window_s, 1.0), diagnose_window, lambda: ring.now_s
+    )  # type: ignore[arg-type]
     stood = []
     for now_s in np.arange(1.3 * window_s, ring.last_s, 0.5 * window_s):
         ring.now_s = now_s

@@ -72,6 +72,6 @@ def test_a_named_cause_never_stands_beside_nothing_explained() -> None:
         for cause in answer.causes:
             assert cause.gain.ci95[0] > 0.0
             assert cause.gain.held_out_rms_after_n < cause.gain.held_out_rms_before_n
-            assert words.explained(answer) >= 0.01
+            assert words.explained_share(answer) >= 0.01
     assert answer.causes, "the larger one is found"
     assert replace(answer).extended.held_out_rms_n < answer.baseline.rms_n

@@ -60,7 +60,7 @@ accept_no_device_watchdog: true
 @contextmanager
 def far_ends(folder: Path) -> Iterator[None]:
     """The devices of rig.yaml on two ptys, behind the names that the rig gives; in a thread of the test."""
-    ours, theirs = message_link.pair()
+    ours, theirs = message_link.create_link()
     rig = load_rig(folder / "rig.yaml", simulated=True)
     thread = threading.Thread(target=lambda: asyncio.run(serve(rig, theirs, folder, EventLog())))
     thread.start()

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from gateway.fieldbus import ModbusTcpServer, ServerSettings
-from gateway.fieldbus.connection import Connection, Shared
-from gateway.fieldbus.limits import LogGate
+from gateway.fieldbus.connection import Connection, ServerState
+from gateway.fieldbus.limits import LogLimiter
 from gateway.fieldbus.peers import Peers
 from gateway.modbus import Peer
 from tests.modbus.memory_bank import MemoryBank
@@ -122,9 +122,9 @@ class Stand:
         self.bank = NotingBank()
         self.log: list[tuple[str, str]] = []
         self.closed: list[Peer] = []
-        gate = LogGate(lambda cause, sentence: self.log.append((cause, sentence)))
+        gate = LogLimiter(lambda cause, sentence: self.log.append((cause, sentence)))
         peers = Peers(self.settings, guarded=False)
-        self.shared = Shared(self.bank, self.settings, self.clock, gate, peers, self.closed.append)
+        self.shared = ServerState(self.bank, self.settings, self.clock, gate, peers, self.closed.append)
 
     def connect(self, host: str = "127.0.0.1", *, stuck: bool = False) -> tuple[Connection, HandTransport]:
         connection, transport = Connection(self.shared), HandTransport(host, stuck=stuck)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.fieldbus import ServerSettings
-from gateway.fieldbus.limits import LogGate, RequestRate
+from gateway.fieldbus.limits import LogLimiter, RequestRate
 from gateway.fieldbus.peers import Peers, address_of, is_loopback
 
 
@@ -33,7 +33,7 @@ def test_the_wait_that_is_told_is_long_enough() -> None:
 
 def test_ten_lines_a_second_of_a_cause_and_the_rest_counted() -> None:
     lines: list[tuple[str, str]] = []
-    gate = LogGate(lambda cause, sentence: lines.append((cause, sentence)))
+    gate = LogLimiter(lambda cause, sentence: lines.append((cause, sentence)))
     for number in range(500):
         gate("framing", f"line {number}", 10.0 + number / 1000)
         gate("idle", "other", 10.0) if number == 250 else None

@@ -14,7 +14,7 @@ import serial
 from serial import SerialException
 
 from gateway.ports import PortError, Pty
-from gateway.ports.errors import why_closed, why_lost
+from gateway.ports.errors import explain_loss, explain_open_failure
 
 
 async def told_by_opening(ear: Any, path: str) -> PortError:
@@ -65,13 +65,13 @@ def test_a_member_who_has_not_logged_in_again_is_told_so(
     monkeypatch.setattr(
         "gateway.ports.errors.grp.getgrnam", lambda name: grp.struct_group(("dialout", "", 20, ["anna"]))
     )
-    assert "log in again" in str(why_closed(line.path, PermissionError(errno.EACCES, ""), []))
-    assert "usermod" not in str(why_closed(line.path, PermissionError(errno.EACCES, ""), []))
+    assert "log in again" in str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
+    assert "usermod" not in str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
 
 
 def test_a_port_for_root_alone_needs_a_group_first(line: Pty, anna: None) -> None:
     os.chmod(line.path, 0o600)  # noqa: PTH101
-    told = str(why_closed(line.path, PermissionError(errno.EACCES, ""), []))
+    told = str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
     assert f"(mode 0600 anna:dialout): sudo chgrp dialout {line.path}" in told
 
 
@@ -110,8 +110,8 @@ def test_a_file_is_no_serial_port(ear: Any, tmp_path: Path) -> None:
     ],
 )
 def test_three_families_of_exceptions_become_one(error: Exception, code: str) -> None:
-    assert why_closed("/dev/ttyX", error, []).code == code
-    assert why_lost("/dev/ttyX", error).code == "E102"
+    assert explain_open_failure("/dev/ttyX", error, []).code == code
+    assert explain_loss("/dev/ttyX", error).code == "E102"
 
 
 @pytest.mark.parametrize("family", [SerialException("gone"), OSError(errno.EIO, "gone"), termios.error(5, "gone")])

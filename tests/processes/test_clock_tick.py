@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from gateway.processes.clock_tick import Tick
+from gateway.processes.clock_tick import ClockTick
 from gateway.service.running_rig.published_status import LoopHealth
 
 PERIOD_S = 0.004
@@ -28,7 +28,7 @@ def ticks(count: int, *, fallback: bool = False, busy_s: float = 0.0) -> list[tu
             if len(seen) >= count:
                 enough.set()
 
-        tick = Tick(PERIOD_S, on_tick)
+        tick = ClockTick(PERIOD_S, on_tick)
         tick.is_fallback = fallback
         tick.start()
         async with asyncio.timeout(5):
@@ -71,7 +71,7 @@ def test_closing_twice_or_before_the_start_is_no_trouble(fallback: bool) -> None
     seen: list[int] = []
 
     async def scene() -> bytes:
-        tick = Tick(PERIOD_S, lambda expirations, late_s: seen.append(expirations))
+        tick = ClockTick(PERIOD_S, lambda expirations, late_s: seen.append(expirations))
         tick.is_fallback = fallback
         tick.close()
         tick.start()

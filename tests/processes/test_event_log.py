@@ -15,9 +15,17 @@ from gateway.codes.catalogue import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.processes import event_file
-from gateway.processes.event import WARNING_ALARMS, Event, event_in, event_of, line_of, record, severity_of
+from gateway.processes.event import (
+    WARNING_ALARMS,
+    EventRecord,
+    encode_event,
+    format_event,
+    make_event,
+    parse_event,
+    severity_of,
+)
 from gateway.processes.event_file import KEPT, EventFile, EventReader
-from gateway.processes.event_log import Drain, EventLog
+from gateway.processes.event_log import EventLog, QueuedWriter
 
 NOON_S = 1_795_348_800.25
 
@@ -162,7 +170,7 @@ def test_a_terminal_that_went_away_stops_nothing(error: Exception) -> None:
     ],
 )
 def test_the_code_alone_decides_the_severity(sentence: str, severity: str, code: str | None, text: str) -> None:
-    assert event_of(NOON_S, "control", "x y", sentence)[1:] == (severity, code, "x", text, "control")
+    assert make_event(NOON_S, "control", "x y", sentence)[1:] == (severity, code, "x", text, "control")
 
 
 def test_every_fault_is_an_error_and_every_refusal_a_warning() -> None:
@@ -179,13 +187,13 @@ def test_alarms_that_are_only_warnings_are_those_of_the_catalogue() -> None:
 # -- the file
 
 
-def kept(directory: Path) -> list[Event]:
+def kept(directory: Path) -> list[EventRecord]:
     with EventReader(directory) as reader:
         return list(reader.kept())
 
 
-def event(text: str, source: str = "control") -> Event:
-    return event_of(NOON_S, source, "test", text)
+def event(text: str, source: str = "control") -> EventRecord:
+    return make_event(NOON_S, source, "test", text)
 
 
 def test_the_file_has_one_json_object_per_line(tmp_path: Path) -> None:
@@ -214,16 +222,16 @@ def test_what_is_noted_is_not_on_the_terminal(tmp_path: Path) -> None:
 
 
 def test_a_line_for_people_moves_no_cursor_and_stays_one_event() -> None:
-    line = line_of(event("E150 one\ntwo \x1b[2J\r\x9b\u2028"))
+    line = format_event(event("E150 one\ntwo \x1b[2J\r\x9b\u2028"))
     assert line.endswith("E150 one\n    two \\x1b[2J\\x0d\\x9b\\x2028")
 
 
 def test_a_sentence_without_end_is_cut() -> None:
-    assert len(record(event("W204 " + "x" * 10_000_000))) < 20_000
+    assert len(encode_event(event("W204 " + "x" * 10_000_000))) < 20_000
 
 
 def torn_forms() -> Iterator[bytes]:
-    whole = record(event("W204 whole"))
+    whole = encode_event(event("W204 whole"))
     yield from (whole[:cut] for cut in range(len(whole) - 1))
     yield from (b"\x00" * 100, b"[" * 100_000, b'{"time": "x"}', b'{"time": "x", "severity": 1}', b"\xff\xfe", b"7")
 
@@ -232,20 +240,20 @@ def test_whatever_a_killed_writer_leaves_costs_no_other_line(tmp_path: Path) -> 
     """The next writer's line begins where the torn one ends."""
     for torn in torn_forms():
         path = tmp_path / "events.jsonl"
-        path.write_bytes(record(event("one")) + torn + record(event("two")) + torn)
+        path.write_bytes(encode_event(event("one")) + torn + encode_event(event("two")) + torn)
         assert [found.text for found in kept(tmp_path)] == ["one", "two"], torn
 
 
 def test_a_record_in_a_sentence_is_no_record() -> None:
-    nested = event("W204 " + record(event("inner")).decode())
-    assert event_in(record(nested)) == nested
-    assert event_in(record(nested)[:-3]) is None
+    nested = event("W204 " + encode_event(event("inner")).decode())
+    assert parse_event(encode_event(nested)) == nested
+    assert parse_event(encode_event(nested)[:-3]) is None
 
 
 def test_size_and_number_of_files_are_bounded_and_the_newest_lines_stay(tmp_path: Path) -> None:
     file = EventFile(tmp_path, longest_bytes=2000)
     for number in range(500):
-        file.append(record(event(f"line {number}")))
+        file.append(encode_event(event(f"line {number}")))
     file.close()
     sizes = [path.stat().st_size for path in tmp_path.iterdir()]
     assert len(sizes) <= KEPT + 1 and max(sizes) < 2200
@@ -281,13 +289,13 @@ def test_two_processes_that_write_and_rotate_at_once_lose_and_tear_nothing(tmp_p
 
 def test_a_reader_that_follows_sees_each_line_once_through_rotations(tmp_path: Path) -> None:
     file, reader = EventFile(tmp_path, longest_bytes=1500), EventReader(tmp_path)
-    file.append(record(event("0")))
+    file.append(encode_event(event("0")))
     found = list(reader.kept())
     for number in range(1, 60):
-        file.append(record(event(str(number))))
+        file.append(encode_event(event(str(number))))
         found += reader.more()
     with (tmp_path / "events.jsonl").open("ab") as stream:
-        line = record(event("late"))
+        line = encode_event(event("late"))
         stream.write(line[:40])
         stream.flush()
         found += reader.more()
@@ -302,7 +310,7 @@ def test_following_begins_before_there_is_a_file(tmp_path: Path) -> None:
     reader = EventReader(tmp_path)
     assert list(reader.kept()) == []
     file = EventFile(tmp_path)
-    file.append(record(event("first")))
+    file.append(encode_event(event("first")))
     assert [each.text for each in reader.more()] == ["first"]
     reader.close()
     file.close()
@@ -335,7 +343,7 @@ def test_a_full_disk_is_one_alarm_and_its_end_says_what_is_missing(tmp_path: Pat
         assert alarmed.wait(5)
         log._disk.end()  # type: ignore[union-attr]
         file.is_full = False
-        log._disk = Drain("events", log._disk._write)  # type: ignore[union-attr]
+        log._disk = QueuedWriter("events", log._disk._write)  # type: ignore[union-attr]
         log._disk.start()
         log("cause", "again")
     assert sum("E150" in line for line in lines) == 1
@@ -347,9 +355,9 @@ def test_a_line_that_the_disk_takes_half_of_does_not_spoil_the_next(tmp_path: Pa
     file, write = EventFile(tmp_path), os.write
     monkeypatch.setattr(event_file.os, "write", lambda descriptor, data: write(descriptor, data[: len(data) // 2]))
     with pytest.raises(OSError, match="No space"):
-        file.append(record(event("half")))
+        file.append(encode_event(event("half")))
     monkeypatch.undo()
-    file.append(record(event("whole")))
+    file.append(encode_event(event("whole")))
     file.close()
     assert [each.text for each in kept(tmp_path)] == ["whole"]
 
@@ -357,4 +365,4 @@ def test_a_line_that_the_disk_takes_half_of_does_not_spoil_the_next(tmp_path: Pa
 def test_a_state_directory_that_was_removed_is_an_error_of_the_system_and_no_more(tmp_path: Path) -> None:
     file = EventFile(tmp_path / "gone")
     with pytest.raises(FileNotFoundError):
-        file.append(record(event("x")))
+        file.append(encode_event(event("x")))

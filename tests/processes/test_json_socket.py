@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from gateway.processes.json_socket import JsonLineServer, Limits
+from gateway.processes.json_socket import JsonLineServer, SocketLimits
 
 
 def refuse(request: dict[str, Any]) -> dict[str, Any]:
@@ -27,7 +27,7 @@ HANDLERS = {"echo": lambda request: {"said": request.get("say")}, "refuse": refu
 Scene = Callable[[Path], Awaitable[None]]
 
 
-def with_server(directory: Path, scene: Scene, limits: Limits | None = None) -> list[dict[str, Any]]:
+def with_server(directory: Path, scene: Scene, limits: SocketLimits | None = None) -> list[dict[str, Any]]:
     """Run the scene beside a server; what reached the loop's exception handler, which would restart the gateway."""
     defects: list[dict[str, Any]] = []
 
@@ -271,7 +271,7 @@ def test_callers_that_say_nothing_make_room_for_one_that_does(tmp_path: Path) ->
         for caller in (*silent, fresh):
             caller.close()
 
-    assert with_server(tmp_path, scene, Limits(spared_s=0.02)) == []
+    assert with_server(tmp_path, scene, SocketLimits(spared_s=0.02)) == []
 
 
 def test_who_says_nothing_half_a_line_or_reads_nothing_is_closed_in_time(tmp_path: Path) -> None:
@@ -293,7 +293,7 @@ def test_who_says_nothing_half_a_line_or_reads_nothing_is_closed_in_time(tmp_pat
                 break
         deaf.close()
 
-    assert with_server(tmp_path, scene, Limits(idle_s=0.2)) == []
+    assert with_server(tmp_path, scene, SocketLimits(idle_s=0.2)) == []
 
 
 def test_a_request_without_its_newline_is_one_when_the_caller_has_ended(tmp_path: Path) -> None:

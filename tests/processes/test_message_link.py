@@ -17,7 +17,7 @@ Pair = tuple[socket.socket, socket.socket]
 
 @pytest.fixture
 def ends() -> Iterator[Pair]:
-    ours, theirs = message_link.pair()
+    ours, theirs = message_link.create_link()
     yield ours, theirs
     ours.close()
     theirs.close()
@@ -125,7 +125,7 @@ def test_control_hands_over_its_port_with_the_safe_frame(ends: Pair) -> None:
 
 def test_control_asks_for_the_simulated_ports_and_gets_them_or_the_reason(ends: Pair) -> None:
     async def scene(answer: dict[str, object]) -> dict[str, str] | None:
-        ours, theirs = message_link.pair()
+        ours, theirs = message_link.create_link()
         theirs.setblocking(False)
         guardian = GuardianLine(theirs)
         asking = asyncio.ensure_future(guardian.simulated_ports("demo"))
@@ -177,7 +177,7 @@ def test_a_guardian_that_does_not_read_does_not_stop_the_loop(ends: Pair) -> Non
 @pytest.mark.parametrize("words", [b"r{", b"r[]", b"r3", b"r\xff", b"r" + b"x" * 70_000])
 def test_what_is_no_message_is_told_apart_from_an_end(ends: Pair, words: bytes) -> None:
     ends[0].send(words)
-    with pytest.raises(message_link.NonsenseError):
+    with pytest.raises(message_link.ProtocolError):
         message_link.receive(ends[1])
     message_link.send(ends[0], message_link.HEARTBEAT)
     assert message_link.receive(ends[1]) == message_link.Message(message_link.HEARTBEAT), "the next one is whole again"
@@ -186,7 +186,7 @@ def test_what_is_no_message_is_told_apart_from_an_end(ends: Pair, words: bytes) 
 def test_more_descriptors_than_are_taken_are_closed_and_no_message(ends: Pair) -> None:
     before = len(list(Path("/proc/self/fd").iterdir()))
     message_link.send(ends[0], message_link.LINE, {}, *[0] * 9)
-    with pytest.raises(message_link.NonsenseError):
+    with pytest.raises(message_link.ProtocolError):
         message_link.receive(ends[1])
     assert len(list(Path("/proc/self/fd").iterdir())) == before
 

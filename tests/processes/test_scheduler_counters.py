@@ -12,8 +12,15 @@ import pytest
 
 from gateway.processes import priority
 from gateway.processes.exit_cause import EndCause
-from gateway.processes.scheduler_counters import Silence, Turns, TurnsOf, judged, load_of_machine, since
-from gateway.service.supervisor.restart_policy import Restarts
+from gateway.processes.scheduler_counters import (
+    ProcessorTime,
+    SchedulerCounters,
+    Silence,
+    explain_silence,
+    load_of_machine,
+    time_between,
+)
+from gateway.service.supervisor.restart_policy import RestartPolicy
 
 BUSY, STALLED, STOPPED = EndCause.MACHINE_BUSY, EndCause.STALLED, EndCause.STOPPED
 
@@ -33,7 +40,9 @@ BUSY, STALLED, STOPPED = EndCause.MACHINE_BUSY, EndCause.STALLED, EndCause.STOPP
     ],
 )
 def test_the_largest_part_of_a_silence_is_its_cause(ran_s: float, waited_s: float, state: str, cause: EndCause) -> None:
-    ending = judged(Silence(0.104, 0.1, Turns(ran_s, waited_s), state, was_late=False), "load 8.40 on 2 cores")
+    ending = explain_silence(
+        Silence(0.104, 0.1, ProcessorTime(ran_s, waited_s), state, was_late=False), "load 8.40 on 2 cores"
+    )
     assert ending.cause is cause
     assert "104 ms without a tick, allowed 100 ms (stall_s)" in ending.text
     if cause is BUSY:
@@ -45,7 +54,7 @@ def test_the_largest_part_of_a_silence_is_its_cause(ran_s: float, waited_s: floa
 
 @pytest.mark.parametrize(("was_late", "cause"), [(True, BUSY), (False, STALLED)])
 def test_a_kernel_that_counts_nothing_leaves_our_own_lateness(was_late: bool, cause: EndCause) -> None:
-    assert judged(Silence(0.2, 0.1, None, "", was_late), "the load is not known").cause is cause
+    assert explain_silence(Silence(0.2, 0.1, None, "", was_late), "the load is not known").cause is cause
 
 
 def test_what_the_kernel_says_is_read_as_it_stands(tmp_path: Path) -> None:
@@ -53,19 +62,19 @@ def test_what_the_kernel_says_is_read_as_it_stands(tmp_path: Path) -> None:
     process.mkdir()
     (process / "schedstat").write_text("1500000000 250000000 42\n")
     (process / "stat").write_text("7 (a )b( c) D 1 7 7 0\n")
-    turns = TurnsOf(7, tmp_path)
-    assert turns.read() == Turns(1.5, 0.25)
+    turns = SchedulerCounters(7, tmp_path)
+    assert turns.read() == ProcessorTime(1.5, 0.25)
     assert turns.state() == "D"
-    assert since(Turns(1.0, 0.25), turns.read()) == Turns(0.5, 0.0)
+    assert time_between(ProcessorTime(1.0, 0.25), turns.read()) == ProcessorTime(0.5, 0.0)
     turns.close()
     assert turns.read() is None
 
 
 def test_a_kernel_without_counters_is_no_error(tmp_path: Path) -> None:
-    turns = TurnsOf(7, tmp_path)
+    turns = SchedulerCounters(7, tmp_path)
     assert turns.read() is None
     assert turns.state() == ""
-    assert since(Turns(), turns.read()) is None
+    assert time_between(ProcessorTime(), turns.read()) is None
     turns.close()
     assert load_of_machine(tmp_path) == "the load is not known"
 
@@ -83,11 +92,11 @@ def test_a_real_process_that_calculates_is_told_from_one_that_was_stopped() -> N
     process = subprocess.Popen([sys.executable, "-c", "print(flush=True)\nwhile True: pass"], stdout=subprocess.PIPE)
     assert process.stdout
     process.stdout.readline()
-    turns = TurnsOf(process.pid)
+    turns = SchedulerCounters(process.pid)
     before = turns.read()
     if before is None:
         pytest.skip("this kernel has no schedstat")
-    while (used := since(before, turns.read())) and used.on_cpu_s < 0.02:
+    while (used := time_between(before, turns.read())) and used.on_cpu_s < 0.02:
         time.sleep(0.001)
     process.send_signal(signal.SIGSTOP)
     while turns.state() != "T":
@@ -95,7 +104,7 @@ def test_a_real_process_that_calculates_is_told_from_one_that_was_stopped() -> N
     ended = os.pidfd_open(process.pid)
     process.kill()
     os.waitid(os.P_PIDFD, ended, os.WEXITED | os.WNOWAIT)
-    used = since(before, turns.read())
+    used = time_between(before, turns.read())
     assert used
     assert used.on_cpu_s >= 0.02
     turns.close()
@@ -105,7 +114,7 @@ def test_a_real_process_that_calculates_is_told_from_one_that_was_stopped() -> N
 
 
 def test_restarts_are_counted_by_cause_and_given_time_when_none_comes_up() -> None:
-    restarts = Restarts()
+    restarts = RestartPolicy()
     pauses = [restarts.count(now_s, EndCause.NOT_STARTED) for now_s in range(5)]
     assert pauses == [0.0, 0.0, 0.25, 0.5, 1.0]
     assert restarts.count(5, BUSY) is None
@@ -114,7 +123,7 @@ def test_restarts_are_counted_by_cause_and_given_time_when_none_comes_up() -> No
 
 
 def test_what_was_ready_is_started_again_at_once() -> None:
-    restarts = Restarts()
+    restarts = RestartPolicy()
     for now_s in (0, 61, 122, 183, 244, 305, 366):
         assert restarts.count(now_s, EndCause.DIED) == 0.0
         restarts.came_up()
@@ -160,4 +169,4 @@ def test_who_may_a_little_takes_that(monkeypatch: pytest.MonkeyPatch, soft_limit
     monkeypatch.setattr(os, "setpriority", set_to)
     monkeypatch.setattr(os, "getpriority", lambda which, who: has[0])
     monkeypatch.setattr(resource, "getrlimit", lambda which: (soft_limit, soft_limit))
-    assert priority.take(priority.LOOP_NICE) == comes_to
+    assert priority.set_nice(priority.LOOP_NICE) == comes_to

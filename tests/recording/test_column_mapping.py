@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import ColumnMapping, ColumnSource, RecordingError
-from gateway.recording.tables.column_mapping import picked, quantity_of
+from gateway.recording.tables.column_mapping import quantity_of, select_columns
 from gateway.recording.tables.columns import CONTRACT, DERIVED
 from gateway.recording.tables.mapping_file import column_mapping, read_mapping
 from gateway.twin.surroundings import COLUMNS
@@ -69,12 +69,12 @@ def test_a_missing_file_is_told(tmp_path: Path) -> None:
 
 def test_unnamed_columns_stay_away_and_others_keep_their_names() -> None:
     names = ("t", "", "humidity", "F")
-    found = picked(names, ColumnMapping.parse("time_s=t:ms,force_n=4"), "x.csv")
+    found = select_columns(names, ColumnMapping.parse("time_s=t:ms,force_n=4"), "x.csv")
     assert [(pick.index, pick.name) for pick in found] == [(0, "time_s"), (3, "force_n"), (2, "humidity")]
 
 
 def test_a_mapped_name_wins_over_the_same_header() -> None:
-    found = picked(("time_s", "force_n", "better"), ColumnMapping.parse("force_n=better"), "x.csv")
+    found = select_columns(("time_s", "force_n", "better"), ColumnMapping.parse("force_n=better"), "x.csv")
     assert [(pick.index, pick.name) for pick in found] == [(2, "force_n"), (0, "time_s")]
 
 
@@ -89,7 +89,7 @@ def test_a_mapped_name_wins_over_the_same_header() -> None:
 )
 def test_a_column_that_is_not_there_is_told(text: str, words: str) -> None:
     with pytest.raises(RecordingError) as caught:
-        picked(("t", "force", ""), ColumnMapping.parse(text), "x.csv")
+        select_columns(("t", "force", ""), ColumnMapping.parse(text), "x.csv")
     assert words in str(caught.value)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement
-from gateway.recording.tables.even_rows import evened
+from gateway.recording.tables.even_rows import resample_evenly
 
 RNG = np.random.default_rng(1)
 PERIOD_S = 0.0100007  # an amplifier's clock is never ours
@@ -41,7 +41,7 @@ def sent(time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_rows_are_even_and_the_force_is_that_of_their_times() -> None:
-    found = evened(MEASUREMENT, *sent(TIME_S))
+    found = resample_evenly(MEASUREMENT, *sent(TIME_S))
     assert np.diff(found.time_s) == pytest.approx(found.even_s)
     assert found.even_s == pytest.approx(PERIOD_S, rel=1.0e-5)
     first_s = np.median(TIME_S - np.round(TIME_S / PERIOD_S) * PERIOD_S)
@@ -51,7 +51,7 @@ def test_rows_are_even_and_the_force_is_that_of_their_times() -> None:
 
 def test_a_command_is_the_mean_of_what_stood_on_the_wire() -> None:
     """Its integral is kept, wherever between two rows a setting was sent."""
-    found = evened(MEASUREMENT, *sent(TIME_S))
+    found = resample_evenly(MEASUREMENT, *sent(TIME_S))
     fine_s = np.arange(0.0, 29.0, 1.0e-5)
     stood = np.where(
         fine_s < SETTINGS_S[0], VOLTS[0], VOLTS[np.maximum(np.searchsorted(SETTINGS_S, fine_s, "right") - 1, 0)]
@@ -65,7 +65,7 @@ def test_a_command_is_the_mean_of_what_stood_on_the_wire() -> None:
 
 def test_noise_is_not_shared_between_neighbours() -> None:
     noise = np.random.default_rng(2).normal(0.0, 0.1, TIME_S.size)
-    found = evened(replace(MEASUREMENT, force_n=noise), *sent(TIME_S)).force_n
+    found = resample_evenly(replace(MEASUREMENT, force_n=noise), *sent(TIME_S)).force_n
     assert np.std(found) == pytest.approx(0.1, rel=0.05)
     assert abs(np.corrcoef(found[1:], found[:-1])[0, 1]) < 0.1
 
@@ -73,9 +73,9 @@ def test_noise_is_not_shared_between_neighbours() -> None:
 def test_a_command_that_was_never_sent_is_another_column() -> None:
     volts, age_s = sent(TIME_S)
     swapped = replace(MEASUREMENT, command_v=MEASUREMENT.force_n, force_n=volts)
-    assert evened(swapped, volts, age_s) is swapped
+    assert resample_evenly(swapped, volts, age_s) is swapped
 
 
 def test_without_anything_sent_it_stays_as_it_is() -> None:
     unknown = np.full(TIME_S.size, np.nan)
-    assert evened(MEASUREMENT, unknown, unknown) is MEASUREMENT
+    assert resample_evenly(MEASUREMENT, unknown, unknown) is MEASUREMENT

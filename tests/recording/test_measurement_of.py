@@ -13,7 +13,7 @@ from gateway.diagnosis.measurement import Measurement
 from gateway.recording import Recording, RecordingError, read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.columns import DERIVED
-from gateway.recording.tables.judged_rows import repeated_readings, valid_by_quality
+from gateway.recording.tables.judged_rows import flag_repeated, valid_by_quality
 from gateway.recording.tables.mapping_file import column_mapping
 
 N = 1000
@@ -233,10 +233,10 @@ def test_the_frequent_quality_of_a_foreign_table_is_the_good_one(good: float) ->
 def test_repeated_readings_are_found_among_quantised_ones(share: float, digits: int) -> None:
     rng = np.random.default_rng(11)
     force_n = np.round(20.0 + 5.0 * np.sin(np.arange(12000) / 300.0) + rng.normal(0.0, 0.2, 12000), digits)
-    assert not repeated_readings(force_n)[0].any()
+    assert not flag_repeated(force_n)[0].any()
     again = np.append(False, rng.random(11999) < share)
     force_n = force_n[np.maximum.accumulate(np.where(again, 0, np.arange(12000)))]
-    found = repeated_readings(force_n)[0]
+    found = flag_repeated(force_n)[0]
     if share > 0.1 or digits > 1:  # a resolution of half the noise hides one repetition in fifty
         assert found.sum() >= 0.9 * again.sum()
         assert found[again].mean() > 0.95
@@ -244,9 +244,9 @@ def test_repeated_readings_are_found_among_quantised_ones(share: float, digits: 
 
 def test_a_coarse_resolution_or_a_force_at_rest_repeats_nothing() -> None:
     rng = np.random.default_rng(4)
-    assert not repeated_readings(np.round(10.0 + rng.normal(0.0, 0.02, 4000), 1))[0].any()
+    assert not flag_repeated(np.round(10.0 + rng.normal(0.0, 0.02, 4000), 1))[0].any()
     clipped = np.clip(20.0 + 15.0 * np.sin(np.arange(4000) / 100.0) + rng.normal(0.0, 0.1, 4000), 0.0, 30.0)
-    assert not repeated_readings(clipped)[0].any()
+    assert not flag_repeated(clipped)[0].any()
 
 
 ZILLEN = Path(os.environ.get("FORCE_GATEWAY_DATA", "../shared/data")) / "zillen-cylinder-friction"

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from gateway.recording import ColumnMapping, Recorder, RecordingError, export_csv, export_parquet, read_recording
 from gateway.recording.tables import csv_table
 from gateway.recording.tables.any_table import read_table
-from gateway.recording.tables.column_mapping import picked
-from gateway.recording.tables.csv_form import csv_form
+from gateway.recording.tables.column_mapping import select_columns
+from gateway.recording.tables.csv_form import detect_dialect
 from gateway.recording.tables.csv_table import read_csv
 
 ROWS = [(0.0, 1.5, -0.25), (0.005, 1.5, 3.75), (0.01, 2.25, float("nan"))]
@@ -190,9 +190,9 @@ cells = st.one_of(
 def test_the_fast_way_and_the_exact_way_agree(rows: list[tuple[str, ...]], separator: str, tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text(separator.join(NAMES) + "\n" + "".join(separator.join(row) + "\n" for row in rows))
-    form = csv_form(path)
-    chosen = picked(form.names, None, "x")
-    fast, exact = csv_table._fast(form, chosen), csv_table._Exact(form, chosen, lenient=False).read()
+    form = detect_dialect(path)
+    chosen = select_columns(form.names, None, "x")
+    fast, exact = csv_table._read_fast(form, chosen), csv_table._LineReader(form, chosen, lenient=False).read()
     if fast is not None:
         assert list(fast.lines) == list(exact.lines)
         for k in range(3):
@@ -202,8 +202,8 @@ def test_the_fast_way_and_the_exact_way_agree(rows: list[tuple[str, ...]], separ
 def test_a_clean_table_goes_the_fast_way(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("# rig: demo\n" + text_of(";", ","))
-    form = csv_form(path)
-    assert csv_table._fast(form, picked(form.names, None, "x")) is not None
+    form = detect_dialect(path)
+    assert csv_table._read_fast(form, select_columns(form.names, None, "x")) is not None
 
 
 def test_more_numbers_than_fit_are_refused_before_they_are_read(

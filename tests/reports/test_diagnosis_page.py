@@ -10,7 +10,7 @@ import pytest
 
 from gateway.diagnosis.result import Diagnosis, Extended, NotIdentifiable, Verdict
 from gateway.reports.diagnosis import wording as words
-from gateway.reports.diagnosis.page import Circumstances, diagnosis_page
+from gateway.reports.diagnosis.page import ReportContext, diagnosis_page
 from gateway.twin.plant import with_value
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, diagnosis, trace
 
@@ -18,7 +18,7 @@ ABOUT = {"load-dependent-friction": "friction in proportion to the thrust"}
 
 
 def page(answer: Diagnosis) -> str:
-    circumstances = Circumstances(
+    circumstances = ReportContext(
         rig="demo", plant="paper-slide", made_utc="2026-11-21 15:50 UTC", runtime_s=2.3, about=ABOUT
     )
     return diagnosis_page(answer, circumstances)
@@ -196,7 +196,7 @@ def test_partial_says_what_it_lacks() -> None:
 def test_a_size_that_the_plant_had_already_is_told_beside_the_new_one() -> None:
     found = FRICTION.parameters["load_dependent_n_per_n"]
     had = replace(diagnosis(), base=with_value(diagnosis().base, "friction", "load_dependent_n_per_n", 0.08))
-    assert words.was(had, "load_dependent_n_per_n", found) == " (0.0800 before)"
+    assert words.previous_value(had, "load_dependent_n_per_n", found) == " (0.0800 before)"
     assert "(0.0800 before)" in page(had)
     lacked = replace(had, base=with_value(had.base, "friction", "load_dependent_n_per_n", 0.0))
-    assert words.was(lacked, "load_dependent_n_per_n", found) == ""
+    assert words.previous_value(lacked, "load_dependent_n_per_n", found) == ""

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from gateway.reports.diagnosis.series import (
-    Left,
-    binned,
+    Residuals,
+    bin_means,
     dependence,
     direction,
     envelope,
-    joined,
-    most_telling_window,
-    occupied,
+    join_traces,
+    most_improved_window,
+    occupied_cells,
     spectrum,
 )
 from tests.reports.fake_diagnosis import trace
@@ -52,7 +52,7 @@ def test_uneven_sampling_is_no_gap() -> None:
 def test_every_point_is_in_a_cell_that_is_drawn() -> None:
     rng = np.random.default_rng(2)
     x, y = rng.uniform(0, 10, 5000), rng.normal(size=5000)
-    cells = {tuple(cell) for cell in occupied(x, y, (50, 30), (0.0, 10.0, -5.0, 5.0)).tolist()}
+    cells = {tuple(cell) for cell in occupied_cells(x, y, (50, 30), (0.0, 10.0, -5.0, 5.0)).tolist()}
     places = zip((x / 10 * 50).astype(int).tolist(), ((y + 5) / 10 * 30).astype(int).tolist(), strict=True)
     assert all(place in cells for place in places)
 
@@ -116,25 +116,25 @@ def test_dependence_is_the_share_of_the_variance_that_the_means_carry() -> None:
 
 def test_means_over_bins_follow_the_shape() -> None:
     x = np.linspace(0.0, 1.0, 3000)
-    found = binned(x, x**2)
+    found = bin_means(x, x**2)
     assert np.allclose(found.mean, found.x**2, atol=1e-3)
 
 
 def test_residuals_are_measured_minus_simulated_of_judged_rows() -> None:
     one = trace(rows=400)
-    rows = joined([one, one])
+    rows = join_traces([one, one])
     usable = one.measurement.usable
     expected = (one.measurement.force_n - one.before_n)[usable]
     assert np.array_equal(rows.before_n, np.concatenate([expected, expected]))
 
 
 def test_a_column_that_only_one_recording_has_is_nan_for_the_other() -> None:
-    rows = joined([trace(rows=400, odd=np.ones(400)), trace(rows=400)])
+    rows = join_traces([trace(rows=400, odd=np.ones(400)), trace(rows=400)])
     assert np.isfinite(rows.quantities["odd"]).sum() == trace(rows=400).measurement.usable.sum()
 
 
 def test_the_closer_look_is_where_the_gain_is() -> None:
     time_s = np.arange(10_000) / 100.0
     before = np.where((time_s > 70.0) & (time_s < 75.0), 2.0, 0.1)
-    start, end = most_telling_window(Left(time_s, before, before, np.full(time_s.size, 0.1)))
+    start, end = most_improved_window(Residuals(time_s, before, before, np.full(time_s.size, 0.1)))
     assert start <= 71.0 and end >= 74.0

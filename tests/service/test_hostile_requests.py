@@ -14,12 +14,12 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.processes.json_socket import JsonLineServer
 from gateway.registers.words import State
-from gateway.service.control_socket import Asked, ControlSocket
-from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.control_socket import ControlSocket, RunningParts
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.calibrations import RigCalibrations
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.simulated_rig import SimulatedRig
-from gateway.service.watch_reports import WatchDesk
+from gateway.service.watch_reports import WatchReports
 from tests.service.hostile import garbage, mutants
 from tests.service.wired import ENABLE, Wired
 
@@ -69,17 +69,17 @@ class Stage:
         log = lambda cause, sentence: self.said.append(sentence)  # noqa: E731
         self.recordings = Recordings(self.state / "recordings", wired.rig, log)  # type: ignore[arg-type]
         wired.gateway.recordings = self.recordings
-        self.ladder = LadderKeeper(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
+        self.ladder = CalibrationRuns(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
         wired.gateway.ladder = self.ladder
         self.upload = RigCalibrations(wired.rig, self.state).serve(wired.bank, lambda taken: None, log)
         self.upload.apart = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers
-        asked = Asked(
+        asked = RunningParts(
             bank=wired.bank,
             recordings=self.recordings,
             health=wired.gateway.health,
             upload=self.upload,
             ladder=self.ladder,
-            watch=WatchDesk(wired.gateway, lambda: wired.now_s, log),
+            watch=WatchReports(wired.gateway, lambda: wired.now_s, log),
         )
         self.server = ControlSocket(self.state, asked, log)
         wired.run(0.1)

@@ -10,8 +10,8 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.control.settings import LeaseAction
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.service.banner import Ready, banner, info, try_lines
-from gateway.service.clean_shutdown_marker import RunFlag
+from gateway.service.banner import Ready, format_banner, ready_fields, try_lines
+from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.running_rig.bank_rules import bank_rules, server_settings
 from gateway.service.running_rig.running_rig import _cause_of_restart
 from tests.service.rigs import demo, with_supervision
@@ -30,7 +30,7 @@ def ready(**changes: object) -> Ready:
 
 
 def test_the_banner_says_where_and_what_and_how_to_try() -> None:
-    text = banner(ready())
+    text = format_banner(ready())
     for words in (
         "rig demo (simulated, seed 7)",
         "calibration demo: bsfm n=2",
@@ -46,16 +46,16 @@ def test_the_banner_says_where_and_what_and_how_to_try() -> None:
 
 
 def test_a_silent_device_is_not_shown_as_zero() -> None:
-    text = banner(ready(voltage_v=None, force_n=None, notes=("E111 /dev/pts/6: silence at every speed",)))
+    text = format_banner(ready(voltage_v=None, force_n=None, notes=("E111 /dev/pts/6: silence at every speed",)))
     assert text.count("silent") == 2
     assert "  note         E111 /dev/pts/6" in text
 
 
 def test_the_command_to_try_names_another_gateway() -> None:
-    text = banner(ready(modbus=("10.0.0.9", 502)))
+    text = format_banner(ready(modbus=("10.0.0.9", 502)))
     assert "mbpoll -1 -p 502 -r 1 10.0.0.9 1 1200" in text
     assert "--gateway 10.0.0.9:502" in text
-    assert "--gateway" not in banner(ready())
+    assert "--gateway" not in format_banner(ready())
 
 
 @pytest.mark.parametrize(
@@ -90,25 +90,25 @@ def test_the_lines_to_try_are_of_the_rig_at_hand() -> None:
 
 def test_a_lease_is_told_with_its_length_and_what_follows() -> None:
     rig = with_supervision(demo(), lease_s=0.2, lease_action=LeaseAction.RAMP)
-    assert "lease        200 ms, then ramp" in banner(ready(rig=rig))
-    assert "none: a command lasts until the next one" in banner(ready(rig=replace(demo(), simulated=False)))
+    assert "lease        200 ms, then ramp" in format_banner(ready(rig=rig))
+    assert "none: a command lasts until the next one" in format_banner(ready(rig=replace(demo(), simulated=False)))
 
 
 def test_the_json_line_is_json_and_tells_the_ports() -> None:
-    facts = json.loads(json.dumps(info(ready(modbus=("127.0.0.1", 40123), notes=("a",)))))
+    facts = json.loads(json.dumps(ready_fields(ready(modbus=("127.0.0.1", 40123), notes=("a",)))))
     assert facts["ready"] is True
     assert facts["modbus"] == ["127.0.0.1", 40123]
     assert facts["ptys"] == {"output": "/dev/pts/4", "load_cell": "/dev/pts/6"}
     assert facts["notes"] == ["a"]
-    assert info(ready(rig=replace(demo(), simulated=False)))["ptys"] == {}
+    assert ready_fields(ready(rig=replace(demo(), simulated=False)))["ptys"] == {}
 
 
 def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
-    flag = RunFlag(tmp_path)
+    flag = CleanShutdownMarker(tmp_path)
     assert not flag.raise_flag()
-    assert RunFlag(tmp_path).raise_flag(), "the one before was killed"
+    assert CleanShutdownMarker(tmp_path).raise_flag(), "the one before was killed"
     flag.lower()
-    assert not RunFlag(tmp_path).raise_flag()
+    assert not CleanShutdownMarker(tmp_path).raise_flag()
     flag.lower()
     flag.lower()  # twice is no trouble
 

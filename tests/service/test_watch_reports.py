@@ -5,7 +5,7 @@ import pytest
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.words import State
-from gateway.service.watch_reports import WatchDesk
+from gateway.service.watch_reports import WatchReports
 from tests.service.wired import Wired
 
 
@@ -15,8 +15,8 @@ def wired() -> Wired:
 
 
 @pytest.fixture
-def desk(wired: Wired) -> WatchDesk:
-    return WatchDesk(
+def desk(wired: Wired) -> WatchReports:
+    return WatchReports(
         wired.gateway, lambda: wired.now_s, lambda cause, sentence: wired.log.append((wired.now_s, sentence))
     )
 

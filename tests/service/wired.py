@@ -21,7 +21,7 @@ from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers import RegisterBank
 from gateway.registers.words import State
 from gateway.service.running_rig.bank_rules import bank_rules
-from gateway.service.running_rig.gateway_core import Gateway
+from gateway.service.running_rig.gateway_core import ControlLoop
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.simulated_rig import SimulatedRig
@@ -118,7 +118,7 @@ class Wired:
             unclean_restart=unclean,
             response=rig.response_of(rig.calibration),
         )
-        self.gateway = Gateway(
+        self.gateway = ControlLoop(
             self.bank,
             self.controller,
             self.exchange,

@@ -1,22 +1,22 @@
 """When the warning of the residual watch rises, what it is called, and when it falls."""
 
 from gateway.registers.residual_cause import ResidualCause as C
-from gateway.watch.warning_filter import Finding, Opinion
+from gateway.watch.warning_filter import WarningFilter, WindowVerdict
 
 
-def after(*findings: Finding) -> C:
-    opinion = Opinion()
+def after(*findings: WindowVerdict) -> C:
+    opinion = WarningFilter()
     for finding in findings:
         opinion.hear(finding)
     return opinion.standing.cause
 
 
-def convicts(cause: C, *others: str, excitation_v: float = 1.0) -> Finding:
-    return Finding(cause, cause.effect, excitation_v, (cause.effect, *others))
+def convicts(cause: C, *others: str, excitation_v: float = 1.0) -> WindowVerdict:
+    return WindowVerdict(cause, cause.effect, excitation_v, (cause.effect, *others))
 
 
 FRICTION, DELAY = convicts(C.COULOMB_FRICTION), convicts(C.TRANSPORT_DELAY)
-FINE = Finding(excitation_v=1.0)
+FINE = WindowVerdict(excitation_v=1.0)
 
 
 def test_one_window_does_not_raise_the_warning():
@@ -52,7 +52,7 @@ def test_a_window_that_agrees_clears_it():
 
 def test_a_window_that_could_not_have_seen_it_clears_nothing():
     """Nobody moved: that is no sign of health."""
-    still = Finding(excitation_v=0.1)
+    still = WindowVerdict(excitation_v=0.1)
     assert after(FRICTION, FRICTION, still) is C.COULOMB_FRICTION
     assert after(FRICTION, still, FRICTION) is C.COULOMB_FRICTION
 

@@ -18,10 +18,10 @@ from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
-from gateway.watch.reference import Reference
-from gateway.watch.residual_watch import Setup, Watch
-from gateway.watch.watch_process import diagnosed
-from gateway.watch.window_verdict import finding_of
+from gateway.watch.reference import WatchReference
+from gateway.watch.residual_watch import Watch, WatchSettings
+from gateway.watch.watch_process import diagnose_window
+from gateway.watch.window_verdict import judge_window
 from tests.service.wired import ENABLE, Wired
 
 WIRE_S = 0.012  # what 9600 and 115200 baud add to the plant's delay
@@ -66,8 +66,8 @@ class Scene:
         assert plant is not None
         self.plant = with_value(plant, "regulator", "delay_s", plant.regulator.delay_s + WIRE_S)
         self.search = StubDiagnosis(self.plant)
-        setup = Setup(window_s=20.0, every_s=5.0, tolerance_n=1.0)
-        self.watch = Watch(self.reader, Reference(plant), setup, self.search, lambda: self.wired.now_s)
+        setup = WatchSettings(window_s=20.0, every_s=5.0, tolerance_n=1.0)
+        self.watch = Watch(self.reader, WatchReference(plant), setup, self.search, lambda: self.wired.now_s)
         self._rng = np.random.default_rng(3)
         self.wired.ready()
 
@@ -222,7 +222,7 @@ def test_a_cell_whose_sign_turned_is_told_as_such(scene):
     scene.looks(1)
     window = scene.watch._window(20.0)
     turned = replace(window.measurement, force_n=-window.measurement.force_n)
-    found = diagnosed([turned], scene.plant)
-    sentence = finding_of(replace(window, measurement=turned), found, scene.watch._reference, 0.25).sentence
+    found = diagnose_window([turned], scene.plant)
+    sentence = judge_window(replace(window, measurement=turned), found, scene.watch._reference, 0.25).sentence
     assert "E522" in sentence
     assert "falls where it should rise" in sentence

@@ -69,7 +69,7 @@ def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str,
 
 def _changed_here(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
     from gateway.bsfm import CoefficientLimits
-    from gateway.calibrations.activation import Activation, NotFit
+    from gateway.calibrations.activation import Activation, UnusableCalibration
     from gateway.calibrations.store import StoreError
 
     rig, store = _rig(rig_name), opened(directory, rig_name)
@@ -80,7 +80,7 @@ def _changed_here(directory: Path, rig_name: str, request: dict[str, Any]) -> di
         taken = (
             activation.take_back() if "rollback" in request else activation.take_offered(request["use"], force=force)
         )
-    except NotFit as error:
+    except UnusableCalibration as error:
         sentence = error.fault.sentence(before.number if before else 0)
         raise CliError(sentence, exit_codes.DATA) from None
     except StoreError as error:

@@ -7,11 +7,11 @@ from typing import Any
 from gateway.cli.diagnosis.sources import Sources
 from gateway.diagnosis.result import Diagnosis
 from gateway.service.closed_loop import study
-from gateway.service.closed_loop.study import ClosedLoop
+from gateway.service.closed_loop.study import ClosedLoopGain
 from gateway.twin.plant import with_value
 
 
-def measured_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoop | str:
+def measured_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoopGain | str:
     """The gain, or a sentence that says why it could not be measured. The cell makes the noise of the plant at the start:
     the diagnosis has taken it away, and control takes a cell without any for a frozen one."""
     noise_n = sources.plant.plant.cell.noise_n
@@ -22,10 +22,10 @@ def measured_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoop | str:
         return f"not measured: {error}"
 
 
-def document(gain: ClosedLoop | str) -> dict[str, Any]:
+def document(gain: ClosedLoopGain | str) -> dict[str, Any]:
     """For the JSON, beside the contract's fields."""
     return {"error": gain} if isinstance(gain, str) else asdict(gain)
 
 
-def sentences(gain: ClosedLoop | str) -> Iterator[str]:
-    yield from [gain] if isinstance(gain, str) else study.lines(gain)
+def sentences(gain: ClosedLoopGain | str) -> Iterator[str]:
+    yield from [gain] if isinstance(gain, str) else study.format_gain(gain)

@@ -34,7 +34,7 @@ def told(
     for suspect in diagnosis.suspects:
         yield Text(suspect.sentence, style="bold red" if suspect.is_sure else "bold yellow")
     yield Text.assemble(
-        (words.title(diagnosis), f"bold {'yellow' if words.blind(diagnosis) else _COLOUR[diagnosis.verdict]}"),
+        (words.title(diagnosis), f"bold {'yellow' if words.why_blind(diagnosis) else _COLOUR[diagnosis.verdict]}"),
     )
     yield Text(words.sentence(diagnosis))
     yield Text()
@@ -49,7 +49,7 @@ def told(
     for keyword, sentence in zip(("control", *[""] * len(loop)), loop, strict=False):
         yield _line(keyword, sentence)
     said = {suspect.sentence for suspect in diagnosis.suspects}
-    for note in (note for note in words.noticed(diagnosis, notes) if note not in said):
+    for note in (note for note in words.all_notes(diagnosis, notes) if note not in said):
         yield _line("note", note, "dim")
     yield from _next(diagnosis, run)
 
@@ -73,7 +73,7 @@ def _error(diagnosis: Diagnosis) -> str:
 
 def _extended(diagnosis: Diagnosis) -> str:
     reached = "at the noise floor" if diagnosis.extended.reaches_noise_floor else "above the noise floor"
-    explained = words.percent(words.explained(diagnosis))
+    explained = words.percent(words.explained_share(diagnosis))
     return (
         f"{words.force(diagnosis.extended.held_out_rms_n)} N RMS held out with the causes, {reached}; "
         f"{explained} of the excess explained"
@@ -94,7 +94,7 @@ def _causes(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     yield Text()
     for cause in diagnosis.causes:
         for name, found in cause.parameters.items():
-            told = f"{found.section}.{name} = {words.estimate(found)}{words.was(diagnosis, name, found)}"
+            told = f"{found.section}.{name} = {words.estimate(found)}{words.previous_value(diagnosis, name, found)}"
             yield Padding(Text(told), (0, 0, 0, 2))
     yield Text()
 
@@ -110,7 +110,7 @@ def _cells(cause: Cause) -> tuple[str | Text, ...]:
     return (
         name,
         words.percent(cause.confidence),
-        words.gained(cause).removesuffix(" N"),
+        words.gain_text(cause).removesuffix(" N"),
         f"{words.force(won_n)} [{words.force(low_n)}, {words.force(high_n)}]",
         words.percent(gain.share_of_excess),
     )
@@ -146,4 +146,4 @@ def _unseen(diagnosis: Diagnosis) -> str:
 
 def _few(names: tuple[str, ...] | list[str]) -> str:
     more = len(names) - _MOST_NAMES
-    return words.listed([*names[:_MOST_NAMES], f"{more} more"] if more > 1 else names)
+    return words.join_words([*names[:_MOST_NAMES], f"{more} more"] if more > 1 else names)

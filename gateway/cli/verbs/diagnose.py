@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gateway.cli.diagnosis.sources import Sources
     from gateway.diagnosis.experiments.experiments import Plan
     from gateway.diagnosis.result import Diagnosis
-    from gateway.service.closed_loop.study import ClosedLoop
+    from gateway.service.closed_loop.study import ClosedLoopGain
 
 _STDOUT: Final = Path("-")
 _FAILS: Final = {"partial": ("partial", "unknown"), "unknown": ("unknown",)}
@@ -43,7 +43,7 @@ class Answer:
     diagnosis: "Diagnosis"
     sources: "Sources"
     runtime_s: float
-    gain: "ClosedLoop | str | None"
+    gain: "ClosedLoopGain | str | None"
     plan: "Plan | None" = None
     run: str = ""
 
@@ -138,7 +138,7 @@ def _diagnosed(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis,
     return diagnosis, time.perf_counter() - began_s
 
 
-def _gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoop | str":
+def _gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoopGain | str":
     from rich.console import Console
 
     from gateway.cli.diagnosis.closed_loop import measured_gain
@@ -167,10 +167,10 @@ def _texts(answer: Answer, options: dict[str, Any]) -> dict[Path, str]:
 
 def _extends(answer: Answer, file: Path) -> bool:
     """Is there a plant to write? Where the force says nothing, or columns are wrong, what was refitted means nothing."""
-    from gateway.reports.diagnosis.wording import blind
+    from gateway.reports.diagnosis.wording import why_blind
 
     sure = [each.sentence for each in answer.diagnosis.suspects if each.is_sure]
-    why = "; ".join(sure) or blind(answer.diagnosis)
+    why = "; ".join(sure) or why_blind(answer.diagnosis)
     if why:
         click.echo(f"{file} is not written: {why}", err=True)
     return not why
@@ -211,9 +211,9 @@ def _loop_sentences(answer: Answer) -> tuple[str, ...]:
 
 def _report(answer: Answer) -> str:
     from gateway.diagnosis import EFFECTS
-    from gateway.reports.diagnosis.page import Circumstances, diagnosis_page
+    from gateway.reports.diagnosis.page import ReportContext, diagnosis_page
 
-    circumstances = Circumstances(
+    circumstances = ReportContext(
         rig=answer.sources.rig or "not named",
         plant=answer.sources.plant.name,
         made_utc=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",

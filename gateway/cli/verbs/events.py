@@ -13,7 +13,7 @@ import click
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.options import json_option, state_directory, state_options
-from gateway.processes.event import SEVERITIES, Event, line_of, utc
+from gateway.processes.event import SEVERITIES, EventRecord, format_event, utc_text
 from gateway.processes.event_file import EventReader
 
 _UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
@@ -26,11 +26,11 @@ def since(context: click.Context, parameter: click.Parameter, value: str | None)
         return ""
     if ago := re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", value.strip()):
         seconds = time.time() - float(ago[1]) * _UNITS_S[ago[2]]
-        return utc(max(0.0, seconds))
+        return utc_text(max(0.0, seconds))
     try:
         moment = datetime.fromisoformat(value.strip())
         moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
-        return utc(moment.timestamp())
+        return utc_text(moment.timestamp())
     except (ValueError, OverflowError):
         raise click.BadParameter(f"{value} is neither 90s, 10m, 2h, 1d nor a time such as 2026-11-22T10:30") from None
 
@@ -64,21 +64,21 @@ def command(
         _show(reader, _wanted(after, severity, {code.upper() for code in codes}), follow, as_json)
 
 
-def _wanted(after: str, severity: str, codes: set[str]) -> Callable[[Event], bool]:
+def _wanted(after: str, severity: str, codes: set[str]) -> Callable[[EventRecord], bool]:
     severities = SEVERITIES[SEVERITIES.index(severity) :]
 
-    def wanted(event: Event) -> bool:
+    def wanted(event: EventRecord) -> bool:
         return event.time >= after and event.severity in severities and (not codes or event.code in codes)
 
     return wanted
 
 
-def _show(reader: EventReader, wanted: Callable[[Event], bool], follow: bool, as_json: bool) -> None:
+def _show(reader: EventReader, wanted: Callable[[EventRecord], bool], follow: bool, as_json: bool) -> None:
     events = reader.kept()
     try:
         while True:
             for event in filter(wanted, events):
-                click.echo(json.dumps(event._asdict()) if as_json else line_of(event))
+                click.echo(json.dumps(event._asdict()) if as_json else format_event(event))
             if not follow:
                 return
             time.sleep(_LOOK_S)

@@ -97,7 +97,7 @@ def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
     from gateway.bsfm.ladder.fault import LadderError
     from gateway.recording.tables.mapping_file import column_mapping
     from gateway.service.fitting.ladder_fit import fit_recording
-    from gateway.service.fitting.ladder_source import Background, find_source, read_source
+    from gateway.service.fitting.ladder_source import RigContext, find_source, read_source
 
     path = find_source(name, state_directory(options["state"], options["rig"] or defaults.RIG))
     if not path.exists():
@@ -109,7 +109,7 @@ def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
     question = FitRequest(
         models=models, orders=options["orders"], ties=Ties(options["ties"]), outliers=options["outliers"]
     )
-    background = Background(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
+    background = RigContext(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
     try:
         return fit_recording(read_source(path, mapping), question, background, options["name"] or "")
     except LadderError as error:

@@ -12,7 +12,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.options import json_option, state_directory, state_options
 
 if TYPE_CHECKING:
-    from gateway.recording import Entry
+    from gateway.recording import RecordingEntry
 
 
 @click.group(name="recordings")
@@ -40,7 +40,7 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
         click.echo(_line(entry))
 
 
-def _facts(entry: "Entry") -> dict[str, object]:
+def _facts(entry: "RecordingEntry") -> dict[str, object]:
     return {
         "id": entry.number,
         "path": str(entry.path),
@@ -55,7 +55,7 @@ def _facts(entry: "Entry") -> dict[str, object]:
     }
 
 
-def _line(entry: "Entry") -> str:
+def _line(entry: "RecordingEntry") -> str:
     if entry.fault:
         return f"{entry.number:>4}  unreadable: {entry.fault}"
     torn = "  torn tail dropped" if entry.truncated else ""

@@ -5,7 +5,7 @@ from pathlib import Path
 from gateway.recording.errors import RecordingError
 from gateway.recording.layout import MAGIC
 from gateway.recording.reader import Recording, read_recording
-from gateway.recording.tables.column_mapping import ColumnMapping, picked
+from gateway.recording.tables.column_mapping import ColumnMapping, select_columns
 from gateway.recording.tables.csv_table import read_csv
 from gateway.recording.tables.parquet_table import MAGIC as PARQUET_MAGIC
 from gateway.recording.tables.parquet_table import read_parquet
@@ -22,7 +22,7 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
     with path.open("rb") as stream:
         start = stream.read(len(MAGIC))
     if start == MAGIC or (path.suffix == ".fgr" and start):
-        return _renamed(read_recording(path), mapping)
+        return _apply_mapping(read_recording(path), mapping)
     if start.startswith(PARQUET_MAGIC):
         return read_parquet(path, mapping)
     if not start:
@@ -30,12 +30,12 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
     return read_csv(path, mapping, lenient=lenient)
 
 
-def _renamed(recording: Recording, mapping: ColumnMapping | None) -> Recording:
+def _apply_mapping(recording: Recording, mapping: ColumnMapping | None) -> Recording:
     if mapping is None:
         return recording
     names = list(recording.columns)
     columns = {
         pick.name: recording.columns[names[pick.index]] * pick.factor + pick.offset
-        for pick in picked(names, mapping, str(recording.path))
+        for pick in select_columns(names, mapping, str(recording.path))
     }
     return Recording(recording.path, recording.header, columns, recording.rows, recording.truncated, recording.notes)

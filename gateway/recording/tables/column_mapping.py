@@ -52,7 +52,7 @@ class ColumnMapping:
 
 
 @dataclass(frozen=True, slots=True)
-class Picked:
+class SelectedColumn:
     """One column to read: its place in the table (from 0), its name from now on, and value = factor x number + offset."""
 
     index: int
@@ -98,12 +98,12 @@ def _check_unit(name: str, unit: str) -> None:
         raise RecordingError(f"--columns: {unit!r} is no unit for {name}; allowed: {allowed}")
 
 
-def picked(names: Sequence[str], mapping: ColumnMapping | None, file: str) -> tuple[Picked, ...]:
+def select_columns(names: Sequence[str], mapping: ColumnMapping | None, file: str) -> tuple[SelectedColumn, ...]:
     """What is read from a table with these headers ("" where there is none). RecordingError when a column is not there."""
-    mapped = [_picked(source, names, file) for source in mapping.sources] if mapping else []
+    mapped = [_select_column(source, names, file) for source in mapping.sources] if mapping else []
     taken = {pick.index for pick in mapped}
     claimed = {pick.name for pick in mapped}
-    own = [Picked(k, name) for k, name in enumerate(names) if name and k not in taken and name not in claimed]
+    own = [SelectedColumn(k, name) for k, name in enumerate(names) if name and k not in taken and name not in claimed]
     seen = [pick.name for pick in own]
     for name in seen:
         if seen.count(name) > 1:
@@ -111,13 +111,15 @@ def picked(names: Sequence[str], mapping: ColumnMapping | None, file: str) -> tu
     return (*mapped, *own)
 
 
-def _picked(source: ColumnSource, names: Sequence[str], file: str) -> Picked:
+def _select_column(source: ColumnSource, names: Sequence[str], file: str) -> SelectedColumn:
     index = _index(source, names, file)
     quantity = quantity_of(source.name)
     if source.unit is None or quantity is None:
-        return Picked(index, source.name)
+        return SelectedColumn(index, source.name)
     factor, offset = linear_conversion(quantity[0], source.unit.removeprefix("-"), quantity[1])
-    return Picked(index, source.name, *((-factor, -offset) if source.unit.startswith("-") else (factor, offset)))
+    return SelectedColumn(
+        index, source.name, *((-factor, -offset) if source.unit.startswith("-") else (factor, offset))
+    )
 
 
 def _index(source: ColumnSource, names: Sequence[str], file: str) -> int:
@@ -128,11 +130,11 @@ def _index(source: ColumnSource, names: Sequence[str], file: str) -> int:
     if source.source in names:
         return list(names).index(source.source)
     near = get_close_matches(source.source, [name for name in names if name], n=1, cutoff=0.6)
-    meant = f"; did you mean {near[0]}?" if near else f"; there: {listed([name for name in names if name])}"
+    meant = f"; did you mean {near[0]}?" if near else f"; there: {join_names([name for name in names if name])}"
     raise RecordingError(f"{file}: {source.name}={source.source}: no such header{meant}")
 
 
-def listed(words: Sequence[str], most: int = 12) -> str:
+def join_names(words: Sequence[str], most: int = 12) -> str:
     """`a, b, c and 9 more`; `none` for nothing."""
     more = len(words) - most
     return ", ".join(words[:most]) + (f" and {more} more" if more > 0 else "") or "none"

@@ -10,14 +10,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.recording.tables.column_mapping import listed
+from gateway.recording.tables.column_mapping import join_names
 from gateway.recording.tables.columns import CONTRACT, DERIVED, LADDER, SENT
 
 Floats = NDArray[np.float64]
 
-JUDGED: Final = ("time_s", "force_n", "command_v", "pressure_kpa", "position_mm", "quality")
+MEASUREMENT_COLUMNS: Final = ("time_s", "force_n", "command_v", "pressure_kpa", "position_mm", "quality")
 """Columns that a measurement has fields for."""
-MANY: Final = 200
+MANY_COVARIATES: Final = 200
 _TURNS_WHILE_CONSTANT: Final = "spindle_rpm"
 _COPY: Final = 1.0 - 5.0e-4
 _COPY_OF_STEPS: Final = 0.98
@@ -25,37 +25,43 @@ _COUNTER: Final = 1.0e-9
 _MOST_NAMES: Final = 6
 
 
-def is_ours(columns: Mapping[str, Floats]) -> bool:
+def is_own_recording(columns: Mapping[str, Floats]) -> bool:
     """Whether our recorder wrote these columns."""
     return set(DERIVED) <= set(columns)
 
 
-def covariates(columns: Mapping[str, Floats], time_s: Floats, force_n: Floats) -> tuple[dict[str, Floats], list[str]]:
+def extract_covariates(
+    columns: Mapping[str, Floats], time_s: Floats, force_n: Floats
+) -> tuple[dict[str, Floats], list[str]]:
     """The covariates without holes, and what was left out or filled. columns: all of the recording, at these times."""
-    ours = is_ours(columns)
-    names = [name for name in columns if name not in JUDGED and not (ours and name in (*DERIVED, *LADDER, *SENT))]
+    ours = is_own_recording(columns)
+    names = [
+        name
+        for name in columns
+        if name not in MEASUREMENT_COLUMNS and not (ours and name in (*DERIVED, *LADDER, *SENT))
+    ]
     dropped: dict[str, list[str]] = {}
     found: dict[str, Floats] = {}
     filled: list[str] = []
     for name in names:
         values = columns[name]
-        why = _useless(name, values, time_s, force_n)
+        why = _why_useless(name, values, time_s, force_n)
         if why:
             dropped.setdefault(why, []).append(name)
             continue
         known = np.isfinite(values)
         if not known.all():
             filled.append(f"{name} ({int((~known).sum())})")
-        found[name] = values if known.all() else filled_in(values, time_s)
-    notes = [f"left out, {why}: {listed(which, _MOST_NAMES)}" for why, which in dropped.items()]
+        found[name] = values if known.all() else interpolate_missing(values, time_s)
+    notes = [f"left out, {why}: {join_names(which, _MOST_NAMES)}" for why, which in dropped.items()]
     if filled:
-        notes.append(f"values missing, drawn straight from the ones around: {listed(filled, _MOST_NAMES)}")
-    if len(found) >= MANY:
+        notes.append(f"values missing, drawn straight from the ones around: {join_names(filled, _MOST_NAMES)}")
+    if len(found) >= MANY_COVARIATES:
         notes.append(f"{len(found)} covariates: with so many, some seem to matter by chance, so each is trusted less")
     return found, notes
 
 
-def filled_in(values: Floats, time_s: Floats) -> Floats:
+def interpolate_missing(values: Floats, time_s: Floats) -> Floats:
     """NaN and infinite values drawn straight between the known ones, held beyond the first and the last."""
     known = np.isfinite(values)
     return np.asarray(np.interp(time_s, time_s[known], values[known]), dtype=np.float64)
@@ -67,7 +73,7 @@ def is_constant(values: Floats) -> bool:
     return bool(np.ptp(known) <= 1.0e-12 * np.abs(known).max())
 
 
-def _useless(name: str, values: Floats, time_s: Floats, force_n: Floats) -> str:
+def _why_useless(name: str, values: Floats, time_s: Floats, force_n: Floats) -> str:
     """Why a column is no covariate, "" when it is one."""
     known = np.isfinite(values)
     if not known.any():
@@ -77,7 +83,7 @@ def _useless(name: str, values: Floats, time_s: Floats, force_n: Floats) -> str:
         return "" if turns else "constant, so nothing can be seen to depend on it"
     if name in CONTRACT:
         return ""
-    if _alike(values[known], time_s[known]) > 1.0 - _COUNTER:
+    if _correlation(values[known], time_s[known]) > 1.0 - _COUNTER:
         return "it only counts time"
     return "a copy of the measured force" if _is_copy(values, force_n) else ""
 
@@ -85,12 +91,12 @@ def _useless(name: str, values: Floats, time_s: Floats, force_n: Floats) -> str:
 def _is_copy(values: Floats, force_n: Floats) -> bool:
     """The same sensor in another unit: it shares the readings' noise, which no other sensor does."""
     both = np.isfinite(values) & np.isfinite(force_n)
-    if both.sum() < 3 or _alike(values[both], force_n[both]) < _COPY:
+    if both.sum() < 3 or _correlation(values[both], force_n[both]) < _COPY:
         return False
-    return _alike(np.diff(values[both]), np.diff(force_n[both])) > _COPY_OF_STEPS
+    return _correlation(np.diff(values[both]), np.diff(force_n[both])) > _COPY_OF_STEPS
 
 
-def _alike(first: Floats, second: Floats) -> float:
+def _correlation(first: Floats, second: Floats) -> float:
     """Absolute correlation; 0 where one of the two is constant."""
     one, two = first - first.mean(), second - second.mean()
     scale = float(np.sqrt(np.dot(one, one) * np.dot(two, two)))

@@ -28,7 +28,7 @@ _OTHER_FORMATS: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class CsvForm:
+class CsvDialect:
     """names: one per column, "" where the header has none; skip: lines before the first row; sample: the first rows."""
 
     path: Path
@@ -42,26 +42,26 @@ class CsvForm:
 
     def cells(self, line: str) -> list[str]:
         """The cells of a line as they stand; empty ones beyond the last column are a trailing separator, and dropped."""
-        cells = split(line, self.separator)
+        cells = split_cells(line, self.separator)
         while len(cells) > len(self.names) and not cells[-1].strip():
             cells.pop()
         return cells
 
-    def number(self, cell: str) -> float | None:
+    def parse_number(self, cell: str) -> float | None:
         """The value of a cell, NaN where nothing was taken; None when it is no number."""
-        return number(cell, self.decimal)
+        return parse_number(cell, self.decimal)
 
     def is_words(self, index: int) -> bool:
         """Every filled cell of the first rows is no number."""
         cells = [row[index] for row in self.sample if index < len(row) and row[index].strip().lower() not in MISSING]
-        return bool(cells) and all(self.number(cell) is None for cell in cells)
+        return bool(cells) and all(self.parse_number(cell) is None for cell in cells)
 
 
-def split(line: str, separator: str) -> list[str]:
+def split_cells(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
 
 
-def number(cell: str, decimal: str) -> float | None:
+def parse_number(cell: str, decimal: str) -> float | None:
     text = cell.strip()
     if text.lower() in MISSING:
         return float("nan")
@@ -71,7 +71,7 @@ def number(cell: str, decimal: str) -> float | None:
         return None
 
 
-def csv_form(path: Path) -> CsvForm:
+def detect_dialect(path: Path) -> CsvDialect:
     """Read the first lines. RecordingError for what is no table, OSError as usual."""
     _refuse_other_formats(path)
     with path.open(encoding="utf-8-sig") as stream:
@@ -84,7 +84,7 @@ def csv_form(path: Path) -> CsvForm:
             ) from error
     if not lines:
         raise RecordingError(f"{path} holds no table: no row with numbers")
-    return _form(path, facts, lines)
+    return _make_dialect(path, facts, lines)
 
 
 def rows_of(stream: TextIO, facts: dict[str, str]) -> Iterator[tuple[int, str]]:
@@ -116,18 +116,18 @@ def _first_lines(stream: TextIO) -> tuple[dict[str, str], list[tuple[int, str]]]
     return facts, lines
 
 
-def _form(path: Path, facts: dict[str, str], lines: Sequence[tuple[int, str]]) -> CsvForm:
+def _make_dialect(path: Path, facts: dict[str, str], lines: Sequence[tuple[int, str]]) -> CsvDialect:
     (at, first), rest = lines[0], [line for _, line in lines[1:]]
     if _UNPRINTABLE.search(first):
         raise RecordingError(f"{path} is neither a recording nor a CSV: line {at} is no text")
     separator = _separator(first)
     decimal = "," if separator != "," and any(_DECIMAL_COMMA.search(line) for line in rest or [first]) else "."
-    names = tuple(cell.strip() for cell in split(first, separator))
-    has_header = any(number(name, decimal) is None for name in names)
+    names = tuple(cell.strip() for cell in split_cells(first, separator))
+    has_header = any(parse_number(name, decimal) is None for name in names)
     rows = rest if has_header else [first, *rest]
-    sample = tuple(tuple(split(row, separator)) for row in rows)
+    sample = tuple(tuple(split_cells(row, separator)) for row in rows)
     shown = names if has_header else ("",) * _width(names)
-    return CsvForm(path, facts, shown, separator, decimal, has_header, at if has_header else at - 1, sample)
+    return CsvDialect(path, facts, shown, separator, decimal, has_header, at if has_header else at - 1, sample)
 
 
 def _width(cells: Sequence[str]) -> int:

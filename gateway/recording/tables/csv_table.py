@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
-from gateway.recording.tables.column_mapping import EXAMPLE, ColumnMapping, Picked, listed, picked
-from gateway.recording.tables.csv_form import MISSING, CsvForm, csv_form, rows_of
+from gateway.recording.tables.column_mapping import EXAMPLE, ColumnMapping, SelectedColumn, join_names, select_columns
+from gateway.recording.tables.csv_form import MISSING, CsvDialect, detect_dialect, rows_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,28 +40,28 @@ _QUALITY_WORDS: Final = {
 
 def read_csv(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool = False) -> Recording:
     """Header facts and columns of a CSV; RecordingError with what was seen when it is none, OSError as usual."""
-    form = csv_form(path)
+    form = detect_dialect(path)
     if mapping is None and not form.has_header:
         raise RecordingError(
             f"{path}:{form.skip + 1}: no header row; it names the columns, such as time_s,command_v,force_n. "
             f"Or say which is which: {EXAMPLE} (the table has {len(form.names)} columns)"
         )
-    asked = picked(form.names, mapping, str(path))
+    asked = select_columns(form.names, mapping, str(path))
     chosen = [pick for pick in asked if pick.is_contract or not form.is_words(pick.index)]
     words = [pick.name for pick in asked if pick not in chosen]
     if not chosen:
         raise RecordingError(
             f"{path}: no column of numbers; a recording is a table with a header such as time_s,command_v,force_n"
         )
-    table = _fast(form, chosen) or _Exact(form, chosen, lenient).read()
-    notes = [*table.notes, *([f"columns of words, not numbers: {listed(words)}"] if words else [])]
-    columns = {pick.name: _converted(table.columns[k], pick) for k, pick in enumerate(chosen) if k in table.columns}
+    table = _read_fast(form, chosen) or _LineReader(form, chosen, lenient).read()
+    notes = [*table.notes, *([f"columns of words, not numbers: {join_names(words)}"] if words else [])]
+    columns = {pick.name: _convert(table.columns[k], pick) for k, pick in enumerate(chosen) if k in table.columns}
     rows = len(table.lines)
     return Recording(path, dict(table.facts), columns, rows, table.dropped, tuple(notes), lines=table.lines)
 
 
 @dataclass(slots=True)
-class Table:
+class NumberTable:
     """Numbers as they stand, by the place of the column in what was chosen; lines: line number of each row."""
 
     facts: dict[str, str]
@@ -71,11 +71,11 @@ class Table:
     dropped: bool = False
 
 
-def _converted(values: "NDArray[np.float64]", pick: Picked) -> "NDArray[np.float64]":
+def _convert(values: "NDArray[np.float64]", pick: SelectedColumn) -> "NDArray[np.float64]":
     return values if (pick.factor, pick.offset) == (1.0, 0.0) else values * pick.factor + pick.offset
 
 
-def _fast(form: CsvForm, chosen: Sequence[Picked]) -> Table | None:
+def _read_fast(form: CsvDialect, chosen: Sequence[SelectedColumn]) -> NumberTable | None:
     """All rows at once; None when there is anything between them that is no row of numbers."""
     import pyarrow as pa
     from pyarrow import csv
@@ -105,7 +105,7 @@ def _fast(form: CsvForm, chosen: Sequence[Picked]) -> Table | None:
             return None
         columns = {k: _floats(found[name]) for k, name in enumerate(kept)}
     first = form.skip + 1
-    return Table(form.facts, columns, range(first, first + found.num_rows))
+    return NumberTable(form.facts, columns, range(first, first + found.num_rows))
 
 
 def _floats(column: Any) -> "NDArray[np.float64]":
@@ -115,7 +115,7 @@ def _floats(column: Any) -> "NDArray[np.float64]":
     return np.array(column.to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
-def _is_comment_between(form: CsvForm, data: mmap.mmap) -> bool:
+def _is_comment_between(form: CsvDialect, data: mmap.mmap) -> bool:
     """A comment after the first row: pyarrow could take it for data where its first cell is not asked for."""
     at = 0
     for _ in range(form.skip):
@@ -131,7 +131,7 @@ def _end(data: mmap.mmap) -> int:
     return end
 
 
-def _check_size(form: CsvForm, data: mmap.mmap, columns: int) -> None:
+def _check_size(form: CsvDialect, data: mmap.mmap, columns: int) -> None:
     if len(data) < LARGEST_CELLS:  # every cell takes two bytes at least
         return
     step = 1 << 24
@@ -147,10 +147,10 @@ def refuse_too_large(path: Path, rows: int, columns: int) -> None:
         )
 
 
-class _Exact:
+class _LineReader:
     """One line after the other."""
 
-    def __init__(self, form: CsvForm, chosen: Sequence[Picked], lenient: bool) -> None:
+    def __init__(self, form: CsvDialect, chosen: Sequence[SelectedColumn], lenient: bool) -> None:
         self._form = form
         self._chosen = chosen
         self._lenient = lenient
@@ -159,7 +159,7 @@ class _Exact:
         self._wrong: dict[int, int] = {}  # column -> cells that were no number
         self._first_wrong: dict[int, str] = {}
 
-    def read(self) -> Table:
+    def read(self) -> NumberTable:
         import numpy as np
 
         facts: dict[str, str] = {}
@@ -180,7 +180,7 @@ class _Exact:
         table = np.concatenate(blocks)
         columns = {k: table[:, k].copy() for k in range(len(self._chosen)) if not self._is_words(k, len(table))}
         notes = self._notes(columns)
-        return Table(facts, columns, np.array(lines, dtype=np.int64), notes, dropped=bool(self._told))
+        return NumberTable(facts, columns, np.array(lines, dtype=np.int64), notes, dropped=bool(self._told))
 
     def _values(self, at: int, line: str) -> list[float] | None:
         """The chosen numbers of a row; None when it is left out."""
@@ -199,7 +199,7 @@ class _Exact:
         return [self._value(at, k, cells[pick.index]) for k, pick in enumerate(self._chosen)]
 
     def _value(self, at: int, k: int, cell: str) -> float:
-        value = self._form.number(cell)
+        value = self._form.parse_number(cell)
         if value is None and self._chosen[k].name == "quality":
             value = _QUALITY_WORDS.get(cell.strip().lower())
         return self._no_number(at, k, cell.strip()) if value is None else value
@@ -237,14 +237,14 @@ class _Exact:
     def _notes(self, columns: "dict[int, NDArray[np.float64]]") -> list[str]:
         mixed = [k for k in self._first_wrong if k in columns and not self._chosen[k].is_contract]
         words = [pick.name for k, pick in enumerate(self._chosen) if k not in columns]
-        notes = shortened(self._told, "such lines")
-        notes += shortened(
+        notes = shorten_notes(self._told, "such lines")
+        notes += shorten_notes(
             [f"{self._first_wrong[k]} ({self._wrong[k]} such cells): not known there" for k in mixed], "such columns"
         )
-        return notes + ([f"columns of words, not numbers: {listed(words)}"] if words else [])
+        return notes + ([f"columns of words, not numbers: {join_names(words)}"] if words else [])
 
 
-def shortened(notes: Sequence[str], noun: str, most: int = _MOST_NOTES) -> list[str]:
+def shorten_notes(notes: Sequence[str], noun: str, most: int = _MOST_NOTES) -> list[str]:
     """The first few, and how many more there were."""
     more = len(notes) - most
     return [*notes[:most], f"and {more} more {noun}"] if more > 0 else list(notes)

@@ -23,16 +23,16 @@ _SURE_ROWS: Final = 200
 _KERNEL: Final = np.full(_SMOOTH, 1.0 / _SMOOTH)
 
 
-def evened(measurement: Measurement, sent_v: Floats, sent_age_s: Floats) -> Measurement:
+def resample_evenly(measurement: Measurement, sent_v: Floats, sent_age_s: Floats) -> Measurement:
     """The same on even rows. sent_v, sent_age_s: of each row, NaN where nothing had been sent; the measurement itself where
     its command is not known so."""
-    times_s, volts = _settings(measurement.time_s - sent_age_s, sent_v)
+    times_s, volts = _distinct_settings(measurement.time_s - sent_age_s, sent_v)
     if measurement.command_v is None or not volts.size or measurement.rows < _FEWEST:
         return measurement
     if not float(np.nanmedian(np.abs(sent_v - measurement.command_v))) < _SAME_V:
         return measurement  # columns of an exported table were renamed: which of them is the command is not ours to say
-    clock = _Clock(measurement.time_s)
-    command_v = _means(times_s, volts, np.append(clock.rows_s, clock.rows_s[-1] + clock.row_s))
+    clock = _EvenClock(measurement.time_s)
+    command_v = _interval_means(times_s, volts, np.append(clock.rows_s, clock.rows_s[-1] + clock.row_s))
     position_m, pressure_pa = measurement.position_m, measurement.pressure_pa
     return replace(
         measurement,
@@ -49,7 +49,7 @@ def evened(measurement: Measurement, sent_v: Floats, sent_age_s: Floats) -> Meas
     )
 
 
-def _settings(times_s: Floats, volts: Floats) -> tuple[Floats, Floats]:
+def _distinct_settings(times_s: Floats, volts: Floats) -> tuple[Floats, Floats]:
     """What was sent and when, each setting once."""
     known = np.isfinite(times_s) & np.isfinite(volts)
     times_s, volts = times_s[known], volts[known]
@@ -57,7 +57,7 @@ def _settings(times_s: Floats, volts: Floats) -> tuple[Floats, Floats]:
     return times_s[new], volts[new]
 
 
-def _means(times_s: Floats, values: Floats, edges_s: Floats) -> Floats:
+def _interval_means(times_s: Floats, values: Floats, edges_s: Floats) -> Floats:
     """Mean between each edge and the next of what holds from each time on; before the first time the first value."""
     knots_s = np.concatenate([[min(edges_s[0], times_s[0]) - 1.0], times_s, [max(edges_s[-1], times_s[-1]) + 1.0]])
     held = np.concatenate([values[:1], values])
@@ -65,7 +65,7 @@ def _means(times_s: Floats, values: Floats, edges_s: Floats) -> Floats:
     return np.asarray(np.diff(np.interp(edges_s, knots_s, integral)) / np.diff(edges_s))
 
 
-class _Clock:
+class _EvenClock:
     """The even clock behind times that scatter, and means of columns about its ticks."""
 
     def __init__(self, time_s: Floats) -> None:

@@ -41,7 +41,7 @@ def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
     return valid, [f"{bad} rows are not judged: {what} by the quality column"] if bad else []
 
 
-def repeated_readings(force_n: Floats) -> tuple[Flags, list[str]]:
+def flag_repeated(force_n: Floats) -> tuple[Flags, list[str]]:
     """Rows whose reading is bit for bit the one before, where that is more frequent than the resolution explains.
 
     The number of steps of 0 that a resolution brings is read off those of one and two counts, whose logarithm falls
@@ -53,7 +53,7 @@ def repeated_readings(force_n: Floats) -> tuple[Flags, list[str]]:
         return none, []
     resting = (force_n == finite.max()) | (force_n == finite.min()) | (force_n == 0.0)
     same = np.append(False, force_n[1:] == force_n[:-1]) & ~resting
-    repeats, expected = int(same.sum()), _equal_by_resolution(force_n, resting)
+    repeats, expected = int(same.sum()), _repeats_by_resolution(force_n, resting)
     enough = max(_LEAST_REPEATS, _LEAST_SHARE * finite.size)
     if expected is None or repeats < enough or repeats < expected + 4.0 * np.sqrt(expected + 1.0) + enough:
         return none, []
@@ -62,7 +62,7 @@ def repeated_readings(force_n: Floats) -> tuple[Flags, list[str]]:
     ]
 
 
-def _equal_by_resolution(force_n: Floats, resting: Flags) -> float | None:
+def _repeats_by_resolution(force_n: Floats, resting: Flags) -> float | None:
     """How many equal neighbours the resolution explains; None when it may explain any number."""
     steps = np.abs(np.diff(force_n))[~resting[1:]]
     steps = steps[np.isfinite(steps) & (steps > 0.0)]

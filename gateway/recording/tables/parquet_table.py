@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
-from gateway.recording.tables.column_mapping import ColumnMapping, Picked, listed, picked
+from gateway.recording.tables.column_mapping import ColumnMapping, SelectedColumn, join_names, select_columns
 from gateway.recording.tables.csv_table import refuse_too_large
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
 
     try:
         with parquet.ParquetFile(path) as file:
-            chosen = picked(file.schema_arrow.names, mapping, str(path))
+            chosen = select_columns(file.schema_arrow.names, mapping, str(path))
             refuse_too_large(path, file.metadata.num_rows, len(chosen))
             table = file.read(columns=list({file.schema_arrow.names[pick.index]: None for pick in chosen}))
     except (pa.ArrowException, OSError) as error:
@@ -39,12 +39,12 @@ def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
     facts = _facts(table.schema.metadata or {})
     dropped = facts.pop("dropped", [])
     notes = [str(note) for note in dropped] if isinstance(dropped, list) else [str(dropped)]
-    notes += [f"columns that hold no numbers: {listed(words)}"] if words else []
+    notes += [f"columns that hold no numbers: {join_names(words)}"] if words else []
     return Recording(path, facts, columns, table.num_rows, bool(dropped), tuple(notes))
 
 
 def _columns(
-    path: Path, table: Any, chosen: Sequence[Picked], headers: Sequence[str]
+    path: Path, table: Any, chosen: Sequence[SelectedColumn], headers: Sequence[str]
 ) -> "tuple[dict[str, NDArray[np.float64]], list[str]]":
     """The columns by name, and the names of those that hold no numbers."""
     columns: dict[str, NDArray[np.float64]] = {}

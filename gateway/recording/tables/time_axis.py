@@ -39,11 +39,11 @@ class TimeAxis:
     notes: tuple[str, ...]
 
 
-def time_axis(recording: Recording) -> TimeAxis:
+def check_time_axis(recording: Recording) -> TimeAxis:
     """RecordingError that names the row, for times that run backwards or are mostly missing."""
     stamps = recording.columns["time_s"]
     known = np.isfinite(stamps)
-    notes = _unknown(recording, known)
+    notes = _check_unknown(recording, known)
     rows = np.flatnonzero(known).astype(np.int64)
     steps = np.diff(stamps[rows])
     if (steps < -_SAME_S).any():
@@ -63,11 +63,11 @@ def time_axis(recording: Recording) -> TimeAxis:
     kept = rows[last_of_stamp]
     time_s = stamps[kept] - stamps[kept[0]] if kept.size else stamps[kept]
     _refuse_coarse(recording, time_s)
-    after_gap, told = _after_gaps(time_s)
+    after_gap, told = _flag_after_gaps(time_s)
     return TimeAxis(kept, time_s, after_gap, (*notes, *told))
 
 
-def _unknown(recording: Recording, known: Flags) -> list[str]:
+def _check_unknown(recording: Recording, known: Flags) -> list[str]:
     unknown = int((~known).sum())
     if not unknown:
         return []
@@ -87,7 +87,7 @@ def _refuse_coarse(recording: Recording, time_s: Floats) -> None:
         )
 
 
-def _after_gaps(time_s: Floats) -> tuple[Flags, list[str]]:
+def _flag_after_gaps(time_s: Floats) -> tuple[Flags, list[str]]:
     flags = np.zeros(time_s.size, dtype=bool)
     steps = np.diff(time_s)
     if not steps.size:

@@ -12,7 +12,7 @@ import numpy as np
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.result import Trace
 from gateway.reports.diagnosis import series
-from gateway.reports.diagnosis.series import FALLING, RISING, Left, Rows
+from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows, Residuals
 from gateway.reports.diagnosis.svg import SeriesChart, limits
 from gateway.reports.svg import Axis
 
@@ -57,9 +57,11 @@ def _width(wide: bool) -> int:
     return _WIDE if wide else _NARROW
 
 
-def followed(trace: Trace, after: bool, window: tuple[float, float] | None = None, *, wide: bool = True) -> Drawing:
+def force_over_time(
+    trace: Trace, after: bool, window: tuple[float, float] | None = None, *, wide: bool = True
+) -> Drawing:
     """Measured and simulated force over time; window: (start, end), s, of a closer look."""
-    left = Left.of(trace)
+    left = Residuals.of(trace)
     start, end = window or (float(left.time_s[0]), float(left.time_s[-1]))
     shown = (left.time_s >= start) & (left.time_s <= end)
     time_s, measured_n = left.time_s[shown], left.measured_n[shown]
@@ -79,7 +81,7 @@ def followed(trace: Trace, after: bool, window: tuple[float, float] | None = Non
 
 
 def residual_over_time(trace: Trace) -> Drawing:
-    left = Left.of(trace)
+    left = Residuals.of(trace)
     chart = SeriesChart(
         Axis(0.0, max(trace.measurement.duration_s, 1e-9), "time (s)"),
         Axis(*limits(left.before_n, left.after_n, around=0.0), "measured − simulated (N)"),
@@ -93,7 +95,7 @@ def residual_over_time(trace: Trace) -> Drawing:
     return _drawing(chart)
 
 
-def residual_against(rows: Rows, quantity: str, *, wide: bool = False) -> Drawing:
+def residual_against(rows: ResidualRows, quantity: str, *, wide: bool = False) -> Drawing:
     """Clouds before and after, with the means over bins."""
     x = rows.quantities[quantity]
     held = np.isfinite(x)
@@ -101,14 +103,14 @@ def residual_against(rows: Rows, quantity: str, *, wide: bool = False) -> Drawin
     for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
         chart.cloud(x[held], left_n[held], name)
     for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
-        means = series.binned(x, left_n)
+        means = series.bin_means(x, left_n)
         chart.line(means.x.tolist(), means.mean.tolist(), f"{name} halo")
         chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", name)
     chart.level(0.0)
     return _drawing(chart)
 
 
-def residual_by_direction(rows: Rows, quantity: str, after: bool, *, wide: bool = False) -> Drawing:
+def residual_by_direction(rows: ResidualRows, quantity: str, after: bool, *, wide: bool = False) -> Drawing:
     """Against the drive, rows of rising and of falling motion apart."""
     x, left_n = rows.quantities[quantity], rows.after_n if after else rows.before_n
     ways = ((RISING, "rising"), (FALLING, "falling"))
@@ -117,14 +119,14 @@ def residual_by_direction(rows: Rows, quantity: str, after: bool, *, wide: bool 
         mask = rows.direction == way
         chart.cloud(x[mask], left_n[mask], name)
     for way, name in ways:
-        means = series.binned(x[rows.direction == way], left_n[rows.direction == way])
+        means = series.bin_means(x[rows.direction == way], left_n[rows.direction == way])
         chart.line(means.x.tolist(), means.mean.tolist(), f"{name} halo")
         chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", name)
     chart.level(0.0)
     return _drawing(chart)
 
 
-def _residual_chart(x: Floats, rows: Rows, quantity: str, wide: bool) -> SeriesChart:
+def _residual_chart(x: Floats, rows: ResidualRows, quantity: str, wide: bool) -> SeriesChart:
     """Before and after on one scale, so that they can be compared."""
     return SeriesChart(
         Axis(*limits(x, margin=0.02), axis_name(quantity)),
@@ -140,7 +142,7 @@ def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing
     label = series.drive(traces[0].measurement)[0]
     alike = [trace for trace in traces if series.drive(trace.measurement)[0] == label]
     x = np.concatenate([series.drive(trace.measurement)[1][trace.measurement.usable] for trace in alike])
-    parts = [Left.of(trace) for trace in alike]
+    parts = [Residuals.of(trace) for trace in alike]
     measured_n = np.concatenate([part.measured_n for part in parts])
     left = [np.concatenate([getattr(part, name) for part in parts]) for name in ("before_n", "after_n")]
     name = "after" if after else "before"
@@ -159,7 +161,7 @@ def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing
 
 def spectra(trace: Trace, *, wide: bool = False) -> Drawing:
     """Amplitude density of the residual, before and after; NOTHING for a recording that is too short."""
-    left = Left.of(trace)
+    left = Residuals.of(trace)
     both = [series.spectrum(left.time_s, left_n) for left_n in (left.before_n, left.after_n)]
     frequency_hz, before = both[0]
     densities = np.concatenate([before, both[1][1]])

@@ -4,7 +4,7 @@ from math import isfinite
 from typing import Any, Final
 
 from gateway.diagnosis.result import Cause, Diagnosis, Interval
-from gateway.reports.diagnosis.wording import noticed
+from gateway.reports.diagnosis.wording import all_notes
 
 FORMAT: Final = 1
 Document = dict[str, Any]
@@ -53,7 +53,7 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
             }
             for each in diagnosis.suspects
         ],
-        "notes": noticed(diagnosis),
+        "notes": all_notes(diagnosis),
     }
 
 

@@ -6,7 +6,7 @@ from typing import Final
 from gateway.diagnosis.result import Diagnosis, Estimate
 from gateway.profiles import PlantProfile
 from gateway.profiles.kinds.plant_writer import with_origins
-from gateway.reports.diagnosis.wording import listed
+from gateway.reports.diagnosis.wording import join_words
 from gateway.twin.plant import values, with_value
 
 _OF_WIRES: Final = "cell.clock_offset_s"
@@ -26,29 +26,29 @@ def extended_plant(diagnosis: Diagnosis, start: PlantProfile, recording: str, da
     found_too = {f"{found.section}.{name}" for cause in diagnosis.causes for name, found in cause.parameters.items()}
     for name, found in diagnosis.base_parameters.items():
         path = f"{found.section}.{name}"
-        if path not in found_too and not _is_found(path, found, before[path]):
+        if path not in found_too and not _is_new_value(path, found, before[path]):
             plant = with_value(plant, found.section, name, before[path])
     moved = [f"{section}.{name}" for section, name, value in values(plant) if before[f"{section}.{name}"] != value]
     sources = dict.fromkeys(moved, f"refitted to {recording}, {date}")
     for cause in diagnosis.causes:
         for name, found in cause.parameters.items():
-            sources[f"{found.section}.{name}"] = _diagnosed(found, recording, date)
+            sources[f"{found.section}.{name}"] = _source_of_diagnosed(found, recording, date)
     return replace(with_origins(start, plant, sources), description=_description(diagnosis, start, recording))
 
 
-def _is_found(path: str, refitted: Estimate, before: float) -> bool:
+def _is_new_value(path: str, refitted: Estimate, before: float) -> bool:
     """Is a refitted number another one than before, and sure enough to be written down?"""
     low, high = refitted.ci95
     is_sure = high - low < _LEAST_SURE * max(abs(refitted.value), abs(before))
     return path != _OF_WIRES and is_sure and not low <= before <= high
 
 
-def _diagnosed(found: Estimate, recording: str, date: str) -> str:
+def _source_of_diagnosed(found: Estimate, recording: str, date: str) -> str:
     low, high = found.ci95
     return f"diagnosed from {recording}, {date}, ci95 [{low:.6g}, {high:.6g}]"
 
 
 def _description(diagnosis: Diagnosis, start: PlantProfile, recording: str) -> str:
     names = [cause.name for cause in diagnosis.causes]
-    what = f"extended by {listed(names)} from" if names else "refitted to"
+    what = f"extended by {join_words(names)} from" if names else "refitted to"
     return f"{start.name}, {what} {recording}: {start.description}".rstrip(": ")

@@ -13,18 +13,19 @@ from gateway.reports.diagnosis import wording as words
 from gateway.reports.diagnosis.charts import Drawing
 from gateway.reports.diagnosis.grid import Panel, figure, grid
 from gateway.reports.diagnosis.series import (
-    Left,
-    Rows,
+    ResidualRows,
+    Residuals,
     dependence,
     drive,
     is_constant,
-    joined,
-    most_telling_window,
+    join_traces,
+    most_improved_window,
 )
 from gateway.reports.diagnosis.style import DIAGNOSIS_STYLE
 
 _MOST_TRACES: Final = 2  # recordings that are drawn over time; the others count in all other charts
 _MOST_COVARIATES: Final = 6
+_MOST_OPEN: Final = 8  # rows of a table that is shown unfolded
 _FRAME: Final = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
@@ -36,7 +37,7 @@ _FRAME: Final = """<!doctype html>
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circumstances:
+class ReportContext:
     """What the diagnosis itself does not know. about: what each effect is; made_utc: date and time as text;
     notes: on how recordings and plant were found; loop: sentences on the gain in commanded force; run: how to run what to
     record next, where a plan of it was written."""
@@ -51,24 +52,24 @@ class Circumstances:
     run: str = ""
 
 
-def diagnosis_page(diagnosis: Diagnosis, circumstances: Circumstances) -> str:
+def diagnosis_page(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
     """The whole page. Text from recordings and profiles is escaped."""
     body = [*_summary(diagnosis, circumstances), *_pictures(diagnosis), *_outlook(diagnosis, circumstances)]
     text = "\n".join(part for part in body if part)
     return _FRAME.format(title=escape(f"Diagnosis: {words.title(diagnosis)}"), style=DIAGNOSIS_STYLE, body=text)
 
 
-def _summary(diagnosis: Diagnosis, circumstances: Circumstances) -> Iterator[str]:
+def _summary(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str]:
     yield _heading(diagnosis, circumstances)
     yield _tiles(diagnosis)
-    yield _notes(words.noticed(diagnosis, circumstances.notes))
-    yield _section("What is missing in the simulation", tables.causes(diagnosis, circumstances.about))
-    yield _section("What no effect explains", tables.leftover(diagnosis))
+    yield _notes(words.all_notes(diagnosis, circumstances.notes))
+    yield _section("What is missing in the simulation", tables.causes_table(diagnosis, circumstances.about))
+    yield _section("What no effect explains", tables.leftover_table(diagnosis))
     lines = "".join(f"<li>{escape(line)}</li>" for line in circumstances.loop)
     yield _section("What it is worth in commanded force, on the twin", f"<ul>{lines}</ul>" if lines else "")
 
 
-def _heading(diagnosis: Diagnosis, circumstances: Circumstances) -> str:
+def _heading(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
     names = [trace.measurement.name for trace in diagnosis.traces]
     shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     baseline = diagnosis.baseline
@@ -104,7 +105,7 @@ def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
         reached = "at the noise floor" if extended.reaches_noise_floor else "above the noise floor"
         yield "With the causes", words.force(extended.held_out_rms_n), f"N RMS, held out, {reached}"
         yield "Noise floor", words.force(baseline.noise_floor_n), "N, no model goes below"
-        yield "Explained", words.percent(words.explained(diagnosis)), "of the squared error above the noise"
+        yield "Explained", words.percent(words.explained_share(diagnosis)), "of the squared error above the noise"
     else:
         yield "Noise floor", words.force(baseline.noise_floor_n), "N, no model goes below"
         yield "Above the noise", words.force(words.excess_n(diagnosis)), "N RMS"
@@ -123,14 +124,14 @@ def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
     traces = [trace for trace in diagnosis.traces if trace.measurement.usable.any()]
     if not traces:
         return
-    worst = sorted(traces, key=lambda trace: -float((Left.of(trace).before_n ** 2).mean()))
+    worst = sorted(traces, key=lambda trace: -float((Residuals.of(trace).before_n ** 2).mean()))
     drawn = worst[:_MOST_TRACES]
     changed = bool(diagnosis.causes)
     for trace in drawn:
         yield from _over_time(trace, f" · {trace.measurement.name}" if len(traces) > 1 else "", changed)
     if len(traces) > len(drawn):
         yield f"<p class='small'>The {len(drawn)} recordings with the greatest error are drawn over time, of {len(traces)}.</p>"
-    rows = joined(traces)
+    rows = join_traces(traces)
     yield from _dependences(rows, drive(drawn[0].measurement)[0], diagnosis)
     yield "<h2>Spectrum and loop</h2>"
     longest = max(traces, key=lambda trace: trace.measurement.rows)
@@ -142,13 +143,13 @@ def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _over_time(trace: Trace, suffix: str, changed: bool) -> Iterator[str]:
-    window = most_telling_window(Left.of(trace))
+    window = most_improved_window(Residuals.of(trace))
     yield f"<h2>Measured and simulated{escape(suffix)}</h2>"
-    yield figure("Before: the base model, refitted", charts.followed(trace, after=False), style="full")
+    yield figure("Before: the base model, refitted", charts.force_over_time(trace, after=False), style="full")
     if changed:
-        yield figure("After: with the causes", charts.followed(trace, after=True), style="full")
+        yield figure("After: with the causes", charts.force_over_time(trace, after=True), style="full")
     close = f"Closer, {words.number(window[0])} to {words.number(window[1])} s"
-    yield grid(*_before_and_after(close, partial(charts.followed, trace, window=window), changed))
+    yield grid(*_before_and_after(close, partial(charts.force_over_time, trace, window=window), changed))
     caption = "Bands reach from the least to the greatest reading of each column of pixels."
     yield figure("What is left over time", charts.residual_over_time(trace), caption, "full")
 
@@ -159,12 +160,12 @@ def _before_and_after(title: str, draw: Callable[..., Drawing], changed: bool) -
     return [*panels, Panel(f"{title}, after", partial(draw, after=True))] if changed else panels
 
 
-def _dependences(rows: Rows, axis: str, diagnosis: Diagnosis) -> Iterator[str]:
+def _dependences(rows: ResidualRows, axis: str, diagnosis: Diagnosis) -> Iterator[str]:
     yield "<h2>What the residual depends on</h2>"
     if not is_constant(rows.quantities[axis]):
         draw = partial(charts.residual_by_direction, rows, axis)
         yield grid(*_before_and_after("By direction", draw, bool(diagnosis.causes)))
-    yield f"<h3>By direction, in figures</h3>{tables.directions(rows)}"
+    yield f"<h3>By direction, in figures</h3>{tables.directions_table(rows)}"
     moving = [name for name, values in rows.quantities.items() if not is_constant(values)]
     named = {rest.depends_on for rest in diagnosis.leftover}
     strength = {
@@ -180,32 +181,32 @@ def _dependences(rows: Rows, axis: str, diagnosis: Diagnosis) -> Iterator[str]:
             Panel(
                 f"Against {charts.axis_name(name)}",
                 partial(charts.residual_against, rows, name),
-                _carries(*strength[name]),
+                _dependence_caption(*strength[name]),
             )
             for name in shown
         )
     )
-    yield _left_out(rows, covariates)
+    yield _not_drawn(rows, covariates)
 
 
-def _carries(before: float, after: float) -> str:
+def _dependence_caption(before: float, after: float) -> str:
     return f"Its means carry {words.percent(before)} of the residual's variance before, {words.percent(after)} after."
 
 
-def _left_out(rows: Rows, covariates: Sequence[str]) -> str:
+def _not_drawn(rows: ResidualRows, covariates: Sequence[str]) -> str:
     still = [name for name, values in rows.quantities.items() if is_constant(values)]
     said = []
     if len(covariates) > _MOST_COVARIATES:
         said.append(f"{len(covariates) - _MOST_COVARIATES} more columns carry less than these.")
     if still:
-        names = words.listed(still[:8] + ([f"{len(still) - 8} more"] if len(still) > 8 else []))
+        names = words.join_words(still[:8] + ([f"{len(still) - 8} more"] if len(still) > 8 else []))
         said.append(f"Constant, so nothing can be said about: {names}.")
     return f"<p class='small'>{escape(' '.join(said))}</p>" if said else ""
 
 
-def _outlook(diagnosis: Diagnosis, circumstances: Circumstances) -> Iterator[str]:
+def _outlook(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str]:
     yield _section("What to record next", _next(diagnosis, circumstances.run))
-    yield _section("Alternatives, ranked", tables.rejected(diagnosis, circumstances.about))
+    yield _section("Alternatives, ranked", tables.rejected_table(diagnosis, circumstances.about))
     count = len(diagnosis.not_identifiable)
     if count:
         summary = (
@@ -213,18 +214,17 @@ def _outlook(diagnosis: Diagnosis, circumstances: Circumstances) -> Iterator[str
             if count > 1
             else "One effect, why, and what would show it"
         )
-        details = (
-            f"<details{' open' if count <= 8 else ''}><summary>{summary}</summary>{tables.unseen(diagnosis)}</details>"
-        )
+        state = " open" if count <= _MOST_OPEN else ""
+        details = f"<details{state}><summary>{summary}</summary>{tables.unseen_table(diagnosis)}</details>"
         yield _section("What this recording cannot show", details)
-    yield _section("The base model", tables.base(diagnosis.base_parameters))
+    yield _section("The base model", tables.base_table(diagnosis.base_parameters))
     yield f"<p class='small'>Computed in {circumstances.runtime_s:.1f} s.</p>"
 
 
 def _next(diagnosis: Diagnosis, run: str) -> str:
     """Only what matters after this verdict: a confirmed cause needs no more recordings."""
     proposals = words.next_recordings(diagnosis)
-    lines = "".join(f"<li>{escape(proposal)}{_shows(names)}</li>" for proposal, names in proposals)
+    lines = "".join(f"<li>{escape(proposal)}{_shown_effects(names)}</li>" for proposal, names in proposals)
     first = (
         "The cause is confirmed; these would show what this recording could not."
         if diagnosis.verdict is Verdict.CONFIRMED
@@ -234,5 +234,5 @@ def _next(diagnosis: Diagnosis, run: str) -> str:
     return (f"<p>{first}</p>" if first else "") + f"<ol class='next'>{lines}</ol>{last}" if lines else last
 
 
-def _shows(names: Sequence[str]) -> str:
-    return f" <small>shows {escape(words.listed(names))}</small>" if names else ""
+def _shown_effects(names: Sequence[str]) -> str:
+    return f" <small>shows {escape(words.join_words(names))}</small>" if names else ""

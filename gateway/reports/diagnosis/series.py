@@ -40,26 +40,26 @@ def envelope(x: Floats, y: Floats, columns: int) -> Envelope:
     held = np.isfinite(x) & np.isfinite(y)
     x, y = x[held], y[held]
     if x.size <= columns:
-        return Envelope(x, y, y, _pieces(x, _usual_step(x) * _GAP_STEPS))
+        return Envelope(x, y, y, _split_at_gaps(x, _usual_step(x) * _GAP_STEPS))
     width = max((x[-1] - x[0]) / columns, 1e-300)
     column = np.minimum(((x - x[0]) / width).astype(np.int64), columns - 1)
     starts = np.flatnonzero(np.diff(column, prepend=-1))
     middle = x[0] + (column[starts] + 0.5) * width
     low, high = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
-    return Envelope(middle, low, high, _pieces(middle, max(_GAP_STEPS * _usual_step(x), 1.5 * width)))
+    return Envelope(middle, low, high, _split_at_gaps(middle, max(_GAP_STEPS * _usual_step(x), 1.5 * width)))
 
 
 def _usual_step(x: Floats) -> float:
     return float(np.median(np.diff(x))) if x.size > 1 else 1.0
 
 
-def _pieces(x: Floats, gap: float) -> tuple[slice, ...]:
+def _split_at_gaps(x: Floats, gap: float) -> tuple[slice, ...]:
     ends = [0, *(np.flatnonzero(np.diff(x) > gap * (1.0 + 1e-9)) + 1).tolist(), x.size]
     return tuple(slice(start, end) for start, end in pairwise(ends) if end > start)
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class Residuals:
     """What one recording's judged rows leave: residuals are measured minus simulated. All arrays (judged rows,)."""
 
     time_s: Floats
@@ -68,7 +68,7 @@ class Left:
     after_n: Floats
 
     @classmethod
-    def of(cls, trace: Trace) -> "Left":
+    def of(cls, trace: Trace) -> "Residuals":
         measurement = trace.measurement
         usable = measurement.usable
         measured_n = measurement.force_n[usable]
@@ -81,7 +81,7 @@ class Left:
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class ResidualRows:
     """The judged rows of all recordings on end: residuals (measured minus simulated) and what they may depend on."""
 
     before_n: Floats
@@ -90,7 +90,7 @@ class Rows:
     direction: Floats
 
 
-def joined(traces: Sequence[Trace]) -> Rows:
+def join_traces(traces: Sequence[Trace]) -> ResidualRows:
     """quantities: the drive, the time and every covariate, by name; NaN where a recording does not have it."""
     parts = [_quantities(trace.measurement) for trace in traces]
     names = dict.fromkeys(name for part in parts for name in part)
@@ -102,9 +102,9 @@ def joined(traces: Sequence[Trace]) -> Rows:
             [part[name][mask] if name in part else gap for part, mask, gap in zip(parts, usable, absent, strict=True)]
         )
 
-    return Rows(
-        np.concatenate([Left.of(trace).before_n for trace in traces]),
-        np.concatenate([Left.of(trace).after_n for trace in traces]),
+    return ResidualRows(
+        np.concatenate([Residuals.of(trace).before_n for trace in traces]),
+        np.concatenate([Residuals.of(trace).after_n for trace in traces]),
         {name: column(name) for name in names},
         np.concatenate([direction(trace.measurement)[trace.measurement.usable] for trace in traces]),
     )
@@ -132,22 +132,22 @@ def _quantities(measurement: Measurement) -> dict[str, Floats]:
 def direction(measurement: Measurement) -> Floats:
     """+1 rising, -1 falling, 0 before the first move, shape (rows,): of the slide's position where that was measured, else
     of the drive. Play of a hundredth of the range keeps noise from being a reversal."""
-    driven = _ways(drive(measurement)[1])
+    driven = _direction_signs(drive(measurement)[1])
     if measurement.position_m is None or not driven.size:
         return driven
-    moved = _ways(measurement.position_m)
+    moved = _direction_signs(measurement.position_m)
     if measurement.command_v is None:
         return moved
     alike = float(np.mean(driven * moved))  # a position that ignores the command is the tool's, along the workpiece
     return driven if abs(alike) < _LEAST_ALIKE else moved
 
 
-def _ways(values: Floats) -> Floats:
+def _direction_signs(values: Floats) -> Floats:
     every = max(-(-values.size // _WALK_ROWS), 1)
-    return np.repeat(_walk(values[::every]), every)[: values.size]
+    return np.repeat(_play_operator(values[::every]), every)[: values.size]
 
 
-def _walk(values: Floats) -> Floats:
+def _play_operator(values: Floats) -> Floats:
     ways, way = np.zeros(values.size), 0.0
     finite = values[np.isfinite(values)]
     if finite.size == 0:
@@ -163,23 +163,23 @@ def _walk(values: Floats) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Binned:
+class BinMeans:
     """Means over equal bins of what they are drawn against."""
 
     x: Floats
     mean: Floats
 
 
-def binned(x: Floats, y: Floats, bins: int = 30, least: int = 5) -> Binned:
+def bin_means(x: Floats, y: Floats, bins: int = 30, least: int = 5) -> BinMeans:
     held = np.isfinite(x) & np.isfinite(y)
     x, y = x[held], y[held]
     if x.size == 0 or is_constant(x):
-        return Binned(np.zeros(0), np.zeros(0))
+        return BinMeans(np.zeros(0), np.zeros(0))
     place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
     count = np.bincount(place, minlength=bins)
     full = count >= least
     x_sum, y_sum = np.bincount(place, x, bins), np.bincount(place, y, bins)
-    return Binned(x_sum[full] / count[full], y_sum[full] / count[full])
+    return BinMeans(x_sum[full] / count[full], y_sum[full] / count[full])
 
 
 def is_constant(values: Floats) -> bool:
@@ -201,7 +201,7 @@ def dependence(x: Floats, y: Floats, bins: int = 20) -> float:
     return between / (float(y.var()) * y.size)
 
 
-def occupied(
+def occupied_cells(
     x: Floats, y: Floats, cells: tuple[int, int], limits: tuple[float, float, float, float]
 ) -> NDArray[np.int64]:
     """The cells (column, row) of a picture that hold at least one point, shape (n, 2). limits: x low, high, y low, high."""
@@ -217,14 +217,14 @@ def spectrum(time_s: Floats, values: Floats, points: int = 140) -> tuple[Floats,
     """(frequency Hz, amplitude density N/sqrt(Hz)) by Welch's method over the stretches without gaps.
 
     The greatest of each of `points` bands that are equally wide on a logarithmic axis: no line is lost. Empty where no
-    stretch is long enough. Rows are brought to equal steps by linear interpolation, which dampens the top of the band.
+    stretch is long enough. ResidualRows are brought to equal steps by linear interpolation, which dampens the top of the band.
     """
     if time_s.size < 32:
         return np.zeros(0), np.zeros(0)
     step_s = _usual_step(time_s)
     stretches = [
         np.interp(np.arange(time_s[piece][0], time_s[piece][-1], step_s), time_s[piece], values[piece])
-        for piece in _pieces(time_s, _GAP_STEPS * step_s)
+        for piece in _split_at_gaps(time_s, _GAP_STEPS * step_s)
     ]
     longest = max(stretch.size for stretch in stretches)
     rows = min(_WELCH_ROWS, 2 ** int(np.log2(max(longest / 4, 2))))
@@ -233,10 +233,10 @@ def spectrum(time_s: Floats, values: Floats, points: int = 140) -> tuple[Floats,
         return np.zeros(0), np.zeros(0)
     found = [signal.welch(stretch, 1.0 / step_s, nperseg=rows, detrend="constant") for stretch in long_enough]
     power = np.average([density for _, density in found], axis=0, weights=[stretch.size for stretch in long_enough])
-    return _banded(np.asarray(found[0][0])[1:], np.sqrt(power)[1:], points)
+    return _peak_per_band(np.asarray(found[0][0])[1:], np.sqrt(power)[1:], points)
 
 
-def _banded(frequency_hz: Floats, density: Floats, points: int) -> tuple[Floats, Floats]:
+def _peak_per_band(frequency_hz: Floats, density: Floats, points: int) -> tuple[Floats, Floats]:
     edges = np.geomspace(frequency_hz[0], frequency_hz[-1] * (1.0 + 1e-9), points + 1)
     band = np.searchsorted(edges, frequency_hz, side="right")
     starts = np.flatnonzero(np.diff(band, prepend=-1))
@@ -245,7 +245,7 @@ def _banded(frequency_hz: Floats, density: Floats, points: int) -> tuple[Floats,
     return frequency_hz[at], peaks
 
 
-def most_telling_window(left: Left, share: float = 0.08) -> tuple[float, float]:
+def most_improved_window(left: Residuals, share: float = 0.08) -> tuple[float, float]:
     """(start, end), s: the stretch in which the extended model gains most, or where the error is greatest."""
     time_s, before_n, after_n = left.time_s, left.before_n, left.after_n
     span_s = share * float(time_s[-1] - time_s[0])

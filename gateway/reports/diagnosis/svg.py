@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Floats
-from gateway.reports.diagnosis.series import Envelope, occupied
+from gateway.reports.diagnosis.series import Envelope, occupied_cells
 from gateway.reports.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, spread
 
 _LEAST_SPREAD: Final = 1e-6
@@ -52,7 +52,7 @@ class SeriesChart(Chart):
         across, down = (self.width - LEFT - RIGHT) / columns, (self.height - TOP - BOTTOM) / rows
         box = (self.x.low, self.x.high, self.y.low, self.y.high)
         place = f"translate({LEFT + across / 2:.2f} {self.height - BOTTOM}) scale({across:.4f} {-down:.4f})"
-        strokes = _strokes(occupied(x, y, (columns, rows), box))
+        strokes = _strokes(occupied_cells(x, y, (columns, rows), box))
         self._parts.append(f'<path class="cloud {style}" transform="{place}" d="{strokes}"/>')
         self._note(name, "line", style)
 

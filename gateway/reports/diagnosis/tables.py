@@ -10,7 +10,7 @@ import numpy as np
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.result import Cause, Diagnosis, Estimate
 from gateway.reports.diagnosis import wording as words
-from gateway.reports.diagnosis.series import FALLING, RISING, Rows
+from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows
 
 _MOST_REJECTED: Final = 12
 
@@ -26,7 +26,7 @@ def _row(cells: list[str]) -> str:
     return f"<tr><th>{cells[0]}</th>" + "".join(f"<td>{cell}</td>" for cell in cells[1:]) + "</tr>"
 
 
-def causes(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
+def causes_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
     """Strongest first. about: what each effect is, by name."""
     if not diagnosis.causes:
         return ""
@@ -42,11 +42,11 @@ def _cause(diagnosis: Diagnosis, cause: Cause, about: Mapping[str, str]) -> tupl
     return (
         _name(cause, about),
         words.percent(cause.confidence),
-        words.gained(cause),
+        words.gain_text(cause),
         f"{words.force(won_n)} N<br><small>[{words.force(low_n)}, {words.force(high_n)}]</small>",
         f"<span class='meter'><i style='width:{100.0 * share:.0f}%'></i></span> {words.percent(gain.share_of_excess)}",
         "<br>".join(
-            escape(f"{name} {words.estimate(found)}{words.was(diagnosis, name, found)}")
+            escape(f"{name} {words.estimate(found)}{words.previous_value(diagnosis, name, found)}")
             for name, found in cause.parameters.items()
         ),
     )
@@ -59,12 +59,12 @@ def _name(cause: Cause, about: Mapping[str, str]) -> str:
     return f"<b>{escape(cause.name)}</b>{alike}{what}"
 
 
-def leftover(diagnosis: Diagnosis) -> str:
+def leftover_table(diagnosis: Diagnosis) -> str:
     rows = ((escape(rest.depends_on), escape(rest.shape), words.percent(rest.share)) for rest in diagnosis.leftover)
     return table(("depends on", "shape", "of the excess"), rows) if diagnosis.leftover else ""
 
 
-def rejected(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
+def rejected_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
     """Those that competed and lost, the nearest first."""
     ranked = sorted(diagnosis.rejected, key=lambda lost: -lost.gain)
     rows = (
@@ -76,13 +76,13 @@ def rejected(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
     return table(("alternative", "held-out gain", "what it is"), rows) + rest if ranked else ""
 
 
-def unseen(diagnosis: Diagnosis) -> str:
+def unseen_table(diagnosis: Diagnosis) -> str:
     rows = ((escape(item.name), escape(item.why), escape(item.experiment)) for item in diagnosis.not_identifiable)
     heads = ("effect", "why it cannot be seen here", "what would show it")
     return table(heads, rows, "unseen") if diagnosis.not_identifiable else ""
 
 
-def base(parameters: Mapping[str, Estimate]) -> str:
+def base_table(parameters: Mapping[str, Estimate]) -> str:
     """The base model's refitted parameters."""
     rows = (
         (escape(f"{found.section}.{name}" if found.section else name), escape(words.estimate(found)))
@@ -91,7 +91,7 @@ def base(parameters: Mapping[str, Estimate]) -> str:
     return table(("parameter of the base model", "refitted [95 %]"), rows, "facts") if parameters else ""
 
 
-def directions(rows: Rows) -> str:
+def directions_table(rows: ResidualRows) -> str:
     """Mean and RMS of the residual by the direction of motion."""
     ways = (
         ("rising", rows.direction == RISING),

@@ -39,7 +39,7 @@ _PARTIAL: Final = (
 def title(diagnosis: Diagnosis) -> str:
     """`Partial: creep or warm-up; mains-hum`."""
     names = "; ".join(label(cause) for cause in diagnosis.causes)
-    word = "Nothing can be told" if blind(diagnosis) else _TITLES[diagnosis.verdict]
+    word = "Nothing can be told" if why_blind(diagnosis) else _TITLES[diagnosis.verdict]
     return f"{word}: {names}" if names else word
 
 
@@ -47,13 +47,13 @@ def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, and for `partial` what it lacks."""
     if any(suspect.is_sure for suspect in diagnosis.suspects):
         return "The columns are not what their names say: no cause was looked for. First mend this, then ask again."
-    if why := blind(diagnosis):
+    if why := why_blind(diagnosis):
         return f"{why}."
-    told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_lack(diagnosis)]
-    return _as_several(told) if len(diagnosis.causes) > 1 else told
+    told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_missing_evidence(diagnosis)]
+    return _use_plural(told) if len(diagnosis.causes) > 1 else told
 
 
-def blind(diagnosis: Diagnosis) -> str:
+def why_blind(diagnosis: Diagnosis) -> str:
     """Why the recordings say nothing, where they do not and nothing else was found."""
     found = (
         diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
@@ -61,13 +61,13 @@ def blind(diagnosis: Diagnosis) -> str:
     return "" if found else notes.blind([trace.measurement for trace in diagnosis.traces])
 
 
-def _lack(diagnosis: Diagnosis) -> int:
+def _missing_evidence(diagnosis: Diagnosis) -> int:
     if diagnosis.leftover or not diagnosis.extended.reaches_noise_floor:
         return 2
     return 0 if any(others(cause) for cause in diagnosis.causes) else 1
 
 
-def _as_several(told: str) -> str:
+def _use_plural(told: str) -> str:
     """The same of several causes."""
     for one, several in _PLURAL.items():
         told = told.replace(one, several)
@@ -132,19 +132,19 @@ def estimate(found: Estimate) -> str:
     return f"{number(found.value, digits)}{unit} {interval(found.ci95)}"
 
 
-def was(diagnosis: Diagnosis, name: str, found: Estimate) -> str:
+def previous_value(diagnosis: Diagnosis, name: str, found: Estimate) -> str:
     """` (0.08 before)`, where the plant that was given has the effect already, in another size."""
     before = getattr(getattr(diagnosis.base, found.section), name) if found.section else 0.0
     null = getattr(getattr(Plant(), found.section), name) if found.section else 0.0
     return "" if before == null else f" ({number(before)} before)"
 
 
-def gained(cause: Cause) -> str:
+def gain_text(cause: Cause) -> str:
     """`0.830 → 0.310 N`."""
     return f"{force(cause.gain.held_out_rms_before_n)} → {force(cause.gain.held_out_rms_after_n)} N"
 
 
-def explained(diagnosis: Diagnosis) -> float:
+def explained_share(diagnosis: Diagnosis) -> float:
     """Share of the squared error above the noise floor that the causes take away, 0..1; nan where there is none.
 
     The model's share, or that of the strongest cause: spikes are taken out of the readings before any model is fitted.
@@ -171,7 +171,7 @@ def next_recordings(diagnosis: Diagnosis) -> list[tuple[str, tuple[str, ...]]]:
     return [(proposal, tuple(names)) for proposal, names in by_experiment.items() if proposal]
 
 
-def noticed(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
+def all_notes(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
     """Every note once: those that came before, the diagnosis' own, and the reader's with their recording's name."""
     measurements = [trace.measurement for trace in diagnosis.traces]
     read = {note for measurement in measurements for note in measurement.notes}
@@ -184,7 +184,7 @@ def noticed(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
     return list(dict.fromkeys([*suspected, *before, *(note for note in diagnosis.notes if note not in read), *named]))
 
 
-def listed(words: Iterable[str]) -> str:
+def join_words(words: Iterable[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
     *most, last = list(words) or [""]
     return f"{', '.join(most)} and {last}" if most else last

@@ -16,7 +16,7 @@ FORMAT = 1
 Document = dict[str, Any]
 
 
-def document_of(evaluation: Evaluation, recording: Path, facts: dict[str, Any]) -> Document:
+def fit_document(evaluation: Evaluation, recording: Path, facts: dict[str, Any]) -> Document:
     """format 1: recording, rig, ladder, fits (one per model and order), chosen (of the fits), reversal, model
     (what is to be activated), notes. Forces in N, voltages in V."""
     return {
@@ -25,16 +25,16 @@ def document_of(evaluation: Evaluation, recording: Path, facts: dict[str, Any]) 
         "rig": facts.get("rig"),
         "rig_fingerprint": facts.get("rig_fingerprint"),
         "started_utc": facts.get("started_utc"),
-        "ladder": _ladder(evaluation),
-        "fits": [_fit(score, score is evaluation.chosen) for score in evaluation.scores],
-        "chosen": _chosen(evaluation),
-        "reversal": _reversal(evaluation),
-        "model": _model(evaluation),
+        "ladder": _ladder_facts(evaluation),
+        "fits": [_fit_facts(score, score is evaluation.chosen) for score in evaluation.scores],
+        "chosen": _chosen_facts(evaluation),
+        "reversal": _reversal_facts(evaluation),
+        "model": _model_facts(evaluation),
         "notes": list(evaluation.notes),
     }
 
 
-def _ladder(evaluation: Evaluation) -> Document:
+def _ladder_facts(evaluation: Evaluation) -> Document:
     ladder = evaluation.checked.ladder
     return {
         "points": len(ladder),
@@ -48,7 +48,7 @@ def _ladder(evaluation: Evaluation) -> Document:
     }
 
 
-def _fit(score: Score, is_chosen: bool) -> Document:
+def _fit_facts(score: Score, is_chosen: bool) -> Document:
     result = score.result
     verdicts = result.verdicts
     heldout_n = _number(score.heldout_rms_n)
@@ -74,10 +74,10 @@ def _fit(score: Score, is_chosen: bool) -> Document:
     }
 
 
-def _chosen(evaluation: Evaluation) -> Document:
+def _chosen_facts(evaluation: Evaluation) -> Document:
     branches = evaluation.chosen.result.branches
     return (
-        _fit(evaluation.chosen, True)
+        _fit_facts(evaluation.chosen, True)
         | {"constrained": evaluation.chosen not in evaluation.scores}
         | coefficients_of(branches)
         | {"force_range_n": list(evaluation.model.force_range_n)}
@@ -96,7 +96,7 @@ def coefficients_of(branches: Branches) -> Document:
     }
 
 
-def _reversal(evaluation: Evaluation) -> Document:
+def _reversal_facts(evaluation: Evaluation) -> Document:
     """policy: linear-blend or slip-stops; rms_n, max_n: on the whole walk; *_heldout_n: on the half not fitted to."""
     reversal = evaluation.reversal
     if reversal is None:
@@ -117,7 +117,7 @@ def _reversal(evaluation: Evaluation) -> Document:
     }
 
 
-def _model(evaluation: Evaluation) -> Document:
+def _model_facts(evaluation: Evaluation) -> Document:
     """What is to be activated: with slip stops the branches are not those of the chosen fit, a joint fit has moved them."""
     slip = evaluation.reversal.slip if evaluation.reversal else None
     stops = slip.stops if slip else None

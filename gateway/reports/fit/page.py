@@ -67,11 +67,11 @@ def _heading(document: Document) -> str:
     number = f"Calibration {document['calibration']} · " if document.get("calibration") else ""
     return (
         f"<header><p class='kicker'>{escape(number)}force-gateway {VERSION}</p>"
-        f"<h1>{escape(document['name'])}</h1><p>{escape(' · '.join(facts))}</p>{_rejected(document)}</header>"
+        f"<h1>{escape(document['name'])}</h1><p>{escape(' · '.join(facts))}</p>{_rejection(document)}</header>"
     )
 
 
-def _rejected(document: Document) -> str:
+def _rejection(document: Document) -> str:
     why = document["measured"]["rejected"]
     return f"<p><strong>Rejected, not offered for use:</strong> {escape(why)}</p>" if why else ""
 

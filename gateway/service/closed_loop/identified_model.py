@@ -24,7 +24,7 @@ from gateway.twin import Contact, Friction, LoadCell, Plant, Regulator, Twin
 from gateway.twin.experiment import Dwell, staircase
 
 ORDERS: Final = (2, 3)
-CLOSE: Final = 2.0  # of the best order's error: a lower order within it is taken
+ORDER_TOLERANCE: Final = 2.0  # of the best order's error: a lower order within it is taken
 TURN_STAIRS: Final = 8  # that may be left out after each turn
 STAIRS: Final = 40
 MINOR_STAIRS: Final = 32  # of the whole range, per way
@@ -68,23 +68,23 @@ CONDITIONING_S: Final = 0.6
 DWELL: Final = Dwell(least_s=0.1, most_s=0.6, check_s=0.02, readings=1)
 
 
-def at_rest(plant: Plant) -> Plant:
+def quasi_static(plant: Plant) -> Plant:
     """The same plant without what passes and without what the surroundings bring: noise, time, delays, tilt, warmth. What is
     left is where the force comes to rest, and plants that rest alike become one."""
     return replace(
         plant,
-        regulator=replace(Regulator(), lag_s=QUICK_LAG_S, **_kept(plant.regulator, REGULATOR)),
-        friction=replace(Friction(), **_kept(plant.friction, FRICTION)),
-        contact=replace(Contact(), **_kept(plant.contact, CONTACT)),
-        cell=replace(LoadCell(), **_kept(plant.cell, CELL)),
+        regulator=replace(Regulator(), lag_s=QUICK_LAG_S, **_section_values(plant.regulator, REGULATOR)),
+        friction=replace(Friction(), **_section_values(plant.friction, FRICTION)),
+        contact=replace(Contact(), **_section_values(plant.contact, CONTACT)),
+        cell=replace(LoadCell(), **_section_values(plant.cell, CELL)),
     )
 
 
-def _kept(section: object, names: tuple[str, ...]) -> dict[str, float]:
+def _section_values(section: object, names: tuple[str, ...]) -> dict[str, float]:
     return {name: getattr(section, name) for name in names}
 
 
-def straightened(plant: Plant, compensation: Compensation) -> Plant:
+def remove_compensated(plant: Plant, compensation: Compensation) -> Plant:
     """What the model has to describe once control takes its part: a straight command map, a straight cell."""
     cell, regulator = plant.cell, plant.regulator
     if compensation.cell:
@@ -94,20 +94,20 @@ def straightened(plant: Plant, compensation: Compensation) -> Plant:
     return replace(plant, cell=cell, regulator=regulator)
 
 
-def identified(plant: Plant, top_v: float) -> Bsfm:
+def identify_model(plant: Plant, top_v: float) -> Bsfm:
     """The model over 0 .. top_v. ValueError with a sentence where the plant has none (no force, a branch that falls)."""
-    return _identified(at_rest(plant), top_v)
+    return _identify(quasi_static(plant), top_v)
 
 
 @lru_cache(maxsize=16)
-def _identified(still: Plant, top_v: float) -> Bsfm:
+def _identify(still: Plant, top_v: float) -> Bsfm:
     plan = ladder_plan(top_v, top_v / STAIRS, 1)
-    force_n = staircase(conditioned(still, top_v), plan.voltage_v, DWELL)
+    force_n = staircase(condition_twin(still, top_v), plan.voltage_v, DWELL)
     ladder = Ladder(np.array(plan.voltage_v), force_n, np.array(plan.direction), np.array(plan.group))
     ladder, branches = _usable_branches(ladder)
     foot_v = branches.rising.x0
     minor_v = _stairs_between([foot_v + turn * (top_v - foot_v) for turn in TURNS], top_v / MINOR_STAIRS)
-    minor_n = staircase(conditioned(still, top_v), minor_v, DWELL)
+    minor_n = staircase(condition_twin(still, top_v), minor_v, DWELL)
     choice = choose_reversal(branches, ladder, minor_v, minor_n)
     if choice is None:
         raise ValueError("the walk of partial reversals is too short for a model")
@@ -122,19 +122,21 @@ def _usable_branches(ladder: Ladder) -> tuple[Ladder, Branches]:
         turned = (ladder.direction < 0) & (ladder.voltage_v > steps_v[-1 - cut])
         part = ladder.part((ladder.voltage_v >= steps_v[cut]) & ~turned)
         for ties in ("tied", "free"):
-            usable = [found for found in fit_orders(part, "bsfm", ORDERS, ties, _over(ladder)) if found.verdicts.usable]
+            usable = [
+                found for found in fit_orders(part, "bsfm", ORDERS, ties, _full_range(ladder)) if found.verdicts.usable
+            ]
             if usable:
-                least_n = CLOSE * min(found.overall.rms_n for found in usable)
+                least_n = ORDER_TOLERANCE * min(found.overall.rms_n for found in usable)
                 return part, next(found.branches for found in usable if found.overall.rms_n <= least_n)
     raise ValueError("no order gives branches that increase and do not cross")
 
 
-def _over(ladder: Ladder) -> FitSettings:
+def _full_range(ladder: Ladder) -> FitSettings:
     """The curves span the whole ladder, also where stairs were left out."""
     return FitSettings(voltage_range_v=(float(ladder.voltage_v.min()), float(ladder.voltage_v.max())))
 
 
-def conditioned(plant: Plant, top_v: float, seed: int = 0) -> Twin:
+def condition_twin(plant: Plant, top_v: float, seed: int = 0) -> Twin:
     """A twin whose friction remembers a full cycle: where a ladder starts, and a rig that has worked before."""
     twin = Twin(plant, seed)
     for voltage_v in (top_v, 0.0):

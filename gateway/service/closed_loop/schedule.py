@@ -39,7 +39,7 @@ COLUMNS: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class SetpointSegment:
     """From start_s on: from_n to to_n in even steps over hold_s (equal: a step, held)."""
 
     start_s: float
@@ -57,7 +57,7 @@ class Wish:
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class ReferenceConditions:
     """Surroundings in which the plant's effects are nothing."""
 
     temperature_c: float
@@ -66,13 +66,13 @@ class Reference:
 
 
 @dataclass(frozen=True, slots=True)
-class Schedule:
+class SetpointSchedule:
     """One run. columns: what moves around the tool; phase: of its movement."""
 
-    wishes: tuple[Wish, ...]
+    wishes: tuple[SetpointSegment, ...]
     columns: frozenset[str]
     phase: float
-    reference: Reference
+    reference: ReferenceConditions
 
     @property
     def duration_s(self) -> float:
@@ -111,26 +111,26 @@ def columns_of(base: Plant, extended: Plant) -> frozenset[str]:
     return frozenset(found)
 
 
-def schedule(base: Plant, extended: Plant, seed: int, force_max_n: float) -> Schedule:
+def draw_schedule(base: Plant, extended: Plant, seed: int, force_max_n: float) -> SetpointSchedule:
     """The wishes of a seed. force_max_n: the largest that rig and model allow."""
     rng = default_rng([seed, 11])
     scale = min(1.0, force_max_n / LARGEST_N)
     partial = rng.uniform(8.0, 38.0, REVERSALS).tolist()
-    wishes: list[Wish] = []
+    wishes: list[SetpointSegment] = []
     for force_n in (*STEPS_N, *partial):
-        wishes.append(Wish(_end_s(wishes), HOLD_S, scale * force_n, scale * force_n))
+        wishes.append(SetpointSegment(_end_s(wishes), HOLD_S, scale * force_n, scale * force_n))
     low_n, high_n = (scale * end_n for end_n in RAMP_ENDS_N)
-    wishes.append(Wish(_end_s(wishes), HOLD_S, low_n, low_n))
+    wishes.append(SetpointSegment(_end_s(wishes), HOLD_S, low_n, low_n))
     for from_n, to_n in ((low_n, high_n), (high_n, low_n)):
-        wishes.append(Wish(_end_s(wishes), abs(to_n - from_n) / RAMP_N_PER_S, from_n, to_n))
+        wishes.append(SetpointSegment(_end_s(wishes), abs(to_n - from_n) / RAMP_N_PER_S, from_n, to_n))
     phase = float(rng.uniform(0.0, 2.0 * pi))
-    reference = Reference(
+    reference = ReferenceConditions(
         temperature_c=extended.cell.reference_c,
         tilt_deg=extended.contact.tilt_zero_deg + 90.0,
         supply_kpa=extended.regulator.droop_reference_pa * 1.0e-3,
     )
-    return Schedule(tuple(wishes), columns_of(base, extended), phase, reference)
+    return SetpointSchedule(tuple(wishes), columns_of(base, extended), phase, reference)
 
 
-def _end_s(wishes: list[Wish]) -> float:
+def _end_s(wishes: list[SetpointSegment]) -> float:
     return wishes[-1].start_s + wishes[-1].hold_s if wishes else 0.5

@@ -13,8 +13,8 @@ from gateway.control import Compensation, Controller, ControlSettings, LineStatu
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
-from gateway.service.closed_loop.identified_model import conditioned
-from gateway.service.closed_loop.schedule import SETTLED_S, Schedule, Wish
+from gateway.service.closed_loop.identified_model import condition_twin
+from gateway.service.closed_loop.schedule import SETTLED_S, SetpointSchedule, SetpointSegment
 from gateway.twin import Plant
 from gateway.twin.surroundings import Surroundings
 
@@ -23,7 +23,7 @@ BAND_N: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Driver:
+class ControlSetup:
     """What drives the plant: settings, a model that speaks straight volts, and what is compensated on top of it."""
 
     settings: ControlSettings
@@ -32,7 +32,7 @@ class Driver:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Run:
+class SimulatedRun:
     """error_n: true minus commanded force at every tick that counts; settled_s: of each step, its hold where it never came
     to stay; fault: what stopped it, empty if nothing did."""
 
@@ -45,11 +45,11 @@ class Run:
         return float(np.sqrt(np.mean(self.error_n**2)))
 
 
-class Loop:
+class SimulatedLoop:
     """Master, gateway and plant in one clock."""
 
-    def __init__(self, driver: Driver, plant: Plant, seed: int, inputs: frozenset[str]) -> None:
-        self._twin = conditioned(plant, driver.model.voltage_range_v[1], seed)
+    def __init__(self, driver: ControlSetup, plant: Plant, seed: int, inputs: frozenset[str]) -> None:
+        self._twin = condition_twin(plant, driver.model.voltage_range_v[1], seed)
         self._voltage_v = 0.0
         self._controller = Controller(
             driver.settings,
@@ -62,7 +62,7 @@ class Loop:
         self._line = LineStatus(acknowledged_v=0.0)
         self.fault = ""
 
-    def tick(self, time_s: float, force_n: float, schedule: Schedule) -> float:
+    def tick(self, time_s: float, force_n: float, schedule: SetpointSchedule) -> float:
         """One sample, one write of the master, one step between; returns the true force at the end, N."""
         tilt_rad = self._surround(schedule.around(time_s)) if schedule.columns else 0.0
         self._write(time_s, force_n, tilt_rad)
@@ -80,7 +80,9 @@ class Loop:
             getattr(around, name) if name in self._inputs else None
             for name in ("temperature_c", "feed_mm_s", "tilt_deg")
         )
-        self._line = LineStatus(acknowledged_v=0.0, temperature_c=_known(temperature_c), feed_mm_s=_known(feed_mm_s))
+        self._line = LineStatus(
+            acknowledged_v=0.0, temperature_c=_nan_if_absent(temperature_c), feed_mm_s=_nan_if_absent(feed_mm_s)
+        )
         return 0.0 if tilt_deg is None else radians(tilt_deg)
 
     def _write(self, time_s: float, force_n: float, tilt_rad: float) -> None:
@@ -105,15 +107,17 @@ class Loop:
         self.fault = self.fault or (output.fault.name.lower() if output.fault else "")
 
 
-def _known(value: float | None) -> float:
+def _nan_if_absent(value: float | None) -> float:
     return nan if value is None else value
 
 
-def run(driver: Driver, plant: Plant, schedule: Schedule, seed: int, inputs: frozenset[str]) -> Run:
+def simulate_run(
+    driver: ControlSetup, plant: Plant, schedule: SetpointSchedule, seed: int, inputs: frozenset[str]
+) -> SimulatedRun:
     """The whole schedule. Once a fault has stopped it, the remaining force counts as it is: gone."""
-    loop = Loop(driver, plant, seed, inputs)
+    loop = SimulatedLoop(driver, plant, seed, inputs)
     errors, settled, time_s = [], [], 0.0
-    for wish in (Wish(0.0, schedule.wishes[0].start_s, 0.0, 0.0), *schedule.wishes):
+    for wish in (SetpointSegment(0.0, schedule.wishes[0].start_s, 0.0, 0.0), *schedule.wishes):
         away = []
         for tick in range(round(wish.hold_s / TICK_S)):
             time_s = wish.start_s + tick * TICK_S
@@ -121,10 +125,10 @@ def run(driver: Driver, plant: Plant, schedule: Schedule, seed: int, inputs: fro
             away.append(loop.tick(time_s, force_n, schedule) - force_n)
         if wish.from_n > 0.0:
             errors += away[round(SETTLED_S / TICK_S) :]
-            settled += [_settled_s(away)] if wish.is_step else []
-    return Run(np.array(errors), tuple(settled), loop.fault)
+            settled += [_settling_time_s(away)] if wish.is_step else []
+    return SimulatedRun(np.array(errors), tuple(settled), loop.fault)
 
 
-def _settled_s(away_n: list[float]) -> float:
+def _settling_time_s(away_n: list[float]) -> float:
     outside = [tick for tick, error_n in enumerate(away_n) if abs(error_n) > BAND_N]
     return (outside[-1] + 1) * TICK_S if outside else 0.0

@@ -19,21 +19,21 @@ from gateway.bsfm.fit.projected_problem import Floats
 from gateway.control import NO_COMPENSATION, Compensation, ControlSettings
 from gateway.profiles import Rig, load_rig
 from gateway.profiles.rigs.compensation import ALL_INPUTS, CALIBRATE, compensation_of
-from gateway.service.closed_loop.identified_model import identified, straightened
-from gateway.service.closed_loop.schedule import LARGEST_N, schedule
-from gateway.service.closed_loop.simulated_run import Driver, Run, run
+from gateway.service.closed_loop.identified_model import identify_model, remove_compensated
+from gateway.service.closed_loop.schedule import LARGEST_N, draw_schedule
+from gateway.service.closed_loop.simulated_run import ControlSetup, SimulatedRun, simulate_run
 from gateway.twin import Plant
 
 SEEDS: Final = 5
-TRIAL: Final = 10_000  # from the first seed to that of the trial run, which is not judged
+TRIAL_SEED_OFFSET: Final = 10_000  # from the first seed to that of the trial run, which is not judged
 RESAMPLES: Final = 4000
 HEADROOM: Final = 0.94  # of the largest voltage: the ladder's top, so that the trim has room above it
 REACH: Final = 0.92  # of the force that the model reaches at its top
-STAND_IN: Final = defaults.RIG
+DEFAULT_RIG: Final = defaults.RIG
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ClosedLoop:
+class ClosedLoopGain:
     """Errors of the true force against the commanded one, N, over all seeds. rms_ratio: after over before, with a 95 %
     interval over seeds; settled_s: mean time until within 1 N for good, a step that never gets there counts as its hold;
     faults: of runs that supervision stopped."""
@@ -62,45 +62,45 @@ def closed_loop_gain(
     *,
     seeds: int = SEEDS,
     inputs: Iterable[str] = ALL_INPUTS,
-) -> ClosedLoop:
+) -> ClosedLoopGain:
     """rig: whose limits, trim and lead are used, None for the demo rig's; inputs: what the controller is told besides the load
     cell. ValueError where the base plant gives no model at all."""
-    settings, told = (rig or load_rig(STAND_IN)).control, frozenset(inputs)
+    settings, told = (rig or load_rig(DEFAULT_RIG)).control, frozenset(inputs)
     top_v = HEADROOM * settings.limits.voltage_max_v
-    before = Driver(settings, identified(base, top_v), NO_COMPENSATION)
-    after = _compensated(before, base, extended, told, seed + TRIAL)
+    before = ControlSetup(settings, identify_model(base, top_v), NO_COMPENSATION)
+    after = _compensate(before, base, extended, told, seed + TRIAL_SEED_OFFSET)
     notes = () if after.model is before.model else ("the model was identified anew on the extended plant",)
     force_max_n = _reach_n(settings, (before.model, after.model))
     if force_max_n < LARGEST_N:
         notes = (*notes, f"the schedule goes up to {force_max_n:.1f} N: model and limits allow no more")
     chosen = tuple(range(seed, seed + seeds))
     runs = [
-        [run(driver, extended, schedule(base, extended, one, force_max_n), one, told) for one in chosen]
+        [simulate_run(driver, extended, draw_schedule(base, extended, one, force_max_n), one, told) for one in chosen]
         for driver in ((before,) if base == extended else (before, after))
     ]
-    return _judged(runs[0], runs[-1], chosen, after.compensation, notes)
+    return _summarize(runs[0], runs[-1], chosen, after.compensation, notes)
 
 
-def _compensated(before: Driver, base: Plant, extended: Plant, told: frozenset[str], seed: int) -> Driver:
+def _compensate(before: ControlSetup, base: Plant, extended: Plant, told: frozenset[str], seed: int) -> ControlSetup:
     """With everything that can be known. A model that the extended plant does not give, or that does worse on a trial run of
     its own seed, is not used: some friction (rigid, and wide) is beyond what the model's stops can follow."""
     whole, kept = (compensation_of(base, extended, told, new_model=new) for new in (True, False))
-    old = Driver(before.settings, before.model, kept)
+    old = ControlSetup(before.settings, before.model, kept)
     try:
-        model = identified(straightened(extended, whole), HEADROOM * before.settings.limits.voltage_max_v)
+        model = identify_model(remove_compensated(extended, whole), HEADROOM * before.settings.limits.voltage_max_v)
     except ValueError as error:
         return _without_model(old, f"the extended plant gives no model: {error}")
-    new = Driver(before.settings, model, whole)
+    new = ControlSetup(before.settings, model, whole)
     if model is before.model:
         return new
-    wishes = schedule(base, extended, seed, _reach_n(before.settings, (model, before.model)))
-    rms_n = [run(driver, extended, wishes, seed, told).rms_n for driver in (old, new)]
+    wishes = draw_schedule(base, extended, seed, _reach_n(before.settings, (model, before.model)))
+    rms_n = [simulate_run(driver, extended, wishes, seed, told).rms_n for driver in (old, new)]
     return (
         new if rms_n[1] <= rms_n[0] else _without_model(old, "a model identified on the extended plant does no better")
     )
 
 
-def _without_model(driver: Driver, why: str) -> Driver:
+def _without_model(driver: ControlSetup, why: str) -> ControlSetup:
     limited = tuple((name, why if said == CALIBRATE else said) for name, said in driver.compensation.limited)
     return replace(driver, compensation=replace(driver.compensation, limited=limited))
 
@@ -109,13 +109,17 @@ def _reach_n(settings: ControlSettings, models: Iterable[Bsfm]) -> float:
     return min(settings.limits.force_max_n, *(REACH * model.force_range_n[1] for model in models))
 
 
-def _judged(
-    before: list[Run], after: list[Run], seeds: tuple[int, ...], compensation: Compensation, notes: tuple[str, ...]
-) -> ClosedLoop:
+def _summarize(
+    before: list[SimulatedRun],
+    after: list[SimulatedRun],
+    seeds: tuple[int, ...],
+    compensation: Compensation,
+    notes: tuple[str, ...],
+) -> ClosedLoopGain:
     squares = np.array([[one.rms_n**2 for one in runs] for runs in (before, after)])
     rms_n = np.sqrt(squares.mean(axis=1))
     low, high = np.quantile(_ratios(squares), (0.025, 0.975)).tolist()
-    return ClosedLoop(
+    return ClosedLoopGain(
         before_rms_n=float(rms_n[0]),
         after_rms_n=float(rms_n[1]),
         before_max_n=_largest_n(before),
@@ -142,15 +146,15 @@ def _ratios(squares: Floats) -> Floats:
     return ratios
 
 
-def _largest_n(runs: list[Run]) -> float:
+def _largest_n(runs: list[SimulatedRun]) -> float:
     return max(float(np.abs(one.error_n).max()) for one in runs)
 
 
-def _mean_settled_s(runs: list[Run]) -> float:
+def _mean_settled_s(runs: list[SimulatedRun]) -> float:
     return float(np.mean([settled_s for one in runs for settled_s in one.settled_s]))
 
 
-def lines(found: ClosedLoop) -> list[str]:
+def format_gain(found: ClosedLoopGain) -> list[str]:
     """For the terminal."""
     low, high = found.rms_ratio_ci95
     told = [

@@ -18,7 +18,7 @@ WORSE_SHARE: Final = 0.05  # of the band: a smaller difference is none
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Acceptance:
     """error: on all measured points; allowed_n: of its RMS, None where the rig is not known; in_use: the same data by the
     calibration in use, None where there is none for this rig; rejected: why it is not offered, empty where it is; has_walk:
     partial reversals are among the points."""
@@ -44,15 +44,15 @@ class Verdict:
         }
 
 
-def verdict_on(evaluation: Evaluation, tolerance_n: float | None, in_use: Calibration | None) -> Verdict:
+def judge_fit(evaluation: Evaluation, tolerance_n: float | None, in_use: Calibration | None) -> Acceptance:
     """tolerance_n: the rig's in_band_tolerance_n, None where nobody knows the rig; in_use: what is active on it."""
     error = Error.of(measured_error_n(evaluation.model, evaluation.checked))
     other = Error.of(measured_error_n(in_use.model(), evaluation.checked)) if in_use else None
     number, has_walk = in_use.number if in_use else 0, len(evaluation.checked.minor_v) > 1
     if tolerance_n is None:
-        return Verdict(error, None, other, number, "", has_walk)
+        return Acceptance(error, None, other, number, "", has_walk)
     bounds = (*_beyond_band(error, tolerance_n), *(_worse(error, other, number, tolerance_n) if other else ()))
-    return Verdict(error, tolerance_n, other, number, _sentence(error, bounds), has_walk)
+    return Acceptance(error, tolerance_n, other, number, _sentence(error, bounds), has_walk)
 
 
 def _sentence(error: Error, bounds: tuple[str, ...]) -> str:

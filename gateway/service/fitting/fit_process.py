@@ -27,17 +27,21 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
     from gateway.profiles import ProfileError, load_rig
     from gateway.recording import RecordingError
     from gateway.service.fitting.ladder_fit import calibration_of, fit_recording
-    from gateway.service.fitting.ladder_source import Background, read_source
+    from gateway.service.fitting.ladder_source import RigContext, read_source
 
     try:
         rig = load_rig(rig_name)
         store = CalibrationStore(state, rig.calibration)
         standing = store.standing().calibration or rig.calibration
         question = FitRequest(reference_span_n=standing.blend_span_n)
-        fit = fit_recording(read_source(recording), question, Background(rig=rig_name, state=state))
+        fit = fit_recording(read_source(recording), question, RigContext(rig=rig_name, state=state))
         fresh = calibration_of(fit, rig.load_cell.range_n)
         number = store.number_of(fresh.data_sha256)
-        return _told(fit, store, number) if number else _told(fit, store, store.add(fresh), is_new=True)
+        return (
+            _describe_result(fit, store, number)
+            if number
+            else _describe_result(fit, store, store.add(fresh), is_new=True)
+        )
     except LadderError as error:
         return {"refused": f"E421 {recording}: {error}"}
     except RecordingError as error:
@@ -48,7 +52,9 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
         return {"refused": f"E106 {error.filename or recording}: {error.strerror}"}
 
 
-def _told(fit: "LadderFit", store: "CalibrationStore", number: int, *, is_new: bool = False) -> dict[str, Any]:
+def _describe_result(
+    fit: "LadderFit", store: "CalibrationStore", number: int, *, is_new: bool = False
+) -> dict[str, Any]:
     """What the calibration of this number is called, and whether it is offered. is_new: its report is still to be written."""
     from gateway.service.fitting.ladder_fit import write_report, write_whole
 
@@ -69,7 +75,7 @@ def rejected_sentence(number: int, why: str) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    priority.run_behind_others()
+    priority.lower_priority()
     asked = json.loads(arguments[0])
     result = fit_and_store(Path(asked["recording"]), asked["rig"], Path(asked["state"]))
     sys.stdout.write(json.dumps(result) + "\n")

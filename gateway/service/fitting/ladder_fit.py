@@ -17,11 +17,11 @@ from gateway.bsfm.fit.response_fit import MeasuredResponse
 from gateway.bsfm.ladder.check import CheckedLadder
 from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
 from gateway.recording import Recording
-from gateway.reports.fit.document import Document, document_of
+from gateway.reports.fit.document import Document, fit_document
 from gateway.reports.fit.page import fit_page
-from gateway.service.fitting.acceptance import Verdict, verdict_on
-from gateway.service.fitting.ladder_source import Background, bounds_on, checked_source
-from gateway.service.fitting.measured_response import response_of
+from gateway.service.fitting.acceptance import Acceptance, judge_fit
+from gateway.service.fitting.ladder_source import RigContext, acceptance_bounds, check_source
+from gateway.service.fitting.measured_response import measure_recorded_response
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,18 +31,18 @@ class LadderFit:
     recording: Recording
     evaluation: Evaluation
     document: Document
-    verdict: Verdict
+    verdict: Acceptance
     measured: MeasuredResponse
 
 
-def fit_recording(recording: Recording, question: FitRequest, background: Background, name: str = "") -> LadderFit:
+def fit_recording(recording: Recording, question: FitRequest, background: RigContext, name: str = "") -> LadderFit:
     """Check, fit, hold out, choose, judge. name: the user's, empty for the one given when it was recorded. LadderError with a
     sentence where the data must not be fitted."""
-    evaluation = evaluate(checked_source(recording, background), question)
-    verdict = verdict_on(evaluation, *bounds_on(recording, background))
-    document = document_of(evaluation, recording.path, recording.header)
+    evaluation = evaluate(check_source(recording, background), question)
+    verdict = judge_fit(evaluation, *acceptance_bounds(recording, background))
+    document = fit_document(evaluation, recording.path, recording.header)
     document["data_sha256"] = data_sha256(evaluation.checked)
-    response = response_of(recording, evaluation)
+    response = measure_recorded_response(recording, evaluation)
     document["response"] = asdict(response.response) if response.response else None
     document["notes"].append(response.told)
     document["name"] = name or str(recording.header.get("name") or "") or default_name(document)

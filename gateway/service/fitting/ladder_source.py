@@ -12,12 +12,12 @@ from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
 from gateway.recording.layout import SUFFIX
 
-_STAND_IN: Final = defaults.RIG  # whose calibration a table without a known rig is compared with
+_DEFAULT_RIG: Final = defaults.RIG  # whose calibration a table without a known rig is compared with
 _MM2_PER_M2: Final = 1.0e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Background:
+class RigContext:
     """rig: the one asked for, None for the recording's own; state: whose calibration in use is the reference, None for
     the rig's built-in one; force_unit: as the user says, None as the table says."""
 
@@ -42,16 +42,16 @@ def find_source(name: str, state: Path) -> Path:
     return find_recording(state, int(name)) if name.isdecimal() and not Path(name).exists() else Path(name)
 
 
-def with_earlier(recording: Recording) -> list[Recording]:
+def read_resumed(recording: Recording) -> list[Recording]:
     """The recordings that a resumed run goes on from, oldest first, and itself. An exported table stands alone."""
     numbers = recording.header.get("continues", ()) if recording.path.suffix == SUFFIX else ()
     earlier = numbers if isinstance(numbers, list) else ()
     beside = recording.path.parent
     parts = [*(read_recording(beside / f"{int(number):04d}{recording.path.suffix}") for number in earlier), recording]
-    return [_from_zero(part, float(parts[0].header.get("zero_n", 0.0))) for part in parts]
+    return [_shift_to_zero(part, float(parts[0].header.get("zero_n", 0.0))) for part in parts]
 
 
-def _from_zero(part: Recording, zero_n: float) -> Recording:
+def _shift_to_zero(part: Recording, zero_n: float) -> Recording:
     """Its forces from this zero of the cell: a restart of the gateway has lost the tare that the first part was made with."""
     moved_n = float(part.header.get("zero_n", zero_n)) - zero_n
     if moved_n == 0.0 or "force_n" not in part.columns:
@@ -61,25 +61,25 @@ def _from_zero(part: Recording, zero_n: float) -> Recording:
     return replace(part, columns=columns, notes=(*part.notes, said))
 
 
-def checked_source(recording: Recording, background: Background) -> CheckedLadder:
+def check_source(recording: Recording, background: RigContext) -> CheckedLadder:
     """The ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
     expected, said = expectation(recording, background)
-    recordings = with_earlier(recording)
+    recordings = read_resumed(recording)
     checked = join_ladders([check_ladder(part.columns, part.header, expected) for part in recordings])
     told = dict.fromkeys(note for part in recordings for note in part.notes)
     return replace(checked, notes=(*told, *said, *checked.notes))
 
 
-def expectation(recording: Recording, background: Background) -> tuple[Expectation, list[str]]:
+def expectation(recording: Recording, background: RigContext) -> tuple[Expectation, list[str]]:
     """What to compare the data with, and sentences about what could not be compared."""
     recorded = str(recording.header.get("rig", "")).strip()
     asked = background.rig or rig_of_state(background.state)
-    rig, said = known_rig(asked or recorded, str(recording.header.get("rig_file", "")))
+    rig, said = find_rig(asked or recorded, str(recording.header.get("rig_file", "")))
     reference = _reference(rig, background.state)
     fingerprint = recording.header.get("rig_fingerprint")
     if rig is not None and fingerprint and fingerprint != rig.fingerprint and recorded == rig.name:
         said.append(f"the files of rig {rig.name} have changed since the recording was made")
-    stand_in = rig or load_rig(_STAND_IN)
+    stand_in = rig or load_rig(_DEFAULT_RIG)
     plant = rig.plant if rig else None
     expected = Expectation(
         reference=reference.model() if reference else stand_in.calibration.model(),
@@ -92,10 +92,10 @@ def expectation(recording: Recording, background: Background) -> tuple[Expectati
     return expected, said
 
 
-def bounds_on(recording: Recording, background: Background) -> tuple[float | None, Calibration | None]:
+def acceptance_bounds(recording: Recording, background: RigContext) -> tuple[float | None, Calibration | None]:
     """What a fit of it must not miss: the rig's in-band tolerance, N, and the calibration in use. None: not known."""
     asked = background.rig or rig_of_state(background.state)
-    rig, _ = known_rig(asked or str(recording.header.get("rig", "")), str(recording.header.get("rig_file", "")))
+    rig, _ = find_rig(asked or str(recording.header.get("rig", "")), str(recording.header.get("rig_file", "")))
     tolerance_n = rig.control.defaults.in_band_tolerance_n if rig else None
     return tolerance_n, _reference(rig, background.state)
 
@@ -106,7 +106,7 @@ def rig_of_state(state: Path | None) -> str | None:
     return next((str(entry.header["rig"]) for entry in reversed(entries) if entry.header.get("rig")), None)
 
 
-def known_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
+def find_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
     """By name, else by the file that the recording names, if that is (still) the one."""
     if not name:
         return None, []

@@ -7,20 +7,20 @@ from gateway.bsfm.fit.response_fit import MeasuredResponse, measure_response
 from gateway.bsfm.ladder.fault import LadderError
 from gateway.bsfm.ladder.rows import usable_rows
 from gateway.recording import Recording
-from gateway.service.fitting.ladder_source import known_rig
+from gateway.service.fitting.ladder_source import find_rig
 
 NOT_OURS = (
     "the response was not measured: this table is no run of the gateway, so nobody knows when its commands went out"
 )
 
 
-def response_of(recording: Recording, evaluation: Evaluation) -> MeasuredResponse:
+def measure_recorded_response(recording: Recording, evaluation: Evaluation) -> MeasuredResponse:
     """Dead time and lags by the steps of a run; without a response, and with the reason, where they do not show. A calibration
     is as good without."""
     header = recording.header
     if "ladder" not in header:
         return MeasuredResponse(None, NOT_OURS)
-    rig, _ = known_rig(str(header.get("rig", "")), str(header.get("rig_file", "")))
+    rig, _ = find_rig(str(header.get("rig", "")), str(header.get("rig_file", "")))
     slew_v_per_s = rig.control.limits.voltage_slew_v_per_s if rig else inf
     try:
         rows = usable_rows(recording.columns, header)

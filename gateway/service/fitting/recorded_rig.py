@@ -12,12 +12,12 @@ from gateway.profiles import PlantProfile, ProfileError, Rig
 from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.strict_yaml.text import Document, parse
 from gateway.recording import Recording
-from gateway.service.fitting.ladder_source import known_rig
+from gateway.service.fitting.ladder_source import find_rig
 
 
 def rig_of(recording: Recording) -> Rig | None:
     """The rig that the recording names, from the files that are here now; None where none is named or known."""
-    return known_rig(str(recording.header.get("rig", "")).strip(), str(recording.header.get("rig_file", "")))[0]
+    return find_rig(str(recording.header.get("rig", "")).strip(), str(recording.header.get("rig_file", "")))[0]
 
 
 def plant_of(recording: Recording) -> PlantProfile | None:
@@ -27,7 +27,7 @@ def plant_of(recording: Recording) -> PlantProfile | None:
     """
     texts = rig_texts(recording)
     if texts:
-        return _recorded_plant(texts)
+        return _read_recorded_plant(texts)
     rig = rig_of(recording)
     return rig.plant_profile if rig else None
 
@@ -42,7 +42,7 @@ def rig_texts(recording: Recording) -> dict[str, str]:
     return {str(file): str(text) for file, text in texts.items()} if isinstance(texts, Mapping) else {}
 
 
-def _recorded_plant(texts: Mapping[str, str]) -> PlantProfile | None:
+def _read_recorded_plant(texts: Mapping[str, str]) -> PlantProfile | None:
     rig_file, *others = texts
     named = str(_document(rig_file, texts).at("plant") or "")
     for file in others:

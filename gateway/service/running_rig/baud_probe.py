@@ -24,7 +24,7 @@ _VALID: Final = (Accepted, Pressure, Refused, ForceSample)  # a device that refu
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ProbeResult:
     """What came at one speed: bytes in all, and lines that the device's grammar knows."""
 
     baud: int
@@ -32,7 +32,7 @@ class Heard:
     valid: int
 
 
-async def why_no_words(line: OutputLine | CellLine, path: str) -> str:
+async def explain_silent_device(line: OutputLine | CellLine, path: str) -> str:
     """One sentence, E110 or E111 (or E10x when the port cannot be opened)."""
     try:
         heard = [await _listen(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
@@ -41,12 +41,12 @@ async def why_no_words(line: OutputLine | CellLine, path: str) -> str:
     return _sentence(path, heard[0], heard[1:])
 
 
-async def achieved(line: OutputLine | CellLine, path: str) -> Heard:
+async def probe_line(line: OutputLine | CellLine, path: str) -> ProbeResult:
     """What is heard at the speed that the rig says."""
     return await _listen(line, path, line.baud)
 
 
-def _sentence(path: str, here: Heard, elsewhere: list[Heard]) -> str:
+def _sentence(path: str, here: ProbeResult, elsewhere: list[ProbeResult]) -> str:
     if here.valid:
         return f"{path}: valid lines at {here.baud}; the device was silent a moment ago"
     saw = f"{here.bytes} bytes, 0 valid lines at {here.baud}"
@@ -61,8 +61,8 @@ def _sentence(path: str, here: Heard, elsewhere: list[Heard]) -> str:
     return f"E111 {path}: silence at every speed; power, crossed wires, stream mode? force-gateway explain E111"
 
 
-async def _listen(line: OutputLine | CellLine, path: str, baud: int) -> Heard:
-    ask, count = _ends(line)
+async def _listen(line: OutputLine | CellLine, path: str, baud: int) -> ProbeResult:
+    ask, count = _question_and_counter(line)
     enough = asyncio.Event()
     total = valid = 0
 
@@ -83,7 +83,7 @@ async def _listen(line: OutputLine | CellLine, path: str, baud: int) -> Heard:
                 await asyncio.wait_for(enough.wait(), _LISTEN_S / _QUESTIONS + _LONG_TALK * settings.character_s)
     finally:
         port.close()
-    return Heard(baud, total, valid)
+    return ProbeResult(baud, total, valid)
 
 
 def _question(device: DeviceProfile) -> OutputRequest:
@@ -91,14 +91,14 @@ def _question(device: DeviceProfile) -> OutputRequest:
     return output_host(device).idle_question or SetVoltage(device.voltage_range_v[0])
 
 
-def _ends(line: OutputLine | CellLine) -> tuple[Callable[[], bytes], Callable[[bytes, float], int]]:
+def _question_and_counter(line: OutputLine | CellLine) -> tuple[Callable[[], bytes], Callable[[bytes, float], int]]:
     """How to ask this device for a word (a stream is not asked), and how many valid ones a chunk completes."""
     if isinstance(line, OutputLine):
         output, question = output_host(line.device), _question(line.device)
-        return lambda: output.request(question), lambda chunk, now_s: _valid(output.receive(chunk, now_s))
+        return lambda: output.request(question), lambda chunk, now_s: _count_valid(output.receive(chunk, now_s))
     cell = cell_host(line.device, line.sign, line.unit)
-    return cell.poll, lambda chunk, now_s: _valid(cell.receive(chunk, now_s))
+    return cell.poll, lambda chunk, now_s: _count_valid(cell.receive(chunk, now_s))
 
 
-def _valid(messages: Sequence[object]) -> int:
+def _count_valid(messages: Sequence[object]) -> int:
     return sum(isinstance(message, _VALID) for message in messages)

@@ -22,17 +22,17 @@ from gateway.profiles.kinds.plans import plain, plan_of
 from gateway.recording import Recorder
 from gateway.recording.tables.columns import LADDER
 from gateway.registers.words import CalibrationPhase
-from gateway.service.running_rig.fit_launcher import FitChild, Result
+from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
-from gateway.service.socket_requests import CalibrateRequest, read
+from gateway.service.socket_requests import CalibrateRequest, parse_request
 
 FOLLOWED_S: Final = 3.0
 _CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
 Answer = dict[str, Any]
 
 
-class LadderKeeper:
+class CalibrationRuns:
     """stored: number of the calibration that the last run gave, 0 for none. Called from the loop only."""
 
     def __init__(
@@ -52,7 +52,7 @@ class LadderKeeper:
         self._payload_n = 0.0
         self._recording: RunRecording | None = None
         self._path: Path | None = None
-        self._child: FitChild | None = None
+        self._child: FitLauncher | None = None
         self._result: Result = {}
         self._ended = ""
         self._decision: Output | None = None
@@ -63,10 +63,10 @@ class LadderKeeper:
     def answer(self, request: Answer) -> Answer:
         """{"plan": {...}, "continues": [numbers], "name": text} starts, with "dry_run": true it is only tried; {"stop": true}
         stops; neither tells how it is. ValueError refuses."""
-        asked = read(CalibrateRequest, request)
+        asked = parse_request(CalibrateRequest, request)
         self._followed_s = self._clock()
         if asked.dry_run:
-            return self._tried(_plan_of(asked.plan))
+            return self._tried(_parse_plan(asked.plan))
         if asked.stop:
             self._calibrating.ask_stop("info calibration stopped at this machine")
         elif asked.plan is not None:
@@ -89,11 +89,11 @@ class LadderKeeper:
             "simulated": self._rig.simulated,
             "rig": self._rig.name,
             "rig_fingerprint": self._rig.fingerprint,
-            **_asks(plan),
+            **_describe_experiment(plan),
         }
 
     def _start(self, fields: Any, continues: tuple[int, ...]) -> None:
-        plan = _plan_of(fields)
+        plan = _parse_plan(fields)
         if refused := self._controller.refusal_of_run(self._clock(), plan):
             raise ValueError(refused)
         self._calibrating.ask(plan)
@@ -107,7 +107,7 @@ class LadderKeeper:
             "phase": calibrating.phase.name.lower(),
             "progress": calibrating.progress,
             "eta_s": round(calibrating.eta_s, 1),
-            **_where(run),
+            **_describe_progress(run),
             "noise_n": run.noise_n if run else None,
             "voltage_v": decision.voltage_v if decision else None,
             "force_n": decision.force_measured_n
@@ -176,7 +176,7 @@ class LadderKeeper:
             "calibration": self._controller.calibration_id,
             "simulated": rig.simulated,
             "seed": rig.seed,
-            **_planned(run),
+            **_header_of_plan(run),
             "continues": list(self._continues),
             "name": self._name,
             "zero_n": self._controller.zero_n,
@@ -214,7 +214,7 @@ class LadderKeeper:
             self._ended = recorder.failure
             self._calibrating.phase = CalibrationPhase.STOPPED
         else:
-            self._child = FitChild(recorder.path, self._rig.file, self._state, self._on_result)
+            self._child = FitLauncher(recorder.path, self._rig.file, self._state, self._on_result)
 
     def _on_result(self, result: Result) -> None:
         self._child, self._result = None, result
@@ -228,7 +228,7 @@ class LadderKeeper:
             self._log("calibration", f"{result.get('refused')}{told}")
 
 
-def _asks(plan: AnyPlan) -> Answer:
+def _describe_experiment(plan: AnyPlan) -> Answer:
     """What a person should know and do before an experiment."""
     if not isinstance(plan, ExperimentPlan):
         return {"experiment": "", "check": True, "notes": [], "questions": []}
@@ -242,7 +242,7 @@ def _asks(plan: AnyPlan) -> Answer:
     }
 
 
-def _where(run: AnyRun | None) -> Answer:
+def _describe_progress(run: AnyRun | None) -> Answer:
     """How far a run is, in its own terms."""
     told: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
     if isinstance(run, ExperimentRun):
@@ -255,7 +255,7 @@ def _where(run: AnyRun | None) -> Answer:
     return told | {"stair": run.done, "stairs": len(run.stairs), "group": stair.group + 1, "groups": groups}
 
 
-def _planned(run: AnyRun) -> Answer:
+def _header_of_plan(run: AnyRun) -> Answer:
     """For the recording's header: a ladder is what `fit` and --resume look for."""
     if isinstance(run, ExperimentRun):
         return {"experiment": plain(run.plan)}
@@ -263,7 +263,7 @@ def _planned(run: AnyRun) -> Answer:
     return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
 
 
-def _plan_of(fields: Any) -> AnyPlan:
+def _parse_plan(fields: Any) -> AnyPlan:
     """A plan from JSON; ValueError for a name or a type that it does not have."""
     if not isinstance(fields, dict):
         raise ValueError("plan: a JSON object is expected")

@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from gateway.bsfm import CoefficientLimits
-from gateway.calibrations.activation import Activation, InUse
+from gateway.calibrations.activation import Activation, ActiveCalibration
 from gateway.calibrations.store import CalibrationStore
-from gateway.calibrations.upload import Upload, UploadRules
+from gateway.calibrations.upload import UploadRules, UploadService
 from gateway.profiles import Rig
 from gateway.registers import RegisterBank
 
@@ -26,11 +26,13 @@ class RigCalibrations:
         chosen = () if number is None else (f"calibration {number} of {calibration.date_utc} from {store.directory}",)
         self.notes = (*standing.notes, *chosen)
 
-    def serve(self, bank: RegisterBank, on_use: Callable[[InUse], None], log: Callable[[str, str], None]) -> Upload:
+    def serve(
+        self, bank: RegisterBank, on_use: Callable[[ActiveCalibration], None], log: Callable[[str, str], None]
+    ) -> UploadService:
         """Show the calibration in use in the bank, and take uploads from now on."""
         bank.set_active_model(self.rig.calibration, self._standing.selection.slot_word)
         rules = UploadRules.of(self.rig.name, self.rig.register_map, _today)
-        upload = Upload(bank.staging, self._activation, self._standing, rules, log)
+        upload = UploadService(bank.staging, self._activation, self._standing, rules, log)
         upload.on_use = on_use
         return upload
 

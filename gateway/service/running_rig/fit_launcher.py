@@ -19,7 +19,7 @@ _LONGEST = 1 << 16
 _REAP_S = 0.1
 
 
-class FitChild:
+class FitLauncher:
     """on_result gets {"stored": number, ...} or {"refused": sentence}; exactly once."""
 
     def __init__(self, recording: Path, rig_file: Path, state: Path, on_result: Callable[[Result], None]) -> None:

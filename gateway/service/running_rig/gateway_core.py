@@ -22,10 +22,10 @@ from gateway.registers import RegisterBank
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import Asked, EdgeRefusal
 from gateway.registers.residual_cause import ResidualCause
-from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
-from gateway.service.running_rig.published_status import Known, LoopHealth, status_of
+from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from gateway.service.running_rig.recorded_row import row_of
 from gateway.service.running_rig.recordings import Recordings
 
@@ -33,7 +33,7 @@ Log = Callable[[str, str], None]
 """log(cause, sentence): the cause groups lines for rate limits, the sentence is for people."""
 
 
-class Gateway:
+class ControlLoop:
     """Joins bank, controller, output line and load cell; owns no file and no socket."""
 
     def __init__(
@@ -50,7 +50,7 @@ class Gateway:
         self.controller = controller
         self.output = output
         self.recordings: Recordings | None = None
-        self.ladder: LadderKeeper | None = None
+        self.ladder: CalibrationRuns | None = None
         self.ring: SampleRing | None = None
         self.health = LoopHealth()
         self.decision: Output | None = None
@@ -170,7 +170,7 @@ class Gateway:
             self.bank.release_owner()
         self.health.loop_time_s = self._clock() - now_s
         stored = self.ladder.stored if self.ladder else 0
-        known = Known(self.controller.calibration_id, stored, self.residual_cause)
+        known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause)
         status = status_of(decision, self.health, self.output.pressure_pa, known)
         if decision.warnings & WarningBit.RESTARTED and not decision.fault:
             status = replace(status, fault_code=self.restart_cause)

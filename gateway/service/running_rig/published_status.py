@@ -32,7 +32,7 @@ class LoopHealth:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class BackgroundStatus:
     """What the service knows beside the loop: calibrations by number, and the residual watch's cause."""
 
     calibration_id: int
@@ -40,7 +40,7 @@ class Known:
     residual_cause: int = 0
 
 
-def status_of(output: Output, health: LoopHealth, pressure_pa: float, known: Known) -> Status:
+def status_of(output: Output, health: LoopHealth, pressure_pa: float, known: BackgroundStatus) -> Status:
     return Status(
         state=output.state,
         status_word=int(output.status),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway import defaults
-from gateway.calibrations.activation import InUse
+from gateway.calibrations.activation import ActiveCalibration
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
@@ -17,26 +17,26 @@ from gateway.devices import cell_host, output_host
 from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.modbus import Peer
 from gateway.ports import PortError, SerialPort
-from gateway.processes.clock_tick import Tick
+from gateway.processes.clock_tick import ClockTick
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.processes.scheduler_counters import TurnsOf
+from gateway.processes.scheduler_counters import SchedulerCounters
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.service import banner
-from gateway.service.clean_shutdown_marker import RunFlag
-from gateway.service.control_socket import Asked, ControlSocket
+from gateway.service.clean_shutdown_marker import CleanShutdownMarker
+from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.bank_rules import bank_rules, server_settings
-from gateway.service.running_rig.baud_probe import why_no_words
-from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.baud_probe import explain_silent_device
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.calibrations import RigCalibrations
-from gateway.service.running_rig.gateway_core import Gateway
+from gateway.service.running_rig.gateway_core import ControlLoop
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.recordings import Recordings
-from gateway.service.watch_reports import WatchDesk
+from gateway.service.watch_reports import WatchReports
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
 _WORDS_AGAIN_S = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
@@ -67,7 +67,7 @@ def _cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCo
     return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
 
 
-class Cell:
+class RunningRig:
     """Wires one rig's gateway to its edges. `failed` is set when a defect of ours left the loop in an unknown state."""
 
     def __init__(self, rig: Rig, ports: dict[str, str], state: Path, guardian: GuardianLine, log: EventLog) -> None:
@@ -76,7 +76,7 @@ class Cell:
         self._state = state
         self._guardian = guardian
         self._log = log
-        self._flag = RunFlag(state)
+        self._flag = CleanShutdownMarker(state)
         self._closing = False
         self._not_opened: dict[str, PortError] = {}  # after a restart, by path
         self._spoke = asyncio.Event()
@@ -103,26 +103,26 @@ class Cell:
             is_simulated=rig.simulated,
         )
         self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
-        self._turns = TurnsOf(os.getpid())
+        self._turns = SchedulerCounters(os.getpid())
         cell = rig.load_cell
         self._cell_line = CellExchange(cell_host(cell.device, cell.sign, cell.unit), self._write_cell, cell.device)
-        self._tick = Tick(1.0 / rig.loop_hz, self._on_tick)
+        self._tick = ClockTick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
 
     def _wire(self, cause: FaultCode) -> None:
         """Bank and controller, the gateway between them, and who serves both."""
         self._wire_gateway(cause)
         rig = self._rig
-        self._ladder = LadderKeeper(self.controller, rig, self._state, time.monotonic, self._log)
+        self._ladder = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
         self.gateway.ladder = self._ladder
         self._server = ModbusTcpServer(
             self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
         )
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
-        self.watch_desk = WatchDesk(self.gateway, time.monotonic, self._log.speaking_for("watch"))
+        self.watch_desk = WatchReports(self.gateway, time.monotonic, self._log.speaking_for("watch"))
         self._control_socket = ControlSocket(
             self._state,
-            Asked(
+            RunningParts(
                 bank=self.bank,
                 recordings=self._recordings,
                 health=self.gateway.health,
@@ -148,7 +148,7 @@ class Cell:
             compensation=rig.compensation,
             response=rig.response_of(rig.calibration),
         )
-        self.gateway = Gateway(
+        self.gateway = ControlLoop(
             self.bank,
             self.controller,
             self._line,
@@ -238,7 +238,7 @@ class Cell:
         if restarted:
             return f"E111 {port.path}: nothing heard within {_WORDS_AGAIN_S:g} s of the restart; power, wires?"
         port.close()
-        sentence = await why_no_words(line, port.path)
+        sentence = await explain_silent_device(line, port.path)
         await port.open()
         return sentence
 
@@ -298,7 +298,7 @@ class Cell:
         if self._line.acknowledged_v is not None and self.gateway.sample is not None:
             self._spoke.set()
 
-    def _on_calibration(self, taken: InUse) -> None:
+    def _on_calibration(self, taken: ActiveCalibration) -> None:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
         rig, calibration = self._rig, taken.calibration
         model, response = rig.model_of(calibration, taken.model), rig.response_of(calibration)

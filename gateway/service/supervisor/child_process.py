@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
-from gateway.processes.scheduler_counters import TurnsOf
+from gateway.processes.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
@@ -31,13 +31,13 @@ class Child:
     link: socket.socket
     pid: int = 0
     died: int = -1
-    turns: TurnsOf | None = None
+    turns: SchedulerCounters | None = None
     _code: int | None = field(default=None, repr=False)
 
     def born(self, pid: int) -> None:
         """Follow this process from now on; OSError when it has died already."""
         self.died = os.pidfd_open(pid)
-        self.pid, self.turns = pid, TurnsOf(pid)
+        self.pid, self.turns = pid, SchedulerCounters(pid)
 
     def adopt(self, pid: int) -> None:
         """Follow a forked process that has told of its birth, and let it begin; OSError when it has died already."""
@@ -53,8 +53,8 @@ class Child:
         """Its exit code (-9: by SIGKILL), LOST when there is none to be had within the bound."""
         if self._code is None and self.pid:
             if self.died >= 0:
-                _readable(self.died, bound_s)
-            self._code = _reaped(self.pid)
+                _wait_readable(self.died, bound_s)
+            self._code = _reap(self.pid)
         return LOST if self._code is None else self._code
 
     def end(self) -> None:
@@ -76,7 +76,7 @@ class Child:
             self.died = -1
 
 
-def exit_word(code: int) -> str:
+def describe_exit(code: int) -> str:
     if code == LOST:
         return "no exit code"
     if code >= 0:
@@ -87,17 +87,17 @@ def exit_word(code: int) -> str:
         return f"signal {-code}"
 
 
-def spawn(module: str, arguments: dict[str, Any], *shared: int, room: int = 0) -> Child:
+def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int = 0) -> Child:
     """`python -m MODULE LINK ARGUMENTS` in a session of its own: the terminal's Ctrl-C reaches the guardian alone.
 
     shared: descriptors that it inherits under their numbers; room: bytes that the arguments take at least, for a
     process that will show other ones. OSError when there is no process for it.
     """
-    ours, theirs = guardian_link.pair()
+    ours, theirs = guardian_link.create_link()
     try:
         with theirs:
             words = [str(theirs.fileno()), json.dumps(arguments).ljust(room)]
-            pid = _spawned([sys.executable, "-m", module, *words], (theirs.fileno(), *shared))
+            pid = _spawn_process([sys.executable, "-m", module, *words], (theirs.fileno(), *shared))
         child = Child(ours, pid)
     except OSError:
         ours.close()
@@ -110,7 +110,7 @@ def spawn(module: str, arguments: dict[str, Any], *shared: int, room: int = 0) -
     return child
 
 
-def _spawned(command: list[str], passed: tuple[int, ...]) -> int:
+def _spawn_process(command: list[str], passed: tuple[int, ...]) -> int:
     for descriptor in passed:
         os.set_inheritable(descriptor, True)
     try:
@@ -121,14 +121,14 @@ def _spawned(command: list[str], passed: tuple[int, ...]) -> int:
             os.set_inheritable(descriptor, False)
 
 
-def reap_strangers(known: set[int]) -> None:
+def reap_orphans(known: set[int]) -> None:
     """Orphans of our children come to us, their subreaper: let them go, but none that somebody still asks for."""
     with contextlib.suppress(OSError):
         while (ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)) and ended.si_pid not in known:
             os.waitpid(ended.si_pid, os.WNOHANG)
 
 
-def shared_memory() -> int | None:
+def create_shared_memory() -> int | None:
     """Memory without a name and without a disk, for the sample ring; None where the kernel has none to give."""
     try:
         return os.memfd_create("force-gateway-samples")
@@ -136,13 +136,13 @@ def shared_memory() -> int | None:
         return None
 
 
-def _readable(descriptor: int, bound_s: float) -> bool:
+def _wait_readable(descriptor: int, bound_s: float) -> bool:
     poll = select.poll()
     poll.register(descriptor, select.POLLIN)
     return bool(poll.poll(bound_s * 1e3))
 
 
-def _reaped(pid: int) -> int | None:
+def _reap(pid: int) -> int | None:
     try:
         reaped, status = os.waitpid(pid, os.WNOHANG)
     except ChildProcessError:  # not ours: a fork server that could not hand it over

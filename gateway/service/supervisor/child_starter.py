@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.service.supervisor import fork_server
-from gateway.service.supervisor.child_process import Child, exit_word, spawn
+from gateway.service.supervisor.child_process import Child, describe_exit, spawn_child
 
 PAUSES_S: Final = (5.0, 30.0, 120.0)
 """Before the fork server is started again; it dies once more, and that is it."""
@@ -20,7 +20,7 @@ _COMMAND_ROOM: Final = 1024
 WATCH: Final = "gateway.watch.watch_process"
 
 
-class Nursery:
+class ChildStarter:
     """rig, simulate: what the fork server reads once in advance. Times are monotonic seconds."""
 
     def __init__(self, rig: str, *, simulate: bool, state: Path, say: Callable[[str], None]) -> None:
@@ -56,7 +56,7 @@ class Nursery:
         if not fork_server.become_subreaper():
             return
         try:
-            self._server = spawn("gateway.service.supervisor.fork_server", self._options, room=_COMMAND_ROOM)
+            self._server = spawn_child("gateway.service.supervisor.fork_server", self._options, room=_COMMAND_ROOM)
         except OSError:
             self._server = None
 
@@ -70,11 +70,11 @@ class Nursery:
         prepared: not for a second try, which avoids whatever went wrong with the first.
         """
         arguments = {"rig": self._options["rig"], "state": str(self._state)}
-        return self._child(fork_server.RIG, arguments) if prepared else spawn(fork_server.RIG, arguments)
+        return self._child(fork_server.RIG, arguments) if prepared else spawn_child(fork_server.RIG, arguments)
 
     def watch(self, arguments: dict[str, Any]) -> Child:
         """The residual watch: what it finds it tells control, through the control socket."""
-        return spawn(WATCH, arguments, arguments["ring"])
+        return spawn_child(WATCH, arguments, arguments["ring"])
 
     def was_born(self) -> None:
         self._is_proven = True
@@ -100,7 +100,7 @@ class Nursery:
     def follow(self, readable: set[int], now_s: float) -> None:
         """After each wait: has the server died, is it time for another one?"""
         if self._server and self._server.died in readable:
-            self.drop_server(f"ended ({exit_word(self._server.wait())})", now_s)
+            self.drop_server(f"ended ({describe_exit(self._server.wait())})", now_s)
         elif now_s >= self._due_s:
             self.open()
 
@@ -114,8 +114,8 @@ class Nursery:
         shared = () if ring is None else (int(ring),)
         if self._server and not self._is_doubted:
             try:
-                return Child(fork_server.ask(self._server.link, module, arguments, *shared))
+                return Child(fork_server.request_child(self._server.link, module, arguments, *shared))
             except OSError:
                 pass  # it is about to be found dead
         self._is_doubted = False
-        return spawn(module, arguments, *shared)
+        return spawn_child(module, arguments, *shared)

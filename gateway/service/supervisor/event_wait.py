@@ -13,7 +13,7 @@ _LONGEST_S: Final = 3600.0
 _MOST_SIGNALS: Final = 64
 
 
-def wait_for(descriptors: list[int], timeout_s: float) -> set[int]:
+def wait_readable(descriptors: list[int], timeout_s: float) -> set[int]:
     """Those that are readable, or at their end; none when the time is over. Any number of a descriptor (select: 1024)."""
     poll = select.poll()
     for descriptor in descriptors:
@@ -22,7 +22,7 @@ def wait_for(descriptors: list[int], timeout_s: float) -> set[int]:
     return {descriptor for descriptor, _ in poll.poll(max(0.0, longest_s) * 1e3)}
 
 
-class Signals:
+class SignalPipe:
     """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler."""
 
     def __init__(self) -> None:

@@ -50,9 +50,9 @@ def become_subreaper() -> bool:
         return False
 
 
-def ask(server: socket.socket, module: str, arguments: dict[str, Any], *shared: int) -> socket.socket:
+def request_child(server: socket.socket, module: str, arguments: dict[str, Any], *shared: int) -> socket.socket:
     """The guardian's side: our end of the new child's line. OSError when the server is gone or does not listen."""
-    ours, theirs = guardian_link.pair()
+    ours, theirs = guardian_link.create_link()
     with theirs:
         try:
             guardian_link.send(
@@ -98,7 +98,7 @@ def _fork(link: socket.socket, message: guardian_link.Message) -> None:
     try:
         if os.fork() == 0:
             link.close()
-            code = _child(message, parent)
+            code = _run_child(message, parent)
     except BaseException:
         traceback.print_exc()
     finally:
@@ -108,7 +108,7 @@ def _fork(link: socket.socket, message: guardian_link.Message) -> None:
         os._exit(code)
 
 
-def _child(message: guardian_link.Message, parent: int) -> int:
+def _run_child(message: guardian_link.Message, parent: int) -> int:
     """The new process: a session of its own, its name, its first word, and then as if it had been started by itself."""
     while os.getppid() == parent:  # it ends at once; from then on we are the guardian's, who may ask for our end
         time.sleep(_MOMENT_S)
@@ -139,7 +139,7 @@ def is_adopted(line: socket.socket) -> bool:
             if message is None or message.tag in (guardian_link.ADOPTED, guardian_link.STOP):
                 return message is not None and message.tag == guardian_link.ADOPTED
             message.drop_descriptors()  # where the rig has moved to is told again when it is asked for
-    except (OSError, guardian_link.NonsenseError):
+    except (OSError, guardian_link.ProtocolError):
         return False
 
 
@@ -158,7 +158,7 @@ def show_command(command: list[str]) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    priority.take(0)
+    priority.set_nice(0)
     prepare(json.loads(arguments[1]))
     serve(socket.socket(fileno=int(arguments[0])))
     return 0

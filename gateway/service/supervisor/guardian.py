@@ -24,12 +24,12 @@ from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.service.supervisor import messages as words
-from gateway.service.supervisor.child_process import Child, exit_word, reap_strangers, shared_memory
-from gateway.service.supervisor.child_starter import Nursery
-from gateway.service.supervisor.event_wait import Signals, wait_for
-from gateway.service.supervisor.heartbeat import Pulse
+from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
+from gateway.service.supervisor.child_starter import ChildStarter
+from gateway.service.supervisor.event_wait import SignalPipe, wait_readable
+from gateway.service.supervisor.heartbeat import Heartbeat
 from gateway.service.supervisor.other_children import OtherChildren
-from gateway.service.supervisor.restart_policy import Restarts
+from gateway.service.supervisor.restart_policy import RestartPolicy
 from gateway.service.supervisor.run_options import RunOptions
 from gateway.service.supervisor.safe_line import SafeLine
 
@@ -51,13 +51,13 @@ def run(options: RunOptions) -> int:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            words.complain(
+            words.print_error(
                 f"E104 another gateway already runs on {state}; stop it, or give this one its own --state DIR"
             )
             return EXIT_DEVICE
-        priority.take(priority.LOOP_NICE)
-        with EventLog(source="guardian", file=EventFile(state)) as log, Signals() as signals:
-            nursery = Nursery(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
+        priority.set_nice(priority.LOOP_NICE)
+        with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
+            nursery = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
             return Guardian(options, state, nursery, signals, log).watch()
 
 
@@ -68,18 +68,18 @@ class Guardian:
 
     options: RunOptions
     state: Path
-    nursery: Nursery
-    signals: Signals
+    nursery: ChildStarter
+    signals: SignalPipe
     log: EventLog
     clock: Callable[[], float] = time.monotonic
-    wait: Callable[[list[int], float], set[int]] = wait_for
+    wait: Callable[[list[int], float], set[int]] = wait_readable
 
     control: Child | None = None  # None: between a death and the next start
     leaving: Child | None = None  # killed and not gone yet: until then no other is started, for there are never two
     others: OtherChildren = field(init=False)
     ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
     line: SafeLine | None = None
-    pulse: Pulse = field(default_factory=Pulse)
+    pulse: Heartbeat = field(default_factory=Heartbeat)
     bound: tuple[str, int] | None = None
     said_cause: Ending | None = None  # what control gave as its own first cause
     next_start: Ending | None = None  # why control is started again, once it is
@@ -88,14 +88,14 @@ class Guardian:
     stops: int = 0
     announced: bool = False
     link_ended: bool = False
-    restarts: Restarts = field(default_factory=Restarts)
+    restarts: RestartPolicy = field(default_factory=RestartPolicy)
 
     def __post_init__(self) -> None:
         self.others = OtherChildren(self.nursery, self.log, lambda answer: self._tell_control(message_link.RIG, answer))
 
     def watch(self) -> int:
         """Until the end; the exit code."""
-        self.ring = shared_memory()
+        self.ring = create_shared_memory()
         try:
             self.nursery.open()
             code = self._start_control()
@@ -198,7 +198,7 @@ class Guardian:
 
     def _take_line(self, message: message_link.Message) -> None:
         if not message.descriptors:
-            raise message_link.NonsenseError("a line without its port")
+            raise message_link.ProtocolError("a line without its port")
         frame, reply = bytes.fromhex(message.body["safe_frame"]), bytes.fromhex(message.body["safe_reply"])
         self._drop_line()
         self.line = SafeLine(message.descriptors.pop(0), frame, reply)
@@ -218,9 +218,9 @@ class Guardian:
         self.pulse.heard(control, self.clock())
         self._provide_watch(message.body["watch"])
         if self.options.json:
-            words.announce(info | {"pids": self._pids()})
+            words.print_ready(info | {"pids": self._pids()})
         elif not self.announced:
-            words.announce(banner)
+            words.print_ready(banner)
         self.log.note("start", f"ready: rig {self.options.rig}, modbus tcp {host}:{port}, processes {self._pids()}")
         self.announced = True
         self.restarts.came_up()
@@ -274,13 +274,13 @@ class Guardian:
             control.close()
         else:
             self.leaving = control
-        reap_strangers(set(self._pids().values()))
+        reap_orphans(set(self._pids().values()))
         if self.stop_deadline_s is not None:
-            self.log.note("stop", f"stopped as asked: safe voltage {words.wire_of(acknowledged)}")
+            self.log.note("stop", f"stopped as asked: safe voltage {words.describe_acknowledgement(acknowledged)}")
             return EXIT_OK
         if code in _REFUSED or (code == EXIT_DEVICE and not self.announced):
             return code  # it told the user why
-        return self._restart(ending, exit_word(code) if is_gone else "it does not go", acknowledged)
+        return self._restart(ending, describe_exit(code) if is_gone else "it does not go", acknowledged)
 
     def _last_word(self) -> bool | None:
         """The safe voltage, through the newest line that control has handed over; None where there was none."""

@@ -4,20 +4,20 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.processes.exit_cause import Ending
-from gateway.processes.scheduler_counters import Silence, Turns, judged, load_of_machine, since
+from gateway.processes.scheduler_counters import ProcessorTime, Silence, explain_silence, load_of_machine, time_between
 from gateway.service.supervisor.child_process import Child
 
 _LATE_S: Final = 0.02
 
 
-class Pulse:
+class Heartbeat:
     """stall_s: the longest silence, which READY tells. Times are monotonic seconds."""
 
     def __init__(self) -> None:
         self.stall_s = 0.1
         self._beat_s: float | None = None  # later than it was where we were late ourselves
         self._heard_s = 0.0
-        self._turns: Turns | None = None  # at the last heartbeat
+        self._turns: ProcessorTime | None = None  # at the last heartbeat
         self._was_late = False
 
     @property
@@ -52,7 +52,7 @@ class Pulse:
         silent_s, before, was_late = now_s - self._heard_s, self._turns, self._was_late
 
         def why() -> Ending:
-            turns = since(before, control.turns.read() if control.turns else None)
-            return judged(Silence(silent_s, self.stall_s, turns, state, was_late), load_of_machine())
+            turns = time_between(before, control.turns.read() if control.turns else None)
+            return explain_silence(Silence(silent_s, self.stall_s, turns, state, was_late), load_of_machine())
 
         return why

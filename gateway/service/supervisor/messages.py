@@ -14,7 +14,7 @@ from gateway.service.supervisor.restart_policy import WINDOW_S
 _PATIENCE_S: Final = 0.1
 
 
-def complain(sentence: str) -> None:
+def print_error(sentence: str) -> None:
     """To stderr. A paused terminal gets nothing: the guardian has other work than to wait for it."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         if select.select([], [sys.stderr], [], _PATIENCE_S)[1]:
@@ -22,7 +22,7 @@ def complain(sentence: str) -> None:
             sys.stderr.flush()
 
 
-def announce(what: str | dict[str, Any]) -> None:
+def print_ready(what: str | dict[str, Any]) -> None:
     """To stdout: READY, for people or for a program. A reader that is gone (`| head -1`) is no reason to end."""
     try:
         sys.stdout.write((what if isinstance(what, str) else json.dumps(what)) + "\n")
@@ -33,7 +33,7 @@ def announce(what: str | dict[str, Any]) -> None:
 
 
 def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str:
-    return f"A401 {ending.sentence}; {how}; safe voltage {wire_of(acknowledged)}: restarted in OFF"
+    return f"A401 {ending.sentence}; {how}; safe voltage {describe_acknowledgement(acknowledged)}: restarted in OFF"
 
 
 def leaving_sentence(pid: int) -> str:
@@ -43,7 +43,7 @@ def leaving_sentence(pid: int) -> str:
     )
 
 
-def wire_of(acknowledged: bool | None) -> str:
+def describe_acknowledgement(acknowledged: bool | None) -> str:
     """How the last word on the wire went; None: there was no line."""
     return {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]
 

@@ -9,18 +9,18 @@ from functools import partial
 from typing import Any
 
 from gateway.processes.event_log import EventLog
-from gateway.service.supervisor.child_starter import Nursery
-from gateway.service.supervisor.simulated_rig_child import Answer, RigKeeper
-from gateway.service.supervisor.watch_child import WatchKeeper
+from gateway.service.supervisor.child_starter import ChildStarter
+from gateway.service.supervisor.simulated_rig_child import Answer, RigSupervisor
+from gateway.service.supervisor.watch_child import WatchSupervisor
 
 
 class OtherChildren:
     """tell: an answer for control about the simulated rig. Times are monotonic seconds."""
 
-    def __init__(self, nursery: Nursery, log: EventLog, tell: Callable[[Answer], None]) -> None:
+    def __init__(self, nursery: ChildStarter, log: EventLog, tell: Callable[[Answer], None]) -> None:
         self._nursery, self._log, self._tell = nursery, log, tell
-        self._rig: RigKeeper | None = None
-        self._watch: WatchKeeper | None = None
+        self._rig: RigSupervisor | None = None
+        self._watch: WatchSupervisor | None = None
 
     @property
     def sources(self) -> list[int]:
@@ -50,14 +50,14 @@ class OtherChildren:
         """Control asks for the simulated rig's ports."""
         if self._rig is None:
             nursery = self._nursery
-            self._rig = RigKeeper(lambda first: nursery.rig(prepared=first), self._tell, partial(self._log, "rig"))
+            self._rig = RigSupervisor(lambda first: nursery.rig(prepared=first), self._tell, partial(self._log, "rig"))
         self._rig.ask(now_s)
 
     def provide_watch(self, arguments: dict[str, Any], now_s: float) -> None:
         """Control is ready, and its rig is one that is watched. The first arguments count."""
         if self._watch is None:
             nursery = self._nursery
-            self._watch = WatchKeeper(lambda: nursery.watch(arguments), partial(self._log, "watch"))
+            self._watch = WatchSupervisor(lambda: nursery.watch(arguments), partial(self._log, "watch"))
         self._watch.start(now_s)
 
     def end(self) -> None:
@@ -67,5 +67,5 @@ class OtherChildren:
                 one.end()
 
     @property
-    def _all(self) -> list[Nursery | RigKeeper | WatchKeeper]:
+    def _all(self) -> list[ChildStarter | RigSupervisor | WatchSupervisor]:
         return [one for one in (self._nursery, self._rig, self._watch) if one]

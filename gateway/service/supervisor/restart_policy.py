@@ -6,14 +6,14 @@ from typing import Final
 
 from gateway.processes.exit_cause import EndCause
 
-MOST: Final = 5
+MOST_RESTARTS: Final = 5
 WINDOW_S: Final = 60.0
 _FIRST_PAUSE_S: Final = 0.25
 _LONGEST_PAUSE_S: Final = 4.0
 
 
 @dataclass
-class Restarts:
+class RestartPolicy:
     """Counts ends within the window, and those since the last READY: what dies while it starts is given time."""
 
     _ends: list[tuple[float, EndCause]] = field(default_factory=list)
@@ -25,7 +25,7 @@ class Restarts:
     def count(self, now_s: float, cause: EndCause) -> float | None:
         """How long to wait before the next start; None when there were too many ends."""
         self._ends = [end for end in self._ends if now_s - end[0] < WINDOW_S] + [(now_s, cause)]
-        if len(self._ends) > MOST:
+        if len(self._ends) > MOST_RESTARTS:
             return None
         self._without_ready += 1
         if self._without_ready <= 2:  # it was ready before, or this was the first try after that

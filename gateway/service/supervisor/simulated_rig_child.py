@@ -10,7 +10,7 @@ from math import inf
 from typing import Any, Final
 
 from gateway.processes import message_link
-from gateway.service.supervisor.child_process import Child, exit_word
+from gateway.service.supervisor.child_process import Child, describe_exit
 
 PAUSES_S: Final = (0.1, 1.0, 5.0)
 """Waiting times before it is started again; it dies once more, and that is it."""
@@ -20,7 +20,7 @@ _START_BOUND_S: Final = 20.0  # imports on a slow machine
 Answer = dict[str, Any]
 
 
-class RigKeeper:
+class RigSupervisor:
     """spawn: starts the process (True: for the first time), OSError when that fails; tell: an answer for control, as the
     RIG message has it; say: a sentence for people. Times are monotonic seconds."""
 
@@ -63,7 +63,7 @@ class RigKeeper:
         if child and not self._link_ended and child.link.fileno() in readable:
             self._hear(child, now_s)
         if child and child is self._child and child.died >= 0 and child.died in readable:
-            self._died(exit_word(child.wait()), now_s)
+            self._died(describe_exit(child.wait()), now_s)
         elif now_s >= self._due_s:
             self._overdue(now_s)
 

@@ -9,14 +9,14 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
-from gateway.service.supervisor.child_process import LOST, Child, exit_word
+from gateway.service.supervisor.child_process import LOST, Child, describe_exit
 
 PAUSES_S: Final = (5.0, 30.0, 120.0)
 """Waiting times before it is started again; it dies once more, and that is it."""
 _LONG_LIFE_S: Final = 900.0  # a watch that lived this long begins to count anew
 
 
-class WatchKeeper:
+class WatchSupervisor:
     """spawn: starts the process, OSError when that fails; say: a sentence for people. Times are monotonic seconds."""
 
     def __init__(self, spawn: Callable[[], Child], say: Callable[[str], None]) -> None:
@@ -52,7 +52,7 @@ class WatchKeeper:
             code = self._child.wait()
             self._child.close()
             self._child = None
-            self._died(f"ended ({f'signal {-code}' if LOST < code < 0 else exit_word(code)})", now_s)
+            self._died(f"ended ({f'signal {-code}' if LOST < code < 0 else describe_exit(code)})", now_s)
         elif now_s >= self._due_s:
             self._begin(now_s)
 

@@ -18,7 +18,7 @@ from gateway.recording import Recording
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit
 from gateway.service.fitting.ladder_fit import calibration_of, fit_recording
-from gateway.service.fitting.ladder_source import Background
+from gateway.service.fitting.ladder_source import RigContext
 from tests.control.foreign.machine import COUNT_V, Machine, Slide
 
 TICK_MS = 10
@@ -154,5 +154,5 @@ def calibrated(machine: Machine, started_with: Bsfm, plan: CalibrationPlan = QUI
         stand.run(0.1)
     facts = {"rig": "foreign", "rig_fingerprint": "", "force_unit": "N", "ladder": asdict(plan)}
     recording = Recording(Path("foreign.fgr"), facts, stand.columns(), len(stand.rows), False)
-    fit = fit_recording(recording, FitRequest(), Background())
+    fit = fit_recording(recording, FitRequest(), RigContext())
     return Calibrated(machine, calibration_of(fit, 98.0), stand.now_s)

@@ -11,8 +11,8 @@ import pytest
 from gateway.control import NO_COMPENSATION, CellMap
 from gateway.profiles import load_plant, load_rig
 from gateway.profiles.rigs.compensation import ALL_INPUTS, compensation_of
-from gateway.service.closed_loop.identified_model import at_rest, identified
-from gateway.service.closed_loop.study import ClosedLoop, closed_loop_gain, lines
+from gateway.service.closed_loop.identified_model import identify_model, quasi_static
+from gateway.service.closed_loop.study import ClosedLoopGain, closed_loop_gain, format_gain
 from gateway.twin import Plant, Twin
 from gateway.twin.plant import with_value
 from gateway.twin.surroundings import Surroundings
@@ -25,7 +25,7 @@ def plant_with(**values: float) -> Plant:
     return reduce(lambda plant, item: with_value(plant, *item[0].split("__"), item[1]), values.items(), BASE)
 
 
-def gain(extended: Plant, **options: object) -> ClosedLoop:
+def gain(extended: Plant, **options: object) -> ClosedLoopGain:
     return closed_loop_gain(BASE, extended, seeds=1, **options)  # type: ignore[arg-type]
 
 
@@ -92,7 +92,7 @@ def test_several_at_once_with_an_interval_over_seeds():
     assert found.seeds == (7, 8)
     low, high = found.rms_ratio_ci95
     assert low <= found.rms_ratio <= high < 0.7
-    told = lines(found)
+    told = format_gain(found)
     assert told[0] == "error in commanded force on the twin, 2 seeds"
     assert f"{found.before_rms_n:.2f} -> {found.after_rms_n:.2f}" in told[1]
     assert "tilt-gravity" in "\n".join(told)
@@ -107,10 +107,10 @@ def test_a_plant_without_a_model_keeps_the_one_before_and_says_so():
 
 
 def test_plants_that_rest_alike_share_one_model():
-    assert identified(plant_with(contact__tilt_n=3.0, cell__noise_n=0.5, regulator__delay_s=0.2), 8.0) is identified(
-        BASE, 8.0
-    )
-    assert at_rest(BASE) == at_rest(at_rest(BASE))
+    assert identify_model(
+        plant_with(contact__tilt_n=3.0, cell__noise_n=0.5, regulator__delay_s=0.2), 8.0
+    ) is identify_model(BASE, 8.0)
+    assert quasi_static(BASE) == quasi_static(quasi_static(BASE))
 
 
 @pytest.mark.parametrize(

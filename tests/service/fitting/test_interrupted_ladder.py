@@ -21,14 +21,14 @@ from gateway.recording import Recorder, Recording, read_recording
 from gateway.recording.tables.columns import LADDER
 from gateway.registers.words import CalibrationPhase
 from gateway.service.fitting.fit_process import fit_and_store
-from gateway.service.fitting.ladder_source import Background, checked_source
+from gateway.service.fitting.ladder_source import RigContext, check_source
 from gateway.service.running_rig import calibration_runs
-from gateway.service.running_rig.calibration_runs import LadderKeeper
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from tests.service.running_rig.test_calibration_runs import kept
 from tests.service.wired import Wired
 
 PLAN = {"step_v": 1.0, "groups": 2, "minor_points": 24}
-DEMO = Background(rig="demo")
+DEMO = RigContext(rig="demo")
 
 
 class NoFit:
@@ -40,7 +40,7 @@ class NoFit:
     def close(self) -> None: ...
 
 
-def climbed(wired: Wired, keeper: LadderKeeper, request: dict[str, Any]) -> Recording:
+def climbed(wired: Wired, keeper: CalibrationRuns, request: dict[str, Any]) -> Recording:
     keeper.answer(request)
     while keeper.answer({})["phase"] != "fitting":
         wired.run(0.5)
@@ -60,7 +60,7 @@ class Runs:
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
     state = tmp_path_factory.mktemp("runs")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(calibration_runs, "FitChild", NoFit)
+        patch.setattr(calibration_runs, "FitLauncher", NoFit)
         recordings = []
         for first_group in (None, 1, 2):
             wired = Wired(seed=11 + (first_group or 0)).ready()
@@ -114,7 +114,7 @@ def test_a_run_that_was_cut_gives_a_calibration_as_good_as_one_that_was_not(runs
     written(tmp_path, runs.whole, cut)
     rest = resumed(tmp_path)
     last = written(tmp_path, runs.rest[rest.groups] if rest.groups else runs.whole, continues=rest.earlier)
-    checked, whole = (checked_source(read_recording(path), DEMO) for path in (last, runs.whole.path))
+    checked, whole = (check_source(read_recording(path), DEMO) for path in (last, runs.whole.path))
     assert checked.ladder.voltage_v == pytest.approx(whole.ladder.voltage_v)
     assert checked.ladder.direction.tolist() == whole.ladder.direction.tolist()
     assert checked.ladder.group.tolist() == whole.ladder.group.tolist()
@@ -161,7 +161,7 @@ def test_a_tare_that_a_restart_has_lost_moves_no_group(runs, tmp_path: Path) -> 
     tared = replace(runs.whole, columns=runs.whole.columns | {"force_n": runs.whole.columns["force_n"] - 1.7})
     written(tmp_path, tared, cut, zero_n=1.7)
     last = written(tmp_path, runs.rest[1], continues=[1], zero_n=0.0)
-    checked, whole = checked_source(read_recording(last), DEMO), checked_source(tared, DEMO)
+    checked, whole = check_source(read_recording(last), DEMO), check_source(tared, DEMO)
     assert np.abs(checked.ladder.force_n - whole.ladder.force_n).max() < 0.6
     assert any("another zero" in note for note in checked.notes)
 

@@ -11,7 +11,7 @@ from gateway.devices import DeviceProfile, cell_device, output_device
 from gateway.devices.messages import Accepted, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
-from gateway.service.running_rig.baud_probe import achieved, why_no_words
+from gateway.service.running_rig.baud_probe import explain_silent_device, probe_line
 from tests.service.rigs import demo
 
 FRAME_PERIOD_S = 0.01
@@ -93,7 +93,9 @@ def output() -> OutputLine:
 
 @pytest.mark.parametrize(("right", "period_s"), [(9600, 0.19), (38400, 0.025)])
 def test_another_speed_of_the_load_cell_is_found_and_named(cell: CellLine, right: int, period_s: float) -> None:
-    sentence = asked(SpeakingCell(cell.device, right, period_s=period_s), lambda path: why_no_words(cell, path))
+    sentence = asked(
+        SpeakingCell(cell.device, right, period_s=period_s), lambda path: explain_silent_device(cell, path)
+    )
     assert sentence.startswith("E110 /dev/pts/")
     assert "0 valid lines at 115200" in sentence
     assert f"at {right} the same device gives valid lines: set baud: {right} in the rig" in sentence
@@ -102,7 +104,7 @@ def test_another_speed_of_the_load_cell_is_found_and_named(cell: CellLine, right
 @pytest.mark.parametrize("right", [19200, 115200])
 def test_another_speed_of_the_regulator_is_found_and_named(output: OutputLine, right: int) -> None:
     device = AnsweringRegulator(output.device, right)
-    sentence = asked(device, lambda path: why_no_words(output, path))
+    sentence = asked(device, lambda path: explain_silent_device(output, path))
     assert sentence.startswith("E110 ")
     assert f"set baud: {right} in the rig" in sentence
     assert not [one for one in device.heard if isinstance(one, SetVoltage)], "a probe asks, it sets nothing"
@@ -110,37 +112,41 @@ def test_another_speed_of_the_regulator_is_found_and_named(output: OutputLine, r
 
 def test_silence_is_e111_with_what_to_look_at(cell: CellLine, output: OutputLine) -> None:
     for line in (cell, output):
-        sentence = asked(SpeakingCell(cell.device, 9600, frame=b""), lambda path, line=line: why_no_words(line, path))
+        sentence = asked(
+            SpeakingCell(cell.device, 9600, frame=b""), lambda path, line=line: explain_silent_device(line, path)
+        )
         assert sentence.startswith("E111 ")
         assert "silence at every speed" in sentence
         assert "explain E111" in sentence
 
 
 def test_bytes_that_mean_nothing_at_any_speed_are_another_device(cell: CellLine) -> None:
-    sentence = asked(SpeakingCell(cell.device, 9600, frame=b"$GPGGA,123519\r\n"), lambda path: why_no_words(cell, path))
+    sentence = asked(
+        SpeakingCell(cell.device, 9600, frame=b"$GPGGA,123519\r\n"), lambda path: explain_silent_device(cell, path)
+    )
     assert sentence.startswith("E110 ")
     assert "nor at 9600, 19200, 38400" in sentence
     assert "another device" in sentence
 
 
 def test_a_device_that_speaks_now_was_silent_a_moment_ago(cell: CellLine) -> None:
-    sentence = asked(SpeakingCell(cell.device, 115200), lambda path: why_no_words(cell, path))
+    sentence = asked(SpeakingCell(cell.device, 115200), lambda path: explain_silent_device(cell, path))
     assert "valid lines at 115200" in sentence
     assert "E1" not in sentence
 
 
 def test_a_refusal_in_the_devices_own_words_is_heard(output: OutputLine) -> None:
-    heard = asked(AnsweringRegulator(output.device, 9600, only_refuses=True), lambda path: achieved(output, path))
+    heard = asked(AnsweringRegulator(output.device, 9600, only_refuses=True), lambda path: probe_line(output, path))
     assert heard.valid >= 1
 
 
 def test_what_is_heard_is_told_in_numbers(cell: CellLine) -> None:
-    heard = asked(SpeakingCell(cell.device, 115200), lambda path: achieved(cell, path))
+    heard = asked(SpeakingCell(cell.device, 115200), lambda path: probe_line(cell, path))
     assert heard.baud == 115200
     assert heard.valid >= 3
     assert heard.bytes >= 3 * 18
 
 
 def test_a_port_that_is_not_there_is_told_as_such(cell: CellLine) -> None:
-    sentence = asyncio.run(why_no_words(replace(cell, port="/dev/none"), "/dev/none"))
+    sentence = asyncio.run(explain_silent_device(replace(cell, port="/dev/none"), "/dev/none"))
     assert sentence.startswith("E102 /dev/none is not there")

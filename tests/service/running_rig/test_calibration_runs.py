@@ -7,15 +7,15 @@ import pytest
 from gateway.control.runs.ladder_stairs import QUICK
 from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
-from gateway.service.running_rig.calibration_runs import FOLLOWED_S, LadderKeeper
+from gateway.service.running_rig.calibration_runs import FOLLOWED_S, CalibrationRuns
 from tests.service.wired import ENABLE, Wired
 
 PLAN = {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
 POLL_S = 0.2  # of `calibrate`
 
 
-def kept(wired: Wired, state: Path) -> LadderKeeper:
-    keeper = LadderKeeper(
+def kept(wired: Wired, state: Path) -> CalibrationRuns:
+    keeper = CalibrationRuns(
         wired.controller,
         wired.rig,
         state,

@@ -21,11 +21,11 @@ from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import load_rig
 from gateway.service.guardian_line import GuardianLine
-from gateway.service.running_rig.running_rig import Cell
+from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
 
 MASTER = Peer("10.0.0.5", 40001)
-Scene = Callable[[Cell, socket.socket], Awaitable[None]]
+Scene = Callable[[RunningRig, socket.socket], Awaitable[None]]
 
 
 @pytest.fixture
@@ -41,11 +41,11 @@ def with_cell(devices: OwnDevices, scene: Scene, restarted: Ending | None = None
     state.mkdir()
 
     async def play(log: EventLog) -> None:
-        ours, theirs = message_link.pair()
+        ours, theirs = message_link.create_link()
         theirs.setblocking(False)
         rig = load_rig(str(devices.rig))
         guardian = GuardianLine(theirs)
-        cell = Cell(rig, rig.ports(), state, guardian, log)
+        cell = RunningRig(rig, rig.ports(), state, guardian, log)
         try:
             await cell.start(["127.0.0.1", 0], record=False, restarted=restarted)
             async with asyncio.timeout(10):
@@ -68,7 +68,7 @@ def drop(guardian: socket.socket) -> None:
     guardian.close()
 
 
-async def pressing(cell: Cell, devices: OwnDevices, volts: float = 4.0) -> None:
+async def pressing(cell: RunningRig, devices: OwnDevices, volts: float = 4.0) -> None:
     cell.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, round(1000 * volts)), MASTER)
     while devices.setting_v < volts - 0.1:
         await asyncio.sleep(0.005)
@@ -78,7 +78,7 @@ def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices
     """3 s for the first words and 3 s of other speeds are for somebody who sets a rig up, not for a running line."""
     devices.is_silent = True
 
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         assert cell.gateway.restart_cause is FaultCode.MACHINE_BUSY
 
     began_s = time.monotonic()
@@ -102,7 +102,7 @@ def test_a_restart_waits_a_moment_for_a_port_whose_holder_is_about_to_end(device
     ending = threading.Timer(0.1, os.close, [holder])
     ending.start()
 
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         await until(lambda: cell.gateway.decision is not None)
         assert cell.gateway.decision is not None
         assert cell.gateway.decision.fault is FaultCode.NONE, "it was nobody's fault"
@@ -119,7 +119,7 @@ def test_a_restart_whose_port_stays_held_comes_up_without_it_and_takes_it_when_i
     monkeypatch.setattr("gateway.service.running_rig.running_rig._HELD_BOUND_S", 0.0)
     holder = held(str(devices.output.link))
 
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         assert not cell._output_port.is_open
         assert cell.gateway.output_lost is FaultCode.OUTPUT_LOST
         os.close(holder)
@@ -136,7 +136,7 @@ def test_a_first_start_ends_over_a_port_that_is_held(devices: OwnDevices) -> Non
     """Somebody sits in front of it, who is told what to stop."""
     holder = held(str(devices.output.link))
 
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         raise AssertionError("it must not come up")
 
     with pytest.raises(PortError, match="E103"):
@@ -145,7 +145,7 @@ def test_a_first_start_ends_over_a_port_that_is_held(devices: OwnDevices) -> Non
 
 
 def test_a_defect_anywhere_in_the_loop_ends_with_the_safe_voltage(devices: OwnDevices) -> None:
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         await pressing(cell, devices)
         asyncio.get_running_loop().call_soon(lambda: 1 // 0)
         await cell.failed.wait()
@@ -162,7 +162,7 @@ def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevic
     """Whatever hangs in closing the rest, the wire has its last word already."""
     seen_v: list[float] = []
 
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         await pressing(cell, devices)
         close = cell._server.close
 
@@ -178,7 +178,7 @@ def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevic
 
 
 def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         await pressing(cell, devices)
         with monkeypatch.context() as patched:
             patched.setattr(cell.controller, "_step", lambda *arguments: 1 // 0)
@@ -192,7 +192,7 @@ def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeyp
 
 
 def test_the_guardian_has_the_line_before_anything_but_safe_is_written(devices: OwnDevices) -> None:
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         assert {heard.voltage_v for heard in devices.settings_since(0.0)} <= {0.0}
         guardian.setblocking(False)
         messages = []
@@ -210,7 +210,7 @@ def test_the_guardian_has_the_line_before_anything_but_safe_is_written(devices: 
 
 
 def test_the_heartbeat_comes_from_the_loop_itself(devices: OwnDevices) -> None:
-    async def scene(cell: Cell, guardian: socket.socket) -> None:
+    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
         def beats() -> int:
             count = 0
             while True:

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from gateway.processes import message_link
-from gateway.processes.scheduler_counters import Turns
+from gateway.processes.scheduler_counters import ProcessorTime
 from gateway.service.supervisor.child_process import Child
-from gateway.service.supervisor.event_wait import wait_for
+from gateway.service.supervisor.event_wait import wait_readable
 from gateway.service.supervisor.guardian import Guardian
 from gateway.service.supervisor.run_options import RunOptions
 
@@ -33,7 +33,7 @@ class FakeChild(Child):
     """A process that is nothing but its line and its death. theirs: the far end, for the script."""
 
     def __init__(self, pid: int) -> None:
-        ours, self.theirs = message_link.pair()
+        ours, self.theirs = message_link.create_link()
         self.theirs.setblocking(False)
         self._died_read, self._died_write = os.pipe()
         super().__init__(ours, 0)
@@ -83,10 +83,10 @@ class FakeChild(Child):
 class FakeTurns:
     """What the kernel counts for a child: before a silence, then behind the kill."""
 
-    readings: list[Turns]
+    readings: list[ProcessorTime]
     letter: str = "S"
 
-    def read(self) -> Turns:
+    def read(self) -> ProcessorTime:
         return self.readings.pop(0) if len(self.readings) > 1 else self.readings[0]
 
     def state(self) -> str:
@@ -202,7 +202,7 @@ class Scene:
         )
 
     def wait(self, descriptors: list[int], timeout_s: float) -> set[int]:
-        ready = wait_for(descriptors, 0.0)
+        ready = wait_readable(descriptors, 0.0)
         if not ready:
             assert timeout_s < 1e6, "the guardian waits for ever"
             self.now_s += timeout_s

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.processes import message_link
 from gateway.service.supervisor import child_starter, fork_server
-from gateway.service.supervisor.child_starter import PAUSES_S, Nursery
+from gateway.service.supervisor.child_starter import PAUSES_S, ChildStarter
 from tests.service.supervisor.guarded import FakeChild
 
 ARGUMENTS = {"rig": "demo", "ring": None}
@@ -25,7 +25,7 @@ def spawned(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[str, FakeChi
         made.append((module, child))
         return child
 
-    monkeypatch.setattr(child_starter, "spawn", spawn)
+    monkeypatch.setattr(child_starter, "spawn_child", spawn)
     monkeypatch.setattr(fork_server, "become_subreaper", lambda: True)
     yield made
     for _, child in made:
@@ -34,9 +34,9 @@ def spawned(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[str, FakeChi
 
 
 @pytest.fixture
-def kept(spawned: list[tuple[str, FakeChild]]) -> tuple[Nursery, list[str]]:
+def kept(spawned: list[tuple[str, FakeChild]]) -> tuple[ChildStarter, list[str]]:
     said: list[str] = []
-    one = Nursery("demo", simulate=True, state=Path("state"), say=said.append)
+    one = ChildStarter("demo", simulate=True, state=Path("state"), say=said.append)
     one.open()
     return one, said
 

@@ -10,7 +10,7 @@ import pytest
 from gateway.processes import message_link
 from gateway.service.supervisor import fork_server
 from gateway.service.supervisor.child_process import Child
-from gateway.service.supervisor.event_wait import wait_for
+from gateway.service.supervisor.event_wait import wait_readable
 
 Ends = tuple[Child, socket.socket]
 
@@ -18,7 +18,7 @@ Ends = tuple[Child, socket.socket]
 @pytest.fixture
 def ends() -> Iterator[Ends]:
     """The guardian's side of a child, and the child's end of the line."""
-    ours, theirs = message_link.pair()
+    ours, theirs = message_link.create_link()
     child = Child(ours)
     yield child, theirs
     child.close()
@@ -48,7 +48,7 @@ def test_a_child_that_is_given_up_between_birth_and_adoption_ends(ends: Ends, is
         child.link.close()
         os._exit(17 if fork_server.is_adopted(theirs) else 0)
     theirs.close()
-    assert wait_for([child.link.fileno()], 5.0)
+    assert wait_readable([child.link.fileno()], 5.0)
     if is_read:
         assert message_link.receive(child.link) == message_link.Message(message_link.BORN, {"pid": pid})
     child.close()
@@ -74,20 +74,20 @@ def test_what_the_server_forked_and_nobody_follows_any_more_begins_nothing(tmp_p
     """It has told of its birth; the guardian gives it up in the same moment."""
     began = tmp_path / "began"
     monkeypatch.setattr(fork_server, "import_module", lambda name: began.touch())
-    ours, theirs = message_link.pair()
+    ours, theirs = message_link.create_link()
     server = os.fork()
     if server == 0:
         ours.close()
         fork_server.serve(theirs)
         os._exit(0)
     theirs.close()
-    line = fork_server.ask(ours, fork_server.CONTROL, {})
-    assert wait_for([line.fileno()], 10.0)
+    line = fork_server.request_child(ours, fork_server.CONTROL, {})
+    assert wait_readable([line.fileno()], 10.0)
     born = message_link.receive(line)
     assert born and born.tag == message_link.BORN
     died = os.pidfd_open(born.body["pid"])
     line.close()
-    assert wait_for([died], 10.0)
+    assert wait_readable([died], 10.0)
     assert not began.exists()
     os.close(died)
     ours.close()

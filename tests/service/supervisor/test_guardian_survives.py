@@ -11,7 +11,7 @@ import pytest
 
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.processes.scheduler_counters import Turns
+from gateway.processes.scheduler_counters import ProcessorTime
 from tests.service.supervisor.guarded import (
     PTYS,
     READY,
@@ -290,10 +290,10 @@ def test_a_stop_does_not_wait_for_a_process_that_does_not_go(scene, port):
 @pytest.mark.parametrize(
     ("turns", "letter", "cause"),
     [
-        ([Turns(1.0, 5.0), Turns(1.01, 5.09)], "R", EndCause.MACHINE_BUSY),
-        ([Turns(1.0, 5.0), Turns(1.09, 5.01)], "R", EndCause.STALLED),
-        ([Turns(1.0, 5.0), Turns(1.0, 5.0)], "S", EndCause.STALLED),
-        ([Turns(1.0, 5.0), Turns(1.0, 5.0)], "T", EndCause.STOPPED),
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.01, 5.09)], "R", EndCause.MACHINE_BUSY),
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.09, 5.01)], "R", EndCause.STALLED),
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.0, 5.0)], "S", EndCause.STALLED),
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.0, 5.0)], "T", EndCause.STOPPED),
     ],
 )
 def test_a_silence_is_told_by_what_the_kernel_gave_the_loop(scene, port, turns, letter, cause):
@@ -311,7 +311,7 @@ def test_a_silence_is_told_by_what_the_kernel_gave_the_loop(scene, port, turns, 
 def test_a_busy_machine_that_ends_the_gateway_is_named_as_the_cause(scene, port):
     def script(child: FakeChild) -> None:
         dies_after(6, port, None)(child)
-        child.turns = FakeTurns([Turns(0.0, 0.0), Turns(0.0, 0.1)], "R")
+        child.turns = FakeTurns([ProcessorTime(0.0, 0.0), ProcessorTime(0.0, 0.1)], "R")
 
     one = scene(script)
     assert one.run() == 1

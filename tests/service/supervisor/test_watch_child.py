@@ -6,7 +6,7 @@ from math import inf
 
 import pytest
 
-from gateway.service.supervisor.watch_child import PAUSES_S, WatchKeeper
+from gateway.service.supervisor.watch_child import PAUSES_S, WatchSupervisor
 
 
 @dataclass
@@ -48,11 +48,11 @@ def nursery() -> Nursery:
 
 
 @pytest.fixture
-def keeper(nursery: Nursery) -> WatchKeeper:
-    return WatchKeeper(nursery.spawn, nursery.said.append)  # type: ignore[arg-type]
+def keeper(nursery: Nursery) -> WatchSupervisor:
+    return WatchSupervisor(nursery.spawn, nursery.said.append)  # type: ignore[arg-type]
 
 
-def dies(keeper: WatchKeeper, now_s: float) -> None:
+def dies(keeper: WatchSupervisor, now_s: float) -> None:
     keeper.follow([*keeper.sources], now_s)
 
 
