@@ -1,9 +1,9 @@
-"""One branch: a rational Bezier curve from voltage to force, with slope, inverse and exact tests (METHOD.md, Eq. 3).
+"""One branch: a rational Bezier curve from voltage to force, with slope, inverse and exact tests (the paper's Eq. 3).
 
 Evaluated in Bernstein-Horner form in r = t/(1-t), mirrored above 1/2, with coefficients multiplied out once: each sum
 has positive weights, and the float32 error at n = 15 is 1e-5 N against 1.7 N for monomials. The slope is numerator /
-W^2 with METHOD.md's c_k instead of N'W - NW': the c_k of increasing handles are all positive, so nothing cancels. One
-formula serves floats and arrays; numpy is imported only when an array comes in.
+W^2 with the c_k of `exact.slope_numerator` instead of N'W - NW': the c_k of increasing handles are all positive, so
+nothing cancels. One formula serves floats and arrays; numpy is imported only when an array comes in.
 
 Weights are scaled by a power of two (exact) so that the largest is in [1/2, 1). A polynomial (PFM, PSFM) is the curve
 with equal weights.

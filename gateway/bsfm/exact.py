@@ -47,7 +47,11 @@ def raise_degree_by_two(a: Sequence[int]) -> list[int]:
 
 
 def slope_numerator(weights: Sequence[int], handles: Sequence[int]) -> list[int]:
-    """Scaled coefficients c_k, k = 0..2n-2, of the numerator of df/dt = numerator / W^2 (METHOD.md)."""
+    """Return the scaled coefficients c_k, k = 0..2n-2, of the numerator of df/dt = numerator / W^2.
+
+    c_k = sum_i (k-2i+1) C(n,i) C(n,k-i+1) w_i w_{k-i+1} (b_{k-i+1} - b_i), i from max(0, k+1-n) to floor(k/2), on
+    t^k (1-t)^(2n-2-k): the quotient rule on the two Bernstein sums.
+    """
     n = len(weights) - 1
     return [
         sum(_slope_term(weights, handles, i, k - i + 1) for i in range(max(0, k + 1 - n), k // 2 + 1))

@@ -68,7 +68,8 @@ def _inverse_1(x0: float, x1: float, handles: tuple[float, float], w1: float) ->
 
 
 def _inverse_2(x0: float, x1: float, handles: tuple[float, float, float], weights: tuple[float, float]) -> Inverse:
-    """METHOD.md's form with w0 = 1: up = -a, and t : 1-t as up : m+s, or s-m : c."""
+    """Return the quadratic's root with w0 = 1. With a = b0 - f, m = w1 (b1 - f), c = w2 (b2 - f) and s = sqrt(m^2 - a c),
+    t : 1-t is -a : m + s where m >= 0, else s - m : c. Below, up is -a and down is c, then both sides of that ratio."""
     b0, b1, b2 = handles
     w1, w2 = weights
     span = x1 - x0

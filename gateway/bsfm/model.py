@@ -1,6 +1,6 @@
-"""The model that control asks: force and share in, volts and status out; and the calibration that it is made from.
+"""The model that control asks: force and branch share in, volts and status out; and the calibration that it is made from.
 
-The share s in [-1, 1] says where between the branches the plant is; the reversal's memory, moved with the force, gives it.
+The branch share s in [-1, 1] says where between the branches the plant is; the reversal's memory gives it.
 A calibration names its reversal by its fields: slip stops where `slip_radii_v` has any, else the linear blend over
 `blend_span_n`, which is kept beside stops too: it is what is left of the set for a master that cannot carry them.
 """
@@ -35,20 +35,20 @@ class Bsfm:
             raise ValueError("both branches must increase: force could not be inverted to voltage")
         self.reversal.check(self.branches)
 
-    def moved(self, memory: Memory, from_n: float, to_n: float) -> Memory:
-        """The reversal's memory after the force has gone from one value to another in one direction."""
-        return self.reversal.moved(self.branches, memory, from_n, to_n)
+    def memory_after(self, memory: Memory, from_n: float, to_n: float) -> Memory:
+        """Return the reversal's memory after the force has gone from one value to another in one direction."""
+        return self.reversal.memory_after(self.branches, memory, from_n, to_n)
 
-    def share(self, memory: Memory) -> float:
-        """s of this memory, for the functions below."""
-        return self.reversal.share(memory)
+    def branch_share(self, memory: Memory) -> float:
+        """Return s of this memory, for the functions below."""
+        return self.reversal.branch_share(memory)
 
-    def voltage_v(self, force_n: float, state: float) -> tuple[float, InverseStatus]:
-        """Feedforward V = (1+s)/2 V_rise(f) + (1-s)/2 V_fall(f) for the blend state s in [-1, 1].
+    def voltage_v(self, force_n: float, branch_share: float) -> tuple[float, InverseStatus]:
+        """Return the feedforward voltage, V = (1+s)/2 V_rise(f) + (1-s)/2 V_fall(f) for the branch share s in [-1, 1].
 
         The status is that of the branches that take part; LOW or HIGH if either is clamped. ValueError for NaN.
         """
-        rising_share = 0.5 + 0.5 * _checked(state)
+        rising_share = 0.5 + 0.5 * _check_share(branch_share)
         if rising_share == 1.0:
             return self.branches.rising.inverse(force_n)
         falling_v, falling_status = self.branches.falling.inverse(force_n)
@@ -58,23 +58,23 @@ class Bsfm:
         status = falling_status if rising_status is InverseStatus.OK else rising_status
         return falling_v + rising_share * (rising_v - falling_v), status
 
-    def force_n(self, voltage_v: float, state: float) -> float:
-        """Expected force: the branches' forces at this voltage, shared by the blend state.
+    def force_n(self, voltage_v: float, branch_share: float) -> float:
+        """Return the expected force, N: the branches' forces at this voltage, mixed by the branch share.
 
         Exactly the inverse of `voltage_v` at s = -1 and 1 only. Between, the voltages are blended there and the forces
         here, which differ by a fraction of the loop's width: enough for a residual, and it needs no iteration. The exact
         inverse is `settled_n`.
         """
-        rising_share = 0.5 + 0.5 * _checked(state)
+        rising_share = 0.5 + 0.5 * _check_share(branch_share)
         rising_n, falling_n = self.branches.rising.value(voltage_v), self.branches.falling.value(voltage_v)
         return falling_n + rising_share * (rising_n - falling_n)
 
-    def settled_n(self, voltage_v: float, state: float) -> float:
-        """The force whose `voltage_v` at this share is this voltage, by bracketed Newton between the branches' forces."""
+    def settled_n(self, voltage_v: float, branch_share: float) -> float:
+        """Return the force whose `voltage_v` at this branch share is this voltage: bracketed Newton between the branches."""
         rising, falling = self.branches.rising, self.branches.falling
-        share = 0.5 + 0.5 * _checked(state)
+        share = 0.5 + 0.5 * _check_share(branch_share)
         low_n, high_n = sorted((rising.value(voltage_v), falling.value(voltage_v)))
-        force_n = self.force_n(voltage_v, state)
+        force_n = self.force_n(voltage_v, branch_share)
         for _ in range(_ROUNDS):
             rising_v, falling_v = rising.inverse(force_n)[0], falling.inverse(force_n)[0]
             gap_v = falling_v + share * (rising_v - falling_v) - voltage_v
@@ -193,7 +193,7 @@ class Calibration:
         return low_n, high_n
 
 
-def _checked(state: float) -> float:
-    if not -1.0 <= state <= 1.0:
-        raise ValueError(f"blend state {state!r}: -1 .. 1 is allowed")
-    return state
+def _check_share(branch_share: float) -> float:
+    if not -1.0 <= branch_share <= 1.0:
+        raise ValueError(f"branch share {branch_share!r}: -1 .. 1 is allowed")
+    return branch_share

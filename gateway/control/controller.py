@@ -63,13 +63,13 @@ class Controller:
         self._settings = settings
         self._follower = CommandTracker(settings)
         self._follower.use(model)
-        self.calibrating = ActiveRun(settings, model)
+        self.active_run = ActiveRun(settings, model)
         self._pursuit = ForceLoop(settings, model, compensation.timing)
         expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
-        self._motion = Motion(self._pursuit, expected, self.calibrating)
+        self._motion = Motion(self._pursuit, expected, self.active_run)
         self._supervisor = FaultDetector(settings)
         self._reader = SampleConditioner(settings.supervision, compensation.cell)
-        self._judge = EdgeCheck(self._follower, self._reader.zero, self.calibrating)
+        self._judge = EdgeCheck(self._follower, self._reader.zero, self.active_run)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._reading = NO_READING
         self._last_s: float | None = None
@@ -160,7 +160,7 @@ class Controller:
         if not reading.is_new:
             return
         touching = self._contact.update(reading)
-        self._supervisor.observe(reading, self._motion.response, self._pursuit.law.blend, touching)
+        self._supervisor.observe(reading, self._motion.response, self._pursuit.law.branch_share, touching)
         if self.state not in ENABLED_STATES:
             self._supervisor.observe_rest(reading)
             self._telling.stuck(self._supervisor.is_stuck, reading, self._outcome.events)
@@ -185,7 +185,7 @@ class Controller:
         """What the bank has let through, in the order in which it was judged."""
         if edges.stops and self.state in ENABLED_STATES:
             self._disable(f"info disabled by {self._follower.who}")
-        elif edges.falls & _CALIBRATE and self.calibrating.running:
+        elif edges.falls & _CALIBRATE and self.active_run.running:
             self._end_run(f"info calibration stopped by {self._follower.who}")
         if edges.rises & _RESET:
             self._reset()
@@ -200,12 +200,12 @@ class Controller:
 
     def _obey_this_machine(self, now_s: float) -> None:
         """A run that was asked for at this machine; refused, it leaves everything as it is."""
-        asked = self.calibrating.take_asked()
+        asked = self.active_run.take_asked()
         if asked is None:
             return
-        self.calibrating.refused = self.refusal_of_run(now_s, asked)
-        if self.calibrating.refused:
-            self._outcome.events.append(self.calibrating.refused)
+        self.active_run.refused = self.refusal_of_run(now_s, asked)
+        if self.active_run.refused:
+            self._outcome.events.append(self.active_run.refused)
             return
         if asked.tare:
             self._tare()
@@ -251,7 +251,7 @@ class Controller:
 
     def _begin_run(self, now_s: float, plan: AnyPlan, sentence: str, *, is_local: bool = False) -> None:
         self.state = next_state(self.state, StateEvent.CALIBRATE)
-        self.calibrating.begin(plan, is_local=is_local)
+        self.active_run.begin(plan, is_local=is_local)
         self._started(now_s, sentence)
 
     def _end_run(self, sentence: str) -> None:
@@ -289,7 +289,7 @@ class Controller:
     @property
     def _goes_on_alone(self) -> bool:
         """No master is needed: a run of this machine, or the way to 0 after any run."""
-        return self.calibrating.is_local or (self.state is State.CALIBRATING and not self.calibrating.running)
+        return self.active_run.is_local or (self.state is State.CALIBRATING and not self.active_run.running)
 
     def _fail(self, now_s: float, found: StopCause) -> None:
         self.state = next_state(self.state, StateEvent.FAILED)
@@ -305,7 +305,7 @@ class Controller:
             self._fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
             return
         self._master_lost = True
-        self._ramping_down = self._ramping_down or action is LeaseAction.RAMP or self.calibrating.running
+        self._ramping_down = self._ramping_down or action is LeaseAction.RAMP or self.active_run.running
         words = "ramping to 0 N" if self._ramping_down else "holding the last setpoint"
         self._outcome.events.append(fault_sentence(FaultCode.MASTER_LOST, f"{seen}, {words}"))
 
@@ -318,7 +318,7 @@ class Controller:
 
     def _move(self, now_s: float, dt_s: float) -> None:
         if self.state is State.CALIBRATING:
-            if not self.calibrating.running or self._climb(now_s):
+            if not self.active_run.running or self._climb(now_s):
                 self._follow(now_s, self._motion.descend(self._target(), dt_s, self._given_n))
             return
         moment = self._moment(now_s, dt_s)
@@ -333,7 +333,7 @@ class Controller:
             self._end_run("info calibration stopped: ramping down")
             return True
         moved = self._motion.climb(now_s, self._reading)
-        if said := self.calibrating.take_said():
+        if said := self.active_run.take_said():
             self._outcome.events.append(said)
         if isinstance(moved, StateEvent) or moved.fault:
             self._follow(now_s, moved)
@@ -365,9 +365,9 @@ class Controller:
             block=self._block(now_s, line),
             warnings=warning_bits(int(line.warnings), self._pursuit, self._restarted, self._master_lost),
             touching=self._contact.touching,
-            accepted_n=self.calibrating.target_n or self._target().force_n if enabled else 0.0,
+            accepted_n=self.active_run.target_n or self._target().force_n if enabled else 0.0,
             expected_cell_n=self._motion.expected_n + self._outside_n,
-            calibration_phase=self.calibrating.phase,
-            calibration_progress=self.calibrating.progress,
-            calibration_time_left_s=self.calibrating.eta_s,
+            calibration_phase=self.active_run.phase,
+            calibration_progress=self.active_run.progress,
+            calibration_time_left_s=self.active_run.eta_s,
         )

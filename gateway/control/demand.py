@@ -63,7 +63,7 @@ def _gravity_of(command: Command, defaults: Defaults) -> float:
 
 
 def _or_default(value: float, default: float, name: str) -> float:
-    """0 in these registers means the rig's default (FIELDBUS); a negative one is as meaningless and treated alike."""
+    """0 in these registers means the rig's default; a negative one is as meaningless and treated alike."""
     return value if finite(value, name) > 0.0 else default
 
 

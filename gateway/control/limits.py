@@ -45,7 +45,7 @@ def narrow_limits(limits: Limits, own_n: tuple[float, float] | None) -> Limits:
 
 
 def is_below_usable(target_n: float, limits: Limits) -> bool:
-    """Below the smallest usable force the output is 0 V (METHOD: outside the range)."""
+    """Whether the target is below the smallest usable force, where the output is 0 V."""
     return finite(target_n, "force_target_n") < limits.smallest_force_n
 
 
@@ -63,7 +63,7 @@ def voltage_limited(target_v: float, limits: Limits) -> Limited:
 
 
 def slew_limited(target_v: float, last_v: float, slew_v_per_s: float, dt_s: float) -> Limited:
-    """At most slew_v_per_s x dt_s above last_v; falling is immediate (SAFETY, I2)."""
+    """At most slew_v_per_s x dt_s above last_v; falling is immediate: less voltage is less force."""
     highest_v = last_v + slew_v_per_s * finite(dt_s, "dt_s")
     if finite(target_v, "voltage_v") > highest_v:
         return highest_v, LimitedBy.VOLTAGE_SLEW

@@ -1,4 +1,4 @@
-"""The sentences of control: a code, what was seen in numbers, what it probably is, one thing to do (FIRST-HOUR's rule)."""
+"""The sentences of control: a code, what was seen in numbers, what it probably is, one thing to do."""
 
 from gateway.codes.faults import FaultCode
 from gateway.control.supervision.unreachable_force import Evidence, unreachable_words

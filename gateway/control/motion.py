@@ -57,20 +57,20 @@ class Motion:
         in `use`."""
         run = self._calibrating.run
         if run is not None:
-            towards_n = run.model.force_n(self.pursuit.stage.voltage_v, run.direction)
-            reached_n = min(towards_n, self.response.force_n(run.direction))
-            self.pursuit.law.take_over(reached_n + given_n, run.direction)
+            towards_n = run.model.force_n(self.pursuit.stage.voltage_v, run.branch_share)
+            reached_n = min(towards_n, self.response.force_n(run.branch_share))
+            self.pursuit.law.take_over(reached_n + given_n, run.branch_share)
         self._calibrating.end()
 
     @property
     def expected_n(self) -> float:
         """Cell force that the model expects now."""
-        return self.response.force_n(self.pursuit.law.blend)
+        return self.response.force_n(self.pursuit.law.branch_share)
 
     @property
     def expected_rise_n(self) -> float:
         """The same above the force at rest."""
-        return self.response.rise_n(self.pursuit.law.blend)
+        return self.response.rise_n(self.pursuit.law.branch_share)
 
     def climb(self, now_s: float, reading: Reading) -> Moved:
         """One step of the run."""
@@ -89,7 +89,7 @@ class Motion:
         law = self.pursuit.law
         law.advance(0.0, demand.ramp_n_per_s, dt_s, given_n)
         voltage_v, _ = law.feedforward(given_n)
-        self.pursuit.follow(min(voltage_v, self.pursuit.stage.voltage_v), law.applied_n, law.blend)
+        self.pursuit.follow(min(voltage_v, self.pursuit.stage.voltage_v), law.applied_n, law.branch_share)
         return StateEvent.MOVE
 
     def _moved(self, move: Callable[[], StateEvent], *, ramps_down: bool) -> Moved:

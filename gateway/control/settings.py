@@ -88,7 +88,7 @@ class LeaseAction(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Supervision:
-    """Time bounds (SAFETY: default bounds)."""
+    """Bounds of the supervision, most of them in time."""
 
     __pydantic_config__ = STRICT
     lease_s: Annotated[float, Gt(0)] | None = None  # None: a command lasts until the next one

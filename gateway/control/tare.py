@@ -2,8 +2,8 @@
 
 Allowed only while nothing presses on purpose: output off, or enabled with setpoint 0; and only on a steady, usable
 signal, so that a force that is still decaying cannot become the zero. The payload's weight is added first: after a tare
-the contact force reads 0 at the present tilt, and a later tilt is still compensated. A restart forgets the zero
-(FIELDBUS: only coefficients are restored).
+the contact force reads 0 at the present tilt, and a later tilt is still compensated. A restart forgets the zero:
+only coefficients are restored.
 """
 
 from collections import deque

@@ -1,6 +1,6 @@
 """From one request PDU to one answer PDU: which function codes are served, and in which order things are checked.
 
-Order (FIELDBUS): function 01, shape and quantity 03, address 02, value 03. Addresses and values are the bank's to
+Order (V1.1b3, section 7): function 01, shape and quantity 03, address 02, value 03. Addresses and values are the bank's to
 judge, in that order; FC05 with a value other than 0x0000/0xFF00 is 03 only when the coil exists. FC23 checks both
 halves before it writes: the read half here by check_registers_readable, the write half by the bank, whose writes are
 all or nothing. What is refused here, before the bank has looked at it, the bank is told (refused): it keeps the reasons.

@@ -96,10 +96,10 @@ def test_a_set_sent_by_a_master_is_the_same_model_but_for_float32(name, tmp_path
     memory, last_n = given.model().reversal.start(), 5.0
     stored_memory = found.model().reversal.start()
     for force_n in (20.0, 12.0, 18.0, 6.0, 24.0):
-        memory = given.model().moved(memory, last_n, force_n)
-        stored_memory = found.model().moved(stored_memory, last_n, force_n)
-        wanted_v = given.model().voltage_v(force_n, given.model().share(memory))[0]
-        assert found.model().voltage_v(force_n, found.model().share(stored_memory))[0] == pytest.approx(
+        memory = given.model().memory_after(memory, last_n, force_n)
+        stored_memory = found.model().memory_after(stored_memory, last_n, force_n)
+        wanted_v = given.model().voltage_v(force_n, given.model().branch_share(memory))[0]
+        assert found.model().voltage_v(force_n, found.model().branch_share(stored_memory))[0] == pytest.approx(
             wanted_v, abs=1e-5
         )
         last_n = force_n

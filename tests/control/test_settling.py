@@ -242,7 +242,7 @@ def test_the_residual_is_that_of_the_set_in_use():
     after_n = bench.step().model_residual_n
     changed_n = bsfm().force_n(3.0, 1.0) - bsfm(scale=1.2).force_n(3.0, 1.0)
     assert after_n - before_n == pytest.approx(changed_n, abs=0.3)
-    assert bench.controller.calibrating.model == bsfm(scale=1.2), "the check of the next ladder compares with this one"
+    assert bench.controller.active_run.model == bsfm(scale=1.2), "the check of the next ladder compares with this one"
 
 
 def test_a_set_with_a_lower_force_limit_is_swapped_in_by_the_ramp_and_out_again():

@@ -1,4 +1,4 @@
-"""The force law with slip stops: the same laws as with the blend, and the memory that the blend does not have."""
+"""The force law with slip stops: the same laws as with the branch_share, and the memory that the branch_share does not have."""
 
 import pytest
 
@@ -53,7 +53,7 @@ def test_a_vented_tool_forgets_and_a_tool_that_lost_contact_rises():
     go(force_law, 30.0, 8.0)
     assert go(force_law, 0.0, 5.0) == pytest.approx(first_v, abs=1e-9)
     force_law.fall_back(2.0)
-    assert force_law.blend == 1.0
+    assert force_law.branch_share == 1.0
 
 
 def test_changing_the_reversal_makes_no_bump():
@@ -77,11 +77,11 @@ def test_an_equal_model_swapped_in_leaves_the_memory_of_every_stop():
 def test_tilting_the_payload_moves_no_stop():
     force_law = law(slip())
     go(force_law, 30.0, 18.0)
-    before = force_law.blend
+    before = force_law.branch_share
     for gravity_n in (0.0, 2.0, 5.0, 0.0):
         force_law.advance(18.0, 100.0, 0.01, gravity_n)
         force_law.feedforward(gravity_n)
-    assert force_law.blend == before
+    assert force_law.branch_share == before
 
 
 def test_chatter_of_the_setpoint_does_not_leave_the_band():

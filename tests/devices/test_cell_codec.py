@@ -1,4 +1,4 @@
-"""Both ends of the load cell's wire against each other, and the traps of DEVICES.md."""
+"""Both ends of the load cell's wire against each other, and the traps of real amplifiers."""
 
 from dataclasses import replace
 from itertools import pairwise

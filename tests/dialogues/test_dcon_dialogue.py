@@ -1,4 +1,4 @@
-"""DCON bytes from the ICP DAS 7000 series manuals (DEVICES.md), spoken by templates alone: no profile is shipped yet, the
+"""DCON bytes from the ICP DAS 7000 series manuals, spoken by templates alone: no profile is shipped yet, the
 language must carry it."""
 
 from dataclasses import replace

@@ -45,8 +45,8 @@ def volts_along(model: Bsfm, forces_n: list[float]) -> list[float]:
     """What control would put out on the way through these forces."""
     memory, at_n, volts = model.reversal.start(), model.force_range_n[0], []
     for force_n in forces_n:
-        memory, at_n = model.moved(memory, at_n, force_n), force_n
-        volts.append(model.voltage_v(force_n, model.share(memory))[0])
+        memory, at_n = model.memory_after(memory, at_n, force_n), force_n
+        volts.append(model.voltage_v(force_n, model.branch_share(memory))[0])
     return volts
 
 

@@ -36,12 +36,12 @@ def stop_sets(draw: st.DrawFn) -> SlipStops:
 def walked(model: Bsfm, path: list[float], memory: Memory | None = None, from_n: float = LOW_N) -> Memory:
     memory = memory or model.reversal.start()
     for force_n in path:
-        memory, from_n = model.moved(memory, from_n, force_n), force_n
+        memory, from_n = model.memory_after(memory, from_n, force_n), force_n
     return memory
 
 
 def voltage_v(model: Bsfm, memory: Memory, force_n: float) -> float:
-    return model.voltage_v(force_n, model.share(memory))[0]
+    return model.voltage_v(force_n, model.branch_share(memory))[0]
 
 
 @MANY
@@ -51,12 +51,12 @@ def test_the_voltage_solves_its_own_equation(stops, path):
     model, memory, last_n = Bsfm(BRANCHES, stops), stops.start(), LOW_N
     last_v = voltage_v(model, memory, last_n)
     for force_n in path:
-        memory, before = model.moved(memory, last_n, force_n), memory
+        memory, before = model.memory_after(memory, last_n, force_n), memory
         volts, last_n = voltage_v(model, memory, force_n), force_n
         followed = stops.advance(before, volts - last_v)
         assert memory == pytest.approx(followed, abs=1e-9)
         middle_v, half_v = middle_and_half(BRANCHES, force_n)
-        assert math.isclose(volts, middle_v + stops.share(memory) * half_v, abs_tol=1e-12)
+        assert math.isclose(volts, middle_v + stops.branch_share(memory) * half_v, abs_tol=1e-12)
         last_v = volts
 
 
@@ -66,7 +66,7 @@ def test_force_to_voltage_to_force_is_a_round_trip(stops, path):
     model = Bsfm(BRANCHES, stops)
     memory = walked(model, path)
     volts = voltage_v(model, memory, path[-1])
-    assert math.isclose(model.settled_n(volts, model.share(memory)), path[-1], abs_tol=1e-9)
+    assert math.isclose(model.settled_n(volts, model.branch_share(memory)), path[-1], abs_tol=1e-9)
 
 
 @MANY
@@ -74,9 +74,9 @@ def test_force_to_voltage_to_force_is_a_round_trip(stops, path):
 def test_every_stop_and_the_share_stay_within_one(stops, path):
     model, memory, last_n = Bsfm(BRANCHES, stops), stops.start(), LOW_N
     for force_n in path:
-        memory, last_n = model.moved(memory, last_n, force_n), force_n
+        memory, last_n = model.memory_after(memory, last_n, force_n), force_n
         assert all(-1.0 <= place <= 1.0 for place in memory)
-        assert -1.0 <= model.share(memory) <= 1.0
+        assert -1.0 <= model.branch_share(memory) <= 1.0
 
 
 @MANY
@@ -142,10 +142,10 @@ def test_a_full_traverse_reaches_each_branch_whatever_came_before(stops, path):
     )
     model = Bsfm(wide, stops)
     memory = walked(model, [*path, 290.0])
-    assert model.share(memory) == pytest.approx(1.0, abs=1e-12)
+    assert model.branch_share(memory) == pytest.approx(1.0, abs=1e-12)
     assert voltage_v(model, memory, 290.0) == pytest.approx(wide.rising.inverse(290.0)[0])
     memory = walked(model, [10.0], memory, 290.0)
-    assert model.share(memory) == pytest.approx(-1.0, abs=1e-12)
+    assert model.branch_share(memory) == pytest.approx(-1.0, abs=1e-12)
     assert voltage_v(model, memory, 10.0) == pytest.approx(wide.falling.inverse(10.0)[0])
 
 
@@ -162,7 +162,7 @@ def test_one_stop_between_parallel_lines_is_the_linear_blend(width_n, beyond_v, 
     blend = Bsfm(Branches(rising, falling), LinearBlend(2.0 * (radius_v - half_v) * slope))
     memories = {model: model.reversal.at(-1.0) for model in (slip, blend)}
     for before_n, force_n in pairwise([path[0], *path]):
-        memories = {model: model.moved(memory, before_n, force_n) for model, memory in memories.items()}
+        memories = {model: model.memory_after(memory, before_n, force_n) for model, memory in memories.items()}
         slip_v, blend_v = (voltage_v(model, memory, force_n) for model, memory in memories.items())
         assert math.isclose(slip_v, blend_v, abs_tol=1e-9)
 

@@ -133,8 +133,8 @@ def test_in_contact_every_setpoint_up_to_sixty_newtons_is_reached_within_a_newto
         for voltage_v in (8.0, 0.0):
             twin.command(voltage_v)
             twin.advance(1.0)
-        memory = model.moved(model.reversal.start(), 0.0, target_n)
-        twin.command(model.voltage_v(target_n, model.share(memory))[0])
+        memory = model.memory_after(model.reversal.start(), 0.0, target_n)
+        twin.command(model.voltage_v(target_n, model.branch_share(memory))[0])
         twin.advance(1.0)
         assert abs(twin.force_n - target_n) < 0.5
 

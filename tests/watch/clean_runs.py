@@ -93,7 +93,7 @@ class Run:
 
     def conduct(self, plan: AnyPlan) -> None:
         """A calibration or an experiment of the gateway, to its end or as long as the recording goes on."""
-        calibrating = self.wired.controller.calibrating
+        calibrating = self.wired.controller.active_run
         calibrating.ask(plan)
         self.rest(0.1)
         while calibrating.running and self.goes_on:

@@ -91,8 +91,8 @@ def commanded(model: Bsfm, plant: Plant, setpoints_n: Sequence[float]) -> tuple[
     twin, memory, last_n = quiet_twin(plant), model.reversal.start(), 0.0
     errors_n, voltages_v = [], []
     for setpoint_n in setpoints_n:
-        memory, last_n = model.moved(memory, last_n, setpoint_n), setpoint_n
-        voltages_v.append(model.voltage_v(setpoint_n, model.share(memory))[0])
+        memory, last_n = model.memory_after(memory, last_n, setpoint_n), setpoint_n
+        voltages_v.append(model.voltage_v(setpoint_n, model.branch_share(memory))[0])
         twin.command(voltages_v[-1])
         settle(twin, Dwell())
         errors_n.append(twin.force_n - setpoint_n)

@@ -81,9 +81,9 @@ def _replayed(model: Bsfm, tables: Tables) -> list[tuple[float, float]]:
     last_n, memory = tables.reached_n[0], model.reversal.start()
     record = []
     for force_n in map(rounded, _commands_n(tables)):
-        memory = model.moved(memory, last_n, force_n)
+        memory = model.memory_after(memory, last_n, force_n)
         last_n = force_n
-        record.append((force_n, rounded(model.voltage_v(force_n, model.share(memory))[0])))
+        record.append((force_n, rounded(model.voltage_v(force_n, model.branch_share(memory))[0])))
     return record
 
 

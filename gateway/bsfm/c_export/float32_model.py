@@ -103,7 +103,7 @@ class Float32Model:
         rising_n, _ = self._force_of(self.rising, voltage_v)
         return falling_n + (_HALF + _HALF * blend) * (rising_n - falling_n), status
 
-    def share(self, state: CommandState) -> Float32:
+    def branch_share(self, state: CommandState) -> Float32:
         if not self.radii:
             return state.memory[0]
         total = _ZERO
@@ -122,7 +122,7 @@ class Float32Model:
         reached_n = _clipped(force_n, self.lowest, self.highest)
         self._move_to(state, reached_n)
         state.force_n = reached_n
-        state.voltage_v, status = self.voltage(force_n, self.share(state))
+        state.voltage_v, status = self.voltage(force_n, self.branch_share(state))
         return state.voltage_v, status
 
     def _is_damaged(self, state: CommandState) -> bool:
@@ -137,7 +137,7 @@ class Float32Model:
             return
         from_middle_v, from_half_v = self._middle_and_half(state.force_n)
         middle_v, half_v = self._middle_and_half(force_n)
-        stuck_v = middle_v - from_middle_v + self.share(state) * (half_v - from_half_v)
+        stuck_v = middle_v - from_middle_v + self.branch_share(state) * (half_v - from_half_v)
         travel_v = self._travel(state, stuck_v, half_v)
         state.memory = [
             _clipped(place + travel_v / radius, -_ONE, _ONE)

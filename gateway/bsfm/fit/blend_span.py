@@ -1,4 +1,5 @@
-"""The span of the reversal blend, from the minor-loop walk: the staircase alone cannot identify it (METHOD, "Reversal").
+"""Choose the span of the reversal blend from the minor-loop walk: the staircase alone cannot identify it, for it turns
+round at its two ends only.
 
 Judged as control would use it: volts asked for each force in turn against those that made it, told in newtons. The walk
 begins on the rising branch, after a full cycle down; its first point only says where.
@@ -35,10 +36,10 @@ def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
     memory, errors = model.reversal.start(), []
     low_n, high_n = model.force_range_n
     for k in range(1, len(force_n)):
-        memory = model.moved(memory, float(force_n[k - 1]), float(force_n[k]))
-        state = model.share(memory)
-        asked_v, _ = model.voltage_v(min(max(float(force_n[k]), low_n), high_n), state)
-        errors.append(model.force_n(asked_v, state) - model.force_n(float(voltage_v[k]), state))
+        memory = model.memory_after(memory, float(force_n[k - 1]), float(force_n[k]))
+        share = model.branch_share(memory)
+        asked_v, _ = model.voltage_v(min(max(float(force_n[k]), low_n), high_n), share)
+        errors.append(model.force_n(asked_v, share) - model.force_n(float(voltage_v[k]), share))
     return np.array(errors)
 
 

@@ -1,7 +1,7 @@
-"""Fit PFM, PSFM, BFM and BSFM of order 1..15 to a ladder, through one interface (METHOD.md).
+"""Fit PFM, PSFM, BFM and BSFM of order 1..15 to a ladder, through one interface (the paper's Eqs. 1, 3 and 4).
 
 A polynomial is the rational curve with equal weights, so one linear step serves all four; the rational ones search log
-weights around it (fit_solver). No constraint keeps an optimum increasing or uncrossed: that would hide what the data
+weights around it (levenberg_marquardt). No constraint keeps an optimum increasing or uncrossed: that would hide what the data
 say. The verdicts tell. Never imported by control.
 """
 
@@ -27,7 +27,7 @@ HUBER_ROUNDS = 8
 
 @dataclass(frozen=True, slots=True)
 class FitSettings:
-    """outliers: keep all, reject by rung, or Huber's loss; voltage_range_v: of the curves, None for the ladder's own."""
+    """outliers: keep all, reject by stair, or Huber's loss; voltage_range_v: of the curves, None for the ladder's own."""
 
     outliers: Literal["keep", "reject", "huber"] = "keep"
     voltage_range_v: tuple[float, float] | None = None

@@ -1,6 +1,6 @@
 """What a model gets wrong on everything that was measured: staircase and partial reversals, with the reversal's own memory.
 
-The error of the branches alone is no measure of a model that is to drive a rig: each rung is compared with its own branch
+The error of the branches alone is no measure of a model that is to drive a rig: each stair is compared with its own branch
 there, and a reversal that leaves both for a while costs nothing. Here the memory moves with the measured forces, as in
 control, and the model's force at each measured voltage is compared with the measured one. Where no reversal part was measured
 the way of reversing is an assumption, which a staircase cannot judge; there the branches are all that is compared.
@@ -35,8 +35,8 @@ def walked_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
     memory, errors = model.reversal.start(), []
     before_n = float(force_n[0]) if len(force_n) else 0.0
     for volts, newtons in zip(voltage_v.tolist(), force_n.tolist(), strict=True):
-        memory, before_n = model.moved(memory, before_n, newtons), newtons
-        errors.append(model.settled_n(volts, model.share(memory)) - newtons)
+        memory, before_n = model.memory_after(memory, before_n, newtons), newtons
+        errors.append(model.settled_n(volts, model.branch_share(memory)) - newtons)
     return np.array(errors)
 
 

@@ -1,6 +1,6 @@
 """Samples that must not steer a fit: found without a model, or played down by their residual.
 
-Rejection compares repeated readings of one rung (same voltage, same direction) with their median. It asks no model, so
+Rejection compares repeated readings of one stair (same voltage, same direction) with their median. It asks no model, so
 that a low order's misfit is not called an outlier and all orders are judged on the same samples. Rungs read fewer than
 three times keep everything.
 """
@@ -16,16 +16,16 @@ HUBER_AT = 1.345  # 95 % efficiency on normal noise (Huber 1981)
 NORMAL_MAD = 1.4826
 
 
-def rungs(ladder: Ladder) -> tuple[NDArray[np.intp], int]:
-    """Which rung (voltage and direction) each sample stands on, and how many rungs there are."""
+def stair_index(ladder: Ladder) -> tuple[NDArray[np.intp], int]:
+    """Which stair (voltage and direction) each sample stands on, and how many stairs there are."""
     _, index = np.unique(np.stack([ladder.voltage_v, ladder.direction]), axis=1, return_inverse=True)
     flat = np.asarray(index).reshape(-1)
     return flat, int(flat.max()) + 1
 
 
 def inlier_mask(ladder: Ladder) -> NDArray[np.bool_]:
-    """False for readings far from the median of their rung."""
-    index, count = rungs(ladder)
+    """False for readings far from the median of their stair."""
+    index, count = stair_index(ladder)
     order = np.argsort(index, kind="stable")
     groups = np.split(order, np.cumsum(np.bincount(index, minlength=count))[:-1])
     away, repeated = np.zeros(len(ladder)), np.zeros(len(ladder), dtype=bool)

@@ -297,7 +297,7 @@ def _stairs(
         from_v, to_v = float(command_v[before.last]), float(command_v[now.last])
         changes = _changes(float(time_s[now.first]), from_v, to_v, slew_v_per_s)
         way = _way(model, memory, (from_v, to_v), (settled_n[k - 1], settled_n[k]))
-        memory = model.moved(memory, settled_n[k - 1], settled_n[k])
+        memory = model.memory_after(memory, settled_n[k - 1], settled_n[k])
         rows = slice(now.first + 1, now.end + 1)
         if way is not None and _tells(force_n[rows], settled_n[k - 1], settled_n[k]):
             kept = tuple(change for change in earlier if change[0] > time_s[now.first] - LONGEST_S)
@@ -374,7 +374,7 @@ def _way(
     path_n = np.linspace(from_n, to_n, PATH_POINTS)
     path_v = []
     for force_n in path_n.tolist():
-        share = model.share(model.moved(memory, from_n, force_n))  # type: ignore[arg-type]
+        share = model.branch_share(model.memory_after(memory, from_n, force_n))  # type: ignore[arg-type]
         path_v.append(model.voltage_v(force_n, share)[0])
     way_v = np.maximum.accumulate((np.array(path_v) - path_v[0]) / (path_v[-1] - path_v[0] or 1.0))
     way_v = way_v / way_v[-1] if way_v[-1] > 0.5 else np.linspace(0.0, 1.0, PATH_POINTS)

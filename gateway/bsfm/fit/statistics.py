@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.bsfm.fit.outliers import rungs
+from gateway.bsfm.fit.outliers import stair_index
 from gateway.bsfm.fit.projected_problem import FitLanes, Floats, ProjectedProblem
 from gateway.bsfm.fit.result import NOT_IDENTIFIABLE, Covariance, Residuals
 from gateway.bsfm.fit.solution import Solution
@@ -82,8 +82,8 @@ def _diagonal(blocks: list[Floats]) -> Floats:
 
 
 def paper_norm(ladder: Ladder, residual_n: Floats, split: bool) -> float:
-    """Per data set, 2-norm of the residuals of the rung means / number of rungs; the data sets of a split model are added."""
-    index, count = rungs(ladder)
+    """Per data set, 2-norm of the residuals of the stair means / number of stairs; the data sets of a split model are added."""
+    index, count = stair_index(ladder)
     readings = np.bincount(index, minlength=count)
     means = np.bincount(index, residual_n, minlength=count) / readings
     rising = np.bincount(index, ladder.direction > 0, minlength=count) > 0

@@ -28,7 +28,7 @@ KGF_SLACK: Final = 1.35  # plants of one kind differ by this much, not by 9.81
 FAR_RATIO: Final = 2.0
 CLIPPED_N: Final = 0.02  # stairs of a saturated cell agree to a count
 FEWEST_CLIPPED: Final = 3
-DIP_SHARE: Final = 0.02  # of the force range: a rung this far below an earlier one is no noise
+DIP_SHARE: Final = 0.02  # of the force range: a stair this far below an earlier one is no noise
 NOISE_AT: Final = 5.0
 UNSETTLED_SHARE: Final = 0.05
 
@@ -255,7 +255,7 @@ def _check_increasing(ladder: Ladder) -> None:
     """A branch whose mean falls on the way up describes no inverse, whatever is fitted to it."""
     limit_n = max(0.5, DIP_SHARE * float(np.ptp(ladder.force_n)))
     for way, words in ((RISING, "up"), (FALLING, "down")):
-        voltage_v, mean_n = _rungs(ladder, ladder.direction == way)
+        voltage_v, mean_n = _mean_by_stair(ladder, ladder.direction == way)
         highest_n = np.maximum.accumulate(mean_n)
         worst = int(np.argmax(highest_n - mean_n))
         dip_n = float(highest_n[worst] - mean_n[worst])
@@ -269,7 +269,7 @@ def _check_increasing(ladder: Ladder) -> None:
             )
 
 
-def _rungs(ladder: Ladder, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _mean_by_stair(ladder: Ladder, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Voltages and mean forces of one branch, by rising voltage."""
     voltages, index = np.unique(np.round(ladder.voltage_v[mask], 3), return_inverse=True)
     totals = np.bincount(index, weights=ladder.force_n[mask])

@@ -1,11 +1,11 @@
-"""What happens between the branches when the force turns round (METHOD.md, "Reversal").
+"""What happens between the branches when the force turns round: reversal policies.
 
-The paper switches branches, which costs up to 0.9 V at once and doubles the error under chatter. Here a state s in [-1,
-1] says where between the branches the plant is: +1 on the rising one, -1 on the falling one. A play operator moves it:
-s += 2 df / span, clipped. An exponential blend was rejected: it drifts under chatter.
+The paper switches branches, which costs up to 0.9 V at once and doubles the error under chatter. Here the branch share s
+in [-1, 1] says where between the branches the plant is: +1 on the rising one, -1 on the falling one. A play operator moves
+it: s += 2 df / span, clipped. An exponential blend was rejected: it drifts under chatter.
 
 Policies have one interface (`Reversal`), so that model and control know none of them: a memory moves with the force, and
-says the share s. LinearBlend remembers s alone, gateway.bsfm.slip.slip_stops one number per stop. `start` is where
+tells the branch share s. LinearBlend remembers s alone, gateway.bsfm.slip.slip_stops one number per stop. `start` is where
 the calibration
 ladder starts, because that is where the policy's branches are true: for two branches that a ladder was fitted to, on the
 rising one.
@@ -28,13 +28,13 @@ class Reversal(Protocol):
     def start(self) -> Memory:
         """Of a vented tool, where the calibration ladder starts."""
 
-    def at(self, share: float) -> Memory:
-        """A memory with this share; +1 and -1 are the branches, whatever came before."""
+    def at(self, branch_share: float) -> Memory:
+        """Return a memory with this branch share; +1 and -1 are the branches, whatever came before."""
 
-    def share(self, memory: Memory) -> float:
+    def branch_share(self, memory: Memory) -> float:
         """s in [-1, 1]: +1 on the rising branch, -1 on the falling one."""
 
-    def moved(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+    def memory_after(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
         """The memory after the force has gone from one value to another without turning round in between."""
 
     def check(self, branches: Branches) -> None:
@@ -54,28 +54,28 @@ class LinearBlend:
     def start(self) -> Memory:
         return (RISING,)
 
-    def at(self, share: float) -> Memory:
-        return (share,)
+    def at(self, branch_share: float) -> Memory:
+        return (branch_share,)
 
-    def share(self, memory: Memory) -> float:
+    def branch_share(self, memory: Memory) -> float:
         return memory[0]
 
-    def moved(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+    def memory_after(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
         return (self.advance(memory[0], to_n - from_n),)
 
     def check(self, branches: Branches) -> None:
         """Any branches that increase will do: the voltage is explicit."""
 
-    def advance(self, state: float, delta_n: float) -> float:
-        """The state after the force has moved by delta_n. ValueError unless both are finite; the answer is in [-1, 1]."""
-        if not (isfinite(state) and isfinite(delta_n)):
-            raise ValueError(f"blend state {state!r}, change {delta_n!r} N: not finite")
+    def advance(self, branch_share: float, delta_n: float) -> float:
+        """Return the branch share, -1 .. 1, after the force has moved by delta_n. ValueError unless both are finite."""
+        if not (isfinite(branch_share) and isfinite(delta_n)):
+            raise ValueError(f"branch share {branch_share!r}, change {delta_n!r} N: not finite")
         if delta_n == 0.0:
-            return _clipped(state)
+            return _clip(branch_share)
         if abs(delta_n) >= self.span_n:  # all the way; also keeps 2 df / span finite
             return RISING if delta_n > 0.0 else FALLING
-        return _clipped(state + 2.0 * delta_n / self.span_n)
+        return _clip(branch_share + 2.0 * delta_n / self.span_n)
 
 
-def _clipped(state: float) -> float:
-    return max(-1.0, min(1.0, state))
+def _clip(branch_share: float) -> float:
+    return max(-1.0, min(1.0, branch_share))

@@ -1,7 +1,7 @@
 """Which reversal describes a rig: slip stops fitted to its walks, judged beside linear blend and switched branches.
 
-Two fits: `fit_stops` leaves the branches as they are, `fit_joint` moves them with the stops (METHOD.md: minor-loop points in
-the fit). The joint fit is the one that pays: branches that were fitted to a staircase already contain its two turns, and no
+Two fits: `fit_stops` leaves the branches as they are, `fit_joint` moves them with the stops, minor-loop points in
+the fit. The joint fit is the one that pays: branches that were fitted to a staircase already contain its two turns, and no
 selection between them can take these out again. Radii stand on a grid, from a fraction of the loop's width to a share of
 the range; the non-negative fit picks few of them. Shares below SMALLEST_SHARE, and the smallest of more than a set of
 registers carries, are dropped and the rest fitted again.

@@ -1,4 +1,4 @@
-"""Reversal by Maxwell slip: stops on the voltage say where between the branches the plant is (METHOD.md, "Reversal").
+"""Reversal by Maxwell slip: stops on the voltage say where between the branches the plant is.
 
 s = sum c_j stop_{r_j}[V] / r_j, V = m(f) + s h(f), m = (V_rise + V_fall) / 2, h = (V_rise - V_fall) / 2. A stop follows the
 voltage within -r .. r, so the voltages at which the plant turned round are remembered until they are passed: a closed
@@ -58,8 +58,8 @@ class SlipStops:
         """All stops at the same share: on a branch for +1 and -1."""
         return (share,) * len(self.radii_v)
 
-    def share(self, memory: Memory) -> float:
-        """s in [-1, 1]."""
+    def branch_share(self, memory: Memory) -> float:
+        """Return s in [-1, 1]."""
         total = 0.0
         for share, place in zip(self.shares, memory, strict=True):
             total += share * place
@@ -75,11 +75,11 @@ class SlipStops:
             [max(-1.0, min(1.0, at + voltage_delta_v / r)) for at, r in zip(memory, self.radii_v, strict=True)]
         )
 
-    def moved(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+    def memory_after(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
         """The memory after the force has gone from one value to another without turning round in between."""
         if from_n == to_n:
             return memory
-        share = self.share(memory)
+        share = self.branch_share(memory)
         from_middle_v, from_half_v = middle_and_half(branches, from_n)
         to_middle_v, to_half_v = middle_and_half(branches, to_n)
         stuck_v = to_middle_v - from_middle_v + share * (to_half_v - from_half_v)

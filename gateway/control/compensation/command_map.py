@@ -58,16 +58,16 @@ class SentBsfm(Bsfm):
     def __post_init__(self) -> None:
         """The inner model was proven when it was made; the loop has no time to prove it again."""
 
-    def voltage_v(self, force_n: float, state: float) -> tuple[float, InverseStatus]:
-        voltage_v, status = Bsfm.voltage_v(self, force_n, state)
+    def voltage_v(self, force_n: float, branch_share: float) -> tuple[float, InverseStatus]:
+        voltage_v, status = Bsfm.voltage_v(self, force_n, branch_share)
         return self.command.sent_v(voltage_v) if self.command else voltage_v, status
 
-    def force_n(self, voltage_v: float, state: float) -> float:
-        return Bsfm.force_n(self, self._straight_v(voltage_v), state)
+    def force_n(self, voltage_v: float, branch_share: float) -> float:
+        return Bsfm.force_n(self, self._straight_v(voltage_v), branch_share)
 
-    def settled_n(self, voltage_v: float, state: float) -> float:
+    def settled_n(self, voltage_v: float, branch_share: float) -> float:
         straight = Bsfm(self.branches, self.reversal, self.limits_n)
-        return straight.settled_n(self._straight_v(voltage_v), state)
+        return straight.settled_n(self._straight_v(voltage_v), branch_share)
 
     @property
     def voltage_range_v(self) -> tuple[float, float]:

@@ -79,9 +79,9 @@ class Feedforward:
         self._carry_over_v = 0.0
 
     @property
-    def blend(self) -> float:
+    def branch_share(self) -> float:
         """Where between the branches the plant is, -1 .. 1."""
-        return self.model.reversal.share(self._memory)
+        return self.model.reversal.branch_share(self._memory)
 
     def approaching_n(self, precontact_n: float) -> float:
         """The pre-contact force, but never one that cannot move a vented tool: what friction keeps pressed at the ladder's
@@ -94,7 +94,7 @@ class Feedforward:
         if model == self.model:
             return
         before_v, _ = self.feedforward(gravity_n)
-        self.model, self._memory = model, model.reversal.at(self.blend)
+        self.model, self._memory = model, model.reversal.at(self.branch_share)
         self._limits = narrow_limits(self._rig_limits, model.limits_n)
         after_v, _ = self.feedforward(gravity_n)
         self._carry_over_v += before_v - after_v
@@ -119,7 +119,7 @@ class Feedforward:
         if self.applied_n <= 0.0:
             self._memory = self.model.reversal.start()
         elif from_n != to_n:
-            self._memory = self.model.moved(self._memory, from_n, to_n)
+            self._memory = self.model.memory_after(self._memory, from_n, to_n)
 
     def fall_back(self, goal_n: float) -> None:
         """Contact lost: at once down to the goal, and on the rising branch for the next contact."""
@@ -129,15 +129,15 @@ class Feedforward:
     def slope_n_per_v(self, gravity_n: float) -> float:
         """How much force a volt makes at the working point, N/V, by the branches as they are shared there."""
         rising, falling = self.model.branches.rising, self.model.branches.falling
-        force_n, share = self.aimed_n - gravity_n, 0.5 + 0.5 * self.blend
+        force_n, share = self.aimed_n - gravity_n, 0.5 + 0.5 * self.branch_share
         slopes = [max(LEAST_SLOPE_N_PER_V, curve.slope(curve.inverse(force_n)[0])) for curve in (rising, falling)]
         return 1.0 / (share / slopes[0] + (1.0 - share) / slopes[1])
 
-    def take_over(self, force_n: float, blend: float = RISING) -> None:
+    def take_over(self, force_n: float, branch_share: float = RISING) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
-        self._memory = self.model.reversal.at(blend)
+        self._memory = self.model.reversal.at(branch_share)
 
     def feedforward(self, gravity_n: float) -> tuple[float, LimitedBy]:
         """Voltage for the applied contact force by the inverse model, and what limited it. ModelError if there is none."""
@@ -146,7 +146,7 @@ class Feedforward:
         if is_below_usable(self.applied_n, self._limits):
             return 0.0, LimitedBy.SMALLEST_FORCE
         try:
-            voltage_v, status = self.model.voltage_v(self.aimed_n - gravity_n, self.blend)
+            voltage_v, status = self.model.voltage_v(self.aimed_n - gravity_n, self.branch_share)
         except ValueError as error:
             raise ModelError(f"model: {error}") from error
         if not isfinite(voltage_v):

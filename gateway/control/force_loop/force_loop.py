@@ -128,12 +128,12 @@ class ForceLoop:
         self._was_touching = moment.touching
         return event
 
-    def follow(self, voltage_v: float, expected_n: float, blend: float) -> None:
+    def follow(self, voltage_v: float, expected_n: float, branch_share: float) -> None:
         """A stair of the calibration ladder: this voltage within the limits, nothing learned, nothing judged."""
         self.trim.reset()
         self._band.restart()
         self._answer.restart()
-        self.law.take_over(expected_n, blend)
+        self.law.take_over(expected_n, branch_share)
         self.feedforward_v = voltage_v
         self.limited_by = self.stage.drive(voltage_v)
 

@@ -113,8 +113,8 @@ class ActiveRun:
         voltage_v = self._below_ceiling(now_s, reading, step, pursuit.stage.voltage_v)
         if voltage_v is None:
             return StopCause(FaultCode.NONE, self._too_high(step.voltage_v, "the run is stopped"))
-        self.target_n = max(0.0, run.model.force_n(voltage_v, run.direction))
-        pursuit.follow(voltage_v, response.force_n(run.direction), run.direction)
+        self.target_n = max(0.0, run.model.force_n(voltage_v, run.branch_share))
+        pursuit.follow(voltage_v, response.force_n(run.branch_share), run.branch_share)
         return None
 
     def end(self) -> None:
@@ -150,7 +150,7 @@ class ActiveRun:
         ceiling.observe(reading)
         if step.row:
             ceiling.settled(step.row)
-        was_reached = run.direction > 0 and ceiling.is_reached(run.noise_n)
+        was_reached = run.branch_share > 0.0 and ceiling.is_reached(run.noise_n)
         if not was_reached and not (step.row and ceiling.is_beyond(step.voltage_v, run.noise_n)):
             return step.voltage_v
         if isinstance(run, ExperimentRun):

@@ -51,9 +51,9 @@ class ExperimentRun:
         return self._check.eta_s + max(0.0, self.schedule.duration_s - self._elapsed_s)
 
     @property
-    def direction(self) -> float:
-        """Which branch the plant is on, as a blend state."""
-        return self._check.direction if self._began_s is None else float(self.schedule.direction(self._elapsed_s))
+    def branch_share(self) -> float:
+        """The branch that the plant is on: 1 rising, -1 falling."""
+        return self._check.branch_share if self._began_s is None else float(self.schedule.direction(self._elapsed_s))
 
     @property
     def part(self) -> int:

@@ -101,8 +101,8 @@ class LadderRun:
         return rest_s + dwell_s * (len(self.stairs) - self.done)
 
     @property
-    def direction(self) -> float:
-        """Which branch the plant is on, as a blend state."""
+    def branch_share(self) -> float:
+        """The branch that the plant is on: 1 rising, -1 falling."""
         return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
 
     def leave_out(self, now_s: float, voltage_v: float, *, was_there: bool) -> bool:

@@ -1,7 +1,7 @@
 """The stairs of a calibration run: sign and scale check, repeated staircases, partial reversals.
 
 The check is a coarse cycle: it settles the friction, so that every group starts from the same history, and its first stair
-is small. Turns of the minor-loop walk are shares of the top, of all sizes and on both sides (METHOD, "Reversal"); none
+is small. Turns of the minor-loop walk are shares of the top, of all sizes and on both sides; none
 comes near both ends, so that no fit takes them for a group.
 """
 

@@ -1,4 +1,4 @@
-"""Looks for the first cause of a fault (SAFETY.md's table), apart from the force law, and only while the output is enabled.
+"""Find the first cause of a fault, apart from the force law, and only while the output is enabled.
 
 Checks run in a fixed order and the first one found is the cause: what makes others follow comes first (our own loop,
 then the output line, then the cell, then what the cell says, then the master). While disabled the same facts only
@@ -72,13 +72,13 @@ class FaultDetector:
         self._response_fault = FaultCode.NONE
         self._over = 0
 
-    def observe(self, reading: Reading, response: ExpectedForce, blend: float, touching: bool) -> None:
+    def observe(self, reading: Reading, response: ExpectedForce, branch_share: float, touching: bool) -> None:
         """Every new sample, enabled or not."""
         self.rise.smooth(reading)
         self._frozen.observe(reading, response, touching)
         is_over = reading.overload or abs(reading.contact_n) >= self._limits.over_force_n
         self._over = self._over + 1 if is_over else 0
-        self._response_fault = self.rise.judge(response, blend, touching, reading.interval_s)
+        self._response_fault = self.rise.judge(response, branch_share, touching, reading.interval_s)
 
     def observe_rest(self, reading: Reading) -> None:
         """While disabled: a force that stays at the safe voltage."""

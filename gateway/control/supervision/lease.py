@@ -1,5 +1,4 @@
-"""A command that expires: only a changing heartbeat value renews it; reads and repeated frames do not (SAFETY: master
-lost).
+"""A command that expires: only a changing heartbeat value renews it; reads and repeated frames do not.
 
 A closed connection of the owner counts as loss only where a lease is set; without a lease a command lasts until the
 next one.

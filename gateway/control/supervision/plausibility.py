@@ -52,13 +52,13 @@ class ExpectedForce:
         self.rising_n = self._model.force_n(self._lagged_v, 1.0)
         self.falling_n = self._model.force_n(self._lagged_v, -1.0)
 
-    def force_n(self, blend: float) -> float:
-        """Expected cell force at this blend state."""
-        return self.falling_n + (0.5 + 0.5 * blend) * (self.rising_n - self.falling_n)
+    def force_n(self, branch_share: float) -> float:
+        """Expected cell force at this branch share."""
+        return self.falling_n + (0.5 + 0.5 * branch_share) * (self.rising_n - self.falling_n)
 
-    def rise_n(self, blend: float) -> float:
+    def rise_n(self, branch_share: float) -> float:
         """The same above the force at rest."""
-        return self.force_n(blend) - self._rest_n
+        return self.force_n(branch_share) - self._rest_n
 
     @property
     def kept_n(self) -> float:
@@ -100,9 +100,9 @@ class RiseCheck:
         """The zero moved: what was measured before reads that much less now."""
         self.smooth_n -= moved_n
 
-    def judge(self, response: "ExpectedForce", blend: float, touching: bool, interval_s: float) -> FaultCode:
-        """One more new sample against the rise that the model expects at this blend state."""
-        expected_n = response.rise_n(blend)
+    def judge(self, response: "ExpectedForce", branch_share: float, touching: bool, interval_s: float) -> FaultCode:
+        """One more new sample against the rise that the model expects at this branch share."""
+        expected_n = response.rise_n(branch_share)
         rise_n = self.measured_rise_n
         wrong_sign = expected_n >= _LEAST_RISE_N and rise_n <= -max(self._threshold_n, _LOWEST_SHARE * expected_n)
         self._wrong_sign_s = self._wrong_sign_s + interval_s if wrong_sign else 0.0

@@ -40,7 +40,7 @@ class CalibrationRuns:
     ) -> None:
         self.stored = 0
         self._controller = controller
-        self._calibrating = controller.calibrating
+        self._calibrating = controller.active_run
         self._rig = rig
         self._state = state
         self._clock = clock

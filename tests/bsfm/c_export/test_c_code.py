@@ -235,7 +235,7 @@ def test_commands_with_reversals_agree_to_the_bit(library, name, level):
     state = build.reset()
     assert bits(build.command(state, forces)) == bits(wanted)
     assert (state.force_n, [*state.memory], state.voltage_v) == (memory.force_n, memory.memory, memory.voltage_v)
-    assert build.share(state) == model.share(memory)
+    assert build.share(state) == model.branch_share(memory)
 
 
 @pytest.mark.parametrize("name", ORDINARY)
@@ -352,9 +352,9 @@ def test_commands_with_reversals_stay_near_the_double_model(name):
     state, memory = single.reset(), model.reversal.start()
     last_n = float(single.lowest)
     for force_n in along_n(name):
-        memory = model.moved(memory, last_n, force_n)
+        memory = model.memory_after(memory, last_n, force_n)
         last_n = force_n
-        wanted_v, _ = model.voltage_v(force_n, model.share(memory))
+        wanted_v, _ = model.voltage_v(force_n, model.branch_share(memory))
         assert abs(float(single.command(state, Float32(force_n))[0]) - wanted_v) < 2e-5
 
 

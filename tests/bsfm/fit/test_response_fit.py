@@ -40,7 +40,7 @@ class Plant:
         way = 1.0 if voltage_v > self.second_v else -1.0
         target_n = self._settled_n(self.second_v, way)
         if (target_n - self.force_n) * way > 0.0:
-            self.memory = self.bsfm.moved(self.memory, self.force_n, target_n)
+            self.memory = self.bsfm.memory_after(self.memory, self.force_n, target_n)
             self.force_n = target_n
         return self.force_n
 
@@ -49,7 +49,7 @@ class Plant:
         near_n, far_n = self.force_n, self.force_n + way * 60.0
         for _ in range(18):
             middle_n = 0.5 * (near_n + far_n)
-            share = self.bsfm.share(self.bsfm.moved(self.memory, self.force_n, middle_n))
+            share = self.bsfm.branch_share(self.bsfm.memory_after(self.memory, self.force_n, middle_n))
             asked_v, _ = self.bsfm.voltage_v(max(0.0, min(60.0, middle_n)), share)
             near_n, far_n = (middle_n, far_n) if way * (voltage_v - asked_v) > 0.0 else (near_n, middle_n)
         return near_n

@@ -56,11 +56,11 @@ def test_halfway_the_voltage_is_halfway(model):
     assert model.voltage_v(12.0, 0.0)[0] == pytest.approx(halves, rel=1e-15)
 
 
-@pytest.mark.parametrize("state", [-1.0, -0.3, 1.0])
-def test_beyond_the_range_the_model_holds_the_end_and_says_so(model, state):
-    assert model.voltage_v(0.4, state) == (0.0, InverseStatus.LOW)
-    assert model.voltage_v(38.1, state) == (5.0, InverseStatus.HIGH)
-    assert model.voltage_v(38.0, state)[1] is InverseStatus.OK
+@pytest.mark.parametrize("share", [-1.0, -0.3, 1.0])
+def test_beyond_the_range_the_model_holds_the_end_and_says_so(model, share):
+    assert model.voltage_v(0.4, share) == (0.0, InverseStatus.LOW)
+    assert model.voltage_v(38.1, share) == (5.0, InverseStatus.HIGH)
+    assert model.voltage_v(38.0, share)[1] is InverseStatus.OK
     assert (model.force_range_n, model.voltage_range_v) == ((0.5, 38.0), (0.0, 5.0))
 
 
@@ -75,14 +75,14 @@ def test_a_branch_that_is_clamped_alone_is_reported_only_when_it_takes_part():
 
 
 def test_nan_and_states_outside_the_blend_are_refused(model):
-    for state in (-1.0, 0.0, 1.0):
+    for share in (-1.0, 0.0, 1.0):
         with pytest.raises(ValueError, match="not a number"):
-            model.voltage_v(math.nan, state)
-    for state in (1.01, math.nan):
-        with pytest.raises(ValueError, match="blend state"):
-            model.voltage_v(12.0, state)
-        with pytest.raises(ValueError, match="blend state"):
-            model.force_n(2.0, state)
+            model.voltage_v(math.nan, share)
+    for share in (1.01, math.nan):
+        with pytest.raises(ValueError, match="branch share"):
+            model.voltage_v(12.0, share)
+        with pytest.raises(ValueError, match="branch share"):
+            model.force_n(2.0, share)
 
 
 def test_branches_without_an_inverse_make_no_model():

@@ -24,8 +24,8 @@ def walk(turns_n: tuple[float, ...], per_way: int = 8) -> tuple[np.ndarray, np.n
         forces += np.linspace(a, b, per_way + 1)[1:].tolist()
     memory, at_n, volts = TRUE.reversal.start(), 0.0, []
     for force_n in forces:
-        memory, at_n = TRUE.moved(memory, at_n, force_n), force_n
-        volts.append(TRUE.voltage_v(force_n, TRUE.share(memory))[0])
+        memory, at_n = TRUE.memory_after(memory, at_n, force_n), force_n
+        volts.append(TRUE.voltage_v(force_n, TRUE.branch_share(memory))[0])
     return np.array(volts), np.array(forces)
 
 

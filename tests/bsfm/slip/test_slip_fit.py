@@ -37,7 +37,7 @@ NOISE_N = 0.05
 def forces_n(voltage_v: Floats, seed: int, noise_n: float = NOISE_N) -> Floats:
     """What the truth gives along these voltages, from a full fall."""
     at = places(voltage_v, np.array(STOPS.radii_v)).tolist()
-    shares = [STOPS.share(tuple(place)) for place in at]
+    shares = [STOPS.branch_share(tuple(place)) for place in at]
     clean = [TRUTH.settled_n(volts, share) for volts, share in zip(voltage_v.tolist(), shares, strict=True)]
     return np.array(clean) + noise_n * np.random.default_rng(seed).standard_normal(len(clean))
 

@@ -53,7 +53,7 @@ def test_a_voltage_change_or_a_force_that_is_no_number_is_refused(bad):
     with pytest.raises(ValueError, match="finite"):
         stops.advance(stops.start(), bad)
     with pytest.raises(ValueError, match="not a number"):
-        stops.moved(BRANCHES, stops.start(), 1.0, nan)
+        stops.memory_after(BRANCHES, stops.start(), 1.0, nan)
 
 
 def test_the_shipped_calibration_has_stops_and_its_c_code_too_and_keeps_a_blend_beside_them():
@@ -74,9 +74,9 @@ def test_half_a_set_of_stops_is_refused_not_taken_for_a_blend(fields):
 
 def test_after_a_reversal_the_stops_give_way_one_by_one():
     model = Bsfm(BRANCHES, SlipStops((0.5, 1.5), (0.5, 0.5)))
-    memory = model.moved(model.reversal.start(), 1.0, 37.0)
+    memory = model.memory_after(model.reversal.start(), 1.0, 37.0)
     assert memory == (1.0, 1.0)
-    memory = model.moved(memory, 37.0, 29.0)
+    memory = model.memory_after(memory, 37.0, 29.0)
     assert memory[0] == -1.0 < memory[1] < 1.0
-    memory = model.moved(memory, 29.0, 1.0)
+    memory = model.memory_after(memory, 29.0, 1.0)
     assert memory == (-1.0, -1.0)

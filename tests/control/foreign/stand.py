@@ -111,8 +111,8 @@ class Stand:
             self._next_sample += 1000.0 / self.machine.rate_hz
             self._measure()
             self._step()
-            if self.recording and self.controller.calibrating.running and self.output and self.sample:
-                self.rows.append((self.now_s, self.output.voltage_v, self.controller.calibrating.cell_n))
+            if self.recording and self.controller.active_run.running and self.output and self.sample:
+                self.rows.append((self.now_s, self.output.voltage_v, self.controller.active_run.cell_n))
         if self.ms % TICK_MS == 0:
             self._step()
         self.on_ms(self)
@@ -147,10 +147,10 @@ def calibrated(machine: Machine, started_with: Bsfm, plan: CalibrationPlan = QUI
     stand = Stand(machine, controller, seed)
     stand.run(0.3)
     top_v = next(tenths / 10 for tenths in range(85, 0, -1) if machine.drive_n(tenths / 10) < MOST_N)
-    controller.calibrating.ask(replace(plan, v_max_v=min(8.0, top_v)))
+    controller.active_run.ask(replace(plan, v_max_v=min(8.0, top_v)))
     stand.recording = True
     stand.run(0.05)
-    while controller.calibrating.running:
+    while controller.active_run.running:
         stand.run(0.1)
     facts = {"rig": "foreign", "rig_fingerprint": "", "force_unit": "N", "ladder": asdict(plan)}
     recording = Recording(Path("foreign.fgr"), facts, stand.columns(), len(stand.rows), False)

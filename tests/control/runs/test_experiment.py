@@ -96,7 +96,7 @@ def test_an_empty_plan_and_an_endless_one_are_refused() -> None:
 
 def begun(bench: Bench, asked: ExperimentPlan) -> Bench:
     bench.run(0.5)
-    bench.controller.calibrating.ask(asked)
+    bench.controller.active_run.ask(asked)
     bench.run(0.05)
     return bench
 
@@ -104,7 +104,7 @@ def begun(bench: Bench, asked: ExperimentPlan) -> Bench:
 def test_a_run_goes_through_zero_and_check_and_then_by_the_clock_to_its_end_at_zero_volts() -> None:
     bench = begun(Bench(seed=3), ExperimentPlan(name="short", parts=SHORT.parts))
     phases, began = [], len(bench.history)
-    while bench.controller.calibrating.running:
+    while bench.controller.active_run.running:
         bench.run(0.01)
         phases.append(CalibrationPhase(bench.last.calibration_phase))
     assert list(dict.fromkeys(phases)) == [
@@ -142,7 +142,7 @@ def test_a_stop_ends_it_at_zero_volts() -> None:
     bench = begun(Bench(seed=6), SHORT)
     bench.run(1.5)
     assert bench.last.voltage_v > 2.0
-    bench.controller.calibrating.ask_stop("info calibration stopped at this machine")
+    bench.controller.active_run.ask_stop("info calibration stopped at this machine")
     bench.run(0.4)
     assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
     assert bench.last.calibration_phase == CalibrationPhase.STOPPED

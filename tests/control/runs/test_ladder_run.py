@@ -20,7 +20,7 @@ LONG_S = 120.0
 
 def begun(bench: Bench, plan: CalibrationPlan = SHORT) -> Bench:
     bench.run(0.5)
-    bench.controller.calibrating.ask(plan)
+    bench.controller.active_run.ask(plan)
     bench.run(0.05)
     return bench
 
@@ -40,9 +40,9 @@ def finished(bench: Bench) -> Bench:
 def rows_of(bench: Bench, plan: CalibrationPlan) -> list[LadderRow]:
     begun(bench, plan)
     rows: list[LadderRow] = []
-    while bench.controller.calibrating.running:
+    while bench.controller.active_run.running:
         bench.run(0.01)
-        row = bench.controller.calibrating.last_row
+        row = bench.controller.active_run.last_row
         if row and row not in rows[-1:]:
             rows.append(row)
     bench.run(0.5)
@@ -94,7 +94,7 @@ def test_a_stair_that_never_settles_is_left_after_its_time_and_counted() -> None
 
 def test_progress_never_falls_and_the_eta_reaches_the_end() -> None:
     bench = begun(Bench(seed=6))
-    calibrating, began_s = bench.controller.calibrating, bench.now_s
+    calibrating, began_s = bench.controller.active_run, bench.now_s
     progress, etas = [], []
     while calibrating.running:
         bench.run(0.1)
@@ -135,7 +135,7 @@ def test_disable_ends_it_too() -> None:
 def test_the_end_clears_the_command_so_that_the_master_sees_the_bit_fall() -> None:
     bench = Bench(seed=9)
     bench.run(0.5)
-    bench.controller.calibrating.ask(SHORT)
+    bench.controller.active_run.ask(SHORT)
     finished(bench)
     bench.run(0.1)
     assert bench.command.control_word == ControlBit(0)
@@ -152,7 +152,7 @@ def test_while_holding_a_force_it_is_refused_and_the_force_stays() -> None:
     assert bench.refused.text.startswith("calibration refused: ")
     bench.run(3.0)
     assert bench.last.state is State.HOLDING
-    assert not bench.controller.calibrating.running
+    assert not bench.controller.active_run.running
     assert bench.voltage_v == pytest.approx(held_v, abs=0.2)
 
 
@@ -164,7 +164,7 @@ def test_a_latched_fault_refuses_it() -> None:
     assert bench.last.fault is FaultCode.SAMPLE_STALE
     bench.write(control_word=ControlBit(0))
     bench.write(control_word=ControlBit.START_CALIBRATION)
-    assert not bench.controller.calibrating.running
+    assert not bench.controller.active_run.running
     assert bench.last.state is State.FAULT
 
 
@@ -230,14 +230,14 @@ def test_a_tare_is_taken_before_the_ladder_where_it_is_asked_for(tare: bool) -> 
     bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.7)
     begun(bench, replace(SHORT, tare=tare))
     assert (bench.last.calibration_phase, bench.last.voltage_v) == (CalibrationPhase.ZERO, 0.0)
-    assert bench.controller.calibrating.cell_n == pytest.approx(0.0 if tare else 1.7, abs=0.2)
+    assert bench.controller.active_run.cell_n == pytest.approx(0.0 if tare else 1.7, abs=0.2)
     assert any(event.startswith("info tare") for event in bench.events) == tare
 
 
 def test_an_asked_stop_keeps_what_was_learned_and_says_so() -> None:
     bench = begun(Bench(seed=17))
     bench.run(3.0)
-    bench.controller.calibrating.ask_stop("info calibration stopped by a person")
+    bench.controller.active_run.ask_stop("info calibration stopped by a person")
     bench.run(0.4)
     assert bench.last.calibration_phase == CalibrationPhase.STOPPED
     assert bench.last.state is State.OFF

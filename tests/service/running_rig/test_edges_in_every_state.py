@@ -37,7 +37,7 @@ def rack(leased: bool) -> Rack:
 
 def local(leased: bool) -> Rack:
     begun = rack(leased)
-    begun.controller.calibrating.ask(CalibrationPlan())
+    begun.controller.active_run.ask(CalibrationPlan())
     return begun.until(State.CALIBRATING).run(2.5)
 
 
@@ -70,7 +70,7 @@ def stopping(leased: bool) -> Rack:
 
 def fitting(leased: bool) -> Rack:
     begun = rack(leased)
-    begun.controller.calibrating.phase = CalibrationPhase.FITTING
+    begun.controller.active_run.phase = CalibrationPhase.FITTING
     return begun
 
 

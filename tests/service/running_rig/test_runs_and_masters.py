@@ -43,7 +43,7 @@ def with_ramp(force_ramp_n_per_s: float = RAMP_N_PER_S) -> Rack:
 
 
 def locally(rack: Rack, plan: CalibrationPlan | ExperimentPlan = SHORT) -> Rack:
-    rack.controller.calibrating.ask(plan)
+    rack.controller.active_run.ask(plan)
     return rack.until(State.CALIBRATING)
 
 
@@ -123,7 +123,7 @@ def test_a_run_of_this_machine_is_stopped_by_0_in_the_control_word_alone_and_not
 def test_a_run_of_this_machine_needs_no_heartbeat_on_its_way_to_0() -> None:
     control = settings(lease_s=LEASE_S)
     rack = Rack(replace(control, defaults=replace(control.defaults, force_ramp_n_per_s=10.0)))
-    locally(rack).run(3.0).controller.calibrating.ask_stop("info calibration stopped at this machine")
+    locally(rack).run(3.0).controller.active_run.ask_stop("info calibration stopped at this machine")
     rack.until(State.OFF, 6.0)
 
 
@@ -137,13 +137,13 @@ def test_the_leases_end_ends_a_run_of_the_masters_along_the_ramp(action: LeaseAc
 
 def test_a_run_that_cannot_begin_any_more_when_its_turn_comes_leaves_the_force() -> None:
     rack = Rack()
-    rack.controller.calibrating.ask(SHORT)
-    rack.controller.calibrating._asked, asked = None, rack.controller.calibrating._asked
+    rack.controller.active_run.ask(SHORT)
+    rack.controller.active_run._asked, asked = None, rack.controller.active_run._asked
     rack.holding()
-    rack.controller.calibrating._asked = asked
+    rack.controller.active_run._asked = asked
     rack.run(2.0)
     assert rack.state is State.HOLDING
-    assert rack.controller.calibrating.take_refused().startswith("W305 calibration refused: state HOLDING")
+    assert rack.controller.active_run.take_refused().startswith("W305 calibration refused: state HOLDING")
 
 
 def test_a_master_that_holds_bit_5_in_its_cycle_does_not_begin_again() -> None:
@@ -163,7 +163,7 @@ def test_one_write_begins_a_run_again_and_again() -> None:
     rack = Rack()
     for _ in range(2):
         rack.calibrating()
-        rack.controller.calibrating.ask_stop("info calibration stopped at this machine")
+        rack.controller.active_run.ask_stop("info calibration stopped at this machine")
         rack.until(State.OFF)
 
 
@@ -187,7 +187,7 @@ def test_a_ladder_never_measures_more_than_the_rig_allows_and_goes_on_below(gain
     rack = Rack(with_limits(settings(), force_max_n=40.0), gain_n_per_v=gain_n_per_v)
     locally(rack)
     measured_n = []
-    while rack.controller.calibrating.running:
+    while rack.controller.active_run.running:
         rack.run(0.01)
         measured_n.append(unpack(">h", rack.bank.read_registers(102, 1))[0] / 100.0)
     assert max(measured_n) <= 40.0
