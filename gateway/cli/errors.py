@@ -25,7 +25,7 @@ class CliError(click.ClickException):
         click.echo(self.format_message(), file=file or sys.stderr)
 
 
-def translated(error: Exception, command_line: str, *, debug: bool) -> CliError:
+def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliError:
     """The message for an exception that no verb has caught. Anything unknown is our defect, and says so."""
     if _is_a(error, "gateway.profiles.strict_yaml.faults", "ProfileError"):
         return CliError(str(error), exit_codes.CONFIGURATION)

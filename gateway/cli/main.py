@@ -9,7 +9,7 @@ from typing import Any, Final
 import click
 
 from gateway import VERSION
-from gateway.cli.errors import translated
+from gateway.cli.errors import translate_error
 
 VERBS: Final = (
     "run",
@@ -71,7 +71,7 @@ class VerbGroup(click.Group):
             raise
         except Exception as error:
             command_line = " ".join(word for word in sys.argv[1:] if word != "--debug")
-            raise translated(error, command_line, debug=bool(ctx.params.get("debug"))) from error
+            raise translate_error(error, command_line, debug=bool(ctx.params.get("debug"))) from error
 
 
 @click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})

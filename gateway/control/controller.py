@@ -34,7 +34,7 @@ from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import Asked, EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
@@ -103,7 +103,7 @@ class Controller:
         self._follower.use(model)
         self.calibration_id = calibration_id
 
-    def refusal_of(self, now_s: float, asked: Asked, line: LineStatus) -> EdgeRefusal | None:
+    def refusal_of(self, now_s: float, asked: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Why a command cannot be taken at this moment; None: the next step takes it. Nothing changes by asking."""
         is_busy = self.state is State.CALIBRATING or self._ramping_down or self._stopping
         if not is_busy and not self._follower.edges_of(asked.command).rises:

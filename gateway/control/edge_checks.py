@@ -18,7 +18,7 @@ from gateway.control.sample_conditioning import Reading
 from gateway.control.state_table import ENABLED_STATES
 from gateway.control.tare import Zero
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import Asked, EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
@@ -59,7 +59,7 @@ class EdgeCheck:
         self._zero = zero
         self._calibrating = calibrating
 
-    def refusal(self, asked: Asked, at: Situation) -> EdgeRefusal | None:
+    def refusal(self, asked: ProposedWrite, at: Situation) -> EdgeRefusal | None:
         """Why this write cannot be taken now; None takes it."""
         edges = self._follower.edges_of(asked.command)
         if not edges.stops and (busy := self._busy(asked, edges, at)):
@@ -81,7 +81,7 @@ class EdgeCheck:
 
     # -- the whole write
 
-    def _busy(self, asked: Asked, edges: Edges, at: Situation) -> EdgeRefusal | None:
+    def _busy(self, asked: ProposedWrite, edges: Edges, at: Situation) -> EdgeRefusal | None:
         is_calibrating = at.state is State.CALIBRATING
         if not is_calibrating and not (at.ramps_down and at.state in ENABLED_STATES):
             return None

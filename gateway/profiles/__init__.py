@@ -8,7 +8,7 @@ wire_checks, network_checks, edit_marks, rig, report, any_file; schema stands ap
 Nothing here imports scipy: `check` answers at once.
 """
 
-from gateway.profiles.find import root, shipped
+from gateway.profiles.find import list_shipped, root
 from gateway.profiles.kinds.any_file import Checked, check_file
 from gateway.profiles.kinds.kinds import CALLED
 from gateway.profiles.kinds.plants import Origin, PlantProfile
@@ -34,6 +34,7 @@ __all__ = [
     "Rig",
     "check_file",
     "check_report",
+    "list_shipped",
     "load_calibration",
     "load_device",
     "load_plant",
@@ -41,5 +42,4 @@ __all__ = [
     "load_rig",
     "root",
     "schema",
-    "shipped",
 ]

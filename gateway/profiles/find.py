@@ -26,7 +26,7 @@ def root() -> Path:
     return installed if installed.is_dir() else package.parent / "profiles"
 
 
-def shipped(kind: str) -> list[str]:
+def list_shipped(kind: str) -> list[str]:
     """Names of the shipped profiles of a kind (rig, device, plant, calibration, registers, plan)."""
     return sorted(path.stem for path in (root() / FOLDERS[kind]).glob("*.yaml"))
 
@@ -37,7 +37,7 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
 
     FileNotFoundError with a sentence that follows the name: what is there, and what was probably meant.
     """
-    known = shipped(kind)
+    known = list_shipped(kind)
     if name in known:
         return root() / FOLDERS[kind] / f"{name}.yaml"
     folder = beside or Path()

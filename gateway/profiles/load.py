@@ -26,7 +26,7 @@ Read = Callable[[Document], tuple[T | None, list[Fault]]]
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class ProfileReference:
     """A profile's name, and where it was written: `place(sentence)` makes the fault about it."""
 
     name: str
@@ -34,20 +34,22 @@ class Reference:
     beside: Path | None = None
 
 
-def asked_for(name: str | Path) -> Reference:
+def refer_to(name: str | Path) -> ProfileReference:
     """A profile that was named on the command line or by a program."""
-    return Reference(str(name), lambda sentence: Fault(str(name), 0, 0, "", sentence))
+    return ProfileReference(str(name), lambda sentence: Fault(str(name), 0, 0, "", sentence))
 
 
-def written_at(document: Document, path: tuple[str, ...], folder: Path, default: str | None = None) -> Reference | None:
+def refer_at(
+    document: Document, path: tuple[str, ...], folder: Path, default: str | None = None
+) -> ProfileReference | None:
     """The profile named at a path of a document; None where no name stands (which the types tell) and none is the default."""
     name = document.at(*path) if path in document.marks else default
     if not isinstance(name, str) or not name:
         return None
-    return Reference(name, lambda sentence: document.fault(path, f"{name} {sentence}"), folder)
+    return ProfileReference(name, lambda sentence: document.fault(path, f"{name} {sentence}"), folder)
 
 
-def open_profile(kind: str, reference: Reference, findings: Findings) -> tuple[Document, Path] | None:
+def open_profile(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
     """Find, read and parse one file of a kind; None with the faults noted."""
     opened = open_file(kind, reference, findings)
     found = kind_of(opened[0].value, kind) if opened else None
@@ -58,7 +60,7 @@ def open_profile(kind: str, reference: Reference, findings: Findings) -> tuple[D
     return opened
 
 
-def open_file(kind: str, reference: Reference, findings: Findings) -> tuple[Document, Path] | None:
+def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
     """The same, whatever the file turns out to be."""
     try:
         path = locate(kind, reference.name, reference.beside)
@@ -77,7 +79,7 @@ def open_file(kind: str, reference: Reference, findings: Findings) -> tuple[Docu
         return None
 
 
-def read_named(kind: str, reference: Reference | None, read: Read[T], findings: Findings) -> T | None:
+def read_named(kind: str, reference: ProfileReference | None, read: Read[T], findings: Findings) -> T | None:
     """One profile, or None with the faults noted."""
     opened = open_profile(kind, reference, findings) if reference else None
     if opened is None:
@@ -89,7 +91,7 @@ def read_named(kind: str, reference: Reference | None, read: Read[T], findings: 
 
 def _load(kind: str, name: str | Path, read: Read[T]) -> T:
     findings = Findings()
-    value = read_named(kind, asked_for(name), read, findings)
+    value = read_named(kind, refer_to(name), read, findings)
     if value is None or findings.faults:
         raise ProfileError(findings.faults)
     return value

@@ -24,7 +24,7 @@ from gateway.registers.command_block import (
     Values,
 )
 from gateway.registers.echo import ByteOrderEcho
-from gateway.registers.edge_questions import Asked, Decide, decide_nothing
+from gateway.registers.edge_questions import Decide, ProposedWrite, decide_nothing
 from gateway.registers.map.register_map import Block
 from gateway.registers.ownership import Ownership
 from gateway.registers.refusal import Refusal
@@ -50,7 +50,7 @@ class Write(NamedTuple):
     touched: int = ALL_BITS
 
 
-class Admitted(NamedTuple):
+class AdmittedWrite(NamedTuple):
     """values: to store; kept: control word that reads back; command: what control gets, edge bits included; is_stop: the
     output goes off; is_taken_over: this host owns from now on, explicitly."""
 
@@ -84,7 +84,7 @@ class Admission:
         self._rules = rules
         self._is_held = False
 
-    def admit(self, write: Write, number: int, now_s: float) -> Admitted | None:
+    def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """What a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
         commands, before = self._commands, self._commands.values
         wish = self._wish(write)
@@ -104,9 +104,9 @@ class Admission:
         if rises & STARTS:
             self._check_starts(write.host, rises, written, word_at)
         kept = 0 if is_stop else written & ~EDGE_BITS
-        return Admitted(values, kept, command, is_stop, bool(written & TAKE), self._held_by(write, written))
+        return AdmittedWrite(values, kept, command, is_stop, bool(written & TAKE), self._held_by(write, written))
 
-    def took(self, admitted: Admitted) -> None:
+    def took(self, admitted: AdmittedWrite) -> None:
         """The write has been stored."""
         self._is_held = admitted.is_held
         self.lowered_from_n = admitted.command.lowered_from_n
@@ -158,7 +158,7 @@ class Admission:
     # -- why not
 
     def _ask(self, command: Command, values: Values, write: Write) -> None:
-        refused = self.decide(Asked(command, lambda: self._changes(values)))
+        refused = self.decide(ProposedWrite(command, lambda: self._changes(values)))
         if refused and refused.bit:
             word_at = self._commands.address(write.block, CONTROL_WORD)
             raise Refusal(refused.reason, word_at, refused.text, value=float(command.control_word))

@@ -25,7 +25,7 @@ from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, RequestError, ServerId
 from gateway.modbus.bits import pack_bits
-from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, Admitted, Write
+from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, AdmittedWrite, Write
 from gateway.registers.command import Command, Status
 from gateway.registers.command_block import CONTROL_WORD, FORCE_SETPOINT, VOLTAGE_SETPOINT, CommandBlock, check_zeros
 from gateway.registers.echo import ByteOrderEcho
@@ -254,7 +254,7 @@ class RegisterBank:
         if self.on_accepted is not None:
             self._tell(self._sentence(before, owner, admitted), peer)
 
-    def _settle_owner(self, admitted: Admitted, host: str) -> None:
+    def _settle_owner(self, admitted: AdmittedWrite, host: str) -> None:
         ownership, values = self._ownership, admitted.values
         if admitted.is_taken_over:
             ownership.take(host, explicitly=True)
@@ -272,7 +272,7 @@ class RegisterBank:
             self._shown_owner = self._ownership.owner
             self._status.show_owner(ip_number(self._shown_owner))
 
-    def _sentence(self, before: list[float], owner: str | None, admitted: Admitted) -> str:
+    def _sentence(self, before: list[float], owner: str | None, admitted: AdmittedWrite) -> str:
         """What an accepted write changed; empty when nothing that people want to know."""
         changes = self._commands.differences(before, admitted.values)
         edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE

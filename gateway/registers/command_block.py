@@ -119,7 +119,7 @@ class CommandBlock:
             if field is not None:
                 candidate[offset] = field.of_word(word, self._first + offset)
             elif word:
-                raise reserved(self._first + offset, word)
+                raise reserved_word_refusal(self._first + offset, word)
             offset += 1
         return candidate
 
@@ -207,9 +207,9 @@ def check_zeros(address: int, data: bytes) -> None:
     """Reserved words accept only 0 (03)."""
     for k in range(0, len(data), 2):
         if word := data[k] << 8 | data[k + 1]:
-            raise reserved(address + k // 2, word)
+            raise reserved_word_refusal(address + k // 2, word)
 
 
-def reserved(address: int, word: int) -> Refusal:
+def reserved_word_refusal(address: int, word: int) -> Refusal:
     text = f"address {address} is reserved: {word} was written, only 0 is accepted"
     return Refusal(RefusalReason.RESERVED, address, text, value=float(word))

@@ -64,7 +64,7 @@ class CommandField:
         return quantity(value, self.decimals, self.unit) + (f" ({name})" if name else "")
 
     def _not_a_value(self, value: float, address: int, order: WordOrder) -> Refusal:
-        if self._is_plausible(swapped := _swapped(value)):
+        if self._is_plausible(swapped := _swap_words_of_float(value)):
             sends, cure = _CURES[order]
             seen = f"{self.shown(value)}; with the words swapped {self.shown(swapped)}"
             text = f"{seen}: your client sends {sends}, {cure} ({self.name} at {address})"
@@ -93,7 +93,7 @@ _CURES: Final = {
 }
 
 
-def _swapped(value: float) -> float:
+def _swap_words_of_float(value: float) -> float:
     """The same four bytes read in the other word order."""
     return float(unpack_number("float32", WordOrder.CDAB, pack_number("float32", WordOrder.ABCD, value)))
 

@@ -12,7 +12,7 @@ from gateway.registers.command import Command
 from gateway.registers.words import ControlBit
 
 
-class Asked(NamedTuple):
+class ProposedWrite(NamedTuple):
     """A write that would be taken. command: as it would be handed on; changes: tells the names of the registers that it would
     change, control_word, heartbeat and command_sequence apart (most writes are taken without anybody asking for them)."""
 
@@ -29,8 +29,8 @@ class EdgeRefusal(NamedTuple):
     text: str
 
 
-Decide: TypeAlias = Callable[[Asked], EdgeRefusal | None]
+Decide: TypeAlias = Callable[[ProposedWrite], EdgeRefusal | None]
 
 
-def decide_nothing(asked: Asked) -> None:
+def decide_nothing(asked: ProposedWrite) -> None:
     """Stands for control where there is none: everything is taken."""

@@ -20,7 +20,7 @@ from gateway.cli.live_monitor.page import page
 from gateway.cli.live_monitor.parts import big, chart, chart_top_n
 from gateway.cli.live_monitor.poll import Poller
 from gateway.cli.live_monitor.table import View, Writer
-from gateway.cli.live_monitor.track import Point, Track, buckets
+from gateway.cli.live_monitor.track import Track, TrackPoint, buckets
 from gateway.cli.master.client import GatewayClient, Reading
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
@@ -104,9 +104,14 @@ def test_a_minute_is_kept_and_no_more(register_map: RegisterMap) -> None:
 
 
 def test_buckets_are_means_with_the_newest_at_the_right() -> None:
-    points = [Point(0.0, 1.0, 0.0), Point(59.0, 4.0, 5.0), Point(59.5, 6.0, 5.0), Point(59.9, nan, 5.0)]
-    assert buckets(points, 60.0, 6) == [None] * 5 + [Point(59.5, 5.0, 5.0)]
-    assert buckets(points, 59.9, 6)[0] == Point(0.0, 1.0, 0.0)
+    points = [
+        TrackPoint(0.0, 1.0, 0.0),
+        TrackPoint(59.0, 4.0, 5.0),
+        TrackPoint(59.5, 6.0, 5.0),
+        TrackPoint(59.9, nan, 5.0),
+    ]
+    assert buckets(points, 60.0, 6) == [None] * 5 + [TrackPoint(59.5, 5.0, 5.0)]
+    assert buckets(points, 59.9, 6)[0] == TrackPoint(0.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(("width", "height"), [(80, 24), (81, 25), (100, 30), (112, 34), (160, 50), (240, 70)])
@@ -155,7 +160,7 @@ def test_big_digits_lose_decimals_before_they_lose_their_meaning(value: float) -
 
 
 def test_the_chart_grows_with_the_force() -> None:
-    points = [Point(0.0, force_n, 10.0) for force_n in (0.0, 2.5, 5.0, 7.5, 10.0)]
+    points = [TrackPoint(0.0, force_n, 10.0) for force_n in (0.0, 2.5, 5.0, 7.5, 10.0)]
     columns = ["".join(column) for column in zip(*chart(points, 3, 10.0).plain.split("\n"), strict=True)]
     heights = [sum(" ▁▂▃▄▅▆▇█".find(cell) for cell in column if cell in "▁▂▃▄▅▆▇█") for column in columns]
     assert heights == [0, 6, 12, 18, 24]
@@ -260,4 +265,4 @@ def test_a_run_shows_its_phase_its_force_its_target_and_the_time_left(register_m
     assert "ladder 43 %, 1:20 left" in text
     assert "target N" in text
     assert "not enabled" not in text
-    assert track.points[-1] == Point(0.0, 41.5, 43.0)
+    assert track.points[-1] == TrackPoint(0.0, 41.5, 43.0)

@@ -8,8 +8,8 @@ from itertools import pairwise
 import pytest
 
 from gateway.cli.errors import CliError
-from gateway.cli.force_hold.heartbeat import Beat, Lease
-from gateway.cli.force_hold.sequence import End, HoldRun, seen_of
+from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
+from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, seen_of
 from gateway.cli.master.client import GatewayClient
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
@@ -20,7 +20,7 @@ from tests.cli.conftest import PlainBank, Server
 from tests.service.rigs import demo, with_supervision
 from tests.service.wired import Wired
 
-Serve, Beating = Callable[..., Server], Callable[..., Beat]
+Serve, Beating = Callable[..., Server], Callable[..., HeartbeatThread]
 LEASE_S, PERIOD_S, LOOK_S = 0.2, 0.05, 0.1
 
 
@@ -71,7 +71,7 @@ def test_letting_go_ramps_as_the_rig_does_and_then_disables() -> None:
     forces = [master.keep(0.1).wired.value("force_applied") for _ in range(10)]
     assert all(before - after == pytest.approx(1.0, abs=0.6) for before, after in pairwise(forces))
     master.keep()
-    assert master.run.end is End.STOPPED
+    assert master.run.end is HoldEnd.STOPPED
     assert wired.now_s - began_s == pytest.approx(1.2, abs=0.3), "12 N at 10 N/s"
     assert (wired.state, wired.fault_code, wired.word("control_word")) == (State.OFF, FaultCode.NONE, 0)
     wired.observer.check(wired.rig)
@@ -81,10 +81,10 @@ def test_a_fault_while_holding_ends_it_and_is_reset_on_request_alone() -> None:
     wired = leased()
     master = Master(wired, 12.0).keep(2.0)
     wired.fault("cell-cut")
-    assert master.keep(2.0).run.end is End.FAULT
+    assert master.keep(2.0).run.end is HoldEnd.FAULT
     wired.fault("cell-cut", False)
     wired.run(0.5)
-    assert Master(wired, 12.0).keep(0.5).run.end is End.FAULT, "nobody asked for a reset"
+    assert Master(wired, 12.0).keep(0.5).run.end is HoldEnd.FAULT, "nobody asked for a reset"
     again = Master(wired, 12.0, resets=True).keep(3.0)
     assert again.run.end is None
     assert wired.state is State.HOLDING, wired.log
@@ -94,7 +94,7 @@ def test_somebody_who_disables_ends_it() -> None:
     wired = leased()
     master = Master(wired, 12.0).keep(2.0)
     wired.write(0, 0)
-    assert master.keep(1.0).run.end is End.DISABLED
+    assert master.keep(1.0).run.end is HoldEnd.DISABLED
     assert wired.word("control_word") == 0, "it is not enabled again"
 
 
@@ -102,7 +102,7 @@ def test_let_go_before_it_began_nothing_is_written() -> None:
     wired = leased()
     master = Master(wired, 12.0)
     master.stops = True
-    assert master.keep(1.0).run.end is End.STOPPED
+    assert master.keep(1.0).run.end is HoldEnd.STOPPED
     assert wired.state is State.OFF
 
 
@@ -110,7 +110,7 @@ def test_let_go_before_it_began_nothing_is_written() -> None:
     ("length_s", "period_s"), [(None, 0.05), (0.2, 0.05), (1.0, 0.05), (0.05, 0.0125), (0.01, 0.005)]
 )
 def test_several_beats_fit_into_a_lease(length_s: float | None, period_s: float) -> None:
-    assert Lease(length_s).period_s == pytest.approx(period_s)
+    assert KnownLease(length_s).period_s == pytest.approx(period_s)
 
 
 # -- the thread
@@ -125,14 +125,14 @@ def bank(register_map: RegisterMap) -> PlainBank:
 
 
 @pytest.fixture
-def beating() -> Iterator[Callable[..., Beat]]:
+def beating() -> Iterator[Callable[..., HeartbeatThread]]:
     """beating(server, lease) starts the thread; its connection is closed at the end."""
     clients: list[GatewayClient] = []
 
-    def start(server: Server, lease: Lease | None = None) -> Beat:
+    def start(server: Server, lease: KnownLease | None = None) -> HeartbeatThread:
         host, _, port = server.address.partition(":")
         clients.append(GatewayClient(host, int(port), 1, server.bank.register_map))
-        beat = Beat(clients[-1], HoldRun(12.0, heartbeat=7, resets=False), lease, time.monotonic)
+        beat = HeartbeatThread(clients[-1], HoldRun(12.0, heartbeat=7, resets=False), lease, time.monotonic)
         beat.start()
         return beat
 
@@ -150,11 +150,11 @@ def waited(condition: Callable[[], bool]) -> bool:
 
 def test_the_heart_beats_whatever_the_terminal_does(bank: PlainBank, serve: Serve, beating: Beating) -> None:
     """Nobody shows anything here, as when stdout blocks; and each beat has another value."""
-    beat = beating(serve(bank), Lease(0.02))
+    beat = beating(serve(bank), KnownLease(0.02))
     assert waited(lambda: len(bank.writes) > 20)
     beat.stopping.set()
     beat.join(5.0)
-    assert beat.failure is None and beat.hold.end is End.STOPPED
+    assert beat.failure is None and beat.hold.end is HoldEnd.STOPPED
     heartbeats = [words[-1] for address, words in bank.writes if address + len(words) == 5]
     assert heartbeats == list(range(8, 8 + len(heartbeats)))
     assert bank.writes[0] == (0, (1, 1200, 0, 0, 8)), "setpoint, enable and heartbeat in one request"
@@ -174,7 +174,7 @@ def test_a_second_order_to_stop_skips_the_ramp(bank: PlainBank, serve: Serve, be
 
 def test_a_gateway_that_is_gone_is_told_with_what_happens_now(bank: PlainBank, serve: Serve, beating: Beating) -> None:
     server = serve(bank)
-    beat = beating(server, Lease(0.2, "ramp"))
+    beat = beating(server, KnownLease(0.2, "ramp"))
     assert waited(lambda: len(bank.writes) > 2)
     server.stop()
     beat.join(10.0)
@@ -186,7 +186,7 @@ def test_a_gateway_that_is_gone_is_told_with_what_happens_now(bank: PlainBank, s
 
 def test_a_gateway_that_comes_back_in_time_is_held_on(bank: PlainBank, serve: Serve, beating: Beating) -> None:
     server = serve(bank)
-    beat = beating(server, Lease(5.0))
+    beat = beating(server, KnownLease(5.0))
     assert waited(lambda: len(bank.writes) > 2)
     server.stop()
     before = len(bank.writes)

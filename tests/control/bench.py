@@ -16,7 +16,7 @@ from gateway.codes.faults import FaultCode
 from gateway.control import Controller, ControlSettings, Limits, LineStatus, Output, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import Asked, EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, Mode
 
 STEP_S = 0.001
@@ -127,7 +127,7 @@ class Bench:
         wanted = replace(stands, **changed)  # type: ignore[arg-type]
         silent = {"control_word", "heartbeat", "command_sequence"}
         names = tuple(name for name in changes if name not in silent and changes[name] != getattr(stands, name))
-        self.refused = self.controller.refusal_of(self.now_s, Asked(wanted, lambda: names), self.line)
+        self.refused = self.controller.refusal_of(self.now_s, ProposedWrite(wanted, lambda: names), self.line)
         if self.refused is None:
             self.command = wanted
         return self.step()

@@ -10,7 +10,7 @@ from gateway.diagnosis import EFFECTS, Measurement, diagnose
 from gateway.diagnosis.experiments.experiments import EXPERIMENTS, plan_for, plan_next
 from gateway.diagnosis.result import NotIdentifiable
 from gateway.profiles import load_plant, load_rig
-from gateway.profiles.kinds.plans import plain, plan_of
+from gateway.profiles.kinds.plans import plan_document, plan_of
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 from gateway.twin.replay.replay import Drive, Replay
@@ -65,7 +65,7 @@ def test_every_effect_has_an_experiment_that_the_shipped_rig_may_run() -> None:
         assert plan.shows == (name,)
         assert 10.0 < Schedule(segments_of(plan, LIMITS, MODEL), 0.0).duration_s <= 620.0, name
         assert experiment.parts
-        assert plan_of(plain(plan)) == plan
+        assert plan_of(plan_document(plan)) == plan
 
 
 def test_what_a_gateway_cannot_do_alone_is_said_and_the_rest_is_still_run() -> None:

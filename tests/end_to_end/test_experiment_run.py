@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.profiles.kinds.plans import load_plan, plain
+from gateway.profiles.kinds.plans import load_plan, plan_document
 from gateway.recording import read_recording
 from gateway.recording.measurement import measurement_of
 
@@ -50,7 +50,7 @@ def test_a_plan_is_run_and_recorded_and_no_calibration_comes_of_it(running, tmp_
     assert (status["state"], status["output_voltage"]) == (OFF, 0)
     assert not list((running.state / "calibrations").glob("*.yaml"))
     recording = read_recording(Path(end["recording"]))
-    assert recording.header["experiment"] == plain(load_plan(plan))
+    assert recording.header["experiment"] == plan_document(load_plan(plan))
     assert "ladder" not in recording.header
     measured = measurement_of(recording)
     assert measured.command_v is not None

@@ -9,7 +9,14 @@ from gateway.control import NO_COMPENSATION, CommandMap
 from gateway.diagnosis import EFFECTS
 from gateway.profiles import check_report, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import plant_text, with_origins
-from gateway.profiles.rigs.compensation import ALL_INPUTS, TREATMENTS, By, changed, compensation_of, number_at
+from gateway.profiles.rigs.compensation import (
+    ALL_INPUTS,
+    TREATMENTS,
+    By,
+    compensation_of,
+    differing_treatments,
+    number_at,
+)
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 
@@ -54,8 +61,8 @@ def test_every_number_that_makes_an_effect_is_looked_at():
 
 def test_an_effect_counts_where_a_number_differs():
     extended = with_value(with_value(BASE.plant, "contact", "tilt_n", 2.0), "cell", "hum_n", 0.1)
-    assert [treatment.name for treatment in changed(BASE.plant, extended)] == ["tilt-gravity", "mains-hum"]
-    assert changed(BASE.plant, BASE.plant) == ()
+    assert [treatment.name for treatment in differing_treatments(BASE.plant, extended)] == ["tilt-gravity", "mains-hum"]
+    assert differing_treatments(BASE.plant, BASE.plant) == ()
 
 
 def test_a_part_without_its_input_is_off_and_the_others_stay():

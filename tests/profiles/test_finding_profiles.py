@@ -5,16 +5,20 @@ from pathlib import Path
 import pytest
 
 import gateway
-from gateway.profiles import ProfileError, check_report, find, load_device, load_rig, shipped
+from gateway.profiles import ProfileError, check_report, find, list_shipped, load_device, load_rig
 
 PROFILES = Path(__file__).parents[2] / "profiles"
 DEMO = (PROFILES / "rigs" / "demo.yaml").read_text(encoding="utf-8")
 
 
 def test_what_the_first_issue_ships() -> None:
-    assert {"demo", "irc5-cell"} <= set(shipped("rig"))
-    assert {"smc-itv-rc", "stream-st-gs"} <= set(shipped("device"))
-    assert "paper-slide" in shipped("plant") and "force-v1" in shipped("registers") and "demo" in shipped("calibration")
+    assert {"demo", "irc5-cell"} <= set(list_shipped("rig"))
+    assert {"smc-itv-rc", "stream-st-gs"} <= set(list_shipped("device"))
+    assert (
+        "paper-slide" in list_shipped("plant")
+        and "force-v1" in list_shipped("registers")
+        and "demo" in list_shipped("calibration")
+    )
 
 
 def test_an_installed_wheel_carries_its_profiles_a_checkout_has_them_beside(

@@ -9,7 +9,7 @@ import yaml
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles import ProfileError, schema
-from gateway.profiles.kinds.plans import load_plan, load_plan_fields, plain, plan_of, plan_text
+from gateway.profiles.kinds.plans import load_plan, load_plan_fields, plan_document, plan_of, plan_text
 
 PLAN = ExperimentPlan(
     name='steps "and" more',
@@ -44,7 +44,7 @@ def test_a_written_plan_reads_back_to_the_last_bit(tmp_path: Path) -> None:
 
 
 def test_it_crosses_the_control_socket_the_same(tmp_path: Path) -> None:
-    assert plan_of(plain(PLAN)) == PLAN
+    assert plan_of(plan_document(PLAN)) == PLAN
     assert plan_of(load_plan_fields(written(tmp_path, plan_text(PLAN)))) == PLAN
 
 

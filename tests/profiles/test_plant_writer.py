@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from gateway.profiles import Origin, PlantProfile, load_plant, shipped
+from gateway.profiles import Origin, PlantProfile, list_shipped, load_plant
 from gateway.profiles.kinds.plant_writer import UNSTATED, plant_text, with_origins
 from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.strict_yaml.text import parse
@@ -24,7 +24,7 @@ def again(profile: PlantProfile, comment: str = "") -> PlantProfile | None:
     return read
 
 
-@pytest.mark.parametrize("name", shipped("plant"))
+@pytest.mark.parametrize("name", list_shipped("plant"))
 def test_a_shipped_plant_is_written_and_read_back_whole(name: str) -> None:
     assert again(load_plant(name), "by another hand\nin two lines") == load_plant(name)
 

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.bsfm import Calibration
 from gateway.devices import DeviceProfile
-from gateway.profiles import find, load_plant, shipped
+from gateway.profiles import find, list_shipped, load_plant
 from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.rigs.rig_file import RigFile
 from gateway.profiles.strict_yaml.text import Document, parse
@@ -28,7 +28,7 @@ def again(value: Any) -> Document:
     return parse(json.dumps(value).encode(), "again.yaml")
 
 
-@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in KINDS for name in shipped(kind)])
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in KINDS for name in list_shipped(kind)])
 def test_a_shipped_file_survives_writing_and_reading(kind: str, name: str) -> None:
     first, faults = build(KINDS[kind], document(kind, name))
     assert not faults
@@ -36,18 +36,18 @@ def test_a_shipped_file_survives_writing_and_reading(kind: str, name: str) -> No
     assert build(KINDS[kind], again(written)) == (first, [])
 
 
-@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in KINDS for name in shipped(kind)])
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in KINDS for name in list_shipped(kind)])
 def test_a_shipped_file_is_called_as_it_says(kind: str, name: str) -> None:
     assert document(kind, name).value["name"] == name
 
 
-@pytest.mark.parametrize("name", shipped("plant"))
+@pytest.mark.parametrize("name", list_shipped("plant"))
 def test_a_plant_survives_writing_and_reading(name: str) -> None:
     value = document("plant", name).value
     assert read_plant(again(value))[0] == load_plant(name)
 
 
-@pytest.mark.parametrize("name", shipped("registers"))
+@pytest.mark.parametrize("name", list_shipped("registers"))
 def test_a_register_map_survives_json_whose_keys_are_all_text(name: str) -> None:
     value = document("registers", name).value
     as_text = json.loads(json.dumps(value))

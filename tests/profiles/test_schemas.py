@@ -6,13 +6,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from gateway.profiles import find, schema, shipped
+from gateway.profiles import find, list_shipped, schema
 from gateway.profiles.schema import schema_text
 from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.map import map_reader
 
 ROOT = Path(__file__).parents[2] / "profiles"
-SHIPPED = [(kind, name) for kind in find.FOLDERS for name in shipped(kind)]
+SHIPPED = [(kind, name) for kind in find.FOLDERS for name in list_shipped(kind)]
 
 
 def as_json(path: Path) -> object:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import ModbusError, Peer
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
-from gateway.registers.edge_questions import Asked, EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
 
 PEERS = [Peer("10.0.0.1", 1), Peer("10.0.0.2", 2), Peer("fe80::1", 3)]
@@ -58,7 +58,7 @@ def memory(bank: RegisterBank) -> bytes:
     return bytes(data)
 
 
-def control_says(asked: Asked) -> EdgeRefusal | None:
+def control_says(asked: ProposedWrite) -> EdgeRefusal | None:
     """Now and then no, by what it is asked."""
     refuses = int(asked.command.force_setpoint_n) % 3 == 1
     return EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, "tare refused") if refuses else None

@@ -9,13 +9,13 @@ from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceProfile, PacedWire, Role, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import Accepted, ForceSample, Garbage, Pressure, ReadPressure, ReadVoltage, SetVoltage
 from gateway.ports import Pty
-from gateway.profiles import load_device, load_rig, shipped
+from gateway.profiles import list_shipped, load_device, load_rig
 from gateway.registers.words import State
 from gateway.service.running_rig.output_line import OutputExchange
 from tests.service.wired import Wired
 
 STEP_S, DURATION_S = 0.001, 5.0
-PROFILES = {name: load_device(name) for name in shipped("device")}
+PROFILES = {name: load_device(name) for name in list_shipped("device")}
 OUTPUTS = [name for name, profile in PROFILES.items() if profile.role is Role.OUTPUT]
 CELLS = [name for name in PROFILES if name not in OUTPUTS]
 
@@ -136,7 +136,7 @@ def converse(profile: DeviceProfile, far: int, near: int) -> None:
         assert reply.voltage_v == pytest.approx(wanted_v, abs=0.5001 * host.resolution_v)
 
 
-@pytest.mark.parametrize("name", shipped("rig"))
+@pytest.mark.parametrize("name", list_shipped("rig"))
 def test_every_shipped_rig_presses_for_five_seconds_when_it_is_simulated(name: str) -> None:
     """Its own lease kept, its own limits, its own devices."""
     wired = Wired(load_rig(name).as_simulated()).ready()

@@ -62,7 +62,7 @@ class Comparison:
         return self.voltage_v[branch.difference_n.index(branch.max_n)]
 
 
-def compared(a: Calibration, b: Calibration) -> Comparison:
+def compare_calibrations(a: Calibration, b: Calibration) -> Comparison:
     """ValueError when the two have no voltage in common."""
     low_v, high_v = max(a.x0_v, b.x0_v), min(a.x1_v, b.x1_v)
     if low_v >= high_v:

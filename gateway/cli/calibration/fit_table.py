@@ -69,19 +69,19 @@ def summary(document: dict[str, Any]) -> list[Text]:
             f"chosen    {chosen['model'].upper()} of order {chosen['order']}, {low_n:.1f} .. {high_n:.1f} N",
             style="bold",
         ),
-        Text(f"error     {_measured(document['measured'])}", style="bold"),
+        Text(f"error     {_describe_error(document['measured'])}", style="bold"),
         Text(f"          {_reason(chosen)}"),
         Text(f"reversal  {_reversal(reversal)}"),
     ]
     lines += [Text(f"note      {note}", style="yellow") for note in document["notes"]]
     if document.get("calibration"):
-        lines.append(_stored(document))
+        lines.append(_describe_storing(document))
     if document.get("report"):
         lines.append(Text(f"report    {document['report']}"))
     return lines
 
 
-def _measured(measured: dict[str, Any]) -> str:
+def _describe_error(measured: dict[str, Any]) -> str:
     """The error on all that was measured, and what it is to be compared with."""
     said = (
         f"{measured['rms_n']:.3f} N RMS, {measured['max_n']:.2f} N max on all {measured['points']} measured points, "
@@ -94,7 +94,7 @@ def _measured(measured: dict[str, Any]) -> str:
     return said
 
 
-def _stored(document: dict[str, Any]) -> Text:
+def _describe_storing(document: dict[str, Any]) -> Text:
     number, rejected = document["calibration"], document["measured"]["rejected"]
     named = f"calibration {number} ({document['name']})"
     if rejected:

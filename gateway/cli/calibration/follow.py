@@ -11,7 +11,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgressColumn, TextColumn
 
-from gateway.cli.calibration.sources import ENDED, LocalRun, Look, RemoteRun
+from gateway.cli.calibration.sources import ENDED, LocalRun, RemoteRun, RunStatus
 from gateway.cli.errors import CliError
 
 _POLL_S: Final = 0.2
@@ -95,11 +95,11 @@ def _wait(run: LocalRun | RemoteRun, progress: Progress, task: TaskID) -> None:
         time.sleep(_POLL_S)
 
 
-def _force(look: Look) -> str:
+def _force(look: RunStatus) -> str:
     return "" if isnan(look.force_n) else f"{look.voltage_v:5.2f} V {look.force_n:7.2f} N"
 
 
-def _eta(look: Look) -> str:
+def _eta(look: RunStatus) -> str:
     if isnan(look.eta_s) or look.eta_s <= 0.0:
         return ""
     return f"{int(look.eta_s) // 60}:{int(look.eta_s) % 60:02d} left"

@@ -19,7 +19,7 @@ _NO_PLAN: Final = ("stairs", "top_v")  # what the header says beside the plan's 
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class RestOfLadder:
     """plan: fields of the whole run; groups: climbed so far; earlier: numbers of the recordings that have them; finished: the
     last recording came to its own end; fingerprint: of the rig's files then."""
 
@@ -43,7 +43,7 @@ class Rest:
         return self.finished and self.groups >= int(plan["groups"]) and not wants_walk
 
 
-def resumed(state: Path) -> Rest:
+def find_rest_of_ladder(state: Path) -> RestOfLadder:
     """What is left of the last recorded ladder. CliError where none is recorded."""
     ladders = [entry for entry in list_recordings(state) if entry.header.get("ladder")]
     if not ladders:
@@ -62,7 +62,7 @@ def resumed(state: Path) -> Rest:
     used = [number for number, groups in climbed.items() if groups]
     header, finished = entry.header, _is_finished(last) and all(earlier.values())
     groups, fingerprint = sum(climbed.values()), header.get("rig_fingerprint", "")
-    return Rest(plan, groups, used, header.get("name", ""), fingerprint, entry.path, finished)
+    return RestOfLadder(plan, groups, used, header.get("name", ""), fingerprint, entry.path, finished)
 
 
 def rig_of(recording: Path, named: str) -> str:

@@ -1,6 +1,6 @@
 """The two ways to run a calibration: on this machine through the control socket, elsewhere by Modbus.
 
-Both answer `preview`, `begin`, `look` and `stop`; `look` is a Look. By Modbus the master decides: bit 5 starts the
+Both answer `preview`, `begin`, `look` and `stop`; `look` is a RunStatus. By Modbus the master decides: bit 5 starts the
 gateway's own plan, and clearing it ends the run.
 """
 
@@ -13,7 +13,7 @@ from gateway import defaults
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import GatewayClient, RefusedError
-from gateway.cli.master.refusal_text import explained
+from gateway.cli.master.refusal_text import explain_refusals
 from gateway.profiles import load_register_map
 from gateway.registers.words import CalibrationPhase, ControlBit
 
@@ -22,7 +22,7 @@ _WORDS: Final = ("calibration_phase", "calibration_progress", "calibration_store
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RunStatus:
     """One look at a run. eta_s: nan where nobody knows; detail: such as ` 2 of 5`."""
 
     phase: str
@@ -50,11 +50,11 @@ class LocalRun:
         request = {"do": "calibrate", "plan": self._plan, "continues": self._earlier, "name": self._name}
         self._last = ask(self._state, request)
 
-    def look(self) -> Look:
+    def look(self) -> RunStatus:
         self._last = last = ask(self._state, {"do": "calibrate"})
         group = f" {last['group']} of {last['groups']}" if last["phase"] == "ladder" else ""
         part = f": {last['part_name']} ({last['part']} of {last['parts']})" if last["phase"] == "experiment" else ""
-        return Look(
+        return RunStatus(
             last["phase"],
             last["progress"],
             last["eta_s"],
@@ -91,8 +91,8 @@ class RemoteRun:
         self._before = self.look().phase
         self._command(int(ControlBit.START_CALIBRATION))
 
-    def look(self) -> Look:
-        with explained(self._client):
+    def look(self) -> RunStatus:
+        with explain_refusals(self._client):
             self._values = [reading.value for reading in self._client.read_values(self._registers)]
         phase, progress, _, force_n, output_mv = self._values
         name = CalibrationPhase(int(phase)).name.lower()
@@ -100,7 +100,7 @@ class RemoteRun:
             name = "idle"  # what the run before left
         elif name != self._before:
             self._before = ""
-        return Look(name, progress / 1000.0, nan, force_n, output_mv / 1000.0)
+        return RunStatus(name, progress / 1000.0, nan, force_n, output_mv / 1000.0)
 
     def stop(self) -> None:
         self._command(0)
@@ -112,7 +112,7 @@ class RemoteRun:
     def _command(self, word: int) -> None:
         register = self._map.find("control_word")
         try:
-            with explained(self._client):
+            with explain_refusals(self._client):
                 self._client.write_values([_assignment(register, word)])
         except RefusedError as error:
             raise CliError(str(error)) from None

@@ -21,7 +21,7 @@ _POLL_S: Final = 0.02
 _ANY_CELL_N: Final = 5000.0  # where the rig is not known: what no calibration file may exceed
 
 
-def opened(directory: Path, rig_name: str) -> "CalibrationStore":
+def open_store(directory: Path, rig_name: str) -> "CalibrationStore":
     """The store of a state directory, with the built-in calibration of the rig where that can be read."""
     from gateway.calibrations.store import CalibrationStore
 
@@ -29,7 +29,7 @@ def opened(directory: Path, rig_name: str) -> "CalibrationStore":
     return CalibrationStore(directory, rig.calibration if rig else None)
 
 
-def found(store: "CalibrationStore", which: str) -> "Calibration":
+def find_calibration(store: "CalibrationStore", which: str) -> "Calibration":
     """A calibration by its number in the store, a shipped name or a file."""
     from gateway.calibrations.store import StoreError
     from gateway.profiles import load_calibration
@@ -54,7 +54,7 @@ def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str,
     """{"use": N, "force": bool} or {"rollback": True}: the gateway's answer when it is through, or our own where none runs."""
     with _not_running(directory) as is_free:
         if is_free:
-            return _changed_here(directory, rig_name, request)
+            return _change_without_gateway(directory, rig_name, request)
     job = ask(directory, {"do": "calibration", **request})
     answer, deadline_s = job, time.monotonic() + _PATIENCE_S
     while answer["busy"] and answer["job"] == job["job"]:
@@ -67,12 +67,12 @@ def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str,
     return answer
 
 
-def _changed_here(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
+def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
     from gateway.bsfm import CoefficientLimits
     from gateway.calibrations.activation import Activation, UnusableCalibration
     from gateway.calibrations.store import StoreError
 
-    rig, store = _rig(rig_name), opened(directory, rig_name)
+    rig, store = _rig(rig_name), open_store(directory, rig_name)
     activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n if rig else _ANY_CELL_N))
     before = store.standing().calibration
     try:

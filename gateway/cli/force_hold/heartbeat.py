@@ -10,9 +10,9 @@ from typing import Final
 from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
-from gateway.cli.force_hold.sequence import HoldRun, Seen, Write, seen_of
+from gateway.cli.force_hold.sequence import HoldRun, HoldWrite, SeenStatus, seen_of
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
-from gateway.cli.master.refusal_text import explained
+from gateway.cli.master.refusal_text import explain_refusals
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 
@@ -29,7 +29,7 @@ _LOOKS_AFTER_A_LOSS_S: Final = 2.0  # without a lease, or one that we do not kno
 
 
 @dataclass(frozen=True, slots=True)
-class Lease:
+class KnownLease:
     """What is known of the rig's lease. length_s None: it has none."""
 
     length_s: float | None
@@ -42,16 +42,18 @@ class Lease:
         return min(DEFAULT_PERIOD_S, max(_SHORTEST_PERIOD_S, shared))
 
 
-class Beat(threading.Thread):
+class HeartbeatThread(threading.Thread):
     """Runs a HoldRun against a gateway until it ends. `seen` is the newest status; `failure` what went wrong, if anything.
 
     lease: None where nobody has said what the rig's is.
     """
 
-    def __init__(self, client: GatewayClient, run: HoldRun, lease: Lease | None, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, client: GatewayClient, run: HoldRun, lease: KnownLease | None, clock: Callable[[], float]
+    ) -> None:
         super().__init__(daemon=True, name="heartbeat")
         self.hold = run
-        self.seen: Seen | None = None
+        self.seen: SeenStatus | None = None
         self.warned = WarningBit(0)  # every warning that there was
         self.failure: CliError | None = None
         self.stopping = threading.Event()
@@ -98,7 +100,7 @@ class Beat(threading.Thread):
                 raise
             self._find_again(error)
 
-    def _send(self, write: Write) -> None:
+    def _send(self, write: HoldWrite) -> None:
         values = {"heartbeat": float(write.heartbeat)}
         if write.control_word is not None:
             values |= {
@@ -110,7 +112,7 @@ class Beat(threading.Thread):
         frames = self._client.frames(
             [Assignment(self._names[name], self._names[name].encode(value)) for name, value in values.items()]
         )
-        with explained(self._client, frames):
+        with explain_refusals(self._client, frames):
             for frame in frames:
                 try:
                     self._client.write(frame)
@@ -129,7 +131,7 @@ class Beat(threading.Thread):
         return True
 
     def _look(self) -> None:
-        with explained(self._client):
+        with explain_refusals(self._client):
             readings = self._client.read_block("status")
         self.seen = seen_of({reading.register.name: float(reading.value) for reading in readings})
         self.warned |= self.seen.warnings

@@ -20,7 +20,7 @@ _ENABLE, _RESET = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT)
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SeenStatus:
     """The status registers, in their units; nan where the gateway has no value."""
 
     state: State
@@ -34,9 +34,9 @@ class Seen:
     voltage_v: float = nan
 
 
-def seen_of(values: Mapping[str, float]) -> Seen:
+def seen_of(values: Mapping[str, float]) -> SeenStatus:
     """From the status block's values by register name."""
-    return Seen(
+    return SeenStatus(
         state=State(int(values["state"])),
         fault=FaultCode(int(values["fault_code"])),
         bits=StatusBit(int(values["status_word"])),
@@ -50,7 +50,7 @@ def seen_of(values: Mapping[str, float]) -> Seen:
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class HoldWrite:
     """The next write. None for control_word and setpoint: the heartbeat alone."""
 
     heartbeat: int
@@ -58,7 +58,7 @@ class Write:
     setpoint_n: float = 0.0
 
 
-class End(Enum):
+class HoldEnd(Enum):
     """How it ended."""
 
     STOPPED = "stopped"  # as asked, at 0 N and disabled
@@ -79,7 +79,7 @@ class HoldRun:
 
     def __init__(self, force_n: float, *, heartbeat: int, resets: bool) -> None:
         self.force_n = force_n
-        self.end: End | None = None
+        self.end: HoldEnd | None = None
         self._resets = resets
         self._heartbeat = heartbeat
         self._phase = _Phase.BEGINNING
@@ -90,10 +90,10 @@ class HoldRun:
         """Whether the output has been enabled by us."""
         return self._phase in (_Phase.HOLDING, _Phase.LOWERING)
 
-    def next(self, seen: Seen, now_s: float, *, stops: bool) -> Write | None:
+    def next(self, seen: SeenStatus, now_s: float, *, stops: bool) -> HoldWrite | None:
         """seen: read after the last write that was more than a beat. stops: whether to let go."""
         if seen.state is State.FAULT and not (self._resets and self._phase.value <= _Phase.RESETTING.value):
-            self.end = End.FAULT
+            self.end = HoldEnd.FAULT
             return None
         match self._phase:
             case _Phase.HOLDING:
@@ -101,16 +101,16 @@ class HoldRun:
             case _Phase.LOWERING:
                 return self._lower(seen, now_s)
         if stops:
-            self.end = End.STOPPED
+            self.end = HoldEnd.STOPPED
             return None
         return self._begin(seen)
 
-    def at_once(self) -> Write:
+    def at_once(self) -> HoldWrite:
         """Clear enable without a ramp."""
-        self.end = End.STOPPED
+        self.end = HoldEnd.STOPPED
         return self._write(0)
 
-    def _begin(self, seen: Seen) -> Write:
+    def _begin(self, seen: SeenStatus) -> HoldWrite:
         if self._phase is _Phase.BEGINNING and seen.state is State.FAULT:
             self._phase = _Phase.RESETTING
             return self._write(0)
@@ -120,18 +120,18 @@ class HoldRun:
         self._phase = _Phase.HOLDING
         return self._write(_ENABLE, self.force_n)
 
-    def _hold(self, seen: Seen, now_s: float, *, stops: bool) -> Write | None:
+    def _hold(self, seen: SeenStatus, now_s: float, *, stops: bool) -> HoldWrite | None:
         if seen.state is State.OFF:
-            self.end = End.STOPPED if stops else End.DISABLED
+            self.end = HoldEnd.STOPPED if stops else HoldEnd.DISABLED
             return None
         if not stops:
             return self._beat()
         self._phase, self._moved_s = _Phase.LOWERING, now_s
         return self._write(_ENABLE, 0.0)
 
-    def _lower(self, seen: Seen, now_s: float) -> Write | None:
+    def _lower(self, seen: SeenStatus, now_s: float) -> HoldWrite | None:
         if seen.state is State.OFF:
-            self.end = End.STOPPED
+            self.end = HoldEnd.STOPPED
             return None
         if seen.applied_n != self._applied_n:
             self._applied_n, self._moved_s = seen.applied_n, now_s
@@ -139,11 +139,11 @@ class HoldRun:
             return self.at_once()
         return self._beat()
 
-    def _beat(self) -> Write:
-        return Write(self._changed())
+    def _beat(self) -> HoldWrite:
+        return HoldWrite(self._changed())
 
-    def _write(self, control_word: int, setpoint_n: float = 0.0) -> Write:
-        return Write(self._changed(), control_word, setpoint_n)
+    def _write(self, control_word: int, setpoint_n: float = 0.0) -> HoldWrite:
+        return HoldWrite(self._changed(), control_word, setpoint_n)
 
     def _changed(self) -> int:
         self._heartbeat = (self._heartbeat + 1) & 0xFFFF

@@ -6,7 +6,7 @@ import sys
 from math import isnan
 from typing import Any, Final
 
-from gateway.cli.force_hold.sequence import Seen
+from gateway.cli.force_hold.sequence import SeenStatus
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import LimitedBy, State, StatusBit
 
@@ -14,7 +14,7 @@ _PLAIN_S: Final = 1.0
 _ERASE: Final = "\r\x1b[K"
 
 
-def words(seen: Seen) -> str:
+def words(seen: SeenStatus) -> str:
     """`holding    11.98 N of 12.00 N   1.512 V   in band`, and what limits or warns."""
     parts = [f"{seen.state.name.lower():<11}", f"{_number(seen.force_n, 2)} N of {_number(seen.setpoint_n, 2)} N"]
     parts += [f"  {_number(seen.voltage_v, 3)} V", "  in band" if seen.bits & StatusBit.IN_BAND else "  not in band"]
@@ -26,7 +26,7 @@ def words(seen: Seen) -> str:
     return " ".join(parts)
 
 
-def document(seen: Seen, time_s: float) -> dict[str, Any]:
+def document(seen: SeenStatus, time_s: float) -> dict[str, Any]:
     """The same as JSON; None where the gateway has no value."""
     numbers = {
         "force_n": seen.force_n,
@@ -49,11 +49,11 @@ def _number(value: float, decimals: int) -> str:
     return "-" if isnan(value) else f"{value:.{decimals}f}"
 
 
-def _warnings(seen: Seen) -> list[str]:
+def _warnings(seen: SeenStatus) -> list[str]:
     return [bit.code for bit in WarningBit if seen.warnings & bit]
 
 
-class Shown:
+class StateLine:
     """Writes to stdout. A reader that has gone ends it with BrokenPipeError, which the caller takes for a stop."""
 
     def __init__(self, *, as_json: bool) -> None:
@@ -61,7 +61,7 @@ class Shown:
         self._is_live = sys.stdout.isatty() and not as_json
         self._last_s, self._last_kind = -_PLAIN_S, ()
 
-    def show(self, seen: Seen, time_s: float) -> None:
+    def show(self, seen: SeenStatus, time_s: float) -> None:
         """time_s: since the start."""
         if self._as_json:
             self._put(json.dumps(document(seen, time_s)) + "\n")
@@ -81,5 +81,5 @@ class Shown:
         sys.stdout.flush()
 
 
-def _kind(seen: Seen) -> tuple[Any, ...]:
+def _kind(seen: SeenStatus) -> tuple[Any, ...]:
     return seen.state, bool(seen.bits & StatusBit.IN_BAND), seen.limited_by, seen.warnings

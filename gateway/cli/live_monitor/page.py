@@ -11,7 +11,7 @@ from rich.text import Text
 from gateway.cli.live_monitor.parts import big, chart, chart_top_n
 from gateway.cli.live_monitor.table import View, register_table
 from gateway.cli.live_monitor.track import Track, buckets
-from gateway.cli.master.value_text import shown
+from gateway.cli.master.value_text import format_value
 from gateway.codes.catalogue import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
@@ -54,17 +54,17 @@ def _header(view: View) -> Text:
         f" {known.name if known is not None else '?'} ", style=_STATE_STYLE.get(known, "") if known is not None else ""
     )
     if known is State.CALIBRATING:
-        text.append(f"  {_run(track)}", style="bold")
+        text.append(f"  {_describe_run(track)}", style="bold")
     else:
         for bit, style in _SHOWN_BITS.items():
             if track.has_status(bit):
                 text.append(f"  {(bit.name or '').lower().replace('_', ' ')}", style=style)
-        text.append(f"   {_settled(track)}")
+        text.append(f"   {_describe_settling(track)}")
     text.append(f"   {view.where}", style="dim")
     return text
 
 
-def _run(track: Track) -> str:
+def _describe_run(track: Track) -> str:
     """`ladder 43 %, 1:20 left`: how far a calibration or an experiment is. Empty for a gateway without these registers."""
     if "calibration_phase" not in track.readings:
         return ""
@@ -74,7 +74,7 @@ def _run(track: Track) -> str:
     return told if isnan(left_s) else f"{told}, {int(left_s) // 60}:{int(left_s) % 60:02d} left"
 
 
-def _settled(track: Track) -> str:
+def _describe_settling(track: Track) -> str:
     """Settling time and what the error has kept to lately; 5 s show a limit cycle, and forget the approach."""
     settling = track.settling
     if not settling.is_settled:
@@ -133,7 +133,7 @@ def _detail(code: str, track: Track) -> str:
     """What else the registers say of an alarm: the name that the residual watch has for its cause."""
     if code != WarningBit.MODEL_DIFFERS.code or "residual_cause" not in track.readings:
         return ""
-    return f": {shown(track.readings['residual_cause']).replace('_', '-')}"
+    return f": {format_value(track.readings['residual_cause']).replace('_', '-')}"
 
 
 def _code_of_fault(number: int) -> str:

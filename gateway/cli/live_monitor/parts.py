@@ -6,7 +6,7 @@ from typing import Final
 
 from rich.text import Text
 
-from gateway.cli.live_monitor.track import Point
+from gateway.cli.live_monitor.track import TrackPoint
 
 _DIGITS: Final = {
     "0": ("█▀█", "█ █", "▀▀▀"),
@@ -38,7 +38,7 @@ def big(value: float, decimals: int, *, sign: str = "-", width: int, style: str)
     return Text(f"\n{value:{sign}.{decimals}f}\n", style=f"bold {style}")
 
 
-def chart(points: Sequence[Point | None], rows: int, top_n: float) -> Text:
+def chart(points: Sequence[TrackPoint | None], rows: int, top_n: float) -> Text:
     """Measured force as columns from 0 to top_n, newest at the right; the setpoint as a line where no column hides it."""
     text = Text(no_wrap=True)
     for row in range(rows - 1, -1, -1):
@@ -49,7 +49,7 @@ def chart(points: Sequence[Point | None], rows: int, top_n: float) -> Text:
     return text
 
 
-def _cell(point: Point | None, row: int, rows: int, top_n: float) -> tuple[str, str]:
+def _cell(point: TrackPoint | None, row: int, rows: int, top_n: float) -> tuple[str, str]:
     if point is None:
         return " ", ""
     eighths = round(max(0.0, min(1.0, point.measured_n / top_n)) * rows * 8) - row * 8
@@ -59,7 +59,7 @@ def _cell(point: Point | None, row: int, rows: int, top_n: float) -> tuple[str, 
     return ("─", "yellow") if setpoint_row == row and point.setpoint_n > 0 else (" ", "")
 
 
-def chart_top_n(points: Sequence[Point | None]) -> float:
+def chart_top_n(points: Sequence[TrackPoint | None]) -> float:
     """A round force above everything in the chart."""
     largest = max((max(point.measured_n, point.setpoint_n) for point in points if point), default=0.0)
     return next((float(top) for top in (5, 10, 20, 30, 40, 50, 75, 100, 150, 200) if largest <= 0.95 * top), 330.0)

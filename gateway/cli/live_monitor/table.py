@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gateway.cli.live_monitor.track import Track
-from gateway.cli.master.value_text import raw, shown
+from gateway.cli.master.value_text import format_value, raw
 
 _ROOMY: Final = 100  # columns from which the writer's port is shown too
 _FIRST: Final = (
@@ -106,7 +106,7 @@ def _cells(view: View, name: str) -> list[Any]:
     cells = [
         Text(str(reading.register.address), style="dim"),
         name,
-        Text(shown(reading), style=fresh),
+        Text(format_value(reading), style=fresh),
         Text(raw(reading), style="dim"),
         Text("-" if age_s is None else f"{age_s:.0f} s", style="dim"),
     ]

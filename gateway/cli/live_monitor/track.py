@@ -17,7 +17,7 @@ WINDOW_S: Final = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class TrackPoint:
     time_s: float
     measured_n: float
     setpoint_n: float
@@ -46,7 +46,7 @@ class Track:
     """Fed with the readings of the command and the status block of each poll."""
 
     def __init__(self) -> None:
-        self.points: deque[Point] = deque()
+        self.points: deque[TrackPoint] = deque()
         self.readings: dict[str, Reading] = {}
         self.settling = Settling()
         self.time_s = 0.0
@@ -59,7 +59,7 @@ class Track:
         self.readings = {reading.register.name: reading for reading in readings}
         for name, reading in self.readings.items():
             self._note_change(name, reading.words)
-        point = Point(time_s, self.value("force_measured"), self.wanted_n)
+        point = TrackPoint(time_s, self.value("force_measured"), self.wanted_n)
         self._settle(point)
         self.points.append(point)
         while self.points[0].time_s < time_s - WINDOW_S:
@@ -93,7 +93,7 @@ class Track:
         if seen.words != words:
             seen.words, seen.changed_s = words, self.time_s
 
-    def _settle(self, point: Point) -> None:
+    def _settle(self, point: TrackPoint) -> None:
         last, settling = (self.points[-1] if self.points else None), self.settling
         if last is not None and last.setpoint_n != point.setpoint_n:
             self._step_s, settling = point.time_s, Settling()
@@ -114,10 +114,10 @@ class Track:
         return max((abs(point.measured_n - point.setpoint_n) for point in recent), default=nan)
 
 
-def buckets(points: Sequence[Point], now_s: float, count: int) -> list[Point | None]:
+def buckets(points: Sequence[TrackPoint], now_s: float, count: int) -> list[TrackPoint | None]:
     """The last minute in `count` equal pieces, oldest first, each its mean; None where nothing was measured."""
     width_s = WINDOW_S / count
-    gathered: list[list[Point]] = [[] for _ in range(count)]
+    gathered: list[list[TrackPoint]] = [[] for _ in range(count)]
     for point in points:
         index = count - 1 - int((now_s - point.time_s) / width_s)
         if 0 <= index < count and not isnan(point.measured_n):
@@ -125,6 +125,6 @@ def buckets(points: Sequence[Point], now_s: float, count: int) -> list[Point | N
     return [_mean(group) if group else None for group in gathered]
 
 
-def _mean(group: Sequence[Point]) -> Point:
+def _mean(group: Sequence[TrackPoint]) -> TrackPoint:
     measured_n = sum(point.measured_n for point in group) / len(group)
-    return Point(group[-1].time_s, measured_n, group[-1].setpoint_n)
+    return TrackPoint(group[-1].time_s, measured_n, group[-1].setpoint_n)

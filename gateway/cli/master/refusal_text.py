@@ -28,7 +28,9 @@ _LAST_REFUSAL: Final = ("refusal_address", "refusal_reason", "refusal_value")
 
 
 @contextmanager
-def explained(client: GatewayClient, frames: "list[Frame] | None" = None, state: Path | None = None) -> Iterator[None]:
+def explain_refusals(
+    client: GatewayClient, frames: "list[Frame] | None" = None, state: Path | None = None
+) -> Iterator[None]:
     """Turns a Modbus exception into one message, exit code 1. frames: what is being written, if anything; state: directory
     of the gateway, where it is on this machine and not among the usual ones."""
     try:

@@ -8,8 +8,8 @@ from typing import Final
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import Frame, GatewayClient
-from gateway.cli.master.refusal_text import explained
-from gateway.cli.master.upload_frames import Request, Upload
+from gateway.cli.master.refusal_text import explain_refusals
+from gateway.cli.master.upload_frames import Request, UploadFrames
 from gateway.modbus.pdu import WRITE_REGISTER
 from gateway.registers.upload.coefficients import HEAD_WORDS, TAIL_FROM
 from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
@@ -28,7 +28,7 @@ class Master(GatewayClient):
 
     def send(self, requests: Iterable[Request]) -> None:
         for request in requests:
-            with explained(self, [Frame(request.address, request.words)]):
+            with explain_refusals(self, [Frame(request.address, request.words)]):
                 if request.function == WRITE_REGISTER:
                     text = f"write 1 at {request.address}"
                     self._ask("write_register", text, request.address, request.words[0])
@@ -36,14 +36,14 @@ class Master(GatewayClient):
                     self.write(Frame(request.address, request.words))
 
     def calibration_id(self) -> int:
-        with explained(self):
+        with explain_refusals(self):
             return int(self.read_values([self.register_map.find("calibration_id")])[0].value)
 
-    def outcome(self, upload: Upload) -> CommitStatus:
+    def outcome(self, upload: UploadFrames) -> CommitStatus:
         """How it ended: idle after a dry run, or committed. CliError when it failed."""
         deadline_s = time.monotonic() + _PATIENCE_S
         while True:
-            with explained(self):
+            with explain_refusals(self):
                 words = self.read_words(upload.poll.address, upload.poll.count)
             status, index, reason = struct.unpack(">HhH", struct.pack(">3H", *words))
             if status == CommitStatus.FAILED:
@@ -57,17 +57,17 @@ class Master(GatewayClient):
 
     def is_known_set(self) -> bool:
         """Whether the gateway knew the committed set already, so that number and name are the old ones."""
-        with explained(self):
+        with explain_refusals(self):
             (word,) = self.read_words(self.register_map.find("commit_notice").address, 1)
         return bool(word & CommitNotice.KNOWN_SET)
 
-    def check_active(self, upload: Upload, slot: int) -> None:
+    def check_active(self, upload: UploadFrames, slot: int) -> None:
         """The active block holds what was sent, word for word."""
         sent = struct.unpack(f">{len(upload.set_words) // 2}H", upload.set_words)
         first = self.register_map.find("order@active").address
         places = [*range(first, first + HEAD_WORDS)]
         places += range(first + TAIL_FROM, first + TAIL_FROM + len(sent) - HEAD_WORDS)
-        with explained(self):
+        with explain_refusals(self):
             words = self.read_words(first, HEAD_WORDS)
             words += self.read_words(first + TAIL_FROM, len(sent) - HEAD_WORDS)
             (seen,) = self.read_words(self.register_map.find("active_slot").address, 1)

@@ -55,7 +55,7 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
-class Upload:
+class UploadFrames:
     """set_words: what the active block must read back; commit is the last request; poll is repeated until commit_status tells
     the end."""
 
@@ -71,7 +71,7 @@ class Upload:
 
 def upload_of(
     calibration: Calibration, register_map: RegisterMap, *, slot: int, action: CommitAction, fc06: bool
-) -> Upload:
+) -> UploadFrames:
     """The requests that stage a calibration and then act. ValueError for more slip stops than the registers carry."""
     if (stops := len(calibration.slip_radii_v)) > STOPS_CARRIED:
         raise ValueError(f"{calibration.name} has {stops} slip stops, the registers carry {STOPS_CARRIED}")
@@ -81,7 +81,7 @@ def upload_of(
     commit = (action.value,)
     text = "commit: check, store and use" if action is CommitAction.COMMIT else "commit word 2: check only"
     parts = tuple(_parts(words, trailer, register_map))
-    return Upload(
+    return UploadFrames(
         words,
         tuple(_single(parts, register_map)) if fc06 else parts,
         Request(text, WRITE_REGISTER if fc06 else WRITE_REGISTERS, commit_address, commit),
@@ -125,7 +125,7 @@ def register_names(register_map: RegisterMap) -> dict[int, str]:
     return names
 
 
-def listing(upload: Upload, register_map: RegisterMap, unit: int) -> Iterator[str]:
+def listing(upload: UploadFrames, register_map: RegisterMap, unit: int) -> Iterator[str]:
     """Every request as text: function, address, frame in hexadecimal, and for FC16 each register with its value."""
     requests = (*upload.requests, upload.poll)
     for number, request in enumerate(requests, 1):
@@ -137,7 +137,7 @@ def listing(upload: Upload, register_map: RegisterMap, unit: int) -> Iterator[st
             yield from _values(request, register_map)
 
 
-def facts(upload: Upload, unit: int) -> list[dict[str, Any]]:
+def facts(upload: UploadFrames, unit: int) -> list[dict[str, Any]]:
     """The same for --json."""
     return [
         {
@@ -170,7 +170,7 @@ def _values(request: Request, register_map: RegisterMap) -> Iterator[str]:
             continue
         for register in registers:
             words = _own(register, request)
-            yield f"    {register.address}  {' '.join(f'{word:04X}' for word in words):<9}  {_shown(register, words)}"
+            yield f"    {register.address}  {' '.join(f'{word:04X}' for word in words):<9}  {_describe_value(register, words)}"
 
 
 def _within(register: Register, request: Request) -> bool:
@@ -182,7 +182,7 @@ def _own(register: Register, request: Request) -> Words:
     return request.words[start : start + register.words]
 
 
-def _shown(register: Register, own: Words) -> str:
+def _describe_value(register: Register, own: Words) -> str:
     value = register.decode(struct.pack(f">{len(own)}H", *own))
     number = f"0x{int(value):08X}" if register.name == "crc32" else f"{value:.9g}"
     return f"{register.name} = {number} {register.unit}".rstrip()

@@ -8,7 +8,7 @@ from gateway.cli.master.client import Reading
 from gateway.registers import Register
 
 
-def parsed(register: Register, text: str) -> bytes:
+def parse_value(register: Register, text: str) -> bytes:
     """The words for a value as typed; ValueError with a sentence."""
     if register.bits:
         number: float = _bits(register, text)
@@ -19,7 +19,7 @@ def parsed(register: Register, text: str) -> bytes:
     return register.encode(number)
 
 
-def shown(reading: Reading) -> str:
+def format_value(reading: Reading) -> str:
     """A value with its unit or names; `-` when the gateway has none."""
     register, value = reading.register, reading.value
     if isnan(value):

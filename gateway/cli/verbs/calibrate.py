@@ -88,9 +88,9 @@ def command(
         run: LocalRun | RemoteRun = RemoteRun(gateway)
     else:
         directory = state_directory(state, rig)
-        asked = _asked(directory, wanted)
+        asked = _plan_wanted(directory, wanted)
         if asked.whole:
-            _tell(_fitted(asked.whole, rig, directory), as_json, resumes=False)
+            _tell(_fit_stopped_run(asked.whole, rig, directory), as_json, resumes=False)
             return
         run = LocalRun(directory, asked.plan, asked.earlier, asked.name)
         resumes = not is_experiment(asked.plan)
@@ -102,7 +102,7 @@ def command(
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _WantedRun:
     """What to climb: the plan's fields, and the recordings that it goes on from. whole: the recording of a run that has
     everything, so that only the fit is left; fingerprint: of the rig that the earlier ones were made on."""
 
@@ -113,7 +113,7 @@ class _Asked:
     fingerprint: str = ""
 
 
-def _asked(directory: Path, wanted: dict[str, Any]) -> _Asked:
+def _plan_wanted(directory: Path, wanted: dict[str, Any]) -> _WantedRun:
     from gateway.control.runs.ladder_stairs import QUICK
 
     fields: dict[str, Any] = {}
@@ -126,15 +126,15 @@ def _asked(directory: Path, wanted: dict[str, Any]) -> _Asked:
     if wanted["tare"]:
         fields["tare"] = True
     if wanted["resume"]:
-        return _resumed(directory, fields, wanted["name"] or "")
-    return _Asked(fields, name=wanted["name"] or "")
+        return _resume(directory, fields, wanted["name"] or "")
+    return _WantedRun(fields, name=wanted["name"] or "")
 
 
-def _resumed(directory: Path, fields: dict[str, Any], name: str) -> _Asked:
+def _resume(directory: Path, fields: dict[str, Any], name: str) -> _WantedRun:
     """The rest of the last run; fields: what is asked for otherwise now, which may be more groups, but no other stairs."""
-    from gateway.cli.calibration.resume import resumed
+    from gateway.cli.calibration.resume import find_rest_of_ladder
 
-    rest = resumed(directory)
+    rest = find_rest_of_ladder(directory)
     changed = [f"{key} {value:g}" for key, value in fields.items() if key in _STAIRS and value != rest.plan[key]]
     if changed:
         stairs = ", ".join(f"{key} {rest.plan[key]:g}" for key in _STAIRS)
@@ -145,10 +145,10 @@ def _resumed(directory: Path, fields: dict[str, Any], name: str) -> _Asked:
         )
     plan = rest.plan_with(fields)
     whole = rest.last if rest.is_whole(plan) else None
-    return _Asked(plan, rest.earlier, name or rest.name, whole, rest.fingerprint)
+    return _WantedRun(plan, rest.earlier, name or rest.name, whole, rest.fingerprint)
 
 
-def _fitted(recording: Path, rig: str, directory: Path) -> dict[str, Any]:
+def _fit_stopped_run(recording: Path, rig: str, directory: Path) -> dict[str, Any]:
     """The end of a run that has everything but its fit: as `follow` answers."""
     from gateway.cli.calibration.resume import rig_of
     from gateway.service.fitting.fit_process import fit_and_store
@@ -160,7 +160,7 @@ def _fitted(recording: Path, rig: str, directory: Path) -> dict[str, Any]:
     return {"phase": phase, "recording": str(recording), "sentence": sentence} | result
 
 
-def _warn_of_another_rig(asked: _Asked, preview: dict[str, Any]) -> None:
+def _warn_of_another_rig(asked: _WantedRun, preview: dict[str, Any]) -> None:
     if asked.fingerprint and asked.fingerprint != preview["rig_fingerprint"]:
         click.echo(
             f"the files of rig {preview['rig']} have changed since the first part was recorded: if cell, cylinder or regulator "

@@ -31,9 +31,9 @@ def command() -> None:
 def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
     """List the calibrations of a state directory; * is in use, x was rejected."""
     from gateway.calibrations.selection import OWN
-    from gateway.cli.calibration.stored import opened
+    from gateway.cli.calibration.stored import open_store
 
-    store = opened(state_directory(state, rig), rig)
+    store = open_store(state_directory(state, rig), rig)
     standing, entries = store.standing(), store.list()
     if as_json:
         facts = {
@@ -68,10 +68,10 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
 def show_command(*, which: str | None, state: Path | None, rig: str, as_json: bool) -> None:
     """Show calibration N (default: the one in use) with all its numbers."""
     from gateway.calibrations.store import as_text
-    from gateway.cli.calibration.stored import found, in_use, opened
+    from gateway.cli.calibration.stored import find_calibration, in_use, open_store
 
-    store = opened(state_directory(state, rig), rig)
-    calibration = found(store, which) if which else in_use(store)
+    store = open_store(state_directory(state, rig), rig)
+    calibration = find_calibration(store, which) if which else in_use(store)
     click.echo(json.dumps(asdict(calibration), indent=2) if as_json else as_text(calibration), nl=as_json)
 
 
@@ -111,13 +111,13 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: Path | None, ri
 
     Numbers of the store, shipped names or files. Differences are B minus A.
     """
-    from gateway.cli.calibration.comparison import compared, page, table
-    from gateway.cli.calibration.stored import found, opened
+    from gateway.cli.calibration.comparison import compare_calibrations, page, table
+    from gateway.cli.calibration.stored import find_calibration, open_store
 
-    store = opened(state_directory(state, rig), rig)
-    first, second = found(store, a), found(store, b)
+    store = open_store(state_directory(state, rig), rig)
+    first, second = find_calibration(store, a), find_calibration(store, b)
     try:
-        comparison = compared(first, second)
+        comparison = compare_calibrations(first, second)
     except ValueError as error:
         raise CliError(f"E433 {error}", exit_codes.DATA) from None
     if plot:
@@ -136,11 +136,11 @@ def export_command(
 ) -> None:
     """Take calibration N along, as YAML (default) or as C."""
     from gateway.calibrations.store import as_text
-    from gateway.cli.calibration.stored import found, opened
+    from gateway.cli.calibration.stored import find_calibration, open_store
 
     if yaml_file and c_directory:
         raise click.UsageError("--yaml or --c, not both")
-    calibration = found(opened(state_directory(state, rig), rig), which)
+    calibration = find_calibration(open_store(state_directory(state, rig), rig), which)
     if c_directory:
         _write({c_directory / name: text for name, text in _c_source(calibration).items()}, force=force)
     elif yaml_file and yaml_file != Path("-"):
@@ -208,11 +208,11 @@ def _line(calibration: "Calibration", slots: list[int]) -> str:
     rms, worst = (f"{error_n:.3f}" if error_n >= 0.0 else "-" for error_n in (calibration.rms_n, calibration.max_n))
     return (
         f"{calibration.date_utc:<12}{calibration.kind:<10}{calibration.reversal_kind:<16}{forces:<18}{rms:>7} {worst:>7}"
-        f"  {','.join(map(str, slots)):<5}  {calibration.name} · {calibration.source}{_rejected(calibration)}"
+        f"  {','.join(map(str, slots)):<5}  {calibration.name} · {calibration.source}{_describe_rejection(calibration)}"
     )
 
 
-def _rejected(calibration: "Calibration") -> str:
+def _describe_rejection(calibration: "Calibration") -> str:
     return f" · rejected, not offered: {calibration.rejected}" if calibration.rejected else ""
 
 

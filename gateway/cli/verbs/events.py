@@ -61,10 +61,10 @@ def command(
             f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA
         )
     with EventReader(directory) as reader:
-        _show(reader, _wanted(after, severity, {code.upper() for code in codes}), follow, as_json)
+        _show(reader, _event_filter(after, severity, {code.upper() for code in codes}), follow, as_json)
 
 
-def _wanted(after: str, severity: str, codes: set[str]) -> Callable[[EventRecord], bool]:
+def _event_filter(after: str, severity: str, codes: set[str]) -> Callable[[EventRecord], bool]:
     severities = SEVERITIES[SEVERITIES.index(severity) :]
 
     def wanted(event: EventRecord) -> bool:

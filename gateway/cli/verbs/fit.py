@@ -71,10 +71,10 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
     from rich.console import Console
 
     with Console(stderr=True).status("fitting"):
-        fit = _fitted(recording, options)
+        fit = _fit(recording, options)
     target = None if options["no_report"] else options["report"] or _beside(fit.recording.path)
     if store:
-        fit.document["calibration"] = _stored(fit, options)
+        fit.document["calibration"] = _store(fit, options)
     if target:
         from gateway.service.fitting.ladder_fit import write_report
 
@@ -90,7 +90,7 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
         raise CliError(rejected_sentence(fit.document["calibration"], fit.verdict.rejected), exit_codes.DATA)
 
 
-def _fitted(name: str, options: dict[str, Any]) -> "LadderFit":
+def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     """Everything that can be wrong with the data, as exit code 65."""
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
@@ -120,7 +120,7 @@ def _beside(path: Path) -> Path:
     return path.with_name(f"{path.stem}.fit.html")
 
 
-def _stored(fit: "LadderFit", options: dict[str, Any]) -> int:
+def _store(fit: "LadderFit", options: dict[str, Any]) -> int:
     from gateway.bsfm.ladder.fault import LadderError
     from gateway.calibrations.store import CalibrationStore
     from gateway.profiles import load_rig

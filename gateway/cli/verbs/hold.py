@@ -16,7 +16,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.options import Endpoint, gateway_options, json_option
 
 if TYPE_CHECKING:
-    from gateway.cli.force_hold.heartbeat import Beat, Lease
+    from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
 
 _SHOW_S: Final = 0.1
 _UNITS: Final = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
@@ -46,10 +46,10 @@ def command(
 
     Example: force-gateway hold 12 --for 10s
     """
-    from gateway.cli.force_hold.heartbeat import Beat
+    from gateway.cli.force_hold.heartbeat import HeartbeatThread
     from gateway.cli.force_hold.sequence import HoldRun
     from gateway.cli.master.client import GatewayClient
-    from gateway.cli.master.refusal_text import explained
+    from gateway.cli.master.refusal_text import explain_refusals
     from gateway.profiles import load_register_map
 
     if not (isfinite(newton) and newton >= 0.0):
@@ -57,26 +57,26 @@ def command(
     lease = _lease(rig)
     register_map = load_register_map(options["map_name"])
     with GatewayClient(*endpoint, options["unit"], register_map) as client:
-        with explained(client):
+        with explain_refusals(client):
             (heartbeat,) = client.read_values([register_map.find("heartbeat")])
-        run = HoldRun(_checked(register_map, newton), heartbeat=int(heartbeat.value), resets=options["resets"])
-        beat = Beat(client, run, lease, time.monotonic)
+        run = HoldRun(_check_force(register_map, newton), heartbeat=int(heartbeat.value), resets=options["resets"])
+        beat = HeartbeatThread(client, run, lease, time.monotonic)
         _follow(beat, for_s, as_json=as_json)
     _tell(beat, client.where, as_json=as_json)
 
 
-def _lease(rig: str | None) -> "Lease | None":
+def _lease(rig: str | None) -> "KnownLease | None":
     """What the rig file says; None where none is named."""
-    from gateway.cli.force_hold.heartbeat import Lease
+    from gateway.cli.force_hold.heartbeat import KnownLease
     from gateway.profiles import load_rig
 
     if rig is None:
         return None
     supervision = load_rig(rig, simulated=True).control.supervision
-    return Lease(supervision.lease_s, supervision.lease_action.value)
+    return KnownLease(supervision.lease_s, supervision.lease_action.value)
 
 
-def _checked(register_map: Any, newton: float) -> float:
+def _check_force(register_map: Any, newton: float) -> float:
     """A force that the register can carry; the rig's own limits are the gateway's to tell."""
     try:
         register_map.find("force_setpoint").encode(newton)
@@ -85,11 +85,11 @@ def _checked(register_map: Any, newton: float) -> float:
     return newton
 
 
-def _follow(beat: "Beat", for_s: float | None, *, as_json: bool) -> None:
+def _follow(beat: "HeartbeatThread", for_s: float | None, *, as_json: bool) -> None:
     """Show the line until the beat ends; what stops it comes as a signal, as the end of its time, or as a closed pipe."""
-    from gateway.cli.force_hold.state_line import Shown
+    from gateway.cli.force_hold.state_line import StateLine
 
-    shown, began_s = Shown(as_json=as_json), time.monotonic()
+    shown, began_s = StateLine(as_json=as_json), time.monotonic()
     with _signals(beat):
         beat.start()
         while beat.is_alive():
@@ -109,7 +109,7 @@ def _follow(beat: "Beat", for_s: float | None, *, as_json: bool) -> None:
 
 
 @contextmanager
-def _signals(beat: "Beat") -> Iterator[None]:
+def _signals(beat: "HeartbeatThread") -> Iterator[None]:
     """The first of Ctrl-C, SIGTERM and a closed terminal ramps down, the second drops the force at once."""
 
     def on_signal(number: int, frame: object) -> None:
@@ -123,24 +123,24 @@ def _signals(beat: "Beat") -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _tell(beat: "Beat", where: str, *, as_json: bool) -> None:
+def _tell(beat: "HeartbeatThread", where: str, *, as_json: bool) -> None:
     """How it ended; CliError when not as asked."""
-    from gateway.cli.force_hold.sequence import End
+    from gateway.cli.force_hold.sequence import HoldEnd
 
     end = beat.hold.end
     if as_json:
         click.echo(json.dumps({"end": end.value if end and not beat.failure else "failed"}))
     if beat.failure:
         raise beat.failure
-    if end is End.FAULT:
+    if end is HoldEnd.FAULT:
         raise CliError(_fault_words(beat))
-    if end is End.DISABLED:
+    if end is HoldEnd.DISABLED:
         raise CliError(f"{_disabled_words(beat)} ({where})")
     if not as_json:
         click.echo("0 N, disabled: the output is at the safe voltage", err=True)
 
 
-def _disabled_words(beat: "Beat") -> str:
+def _disabled_words(beat: "HeartbeatThread") -> str:
     """Why the output is off although nobody here has asked for it."""
     from gateway.codes.warning_bits import WarningBit
 
@@ -151,7 +151,7 @@ def _disabled_words(beat: "Beat") -> str:
     return "W336 somebody else has cleared enable; the output is at the safe voltage"
 
 
-def _fault_words(beat: "Beat") -> str:
+def _fault_words(beat: "HeartbeatThread") -> str:
     """The fault's sentence, and how to go on."""
     assert beat.seen
     entry = beat.seen.fault.explanation

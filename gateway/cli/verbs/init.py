@@ -16,14 +16,14 @@ def command(*, name: str) -> None:
     NAME.yaml, in the current directory (default: my-cell).
     """
     from gateway.cli.starter_rig import starter_rig
-    from gateway.profiles import shipped
+    from gateway.profiles import list_shipped
 
     target = Path(name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
     if target.name != str(target):
         raise click.UsageError(f"{target} is not in the current directory; give a name alone, such as my-cell")
     if not re.fullmatch(r"[a-z0-9][a-z0-9._-]{0,62}", target.stem):
         raise click.UsageError(f"{target.stem} is no name for a rig: small letters, digits, . _ -, such as my-cell")
-    if target.stem in shipped("rig"):
+    if target.stem in list_shipped("rig"):
         raise click.UsageError(f"{target.stem} is the name of a shipped rig; choose another")
     try:
         with target.open("x", encoding="utf-8") as file:

@@ -33,13 +33,13 @@ def command(*, svg: Path | None, seconds: float | None, endpoint: Endpoint, **op
 
     from gateway.cli.live_monitor.poll import Poller
     from gateway.cli.master.client import GatewayClient
-    from gateway.cli.master.refusal_text import explained
+    from gateway.cli.master.refusal_text import explain_refusals
     from gateway.profiles import load_register_map
 
     register_map = load_register_map(options["map_name"])
     with GatewayClient(*endpoint, options["unit"], register_map) as client:
         poller = Poller(client, options["state"], time.monotonic)
-        with explained(client):
+        with explain_refusals(client):
             poller.poll()  # the first one fails loudly: a wrong address is no reason to wait
         if svg or options["once"] or not sys.stdout.isatty():
             _watch(poller, seconds or 0.0)

@@ -24,20 +24,20 @@ def command(*, names: tuple[str, ...], endpoint: Endpoint, unit: int, map_name: 
     Example: force-gateway read force_measured state
     """
     from gateway.cli.master.client import GatewayClient
-    from gateway.cli.master.refusal_text import explained
-    from gateway.cli.master.value_text import raw, shown
+    from gateway.cli.master.refusal_text import explain_refusals
+    from gateway.cli.master.value_text import format_value, raw
     from gateway.profiles import load_register_map
 
     register_map = load_register_map(map_name)
-    registers = _found(register_map, names)
-    with GatewayClient(*endpoint, unit, register_map) as client, explained(client):
+    registers = _find_registers(register_map, names)
+    with GatewayClient(*endpoint, unit, register_map) as client, explain_refusals(client):
         readings = client.read_values(registers)
     if as_json:
         click.echo(json.dumps({label(reading.register): _facts(reading) for reading in readings}, indent=2))
         return
     width = max(len(label(reading.register)) for reading in readings)
     for reading in readings:
-        click.echo(f"{label(reading.register):<{width}}  {shown(reading):<28}  {raw(reading)}")
+        click.echo(f"{label(reading.register):<{width}}  {format_value(reading):<28}  {raw(reading)}")
 
 
 def label(register: "Register") -> str:
@@ -47,7 +47,7 @@ def label(register: "Register") -> str:
     return register.name if register.block in PLAIN_BLOCKS else f"{register.name}@{register.block}"
 
 
-def _found(register_map: "RegisterMap", names: tuple[str, ...]) -> "list[Register]":
+def _find_registers(register_map: "RegisterMap", names: tuple[str, ...]) -> "list[Register]":
     from gateway.registers import UnknownRegister
 
     blocks = {block.name for block in register_map.blocks}
@@ -61,11 +61,11 @@ def _found(register_map: "RegisterMap", names: tuple[str, ...]) -> "list[Registe
 
 
 def _facts(reading: "Reading") -> dict[str, Any]:
-    from gateway.cli.master.value_text import shown
+    from gateway.cli.master.value_text import format_value
 
     return {
         "value": reading.value if reading.is_available else None,
-        "text": shown(reading),
+        "text": format_value(reading),
         "unit": reading.register.unit,
         "address": reading.register.address,
         "words": list(reading.words),

@@ -46,7 +46,7 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
     sources = read_sources([recording], **options)
     measurement, profile = sources.measurements[0], profile or sources.plant
     check_targets([csv_file] if csv_file else [], [*sources.paths, *([Path(plant)] if plant else [])])
-    simulated_n, notes = _simulated(measurement, profile)
+    simulated_n, notes = _simulate(measurement, profile)
     facts = _facts(measurement, simulated_n) | {
         "plant": profile.name,
         "notes": [*sources.notes, *measurement.notes, *notes],
@@ -61,7 +61,7 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
         click.echo(f"wrote {csv_file}", err=True)
 
 
-def _simulated(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Floats, list[str]]":
+def _simulate(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Floats, list[str]]":
     """Readings, N. Where a position was measured nobody says which way is out, or whether it is that of the slide at all
     and not of the tool along the workpiece: as in a diagnosis, the way that fits best is taken."""
     import numpy as np

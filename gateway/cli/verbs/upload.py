@@ -17,7 +17,7 @@ from gateway.cli.options import Endpoint, gateway_options, json_option
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration
-    from gateway.cli.master.upload_frames import Upload
+    from gateway.cli.master.upload_frames import UploadFrames
     from gateway.registers import RegisterMap
 
 
@@ -37,12 +37,12 @@ def command(*, file: str, map_name: str, as_json: bool, **options: Any) -> None:
     from gateway.cli.master.upload_frames import facts, listing
     from gateway.profiles import load_register_map
 
-    calibration, register_map = _loaded(file), load_register_map(map_name)
+    calibration, register_map = _load(file), load_register_map(map_name)
     upload, unit = _upload(calibration, register_map, options), options["unit"]
     only_print = options["print_frames"] and options["dry_run"]
     if options["print_frames"] and not as_json:
         click.echo("\n".join(listing(upload, register_map, unit)))
-    told = {} if only_print else _sent(upload, register_map, options)
+    told = {} if only_print else _send(upload, register_map, options)
     if as_json:
         frames = {"frames": facts(upload, unit)} if options["print_frames"] else {}
         click.echo(json.dumps({"sent": not only_print, **told, **frames}))
@@ -50,7 +50,7 @@ def command(*, file: str, map_name: str, as_json: bool, **options: Any) -> None:
         click.echo(_sentence(calibration, told))
 
 
-def _loaded(file: str) -> "Calibration":
+def _load(file: str) -> "Calibration":
     """The file to upload, with METHOD's checks: what can be said here need not go to the gateway."""
     from gateway.profiles import ProfileError, load_calibration
 
@@ -60,7 +60,7 @@ def _loaded(file: str) -> "Calibration":
         raise CliError(str(error), exit_codes.DATA) from None
 
 
-def _upload(calibration: "Calibration", register_map: "RegisterMap", options: dict[str, Any]) -> "Upload":
+def _upload(calibration: "Calibration", register_map: "RegisterMap", options: dict[str, Any]) -> "UploadFrames":
     from gateway.cli.master.upload_frames import upload_of
     from gateway.registers.words import CommitAction
 
@@ -73,7 +73,7 @@ def _upload(calibration: "Calibration", register_map: "RegisterMap", options: di
         raise CliError(text, exit_codes.DATA) from None
 
 
-def _sent(upload: "Upload", register_map: "RegisterMap", options: dict[str, Any]) -> dict[str, Any]:
+def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str, Any]) -> dict[str, Any]:
     """Stage, commit, wait, read back; what to tell. CliError when it did not come to that."""
     from gateway.cli.master.upload import Master
 

@@ -30,16 +30,16 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, 
     Example: force-gateway write force_setpoint=12 control_word=enable
     """
     from gateway.cli.master.client import GatewayClient
-    from gateway.cli.master.refusal_text import explained
+    from gateway.cli.master.refusal_text import explain_refusals
     from gateway.profiles import load_register_map
 
     register_map = load_register_map(options["map_name"])
     wanted = [_assignment(register_map, text) for text in assignments]
     _refuse_doubles(wanted)
     with GatewayClient(*endpoint, options["unit"], register_map) as client:
-        with explained(client):
+        with explain_refusals(client):
             frames = client.frames(wanted)
-        with explained(client, frames, options["state"]):
+        with explain_refusals(client, frames, options["state"]):
             for frame in [] if dry_run else frames:
                 client.write(frame)
     _tell(frames, wanted, dry_run=dry_run, as_json=as_json)
@@ -47,7 +47,7 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, 
 
 def _assignment(register_map: "RegisterMap", text: str) -> "Assignment":
     from gateway.cli.master.client import Assignment
-    from gateway.cli.master.value_text import parsed
+    from gateway.cli.master.value_text import parse_value
     from gateway.registers import UnknownRegister
 
     name, equals, value = text.partition("=")
@@ -57,7 +57,7 @@ def _assignment(register_map: "RegisterMap", text: str) -> "Assignment":
         register = register_map.find(name.strip())
         if not register.is_writable:
             raise click.UsageError(f"{name} is read only: {register.text}")
-        return Assignment(register, parsed(register, value))
+        return Assignment(register, parse_value(register, value))
     except UnknownRegister as error:
         raise click.UsageError(str(error)) from None
     except ValueError as error:
@@ -86,6 +86,6 @@ def _tell(frames: "list[Frame]", wanted: "list[Assignment]", *, dry_run: bool, a
 
 def _as_shown(assignment: "Assignment") -> str:
     from gateway.cli.master.client import Reading
-    from gateway.cli.master.value_text import shown
+    from gateway.cli.master.value_text import format_value
 
-    return shown(Reading(assignment.register, assignment.register.decode(assignment.data), ()))
+    return format_value(Reading(assignment.register, assignment.register.decode(assignment.data), ()))

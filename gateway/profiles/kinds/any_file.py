@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.profiles.find import FOLDERS, shipped
+from gateway.profiles.find import FOLDERS, list_shipped
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.kinds import kind_of
 from gateway.profiles.kinds.plans import AnyPlan, read_plan
 from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.kinds.registers import read_registers
-from gateway.profiles.load import asked_for, open_file
+from gateway.profiles.load import open_file, refer_to
 from gateway.profiles.rigs.assembly import check_report
 from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
 from gateway.profiles.strict_yaml.text import Document
@@ -31,9 +31,9 @@ class Checked:
 
 def check_file(name: str | Path) -> Checked:
     """Read and check a profile of any kind, by shipped name (a rig's first) or path. Never raises for what is in a file."""
-    kind = next((kind for kind in FOLDERS if str(name) in shipped(kind)), "rig")
+    kind = next((kind for kind in FOLDERS if str(name) in list_shipped(kind)), "rig")
     findings = Findings()
-    opened = open_file(kind, asked_for(name), findings)
+    opened = open_file(kind, refer_to(name), findings)
     kind = (kind_of(opened[0].value, kind) if opened else None) or kind
     if kind == "rig":
         report = check_report(name)

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeAlias
 
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part, plan_faults
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.profiles.load import asked_for, open_profile
+from gateway.profiles.load import open_profile, refer_to
 from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError, printable
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
@@ -26,19 +26,19 @@ _SCHEMA_LINE: Final = "# force-gateway schema plan > plan.json gives editors the
 
 def load_plan(path: str | Path) -> AnyPlan:
     """The plan of a file. ProfileError with every fault."""
-    return read_plan(_opened(path))
+    return read_plan(_open_plan(path))
 
 
 def load_plan_fields(path: str | Path) -> dict[str, Any]:
     """What a good file says and no more, for options that fill in what it leaves out. ProfileError with every fault."""
-    document = _opened(path)
+    document = _open_plan(path)
     read_plan(document)
     return dict(document.value)
 
 
-def _opened(path: str | Path) -> Document:
+def _open_plan(path: str | Path) -> Document:
     findings = Findings()
-    opened = open_profile("plan", asked_for(path), findings)
+    opened = open_profile("plan", refer_to(path), findings)
     if opened is None:
         raise ProfileError(findings.faults)
     return opened[0]
@@ -70,7 +70,7 @@ def plan_of(fields_: Mapping[str, Any]) -> AnyPlan:
         raise ValueError(f"plan: {fault.path} {fault.message}".replace("  ", " ")) from None
 
 
-def plain(plan: AnyPlan) -> dict[str, Any]:
+def plan_document(plan: AnyPlan) -> dict[str, Any]:
     """As JSON takes it and `plan_of` reads it back: without what is not given."""
     document: dict[str, Any] = json.loads(json.dumps(asdict(plan)))
     for part in document.get("parts", ()):

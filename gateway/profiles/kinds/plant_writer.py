@@ -24,7 +24,7 @@ def plant_text(profile: PlantProfile, comment: str = "") -> str:
     """The whole file. comment: lines to stand at its top. ValueError for a plant of lanes or with a number that is not
     finite, which no file can hold."""
     head = "".join(f"# {line}\n" for line in comment.splitlines())
-    about = f"name: {_quoted(profile.name)}\ndescription: {_quoted(profile.description)}\n"
+    about = f"name: {_quote(profile.name)}\ndescription: {_quote(profile.description)}\n"
     return _SCHEMA_LINE + head + about + "".join(_sections(profile))
 
 
@@ -62,7 +62,7 @@ def _sections(profile: PlantProfile) -> Iterator[str]:
 
 
 def _leaf(value: object, origin: Origin | None) -> str:
-    source = _quoted(origin.source if origin else UNSTATED)
+    source = _quote(origin.source if origin else UNSTATED)
     bounds = origin.range if origin else None
     end = f", range: [{_number(bounds[0])}, {_number(bounds[1])}]" if bounds else ""
     return f"{{value: {_number(value)}, source: {source}{end}}}"
@@ -78,11 +78,11 @@ def _number(value: object) -> str:
     return f"{mantissa if '.' in mantissa else mantissa + '.0'}{exponent}{power}"
 
 
-def _quoted(text: str) -> str:
-    return '"' + "".join(map(_escaped, text)) + '"'
+def _quote(text: str) -> str:
+    return '"' + "".join(map(_escape, text)) + '"'
 
 
-def _escaped(sign: str) -> str:
+def _escape(sign: str) -> str:
     if sign in '"\\':
         return "\\" + sign
     if sign.isprintable():

@@ -13,7 +13,7 @@ _NAMES: Final[dict[str, Any]] = {
 }
 
 
-def _named(own: Iterable[str]) -> dict[str, Any]:
+def _names_or_enumeration(own: Iterable[str]) -> dict[str, Any]:
     return {"anyOf": [_NAMES, {"enum": list(own)}]}
 
 
@@ -32,9 +32,10 @@ _REGISTER: Final[dict[str, Any]] = {
         "min": {"type": "number", "description": "least value, in the unit; else what the type carries"},
         "max": {"type": "number", "description": "largest value, in the unit; else what the type carries"},
         "text": {"type": "string", "description": "what it means, for the register table"},
-        "values": _named(VALUE_NAMES)
+        "values": _names_or_enumeration(VALUE_NAMES)
         | {"description": "names of an enumeration's numbers, or one of the program's own"},
-        "bits": _named(BIT_NAMES) | {"description": "names of a word's bits, or one of the program's own"},
+        "bits": _names_or_enumeration(BIT_NAMES)
+        | {"description": "names of a word's bits, or one of the program's own"},
         "constant": {"type": "number", "description": "what a proof register always reads"},
         "word_order": _ORDER,
         "count": {"type": "integer", "minimum": 1, "maximum": 256, "description": "makes NAME_0, NAME_1, ..."},

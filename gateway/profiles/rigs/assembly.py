@@ -15,11 +15,11 @@ from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
-from gateway.profiles.load import asked_for, load_plant, open_profile, read_named, written_at
+from gateway.profiles.load import load_plant, open_profile, read_named, refer_at, refer_to
 from gateway.profiles.rigs import checks, line_checks, network_checks, wire_checks
 from gateway.profiles.rigs.checks import Check, Parts
 from gateway.profiles.rigs.compensation import compensation_of, compensation_words, in_simulation, without_compensable
-from gateway.profiles.rigs.edit_marks import marked
+from gateway.profiles.rigs.edit_marks import find_edit_marks
 from gateway.profiles.rigs.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, RigFile
 from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
@@ -52,7 +52,7 @@ def check_report(name: str | Path, *, simulated: bool = False) -> Report:
     simulated: its devices will be simulated, so no port is needed; rig is `as_simulated` then.
     """
     findings = Findings()
-    opened = open_profile("rig", asked_for(name), findings)
+    opened = open_profile("rig", refer_to(name), findings)
     rig = _rig(opened[0], opened[1], findings) if opened else None
     faults = findings.faults + ([] if simulated else findings.hardware)
     if rig and simulated:
@@ -85,17 +85,17 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     file, faults = build(RigFile, document)
     findings.faults += faults
     register_map = read_named(
-        "registers", written_at(document, ("registers",), path.parent, defaults.REGISTER_MAP), read_registers, findings
+        "registers", refer_at(document, ("registers",), path.parent, defaults.REGISTER_MAP), read_registers, findings
     )
     parts = _parts(document, path.parent, findings)
-    findings.faults += _first_of_each_path(_told(document, FAULTS, parts))
-    findings.hardware += _first_of_each_path(_told(document, line_checks.HARDWARE, parts))
-    findings.warnings += _told(document, WARNINGS, parts)
+    findings.faults += _first_of_each_path(_run_checks(document, FAULTS, parts))
+    findings.hardware += _first_of_each_path(_run_checks(document, line_checks.HARDWARE, parts))
+    findings.warnings += _run_checks(document, WARNINGS, parts)
     marks = _marks(document, path, findings)
     findings.warnings += marks
     if file is None or register_map is None or findings.faults:
         return None
-    rig = _assembled(file, parts, register_map, path, findings)
+    rig = _assemble_rig(file, parts, register_map, path, findings)
     if not marks:
         return rig
     lines = ", ".join(str(fault.line) for fault in marks)
@@ -111,10 +111,10 @@ def _marks(document: Document, path: Path, findings: Findings) -> list[Fault]:
         return []
     told = {fault.path for fault in (*findings.faults, *findings.hardware)}
     text = findings.texts[display(path)].decode("utf-8-sig", "replace")
-    return [fault for fault in marked(document, text) if fault.path not in told]
+    return [fault for fault in find_edit_marks(document, text) if fault.path not in told]
 
 
-def _told(document: Document, found_by: Iterable[Check], parts: Parts) -> list[Fault]:
+def _run_checks(document: Document, found_by: Iterable[Check], parts: Parts) -> list[Fault]:
     return [document.fault(_steps(path), sentence) for check in found_by for path, sentence in check(parts)]
 
 
@@ -131,7 +131,7 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     """What can be checked together: every part that has no fault of its own."""
 
     def named(kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]) -> T | None:
-        return read_named(kind, written_at(document, path, folder), read, findings)
+        return read_named(kind, refer_at(document, path, folder), read, findings)
 
     plant = named("plant", ("plant",), read_plant)
     extended = named("plant", ("compensation",), read_plant)
@@ -176,7 +176,7 @@ def _part(document: Document, key: str, kind: type[T]) -> T | None:
         return None
 
 
-def _assembled(file: RigFile, parts: Parts, register_map: RegisterMap, path: Path, findings: Findings) -> Rig:
+def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: Path, findings: Findings) -> Rig:
     assert parts.output_device and parts.cell_device and parts.calibration  # or there were faults
     compensation = parts.compensation or NO_COMPENSATION
     compensation = in_simulation(compensation) if file.simulated else compensation

@@ -65,7 +65,7 @@ def number_at(plant: Plant, path: str) -> Any:
     return getattr(getattr(plant, section), name)
 
 
-def changed(base: Plant, extended: Plant) -> tuple[FieldTreatment, ...]:
+def differing_treatments(base: Plant, extended: Plant) -> tuple[FieldTreatment, ...]:
     """Effects in which the two plants differ, in the catalogue's order of compensation."""
     return tuple(
         treatment
@@ -83,7 +83,7 @@ def compensation_of(
     An extended plant without any of it gives the null compensation, its effects all in `limited`.
     """
     told, acting, limited = frozenset(inputs), [], []
-    for treatment in changed(base, extended):
+    for treatment in differing_treatments(base, extended):
         why_not = _why_not(treatment, told, new_model)
         if why_not:
             limited.append((treatment.name, why_not))

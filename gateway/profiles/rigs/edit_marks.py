@@ -15,7 +15,7 @@ PLACEHOLDER: Final = re.compile(r"\bEDIT\b")
 """In a value that cannot stay as it is, such as the path of a port."""
 
 
-def marked(document: Document, text: str) -> Iterator[Fault]:
+def find_edit_marks(document: Document, text: str) -> Iterator[Fault]:
     """Each value whose line is still marked, with what belongs there."""
     keys = {mark.key_line: path for path, mark in document.marks.items() if path}
     for number, line in enumerate(text.splitlines(), start=1):

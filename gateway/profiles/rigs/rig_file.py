@@ -28,10 +28,10 @@ def _network(text: Any) -> IPv4Network | IPv6Network:
     try:
         return ip_network(text)
     except ValueError:
-        raise ValueError(f'"{text}" is not a network such as 192.168.125.0/24{_masked(text)}') from None
+        raise ValueError(f'"{text}" is not a network such as 192.168.125.0/24{_suggest_network(text)}') from None
 
 
-def _masked(text: str) -> str:
+def _suggest_network(text: str) -> str:
     """Host bits set is the usual slip: say the network that the address is in."""
     try:
         return f"; did you mean {ip_network(text, strict=False)}?"

@@ -66,7 +66,7 @@ class Document:
 
 def parse(data: bytes, file: str) -> Document:
     """Read one file's bytes; ProfileError with all faults."""
-    reader = _Reader(file, _decoded(data, file))
+    reader = _Reader(file, _decode(data, file))
     value = reader.document()
     if not reader.faults and value is None:
         reader.faults.append(Fault(file, 1, 1, "", "the file is empty: keys such as `name:` are expected"))
@@ -81,7 +81,7 @@ def _kind(value: object) -> str:
     return "a list" if isinstance(value, list) else "a single value"
 
 
-def _decoded(data: bytes, file: str) -> str:
+def _decode(data: bytes, file: str) -> str:
     if len(data) > _LARGEST_BYTES:
         raise ProfileError([Fault(file, 0, 0, "", f"{len(data)} bytes: a profile has at most {_LARGEST_BYTES}")])
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):

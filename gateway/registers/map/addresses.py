@@ -16,18 +16,18 @@ _NAMES: Final = ((40001, 49999, "holding register"), (30001, 39999, "input regis
 
 def no_such_address(blocks: Sequence[Block], address: int, count: int) -> Refusal:
     """The refusal of a range that no block holds."""
-    if shifted := _shifted(blocks, address, count):
+    if shifted := _explain_shift(blocks, address, count):
         return Refusal(OFF_BY_ONE, address, shifted)
     ranges = ", ".join(f"{block.first}-{block.last}" for block in blocks)
     elsewhere = f"{_range(address, count)} is not in one block; blocks are {ranges}"
-    return Refusal(RefusalReason.ADDRESS, address, _named(address) or elsewhere)
+    return Refusal(RefusalReason.ADDRESS, address, _explain_name_as_address(address) or elsewhere)
 
 
 def _range(address: int, count: int) -> str:
     return f"address {address}" if count == 1 else f"addresses {address} .. {address + count - 1}"
 
 
-def _named(address: int) -> str:
+def _explain_name_as_address(address: int) -> str:
     for first, last, what in _NAMES:
         if first <= address <= last:
             return f"{address} is the name of address {address - first}: a {what}'s name counts from {first}"
@@ -36,7 +36,7 @@ def _named(address: int) -> str:
     return ""
 
 
-def _shifted(blocks: Sequence[Block], address: int, count: int) -> str:
+def _explain_shift(blocks: Sequence[Block], address: int, count: int) -> str:
     for block in blocks:
         inside = f"block {block.name} is {block.first} .. {block.last}"
         if block.first <= address <= block.last + 1 == address + count - 1:

@@ -25,7 +25,7 @@ class DocumentReader:
     def keys(self, place: Place, content: Mapping[str, Any], known: tuple[str, ...]) -> None:
         for key in content:
             if key not in known:
-                self.fault((*place, key), f"is not a known key{meant(str(key), known)}")
+                self.fault((*place, key), f"is not a known key{suggest(str(key), known)}")
 
     def group(self, place: Place, content: Any) -> Mapping[str, Any]:
         if isinstance(content, Mapping):
@@ -77,7 +77,7 @@ class DocumentReader:
         """Return {number: name}, as given or as the named one of `known` has it; numbers may have become text (JSON)."""
         if isinstance(given, str):
             if given not in known:
-                self.fault(place, f"{given} is not one of {', '.join(known)}{meant(given, known)}")
+                self.fault(place, f"{given} is not one of {', '.join(known)}{suggest(given, known)}")
             return known.get(given, {})
         names: dict[int, str] = {}
         for key, name in self.group(place, given).items():
@@ -89,6 +89,6 @@ class DocumentReader:
         return names
 
 
-def meant(word: str, known: Iterable[str]) -> str:
+def suggest(word: str, known: Iterable[str]) -> str:
     near = get_close_matches(word, list(known), 1, 0.6)
     return f"; did you mean {near[0]}?" if near else ""

@@ -15,8 +15,8 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any, Final
 
-from gateway.registers.map.document_reader import DocumentReader, Place, meant
-from gateway.registers.map.register_map import Block, Register, RegisterMap, repeated
+from gateway.registers.map.document_reader import DocumentReader, Place, suggest
+from gateway.registers.map.register_map import Block, Register, RegisterMap, repeat_as_float
 from gateway.registers.map.value_names import BIT_NAMES, VALUE_NAMES
 from gateway.registers.values import RAW_LIMITS, TYPES, words_of
 
@@ -38,14 +38,14 @@ class MapError(ValueError):
 
 def read_map(document: Mapping[str, Any]) -> RegisterMap:
     """Raises MapError with every fault found."""
-    reader = _Reader()
+    reader = _MapReader()
     found = reader.map(document)
     if reader.faults:
         raise MapError(reader.faults)
     return found
 
 
-class _Reader(DocumentReader):
+class _MapReader(DocumentReader):
     """Knows what a map, a block and a register consist of."""
 
     def map(self, document: Mapping[str, Any]) -> RegisterMap:
@@ -95,7 +95,7 @@ class _Reader(DocumentReader):
         name, kind = self.text(place, entry, "name"), self.text(place, entry, "type")
         self.is_name((*place, "name"), name)
         if kind not in TYPES:
-            self.fault((*place, "type"), f"{kind} is not one of {', '.join(TYPES)}{meant(kind, TYPES)}")
+            self.fault((*place, "type"), f"{kind} is not one of {', '.join(TYPES)}{suggest(kind, TYPES)}")
             return
         address = self.whole(place, entry, "address", 0, 0xFFFF)
         count = self.whole(place, entry, "count", 1, 256) if "count" in entry else 1
@@ -134,11 +134,13 @@ class _Reader(DocumentReader):
                 place: Place = ("blocks", block.name, "repeats", source_name)
                 source = by_name.get(source_name)
                 if source is None or source.repeats:
-                    self.fault(place, f"{source_name} is not a block with registers{meant(source_name, by_name)}")
+                    self.fault(place, f"{source_name} is not a block with registers{suggest(source_name, by_name)}")
                 elif not isinstance(base, int) or base < block.first or base + 2 * source.words - 1 > block.last:
                     self.fault(place, f"{base} .. does not fit in {block.name}, {block.first} .. {block.last}")
                 else:
-                    copies = (repeated(register, source, block) for register in own if register.block == source_name)
+                    copies = (
+                        repeat_as_float(register, source, block) for register in own if register.block == source_name
+                    )
                     yield from (register for register in copies if register is not None)
 
     def blocks_apart(self, blocks: tuple[Block, ...]) -> None:
@@ -174,8 +176,8 @@ class _Reader(DocumentReader):
         self, place: Place, entry: Mapping[str, Any], kind: str, scale: float
     ) -> tuple[float | None, float | None]:
         low, high = RAW_LIMITS.get(kind, (None, None))
-        minimum = self.number(place, entry, "min") if "min" in entry else _scaled(low, scale)
-        maximum = self.number(place, entry, "max") if "max" in entry else _scaled(high, scale)
+        minimum = self.number(place, entry, "min") if "min" in entry else _scale_bound(low, scale)
+        maximum = self.number(place, entry, "max") if "max" in entry else _scale_bound(high, scale)
         if minimum is not None and maximum is not None and minimum > maximum:
             self.fault(place, f"min {minimum:g} is above max {maximum:g}")
         for key, bound in (("min", minimum), ("max", maximum)):
@@ -190,5 +192,5 @@ class _Reader(DocumentReader):
         return access
 
 
-def _scaled(bound: int | None, scale: float) -> float | None:
+def _scale_bound(bound: int | None, scale: float) -> float | None:
     return None if bound is None else bound / round(1.0 / scale) if scale != 1.0 else bound

@@ -88,7 +88,7 @@ class Block:
         return self.last - self.first + 1
 
 
-def repeated(register: Register, source: Block, block: Block) -> Register | None:
+def repeat_as_float(register: Register, source: Block, block: Block) -> Register | None:
     """The same quantity as float32 in a float block: word k of the source at base + 2k. None if float32 cannot carry it."""
     if register.type in ("int32", "uint32"):
         return None

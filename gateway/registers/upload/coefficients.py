@@ -94,8 +94,8 @@ class CoefficientSet:
 
     def to_words(self) -> bytes:
         """SET_BYTES bytes. ValueError when an array is longer than there is room."""
-        branches = (number for array in self.arrays for number in _padded(array, STRIDE))
-        stops = (number for array in (self.slip_radii_v, self.slip_shares) for number in _padded(array, STOPS_CARRIED))
+        branches = (number for array in self.arrays for number in _pad(array, STRIDE))
+        stops = (number for array in (self.slip_radii_v, self.slip_shares) for number in _pad(array, STOPS_CARRIED))
         limits = (self.force_low_n, self.force_high_n, self.blend_span_n)
         head = _HEAD.pack(self.order, self.x0_v, self.x1_v, *branches, *limits)
         return head + _TAIL.pack(self.stops, *self.response_s, *stops)
@@ -139,7 +139,7 @@ def _limits_n(calibration: Calibration) -> tuple[float, float]:
     return max(low_n, own_low_n), min(high_n, own_high_n)
 
 
-def _padded(array: Numbers, room: int) -> Numbers:
+def _pad(array: Numbers, room: int) -> Numbers:
     if len(array) > room:
         raise ValueError(f"{len(array)} numbers in an array of at most {room}")
     return (*array, *(0.0,) * (room - len(array)))

@@ -58,7 +58,7 @@ class Staged(NamedTuple):
     without_stops: bool
 
 
-class _Given(NamedTuple):
+class _StagedSet(NamedTuple):
     """What a block holds, taken apart. words: those that length and CRC speak of."""
 
     words: bytes
@@ -75,10 +75,10 @@ def check_staged(block: bytes, limits: CoefficientLimits) -> Staged | StagedFaul
     """
     if len(block) != BLOCK_BYTES:
         raise ValueError(f"{len(block)} bytes are staged, {BLOCK_BYTES} are needed")
-    given = _taken_apart(block)
+    given = _take_apart(block)
     if (fault := next(_frame_faults(block, given), None)) is not None:
         return fault
-    used = _used(given.staged)
+    used = _cut_to_order(given.staged)
     for found in validate_coefficients(used, limits):
         return StagedFault(found.index, found.reason, found.text)
     if (fault := _force_fault(given.staged)) is not None:
@@ -86,13 +86,13 @@ def check_staged(block: bytes, limits: CoefficientLimits) -> Staged | StagedFaul
     return Staged(used, _own_limits_n(given.staged), given.slot, given.length == HEAD_WORDS)
 
 
-def _taken_apart(block: bytes) -> _Given:
+def _take_apart(block: bytes) -> _StagedSet:
     length, crc, slot = _TRAILER.unpack_from(block, HEAD_BYTES)
     words = block[:HEAD_BYTES] if length == HEAD_WORDS else words_of_block(block)
-    return _Given(words, CoefficientSet.from_words(words), length, crc, slot)
+    return _StagedSet(words, CoefficientSet.from_words(words), length, crc, slot)
 
 
-def _frame_faults(block: bytes, given: _Given) -> Iterator[StagedFault]:
+def _frame_faults(block: bytes, given: _StagedSet) -> Iterator[StagedFault]:
     """What can be said without judging a number."""
     staged = given.staged
     if given.length not in (SET_WORDS, HEAD_WORDS):
@@ -128,7 +128,7 @@ def _unused_places(staged: CoefficientSet) -> Iterator[StagedFault]:
                 yield StagedFault(first + place, UploadReason.UNUSED_NOT_ZERO, text)
 
 
-def _used(staged: CoefficientSet) -> Coefficients:
+def _cut_to_order(staged: CoefficientSet) -> Coefficients:
     rising_b, rising_w, falling_b, falling_w = (array[: staged.order + 1] for array in staged.arrays)
     return Coefficients(
         staged.x0_v,

@@ -12,7 +12,7 @@ from typing import Final
 from numpy.random import default_rng
 
 from gateway.catalogue.catalogue import EFFECTS
-from gateway.profiles.rigs.compensation import changed
+from gateway.profiles.rigs.compensation import differing_treatments
 from gateway.twin import Plant, surroundings
 from gateway.twin.surroundings import Surroundings
 
@@ -97,7 +97,7 @@ class SetpointSchedule:
 
 def columns_of(base: Plant, extended: Plant) -> frozenset[str]:
     """What has to move so that the extension is felt."""
-    names = {treatment.name for treatment in changed(base, extended)}
+    names = {treatment.name for treatment in differing_treatments(base, extended)}
     found = {column for name, column in COLUMNS.items() if name in names}
     friction, before = extended.friction, base.friction
     for field, column in (

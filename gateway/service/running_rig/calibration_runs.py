@@ -18,7 +18,7 @@ from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.devices.messages import ForceSample
 from gateway.profiles import Rig
-from gateway.profiles.kinds.plans import plain, plan_of
+from gateway.profiles.kinds.plans import plan_document, plan_of
 from gateway.recording import Recorder
 from gateway.recording.tables.columns import LADDER
 from gateway.registers.words import CalibrationPhase
@@ -258,7 +258,7 @@ def _describe_progress(run: AnyRun | None) -> Answer:
 def _header_of_plan(run: AnyRun) -> Answer:
     """For the recording's header: a ladder is what `fit` and --resume look for."""
     if isinstance(run, ExperimentRun):
-        return {"experiment": plain(run.plan)}
+        return {"experiment": plan_document(run.plan)}
     top_v = max(stair.voltage_v for stair in run.stairs)
     return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
 

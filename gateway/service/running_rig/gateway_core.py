@@ -20,7 +20,7 @@ from gateway.devices.messages import ForceSample
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import Asked, EdgeRefusal
+from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.load_cell_line import CellExchange
@@ -74,7 +74,7 @@ class ControlLoop:
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
 
-    def _on_asked(self, asked: Asked) -> EdgeRefusal | None:
+    def _on_asked(self, asked: ProposedWrite) -> EdgeRefusal | None:
         """Before the bank stores a write: whether control can take it at this moment."""
         now_s = self._clock()
         return self.controller.refusal_of(now_s, asked, self._line(now_s))

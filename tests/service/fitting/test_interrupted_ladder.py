@@ -14,7 +14,7 @@ import pytest
 
 from gateway.bsfm.ladder.labels import CHECK, DONE, LABELS, WALK, Labels
 from gateway.calibrations.store import CalibrationStore
-from gateway.cli.calibration.resume import resumed
+from gateway.cli.calibration.resume import find_rest_of_ladder
 from gateway.cli.errors import CliError
 from gateway.profiles import load_rig
 from gateway.recording import Recorder, Recording, read_recording
@@ -99,7 +99,7 @@ def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbe
     for cut in [*range(1, rows, 61), *(np.flatnonzero(np.diff(runs.whole.columns["group"])) + 1).tolist(), rows - 1]:
         path.unlink()
         assert written(tmp_path, runs.whole, cut) == path
-        rest, groups = resumed(tmp_path), groups_left_behind(runs.whole, cut)
+        rest, groups = find_rest_of_ladder(tmp_path), groups_left_behind(runs.whole, cut)
         assert (rest.groups, rest.earlier) == (groups, [1] if groups else []), f"cut at row {cut}"
         assert not rest.is_whole(rest.plan)
         plan = rest.plan_with({})
@@ -112,7 +112,7 @@ def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbe
 def test_a_run_that_was_cut_gives_a_calibration_as_good_as_one_that_was_not(runs, stair: int, tmp_path: Path) -> None:
     cut = int(np.searchsorted(runs.whole.columns["stair"], stair)) + 20
     written(tmp_path, runs.whole, cut)
-    rest = resumed(tmp_path)
+    rest = find_rest_of_ladder(tmp_path)
     last = written(tmp_path, runs.rest[rest.groups] if rest.groups else runs.whole, continues=rest.earlier)
     checked, whole = (check_source(read_recording(path), DEMO) for path in (last, runs.whole.path))
     assert checked.ladder.voltage_v == pytest.approx(whole.ladder.voltage_v)
@@ -138,7 +138,7 @@ def test_the_fit_of_a_resumed_run_is_offered_and_its_error_is_that_of_a_whole_on
 
 def test_a_finished_run_repeats_nothing_and_its_fit_is_made_once(runs, tmp_path: Path) -> None:
     path = written(tmp_path, runs.whole)
-    rest = resumed(tmp_path)
+    rest = find_rest_of_ladder(tmp_path)
     assert rest.is_whole(rest.plan)
     assert rest.name == "left cell"
     first = fit_and_store(path, "demo", tmp_path)
@@ -151,9 +151,9 @@ def test_a_finished_run_repeats_nothing_and_its_fit_is_made_once(runs, tmp_path:
 def test_an_earlier_part_that_is_gone_is_climbed_again(runs, tmp_path: Path) -> None:
     gone = written(tmp_path, runs.whole, int(np.searchsorted(runs.whole.columns["stair"], 30)))
     written(tmp_path, runs.rest[1], int(np.searchsorted(runs.rest[1].columns["stair"], 12)), continues=[1])
-    assert (resumed(tmp_path).groups, resumed(tmp_path).earlier) == (1, [1])
+    assert (find_rest_of_ladder(tmp_path).groups, find_rest_of_ladder(tmp_path).earlier) == (1, [1])
     gone.unlink()
-    assert (resumed(tmp_path).groups, resumed(tmp_path).earlier) == (0, [])
+    assert (find_rest_of_ladder(tmp_path).groups, find_rest_of_ladder(tmp_path).earlier) == (0, [])
 
 
 def test_a_tare_that_a_restart_has_lost_moves_no_group(runs, tmp_path: Path) -> None:
@@ -178,4 +178,4 @@ def test_only_the_last_stair_left_makes_a_run_whole(runs) -> None:
 
 def test_without_a_recorded_ladder_there_is_nothing_to_go_on_with(tmp_path: Path) -> None:
     with pytest.raises(CliError, match="E422"):
-        resumed(tmp_path)
+        find_rest_of_ladder(tmp_path)
