@@ -186,7 +186,7 @@ class UploadService:
         self._end(CommitStatus.COMMITTED, self._told(_describe_active(taken)))
 
     def _fail(self, error: Exception) -> None:
-        """UnusableCalibration and StoreError are answers; anything else is our defect, which must not stop the control."""
+        """UnusableCalibration and StoreError are answers; anything else, an internal error, must not stop the control."""
         index, reason, active = _NO_COEFFICIENT, int(UploadReason.DEFECT), self._calibration.number
         self._notice = NO_NOTICE
         if isinstance(error, UnusableCalibration):
@@ -196,7 +196,7 @@ class UploadService:
             reason = int(UploadReason.STORAGE if error.code == _NO_ROOM else UploadReason.NOT_STORED)
         else:
             trace = "".join(traceback.format_exception(error))
-            sentence = f"A499 a defect of ours, active set {active} unchanged:\n{trace}"
+            sentence = f"A499 internal error, please report it; active set {active} unchanged:\n{trace}"
         self._end(CommitStatus.FAILED, sentence, index, reason)
 
     def _end(self, status: CommitStatus, sentence: str, index: int = 0, reason: int = 0) -> None:

@@ -1,4 +1,4 @@
-"""What a rig may say about its Modbus TCP face."""
+"""What a rig may say about its Modbus TCP server."""
 
 from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Network

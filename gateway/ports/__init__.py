@@ -1,35 +1,23 @@
 """Serial lines: bytes in and out with a time of arrival. What the bytes mean is not known here (see gateway.devices).
 
-`SerialPort` is the real one; `PacedPty` is the device's end of a simulated one; `memory_pair` and `ReplayPort` have the
-same interface without a descriptor. `list_ports` says what is plugged in.
+`SerialPort` is the real one; `PacedPty` is the device's end of a simulated one; `list_ports` says
+what is plugged in.
 """
 
 from gateway.ports.errors import PortError
 from gateway.ports.holders import Holder, holders_of
 from gateway.ports.listing import PortInfo, list_ports
-from gateway.ports.memory import Listener, MemoryPort, byte_by_byte, delayed, lossy, memory_pair, whole
 from gateway.ports.paced_pty import PacedPty
-from gateway.ports.port import Port
 from gateway.ports.pseudo_terminal import Pty
-from gateway.ports.replay import ReplayPort
 from gateway.ports.serial_port import SerialPort
 
 __all__ = [
     "Holder",
-    "Listener",
-    "MemoryPort",
     "PacedPty",
-    "Port",
     "PortError",
     "PortInfo",
     "Pty",
-    "ReplayPort",
     "SerialPort",
-    "byte_by_byte",
-    "delayed",
     "holders_of",
     "list_ports",
-    "lossy",
-    "memory_pair",
-    "whole",
 ]

@@ -42,7 +42,7 @@ class PortError(Exception):
 
 
 def errno_of(error: Exception) -> int | None:
-    """The errno of any of the three families: termios.error keeps it in args, pyserial sometimes only in its text."""
+    """Return the errno of any of the three families: termios.error keeps it in args, pyserial sometimes only in its text."""
     number = getattr(error, "errno", None)
     if number is None and error.args and isinstance(error.args[0], int):
         number = error.args[0]
@@ -50,7 +50,7 @@ def errno_of(error: Exception) -> int | None:
 
 
 def explain_open_failure(path: str, error: Exception, present: Sequence[str]) -> PortError:
-    """The reason why a port did not open. present: the ports that are there, by-id names where they exist."""
+    """Return the reason why a port did not open. present: the ports that are there, by-id names where they exist."""
     number = errno_of(error)
     if number in _DENIED:
         return PortError("E101", _permission(path))
@@ -62,9 +62,9 @@ def explain_open_failure(path: str, error: Exception, present: Sequence[str]) ->
 
 
 def explain_loss(path: str, error: Exception | None) -> PortError:
-    """The reason why an open port is gone."""
+    """Return the reason why an open port was lost. error: what the system call raised, None at a hang-up."""
     reason = f" ({os.strerror(number)})" if error and (number := errno_of(error)) else ""
-    return PortError("E102", f"{path} is gone{reason}: unplugged? It is reopened as soon as it is back")
+    return PortError("E102", f"{path} disconnected{reason} (unplugged?); reconnecting")
 
 
 def _permission(path: str) -> str:

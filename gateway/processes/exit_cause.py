@@ -9,7 +9,7 @@ class EndCause(StrEnum):
     """What the guardian knows about the end of a control process; travels to the next one as its value."""
 
     DIED = "died"  # by a signal, or it ended by itself without a reason
-    DEFECT = "defect"  # it said that a defect of ours was the first cause
+    DEFECT = "defect"  # it said that an internal error was the first cause
     NONSENSE = "nonsense"  # it said what no control process says
     NOT_STARTED = "not-started"  # the machine had no process for us, or it never came up
     MACHINE_BUSY = "machine-busy"  # silent, because the machine did not let it run

@@ -51,7 +51,7 @@ class JsonLineServer:
     """Serves PATH (mode 0600): each line {"do": NAME, ...} goes to handlers[NAME], whose answer gets "ok": true.
 
     A handler refuses by raising ValueError or OSError; the caller reads {"ok": false, "error": sentence}. Anything else that it
-    raises is a defect of ours: the caller reads that, log gets the traceback, and all goes on.
+    raises is an internal error: the caller reads that, log gets the traceback, and all goes on.
     """
 
     def __init__(
@@ -189,7 +189,8 @@ class JsonLineServer:
                 text = _as_json(_error(f"the answer would have {len(text)} bytes"))
         except Exception as error:
             self._log(
-                "internal", "A499 a defect of ours, in an answer of the control socket:\n" + traceback.format_exc()
+                "internal",
+                "A499 internal error in an answer of the control socket, please report it:\n" + traceback.format_exc(),
             )
             told = f"internal error, please report it with the gateway's log: {type(error).__name__}: {error}"
             text = _as_json(_error(told))

@@ -45,7 +45,7 @@ class GuardianLine:
         self._tell(guardian_link.LINE, {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex()}, descriptor)
 
     def first_cause(self, cause: str) -> None:
-        """A defect of ours, in words: we are about to end."""
+        """Tell the guardian of an internal error, in words: this process is about to end."""
         self._tell(guardian_link.FIRST_CAUSE, {"text": cause})
 
     def ready(self, announcement: dict[str, Any], stall_s: float) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.residual_cause import ResidualCause
-from gateway.service.running_rig.gateway_core import ControlLoop, Log
+from gateway.service.running_rig.control_loop import ControlLoop, Log
 from gateway.service.socket_requests import ResidualRequest, parse_request
 
 Answer = dict[str, Any]

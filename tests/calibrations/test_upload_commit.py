@@ -245,7 +245,7 @@ def test_whatever_call_of_the_disk_fails_the_active_set_stays(bench, slot):
 def test_a_defect_of_ours_ends_the_commit_and_nothing_else(bench, monkeypatch):
     monkeypatch.setattr(bench.store, "add", lambda given: {}["missing"])
     assert bench.upload_of(calibration(16)) == (FAILED, -1, UploadReason.DEFECT)
-    assert bench.log[-1].startswith("A499 a defect of ours, active set 1 unchanged:\n")
+    assert bench.log[-1].startswith("A499 internal error, please report it; active set 1 unchanged:\n")
     assert "KeyError: 'missing'" in bench.log[-1]
     monkeypatch.undo()
     assert bench.upload_of(calibration(16)) == COMMITTED

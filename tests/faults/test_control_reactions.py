@@ -1,4 +1,4 @@
-"""SAFETY.md's table, row by row: what is detected, and within which time the safe voltage goes out."""
+"""The hazards that supervision detects, one by one: what is detected, and within which time the safe voltage goes out."""
 
 from dataclasses import replace
 from math import nan

@@ -1,7 +1,7 @@
 """Seeded random schedules of faults in virtual time; an observer that shares no code with control judges the whole history.
 
 It knows the rig's numbers, the command block, the samples and the line, as anybody beside the gateway could, and checks
-of SAFETY.md: I1 range, I2 slew, I4 no non-safe voltage without its conditions, I5 faults latch, I11 one first cause,
+these invariants: I1 range, I2 slew, I4 no non-safe voltage without its conditions, I5 faults latch, I11 one first cause,
 I13 force after healing.
 """
 

@@ -265,11 +265,11 @@ def test_size_and_number_of_files_are_bounded_and_the_newest_lines_stay(tmp_path
 WRITER = """
 import sys
 from pathlib import Path
-from gateway.processes.event import event_of, record
+from gateway.processes.event import encode_event, make_event
 from gateway.processes.event_file import EventFile
 file = EventFile(Path(sys.argv[1]), longest_bytes=40_000)
 for number in range(400):
-    file.append(record(event_of(0.0, sys.argv[2], "test", f"{number} " + "x" * 300)))
+    file.append(encode_event(make_event(0.0, sys.argv[2], "test", f"{number} " + "x" * 300)))
 """
 
 

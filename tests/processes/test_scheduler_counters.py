@@ -132,7 +132,12 @@ def test_what_was_ready_is_started_again_at_once() -> None:
 def taken(wanted: int, *before: str) -> int:
     """The nice value that a process of its own comes to, after these statements."""
     code = "; ".join(
-        ["import os, resource", "from gateway.processes import priority", *before, f"print(priority.take({wanted}))"]
+        [
+            "import os, resource",
+            "from gateway.processes import priority",
+            *before,
+            f"print(priority.set_nice({wanted}))",
+        ]
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, start_new_session=True

@@ -18,7 +18,7 @@ def with_supervision(rig: Rig, **bounds: object) -> Rig:
 
 
 def strict() -> Rig:
-    """The demo rig with SAFETY.md's default bounds instead of those for a busy laptop."""
+    """The demo rig with the default bounds of supervision instead of those for a busy laptop."""
     return with_supervision(demo(), sample_timeout_s=0.05, output_timeout_s=0.1)
 
 

@@ -94,7 +94,7 @@ class Stage:
 
 
 def answered(server: JsonLineServer, line: bytes) -> dict[str, Any]:
-    """The answer, which must be one line of true JSON, and no defect of ours."""
+    """The answer, which must be one line of true JSON, and no internal error."""
     data = server.answer(line)
     assert data.count(b"\n") == 1 and data.endswith(b"\n")
     answer: dict[str, Any] = json.loads(data, parse_constant=pytest.fail)

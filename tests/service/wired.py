@@ -21,7 +21,7 @@ from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers import RegisterBank
 from gateway.registers.words import State
 from gateway.service.running_rig.bank_rules import bank_rules
-from gateway.service.running_rig.gateway_core import ControlLoop
+from gateway.service.running_rig.control_loop import ControlLoop
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.simulated_rig import SimulatedRig
@@ -62,7 +62,7 @@ class Observer:
                 self.others.append(line)
 
     def check(self, rig: Rig) -> None:
-        """I1, I2 and I6 of SAFETY.md over everything that was ever on the wire."""
+        """Assert over everything that was ever on the wire: I1 the range, I2 the slew, I6 the safe voltage first."""
         limits, step_v = rig.control.limits, 10.0 / 1023
         broken = [line for line in self.others if line != b"MON" and not self._is_after_a_cut(line)]
         assert not broken, "I7: nothing but whole sentences"

@@ -2,7 +2,8 @@
 
 Steps up and down over 5..40 N, partial reversals, a slow ramp up and down. Tilt, temperature, feed and the rest move only
 where the plant has an effect that feels them, so that the two runs of a pair meet the same world. Judged is the force from
-SETTLED_S after each change on: before that no rig of this kind has arrived (METHOD, Fig. 8).
+SETTLED_S after each change on: before that no rig of this kind has arrived: its pressure
+and its pad need some 0.5 s (README, "How well it holds").
 """
 
 from dataclasses import dataclass

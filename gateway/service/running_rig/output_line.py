@@ -27,7 +27,7 @@ from gateway.devices.messages import (
     SetVoltage,
 )
 
-_FAILURES_BEFORE_FAULT = 3  # SAFETY: T_dac is three writes or 100 ms; one bad echo is noise
+_FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
 
 

@@ -32,7 +32,7 @@ from gateway.service.running_rig.bank_rules import bank_rules, server_settings
 from gateway.service.running_rig.baud_probe import explain_silent_device
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.calibrations import RigCalibrations
-from gateway.service.running_rig.gateway_core import ControlLoop
+from gateway.service.running_rig.control_loop import ControlLoop
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.recordings import Recordings
@@ -68,7 +68,7 @@ def _cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCo
 
 
 class RunningRig:
-    """Wires one rig's gateway to its edges. `failed` is set when a defect of ours left the loop in an unknown state."""
+    """Wires one rig's gateway to its edges. `failed` is set when an internal error left the loop in an unknown state."""
 
     def __init__(self, rig: Rig, ports: dict[str, str], state: Path, guardian: GuardianLine, log: EventLog) -> None:
         self._calibrations = RigCalibrations(rig, state)
@@ -284,10 +284,8 @@ class RunningRig:
         """An exception that nobody expected: the process ends with the safe voltage, the guardian starts it again in OFF."""
         error = context.get("exception")
         trace = "".join(traceback.format_exception(error)) if isinstance(error, BaseException) else ""
-        self._log("internal", f"A499 a defect of ours: {context['message']}\n{trace}")
-        self._guardian.first_cause(
-            f"a defect of ours: {error!r}" if error else f"a defect of ours: {context['message']}"
-        )
+        self._log("internal", f"A499 internal error, please report it: {context['message']}\n{trace}")
+        self._guardian.first_cause(f"internal error: {error!r}" if error else f"internal error: {context['message']}")
         self.failed.set()
 
     def _on_tick(self, expirations: int, late_s: float) -> None:

@@ -169,7 +169,9 @@ class Guardian:
         except BlockingIOError:
             return
         except (ValueError, KeyError, TypeError, OSError) as error:
-            self.said_cause = Ending(EndCause.NONSENSE, f"control process said {error!r}: a defect of ours")
+            self.said_cause = Ending(
+                EndCause.NONSENSE, f"control process said {error!r}: internal error, please report it"
+            )
             self.link_ended = True
             control.kill()
 

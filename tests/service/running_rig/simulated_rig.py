@@ -17,7 +17,7 @@ from gateway.profiles import load_register_map
 from gateway.registers import BankRules, Refusal, RegisterBank
 from gateway.registers.rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State
-from gateway.service.running_rig.gateway_core import ControlLoop
+from gateway.service.running_rig.control_loop import ControlLoop
 from tests.control.bench import SmallPlant, bsfm, settings
 
 OWNER, OTHER = Peer("10.0.0.5", 4001), Peer("10.0.0.6", 4002)

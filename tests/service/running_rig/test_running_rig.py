@@ -1,4 +1,4 @@
-"""One running cell in this process, on ptys whose devices the test serves: what a defect of ours leaves on the wire."""
+"""One running cell in this process, on ptys whose devices the test serves: what an internal error leaves on the wire."""
 
 import asyncio
 import os

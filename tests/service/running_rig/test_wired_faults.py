@@ -1,4 +1,4 @@
-"""What goes wrong in the world, and what then stands on the wire and in the registers: SAFETY.md's table in virtual time."""
+"""What goes wrong in the world, and what then stands on the wire and in the registers: the table of hazards in virtual time."""
 
 from dataclasses import replace
 from random import Random
@@ -248,7 +248,7 @@ def test_a_defect_inside_a_masters_write_is_the_safe_voltage_too(monkeypatch: py
 
 
 def test_what_arrived_during_a_stall_is_dropped() -> None:
-    """SAFETY: a request executed late. The setpoint that waited is not pressed with, the force goes away."""
+    """A request executed late: The setpoint that waited is not pressed with, the force goes away."""
     wired = at_twenty()
     stalled_s = wired.now_s
     wired.stall(0.3, then=lambda: wired.write(1, 4000))

@@ -166,7 +166,7 @@ def test_a_dead_childs_last_words_still_count(scene, port):
         child.say(message_link.BORN, {"pid": 1})
         one.guardian._on_messages(child)  # heard; what follows comes with the death
         child.say(message_link.LINE, {"safe_frame": SAFE_FRAME.hex(), "safe_reply": ""}, port.writer)
-        child.say(message_link.FIRST_CAUSE, {"text": "a defect of ours: ZeroDivisionError()"})
+        child.say(message_link.FIRST_CAUSE, {"text": "internal error: ZeroDivisionError()"})
         child.dies(1)
 
     one = scene(script, lives(port))

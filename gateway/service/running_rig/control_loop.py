@@ -126,7 +126,7 @@ class ControlLoop:
         self.cell_lost = False
 
     def _late_s(self, now_s: float) -> float:
-        """How long the loop has not come by: what arrived meanwhile is executed late (SAFETY: stall)."""
+        """Return the time since the last tick, s: what arrived during a stall is executed late, and control judges by it."""
         return 0.0 if self._last_tick_s is None else now_s - self._last_tick_s
 
     def _waited_s(self) -> float | None:
@@ -155,7 +155,9 @@ class ControlLoop:
         try:
             return self.controller.step(now_s, self.bank.command, self.sample, self._line(now_s))
         except Exception:
-            self._log("internal", "A499 a defect of ours, safe voltage written:\n" + traceback.format_exc())
+            self._log(
+                "internal", "A499 internal error, please report it; safe voltage written:\n" + traceback.format_exc()
+            )
             return self.controller.safe_output(FaultCode.INTERNAL)
 
     def _step(self, now_s: float) -> None:
