@@ -212,7 +212,7 @@ class UploadService:
         if self._notice & CommitNotice.WITHOUT_STOPS:
             old = f"length {HEAD_WORDS}, as of map version 1: no slip stops, no response"
             return f"W330 {self._doing}: {what}; {old}{known}"
-        return f"info {self._doing}: {what}{known}"
+        return f"{self._doing}: {what}{known}"
 
 
 def _describe_active(taken: ActiveCalibration) -> str:

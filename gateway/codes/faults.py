@@ -41,7 +41,7 @@ class FaultCode(IntEnum):
             "A311",
             "no fresh force sample",
             "The last sample of the load cell is older than the bound.",
-            "A loose cable, a power cut at the amplifier, or a rate too low for sample_timeout_s.",
+            "A loose cable, a power cut at the amplifier, a rate too low for sample_timeout_s; or we were late (see the line).",
             "Look at sample_age; check the amplifier's power and its output rate.",
         ),
     )
@@ -92,7 +92,7 @@ class FaultCode(IntEnum):
             "A314",
             "output device is silent",
             "A voltage was written and not acknowledged in time.",
-            "No power at the DAC or regulator, or a broken cable.",
+            "No power at the DAC or regulator, or a broken cable; or we were late (the line says so).",
             "Check its power and cable; `force-gateway explain E111`.",
         ),
     )
@@ -184,8 +184,7 @@ class FaultCode(IntEnum):
         Explanation(
             "A403",
             "machine too busy",
-            "The control loop was later than the rig's stall_s; most of that time it could have run but got no "
-            "processor.",
+            "The control loop, or a simulated rig's process, was later than a bound; most of that time it got no processor.",
             "Other programs take all cores: a build, more gateways, a virtual machine with too few of them.",
             "End them, or `nice -n 10` them; else give the loop priority (run --realtime), or the rig a longer "
             "stall_s.",

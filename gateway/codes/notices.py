@@ -35,6 +35,13 @@ NOTICES: Final = (
         "Look at the client's frames: the length counts unit id and everything after it.",
     ),
     Explanation(
+        "W234",
+        "a frozen load cell would be found late",
+        "While the force stands still only its noise shows that a cell lives; at this rate there is too little of it for 2 s.",
+        "A coarse count (few digits on the amplifier), few samples per second, or a strong filter.",
+        "Set a finer resolution, a faster rate or a weaker filter on the amplifier; or frozen_equal_samples in the rig file.",
+    ),
+    Explanation(
         "W304",
         "force at the safe voltage",
         "The output is at the safe voltage and the load cell still measures a force.",

@@ -169,12 +169,14 @@ class Controller:
         reading = at_time(
             self._reading, now_s - (now_s if self._last_s is None else self._last_s), self._settings.supervision
         )
+        block = self._block_in_off(now_s, reading, line)
         return Situation(
             now_s=now_s,
             state=self.state,
             faulted_s=self._faulted_s,
             reading=reading,
-            block=self._block_in_off(now_s, reading, line),
+            block=block,
+            excuse=self._supervisor.excuse(block, now_s, reading, line),
             voltage_v=self._pursuit.stage.voltage_v,
             applied_n=self._pursuit.law.applied_n,
             expected_n=self._motion.expected_rise_n,
@@ -184,9 +186,9 @@ class Controller:
     def _obey(self, now_s: float, edges: Edges, line: LineStatus) -> None:
         """What the bank has let through, in the order in which it was judged."""
         if edges.stops and self.state in ENABLED_STATES:
-            self._disable(f"info disabled by {self._follower.who}")
+            self._disable(f"disabled by {self._follower.who}")
         elif edges.falls & _CALIBRATE and self.active_run.running:
-            self._end_run(f"info calibration stopped by {self._follower.who}")
+            self._end_run(f"calibration stopped by {self._follower.who}")
         if edges.rises & _RESET:
             self._reset()
         if edges.rises & _TARE:
@@ -194,7 +196,7 @@ class Controller:
         if edges.rises & _ENABLE and self.state not in ENABLED_STATES:
             self._enable(now_s)
         if edges.rises & _CALIBRATE:
-            self._begin_run(now_s, CalibrationPlan(), f"info calibration begun by {self._follower.who}")
+            self._begin_run(now_s, CalibrationPlan(), f"calibration begun by {self._follower.who}")
         self._obey_this_machine(now_s)
         self._ramping_down = self._ramping_down or self._stopping
 
@@ -209,7 +211,7 @@ class Controller:
             return
         if asked.tare:
             self._tare()
-        self._begin_run(now_s, asked, "info calibration begun by this machine", is_local=True)
+        self._begin_run(now_s, asked, "calibration begun by this machine", is_local=True)
 
     # -- edges of the command
 
@@ -229,18 +231,18 @@ class Controller:
         if self.state is State.OFF:
             return
         self.state = next_state(self.state, StateEvent.RESET)
-        self._outcome.events.append(f"info fault {self._fault.name} reset by {self._follower.who}")
+        self._outcome.events.append(f"fault {self._fault.name} reset by {self._follower.who}")
         self._fault = FaultCode.NONE
         self._restarted = False
 
     def _tare(self) -> None:
         moved_n = self._reader.zero.take(self._follower.demand.gravity_n)
         self._supervisor.rise.shift(moved_n)
-        self._outcome.events.append(f"info tare: zero at {self._reader.zero.zero_n:.2f} N")
+        self._outcome.events.append(f"tare: zero at {self._reader.zero.zero_n:.2f} N")
 
     def _enable(self, now_s: float) -> None:
         self.state = next_state(self.state, StateEvent.ENABLE)
-        self._started(now_s, f"info enabled by {self._follower.who}")
+        self._started(now_s, f"enabled by {self._follower.who}")
 
     def _started(self, now_s: float, sentence: str) -> None:
         self._restarted = False
@@ -330,7 +332,7 @@ class Controller:
     def _climb(self, now_s: float) -> bool:
         """One step of the run; True when it has just ended, and the ramp down begins."""
         if self._ramping_down:
-            self._end_run("info calibration stopped: ramping down")
+            self._end_run("calibration stopped: ramping down")
             return True
         moved = self._motion.climb(now_s, self._reading)
         if said := self.active_run.take_said():
@@ -339,6 +341,8 @@ class Controller:
             self._follow(now_s, moved)
             return False
         self._end_run(moved.sentence)
+        if words := self._supervisor.slow_words:
+            self._outcome.events.append(words)
         return True
 
     def _moment(self, now_s: float, dt_s: float) -> LoopInputs:

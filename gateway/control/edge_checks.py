@@ -37,14 +37,16 @@ BLOCKS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; expected_n:
-    force that the voltages of late still make, by the model; ramps_down: the force goes to 0, and then the output off."""
+    """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
+    machine, where that is the cause of it; expected_n: force that the voltages of late still make, by the model;
+    ramps_down: the force goes to 0, and then the output off."""
 
     now_s: float
     state: State
     faulted_s: float
     reading: Reading
     block: RefusalReason
+    excuse: str
     voltage_v: float
     applied_n: float
     expected_n: float
@@ -176,7 +178,8 @@ def _blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
     if not reason:
         return None
     what = "enable" if bit is ControlBit.ENABLE else "calibration"
-    return EdgeRefusal(reason, bit, f"{what} refused: {BLOCKS[reason]}")
+    late = f"a device was not heard in time; {at.excuse}" if at.excuse and reason is at.block else ""
+    return EdgeRefusal(reason, bit, f"{what} refused: {late or BLOCKS[reason]}")
 
 
 def _no_run(reason: RefusalReason, why: str) -> EdgeRefusal:

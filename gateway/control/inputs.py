@@ -7,6 +7,7 @@ from typing import Final
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
+from gateway.control.silence import NOT_HELD, Held
 from gateway.registers.command import Command
 from gateway.registers.words import LimitedBy, State, StatusBit
 
@@ -24,7 +25,8 @@ class LineStatus:
     oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered, lost);
     pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning master's last
     connection has closed; late_s: how late this step runs; waited_s: so much of it the process could have run and was not
-    let, None where the machine does not count that; temperature_c, feed_mm_s: of the load cell and under the tool, for
+    let, None where the machine does not count that; cell_held, output_held: what kept us from hearing a
+    device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under the tool, for
     compensation; nan: nobody knows.
     """
 
@@ -42,6 +44,8 @@ class LineStatus:
     feed_mm_s: float = nan
     sent_v: float | None = None
     wire_s: float = nan
+    cell_held: Held = NOT_HELD
+    output_held: Held = NOT_HELD
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +74,7 @@ class Output:
     enable_block: RefusalReason = RefusalReason.NONE  # why an enable would be refused now
     clear_command: bool = False  # service: bank.clear_command(): the output went off
     release_owner: bool = False  # service: bank.release_owner(): the lease is over
-    events: tuple[str, ...] = ()  # sentences for the log, each starting with its code or "info"
+    events: tuple[str, ...] = ()  # sentences for the log, each starting with its code where it has one
 
 
 NO_COMMAND = Command()

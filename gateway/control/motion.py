@@ -23,7 +23,7 @@ from gateway.control.supervision.plausibility import ExpectedForce
 
 Moved: TypeAlias = StateEvent | StopCause
 
-_RAMPED_DOWN: Final = StopCause(FaultCode.NONE, "info force ramped to 0, output disabled")
+_RAMPED_DOWN: Final = StopCause(FaultCode.NONE, "force ramped to 0, output disabled")
 
 
 class Motion:

@@ -18,11 +18,15 @@ OUTPUT_CODECS: Final[dict[str, OutputEnds]] = {"template": (TemplateOutputHost, 
 CELL_CODECS: Final[dict[str, CellEnds]] = {"template": (TemplateCellHost, TemplateCellDevice)}
 
 
+class UnknownCodecError(ValueError):
+    """The profile names a codec that is none of its role."""
+
+
 def _find(table: dict[str, Ends], profile: DeviceProfile, role: Role) -> Ends:
     if profile.role is not role:
         raise ValueError(f"{profile.name} is of role {profile.role}, {role} is needed here")
     if profile.codec not in table:
-        raise ValueError(f"{profile.name}: codec {profile.codec} is not one of {', '.join(table)}")
+        raise UnknownCodecError(f"{profile.name}: codec {profile.codec} is not one of {', '.join(table)}")
     return table[profile.codec]
 
 

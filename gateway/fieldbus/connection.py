@@ -94,7 +94,8 @@ class Connection(asyncio.BufferedProtocol):
         shared.connections.add(self)
         self._rate = shared.peers.rate(self.peer.host, now_s)
         self._fast_units = frozenset(shared.settings.units if self._rate is None else ())
-        self._read_registers = shared.bank.read_registers
+        read, peer = shared.bank.read_registers, self.peer
+        self._read_registers = lambda address, count: read(address, count, peer)
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)
 
     def get_buffer(self, _size_hint: int) -> memoryview:

@@ -1,6 +1,7 @@
 """Who asks: what the bank needs to decide about ownership, and what people read in the log."""
 
 from dataclasses import dataclass
+from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,3 +16,7 @@ class Peer:
         host = f"[{self.host}]" if ":" in self.host else self.host
         where = f"{host}:{self.port}" if self.port else host
         return f"{self.name} ({where})" if self.name else where
+
+
+NOBODY: Final = Peer("nobody")
+"""Whoever asks in the gateway's own name."""

@@ -15,7 +15,7 @@ from gateway.modbus import pdu as P  # noqa: N812  the names of function codes a
 from gateway.modbus.diagnostics import ServerId, loopback_answer, report_answer
 from gateway.modbus.errors import ModbusError, RequestError, RequestFault
 from gateway.modbus.identification import identification_answer
-from gateway.modbus.peer import Peer
+from gateway.modbus.peer import NOBODY, Peer
 
 _ONE_WORD: Final = Struct(">H")
 
@@ -31,13 +31,13 @@ class DataBank(Protocol):
     def server_id(self) -> ServerId:
         """What FC17 reports."""
 
-    def read_registers(self, address: int, count: int) -> bytes:
+    def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Big-endian words. count is 1..125 already."""
 
-    def read_bits(self, address: int, count: int) -> bytes:
+    def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Packed, first bit lowest, unused bits 0. count is 1..2000 already."""
 
-    def check_registers_readable(self, address: int, count: int) -> None:
+    def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
         """Raises what read_registers would raise."""
 
     def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
@@ -79,20 +79,20 @@ def _not_served(pdu: bytes, _bank: DataBank, _peer: Peer) -> bytes:
     raise RequestError(RequestFault.FUNCTION, f"function {function} is not served", function)
 
 
-def _read_bits(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
-    data = bank.read_bits(*P.parse_read(pdu, P.MOST_BITS_READ))
+def _read_bits(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    data = bank.read_bits(*P.parse_read(pdu, P.MOST_BITS_READ), peer)
     return bytes((pdu[0], len(data))) + data
 
 
-def _read_registers(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
-    data = bank.read_registers(*P.parse_read(pdu, P.MOST_REGISTERS_READ))
+def _read_registers(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    data = bank.read_registers(*P.parse_read(pdu, P.MOST_REGISTERS_READ), peer)
     return bytes((pdu[0], len(data))) + data
 
 
 def _write_coil(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     address, word = P.parse_write_one(pdu)
     if word not in (0x0000, 0xFF00):
-        bank.read_bits(address, 1)
+        bank.read_bits(address, 1, peer)
         raise RequestError(RequestFault.VALUE, f"coil value 0x{word:04X}, allowed 0x0000 and 0xFF00", word, address)
     bank.write_bits(address, (word == 0xFF00,), peer)
     return pdu
@@ -124,9 +124,9 @@ def _mask_write(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
 
 def _read_write(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     read_address, count, write_address, data = P.parse_read_write(pdu)
-    bank.check_registers_readable(read_address, count)
+    bank.check_registers_readable(read_address, count, peer)
     bank.write_registers(write_address, data, peer)
-    words = bank.read_registers(read_address, count)
+    words = bank.read_registers(read_address, count, peer)
     return bytes((P.READ_WRITE, len(words))) + words
 
 

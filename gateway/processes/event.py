@@ -1,7 +1,7 @@
 """What is said to people about a running gateway, as a record: when, how bad, which code, from where, and the sentence.
 
 Control process, guardian and `force-gateway events` share it. The severity follows from the code alone, by one table: a
-word in a sentence decides nothing. Standard library only: the guardian imports this.
+word in a sentence decides nothing, and no sentence begins with one. Standard library only: the guardian imports this.
 """
 
 import json
@@ -26,7 +26,6 @@ RECORD_START: Final = b'{"time": "'
 """How each record in the file begins; nothing inside a record can look like it, for JSON escapes its quotes."""
 
 _CODE: Final = re.compile(r"([EWA]\d{3})[ :]\s*")
-_INFO_PREFIX: Final = "info "
 _LONGEST_TEXT: Final = 16_000
 _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
@@ -54,7 +53,7 @@ def make_event(time_s: float, source: str, group: str, sentence: str) -> EventRe
     """From what the house says to a record. group: the cause, and what else lines are limited by (`refusal 10.0.0.5`)."""
     found = _CODE.match(sentence)
     code = found[1] if found else None
-    text = sentence[found.end() :] if found else sentence.removeprefix(_INFO_PREFIX)
+    text = sentence[found.end() :] if found else sentence
     if len(text) > _LONGEST_TEXT:
         text = f"{text[:_LONGEST_TEXT]} ... ({len(text) - _LONGEST_TEXT} more characters)"
     return EventRecord(utc_text(time_s), severity_of(code), code, group.partition(" ")[0], text, source)

@@ -13,7 +13,7 @@ from typing import Final
 
 from gateway.processes.exit_cause import EndCause, Ending
 
-_STOPPED_STATES: Final = "Tt"
+STOPPED_STATES: Final = "Tt"
 _CURE: Final = ": the machine is too busy; end other programs, `run --realtime`, or a longer stall_s in the rig"
 
 
@@ -80,7 +80,7 @@ def time_between(before: ProcessorTime | None, now: ProcessorTime | None) -> Pro
 def explain_silence(silence: Silence, load: str) -> Ending:
     """The cause of a silence: what took the largest part of it. load: of the machine, in words."""
     seen = f"control process stalled: {_ms(silence.silent_s)} without a tick, allowed {_ms(silence.bound_s)} (stall_s)"
-    if silence.state and silence.state in _STOPPED_STATES:
+    if silence.state and silence.state in STOPPED_STATES:
         return Ending(EndCause.STOPPED, f"{seen}; it was stopped by a signal or a debugger")
     if silence.turns is None:
         cause = EndCause.MACHINE_BUSY if silence.was_late else EndCause.STALLED

@@ -25,6 +25,7 @@ from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, RequestError, ServerId
 from gateway.modbus.bits import pack_bits
+from gateway.modbus.peer import NOBODY
 from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, AdmittedWrite, Write
 from gateway.registers.command import Command, Status
 from gateway.registers.command_block import CONTROL_WORD, FORCE_SETPOINT, VOLTAGE_SETPOINT, CommandBlock, check_zeros
@@ -42,8 +43,6 @@ from gateway.registers.words import ControlBit, State, StatusBit
 
 BITS: Final = 16
 SERVER_ID: Final = 0x46  # "F"
-READER: Final = Peer("a reader")
-"""Stands for the peer of a refused read, which is not told to the bank."""
 
 
 class RegisterBank:
@@ -94,21 +93,21 @@ class RegisterBank:
         """What the framing has refused leaves its reason as all others do."""
         self._noted(request_refusal(refusal), peer)
 
-    def read_registers(self, address: int, count: int) -> bytes:
+    def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Big-endian words of one block. Refusal (02) for a range that no block holds."""
         if not 0 < count <= self._room[address]:
-            raise self._noted(no_such_address(self._blocks, address, count), READER)
+            raise self._noted(no_such_address(self._blocks, address, count), peer)
         return bytes(self._data[2 * address : 2 * (address + count)])
 
-    def check_registers_readable(self, address: int, count: int) -> None:
-        self.read_registers(address, count)
+    def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
+        self.read_registers(address, count, peer)
 
-    def read_bits(self, address: int, count: int) -> bytes:
+    def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Bits of control_word (0-15) or status_word (100-115), packed."""
         try:
             first = self._bit_word(address, count)
         except Refusal as refusal:
-            raise self._noted(refusal, READER) from None
+            raise self._noted(refusal, peer) from None
         word = self._image.word(first)
         return pack_bits([bool(word >> (address - first + k) & 1) for k in range(count)])
 

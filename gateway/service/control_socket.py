@@ -1,13 +1,13 @@
 """`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
 
 record on|off|status, calibration runs, the calibration in use and its change, last writers of each register and the sentence
-of the last refusal, what the residual watch has found (its process tells it here, others may read it), the loop's health,
-and faults of a simulated rig (passed on to the rig's own socket by the tools themselves). Mode 0600: whoever may write the
-state directory may ask. What each verb takes stands in gateway.service.socket_requests.
+of the last refusal, which rig runs and its lease, what the residual watch has found (its process tells it here, others may
+read it), the loop's health, and faults of a simulated rig (passed on to the rig's own socket by the tools themselves).
+Mode 0600: whoever may write the state directory may ask. What each verb takes stands in gateway.service.socket_requests.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ class RunningParts:
     upload: UploadService
     ladder: CalibrationRuns
     watch: WatchReports
+    running: dict[str, Any] = field(default_factory=dict)
+    """What does not change while it runs: rig, port of Modbus TCP, lease_s (null: none), lease_action."""
 
 
 class ControlSocket(JsonLineServer):
@@ -42,6 +44,7 @@ class ControlSocket(JsonLineServer):
             "last-writer": self._last_writer,
             "last-refusal": self._last_refusal,
             "health": self._health_figures,
+            "running": self._running,
             "residual": asked.watch.answer,
         }
         super().__init__(state / "control.sock", handlers, log)
@@ -76,6 +79,10 @@ class ControlSocket(JsonLineServer):
         if refusal is None:
             return {"sentence": ""}
         return {"address": refusal.address, "reason": int(refusal.reason), "sentence": refusal.sentence}
+
+    def _running(self, request: dict[str, Any]) -> dict[str, Any]:
+        parse_request(EmptyRequest, request)
+        return dict(self._asked.running)
 
     def _health_figures(self, request: dict[str, Any]) -> dict[str, Any]:
         parse_request(EmptyRequest, request)

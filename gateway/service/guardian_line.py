@@ -12,7 +12,8 @@ from gateway.processes import message_link as guardian_link
 
 
 class GuardianLine:
-    """Our end of the guardian's line. on_ports: the simulated rig has been started again, with these ptys.
+    """Our end of the guardian's line. on_ports: the simulated rig has been started again, with these ptys; rig_pid: its
+    process, None for a real rig.
 
     A guardian that does not read for a while misses heartbeats, which is what its silence deserves, but nothing else:
     what does not fit waits, in order, for the next heartbeat.
@@ -20,6 +21,7 @@ class GuardianLine:
 
     def __init__(self, link: socket.socket) -> None:
         self.on_ports: Callable[[dict[str, str]], None] = lambda ports: None
+        self.rig_pid: int | None = None
         self._link = link
         self._waiting: deque[tuple[str, dict[str, Any], int | None]] = deque()
         self._rig: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
@@ -95,6 +97,7 @@ class GuardianLine:
             self._on_rig(message.body)
 
     def _on_rig(self, answer: dict[str, Any]) -> None:
+        self.rig_pid = answer.get("pid")
         if not self._rig.done():
             self._rig.set_result(answer)
         elif "ptys" in answer:

@@ -8,6 +8,7 @@ repeats its last value, or a plant that is no longer the one in the rig's file.
 
 import asyncio
 import json
+import os
 import socket
 import sys
 import time
@@ -201,7 +202,8 @@ async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> No
     if tick:
         tick.start()
     loop.add_reader(link.fileno(), ended.set)
-    guardian_link.send(link, guardian_link.PTYS, {"ptys": {"output": output_pty.path, "load_cell": cell_pty.path}})
+    ptys = {"output": output_pty.path, "load_cell": cell_pty.path}
+    guardian_link.send(link, guardian_link.PTYS, {"ptys": ptys, "pid": os.getpid()})
     await ended.wait()
     loop.remove_reader(link.fileno())
     if tick:

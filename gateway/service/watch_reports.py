@@ -59,7 +59,7 @@ class WatchReports:
         was_none, gateway.residual_cause = gateway.residual_cause is ResidualCause.NONE, cause
         if cause is ResidualCause.NONE:
             gateway.warnings &= ~WarningBit.MODEL_DIFFERS
-            self._log("residual", f"info {self._sentence or 'the model agrees with the measurements again'}")
+            self._log("residual", self._sentence or "the model agrees with the measurements again")
         else:
             gateway.warnings |= WarningBit.MODEL_DIFFERS
             self._warnings += was_none

@@ -44,9 +44,7 @@ def test_a_committed_set_is_in_use_and_reads_back_as_sent(bench):
     assert bench.shown == [CommitStatus.WRITING], "committed is not said before the set is in use"
     assert taken.calibration.number == 2
     assert taken.model.voltage_v(26.0, 1.0)[0] == pytest.approx(4.0)
-    assert bench.log == [
-        f"info upload by {PEER}: calibration 2 (slot-3) in use, slot 3: psfm n=2, blend 5 N, 0.0 .. 52.0 N"
-    ]
+    assert bench.log == [f"upload by {PEER}: calibration 2 (slot-3) in use, slot 3: psfm n=2, blend 5 N, 0.0 .. 52.0 N"]
 
 
 def test_what_an_upload_does_not_tell_is_not_made_up(bench):
@@ -176,7 +174,7 @@ def test_a_dry_run_checks_all_and_stores_nothing(bench):
     assert bench.commit(staged(GOOD), DRY_RUN) == NOTHING
     assert bench.active_words == before
     assert (bench.used, bench.store.list()) == ([], [])
-    assert bench.log == [f"info dry run by {PEER}: the set would be accepted"]
+    assert bench.log == [f"dry run by {PEER}: the set would be accepted"]
 
 
 # -- while it is under way

@@ -29,7 +29,7 @@ def test_a_selected_slot_is_in_use_now_and_after_a_restart(filled):
     assert filled.status is CommitStatus.WRITING
     filled.run()
     assert (filled.outcome, filled.active_slot, top_n(filled)) == (COMMITTED, 1, 51.25)
-    assert filled.log[-1].startswith(f"info slot 1 selected by {PEER}: calibration 2 (slot-1) in use, slot 1")
+    assert filled.log[-1].startswith(f"slot 1 selected by {PEER}: calibration 2 (slot-1) in use, slot 1")
     again = filled.restarted()
     assert (again.active_words, again.active_slot) == (filled.active_words, 1)
     again.write(1149, 3)

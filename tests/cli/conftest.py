@@ -14,6 +14,7 @@ from gateway.cli.main import command
 from gateway.codes.refusals import RefusalReason
 from gateway.fieldbus import ModbusTcpServer, ServerSettings
 from gateway.modbus import ModbusError, Peer, RequestError
+from gateway.modbus.peer import NOBODY
 from gateway.profiles import load_register_map
 from gateway.registers import RegisterMap
 
@@ -45,11 +46,11 @@ class PlainBank:
     def refused(self, refusal: RequestError, peer: Peer) -> None:
         """The protocol's own refusals: nothing here keeps them."""
 
-    def check_registers_readable(self, address: int, count: int) -> None:
+    def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
         if not any(block.first <= address and address + count - 1 <= block.last for block in self.register_map.blocks):
             raise ModbusError(2, "outside")
 
-    def read_registers(self, address: int, count: int) -> bytes:
+    def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         self.check_registers_readable(address, count)
         self.reads.append((address, count))
         return self.read(address, count)
@@ -66,7 +67,7 @@ class PlainBank:
         self.writes.append((address, words))
         self.words |= {address + at: word for at, word in enumerate(words)}
 
-    def read_bits(self, address: int, count: int) -> bytes:
+    def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         raise ModbusError(1, "not here")
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:

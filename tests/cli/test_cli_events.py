@@ -12,7 +12,7 @@ from gateway.processes.event_file import EventFile
 
 NOON_S = 1_795_348_800.0
 SAID = [
-    (-7200.0, "control", "control", "info enabled by 10.0.0.5"),
+    (-7200.0, "control", "control", "enabled by 10.0.0.5"),
     (-600.0, "control", "refusal 10.0.0.5 out_of_range", "W204 force_setpoint = 65.00 N"),
     (-300.0, "watch", "residual", "A345 friction has doubled"),
     (-60.0, "guardian", "restart", "A401 control process died (SIGKILL): safe voltage acknowledged"),

@@ -127,7 +127,7 @@ def test_a_dry_run_is_the_gateways_own(gateway, address, call, file):
     done = call("upload", file, "--dry-run", "--gateway", address)
     assert done.output == "mark 16 passes every check; nothing was stored, active set 1 unchanged\n"
     assert gateway.store.list() == []
-    assert gateway.log[0].startswith("info dry run by 127.0.0.1")
+    assert gateway.log[0].startswith("dry run by 127.0.0.1")
 
 
 def test_what_the_gateway_refuses_is_told_in_words(gateway, address, call, tmp_path):

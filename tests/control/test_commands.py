@@ -101,7 +101,7 @@ def test_a_tare_makes_the_resting_force_zero():
     bench.write(control_word=ControlBit.TARE)
     bench.run(0.1)
     assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
-    assert any(event.startswith("info tare") for event in bench.events)
+    assert any(event.startswith("tare") for event in bench.events)
 
 
 def test_a_tare_with_payload_makes_the_contact_force_zero_at_any_tilt():

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from gateway.modbus.bits import pack_bits
 from gateway.modbus.diagnostics import ServerId
 from gateway.modbus.errors import ILLEGAL_ADDRESS, ModbusError, RequestError
-from gateway.modbus.peer import Peer
+from gateway.modbus.peer import NOBODY, Peer
 
 
 class MemoryBank:
@@ -20,11 +20,11 @@ class MemoryBank:
         self.identity: Mapping[int, bytes] = identity or {}
         self.server_id = ServerId(0, True, b"")
 
-    def read_registers(self, address: int, count: int) -> bytes:
+    def read_registers(self, address: int, count: int, _peer: Peer = NOBODY) -> bytes:
         self.check_registers_readable(address, count)
         return bytes(self.image[2 * address : 2 * (address + count)])
 
-    def check_registers_readable(self, address: int, count: int) -> None:
+    def check_registers_readable(self, address: int, count: int, _peer: Peer = NOBODY) -> None:
         if 2 * (address + count) > len(self.image):
             raise ModbusError(ILLEGAL_ADDRESS)
 
@@ -37,7 +37,7 @@ class MemoryBank:
         changed = (word & and_mask) | (or_mask & ~and_mask & 0xFFFF)
         self.write_registers(address, changed.to_bytes(2, "big"), peer)
 
-    def read_bits(self, address: int, count: int) -> bytes:
+    def read_bits(self, address: int, count: int, _peer: Peer = NOBODY) -> bytes:
         self._check_bits(address, count)
         return pack_bits(self.bits[address : address + count])
 

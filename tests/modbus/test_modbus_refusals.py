@@ -239,7 +239,7 @@ def test_whatever_arrives_is_answered_with_a_pdu_of_its_own_function(request_pdu
 
 def test_a_bug_in_the_bank_is_not_dressed_up_as_an_exception_answer() -> None:
     class Broken(FussyBank):
-        def read_registers(self, address: int, count: int) -> bytes:
+        def read_registers(self, address: int, count: int, _peer: Peer = PEER) -> bytes:
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):

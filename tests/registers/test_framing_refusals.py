@@ -40,6 +40,16 @@ def test_the_reason_is_in_the_registers_and_in_the_log(
     assert (bank.read_registers(0, 13), bank.owner) == (command, owner)
 
 
+@pytest.mark.parametrize(
+    "request_hex", ["03 2710 0001", "04 0064 007d", "01 0020 0001", "17 2710 0001 0000 0001 02 0000"]
+)
+def test_a_refused_read_names_who_asked(request_hex: str, bank: RegisterBank) -> None:
+    said: list[Peer] = []
+    bank.on_refusal = lambda refusal, peer: said.append(peer)
+    assert answer(bytes.fromhex(request_hex), bank, MASTER)[1] == 2
+    assert said == [MASTER]
+
+
 def test_a_foreign_unit_is_reason_40(bank: RegisterBank) -> None:
     said: list[str] = []
     bank.on_refusal = lambda refusal, peer: said.append(refusal.sentence)

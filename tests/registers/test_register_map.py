@@ -232,7 +232,7 @@ def test_every_fault_is_told_at_once_with_its_place():
     document["blocks"]["twin"] = {"first": 5, "last": 20, "repeats": {"onyl": 5}}
     with pytest.raises(MapError) as caught:
         read_map(document)
-    assert [place for place, _ in caught.value.faults] == [
+    assert [place for place, *_ in caught.value.faults] == [
         ("blocks", "twin"),
         ("blocks", "only", "registers", 0, "access"),
         ("blocks", "twin", "repeats", "onyl"),

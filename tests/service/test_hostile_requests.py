@@ -45,6 +45,7 @@ CONTROL: list[dict[str, Any]] = [
     {"do": "last-writer"},
     {"do": "last-refusal"},
     {"do": "health"},
+    {"do": "running"},
     {"do": "residual"},
     {"do": "residual", "cause": 12, "sentence": "friction", "counters": {"looks": 3, "rms_n": 0.2}},
 ]
@@ -80,6 +81,7 @@ class Stage:
             upload=self.upload,
             ladder=self.ladder,
             watch=WatchReports(wired.gateway, lambda: wired.now_s, log),
+            running={"rig": "demo", "port": 5020, "lease_s": None, "lease_action": "fault"},
         )
         self.server = ControlSocket(self.state, asked, log)
         wired.run(0.1)

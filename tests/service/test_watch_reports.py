@@ -49,7 +49,7 @@ def test_repeated_words_are_logged_once_and_agreement_clears_it(wired, desk):
     desk.answer(told(ResidualCause.NONE, ""))
     assert not wired.warnings & WarningBit.MODEL_DIFFERS
     assert wired.word("residual_cause") == 0
-    assert wired.said("info the model agrees")
+    assert wired.said("the model agrees")
 
 
 def test_counters_and_age_can_be_read(wired, desk):

@@ -191,7 +191,9 @@ def _no_connection(where: str, error: OSError) -> CliError:
 
 
 def _no_answer(where: str, unit: int, error: Exception) -> CliError:
-    reset = isinstance(error, OSError) or "closed" in str(error)
+    from pymodbus.exceptions import ConnectionException
+
+    reset = isinstance(error, (OSError, ConnectionException))
     seen = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
     return CliError(
         f"E131 {where} {seen}: not a Modbus server, another unit id, or this machine is not on its allow-list",

@@ -6,7 +6,6 @@ refusal as the registers.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
@@ -53,9 +52,10 @@ def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:
     """What the gateway itself has said to this refusal; empty where it is elsewhere, or nobody answers."""
     from gateway.cli.control_socket import ask
+    from gateway.cli.master.nearby import sockets_near
     from gateway.service.supervisor.run_options import default_state_root
 
-    states = [state] if state else _sockets_near(client, default_state_root())
+    states = [state] if state else sockets_near(client.where.rpartition(":")[0], default_state_root())
     for directory in states:
         try:
             told = ask(directory, {"do": "last-refusal"})
@@ -64,15 +64,6 @@ def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, st
         if (told.get("address"), told.get("reason")) == (address, int(reason)):
             return str(told["sentence"])
     return ""
-
-
-def _sockets_near(client: GatewayClient, root: Path) -> list[Path]:
-    host = client.where.rpartition(":")[0]
-    try:
-        is_here = host == "localhost" or ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        is_here = False
-    return sorted(path.parent for path in root.glob("*/control.sock")) if is_here else []
 
 
 def _last_refusal(client: GatewayClient, frames: list[Frame]) -> tuple[RefusalReason, int, str]:

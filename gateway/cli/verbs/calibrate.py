@@ -155,7 +155,7 @@ def _fit_stopped_run(recording: Path, rig: str, directory: Path) -> dict[str, An
 
     result = fit_and_store(recording, rig_of(recording, rig), directory)
     phase = "stored" if "stored" in result else "refused"
-    sentence = result.pop("refused", "") or "info the run is whole: nothing was climbed again"
+    sentence = result.pop("refused", "") or "the run is whole: nothing was climbed again"
     click.echo(f"{recording} has every stair of its plan: nothing is climbed again", err=True)
     return {"phase": phase, "recording": str(recording), "sentence": sentence} | result
 

@@ -217,4 +217,4 @@ def _describe_rejection(calibration: "Calibration") -> str:
 
 
 def _tell_change(answer: dict[str, Any], *, as_json: bool) -> None:
-    click.echo(json.dumps(answer) if as_json else answer["said"].removeprefix("info "))
+    click.echo(json.dumps(answer) if as_json else answer["said"])

@@ -34,7 +34,7 @@ def _duration(context: click.Context, parameter: click.Parameter, text: str | No
 @click.argument("newton", type=float)
 @click.option("--for", "for_s", callback=_duration, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
 @click.option("--reset", "resets", is_flag=True, help="Reset a latched fault first.")
-@click.option("--rig", metavar="RIG", help="The rig that runs there: its lease sets the pace of the heartbeat.")
+@click.option("--rig", metavar="RIG", help="The rig that runs there; its lease sets the pace of the heartbeat.")
 @gateway_options
 @json_option
 def command(
@@ -43,6 +43,9 @@ def command(
     """Hold NEWTON until Ctrl-C, which ramps the force to 0.
 
     Sets the force, enables, and keeps the heartbeat that a rig with a lease wants. A second Ctrl-C skips the ramp.
+
+    A gateway of this machine tells its lease, unless it runs with a --state of its own; no register has it, so of one
+    elsewhere name the rig with --rig, or the heartbeat takes 200 ms for its lease.
 
     Example: force-gateway hold 12 --for 10s
     """
@@ -54,7 +57,7 @@ def command(
 
     if not (isfinite(newton) and newton >= 0.0):
         raise click.UsageError(f"{newton:g} N is no force to hold")
-    lease = _lease(rig)
+    lease = _lease(rig) if rig is not None else _told_lease(*endpoint)
     register_map = load_register_map(options["map_name"])
     with GatewayClient(*endpoint, options["unit"], register_map) as client:
         with explain_refusals(client):
@@ -65,15 +68,25 @@ def command(
     _tell(beat, client.where, as_json=as_json)
 
 
-def _lease(rig: str | None) -> "KnownLease | None":
-    """What the rig file says; None where none is named."""
+def _lease(rig: str) -> "KnownLease":
+    """What the rig file says."""
     from gateway.cli.force_hold.heartbeat import KnownLease
     from gateway.profiles import load_rig
 
-    if rig is None:
-        return None
     supervision = load_rig(rig, simulated=True).control.supervision
     return KnownLease(supervision.lease_s, supervision.lease_action.value)
+
+
+def _told_lease(host: str, port: int) -> "KnownLease | None":
+    """What the gateway that serves this port says, where it runs on this machine; None where nobody says."""
+    from gateway.cli.force_hold.heartbeat import KnownLease
+    from gateway.cli.master.nearby import running_at
+    from gateway.service.supervisor.run_options import default_state_root
+
+    told = running_at(host, port, default_state_root())
+    if told is None or not {"lease_s", "lease_action"} <= told.keys():
+        return None
+    return KnownLease(told["lease_s"], str(told["lease_action"]))
 
 
 def _check_force(register_map: Any, newton: float) -> float:

@@ -63,7 +63,7 @@ class ExperimentRun:
     @property
     def ended(self) -> str:
         """What is said at its end."""
-        return f"info experiment {self.plan.name} done: {len(self.plan.parts)} parts, {self.schedule.duration_s:.0f} s"
+        return f"experiment {self.plan.name} done: {len(self.plan.parts)} parts, {self.schedule.duration_s:.0f} s"
 
     def step(self, now_s: float, reading: Reading) -> RunStep:
         """reading: of this moment."""

@@ -92,7 +92,7 @@ class LadderRun:
     @property
     def ended(self) -> str:
         """What is said at its end."""
-        return f"info calibration ladder done: {self.done} stairs, {self.unsettled} of them never settled"
+        return f"calibration ladder done: {self.done} stairs, {self.unsettled} of them never settled"
 
     @property
     def eta_s(self) -> float:

@@ -14,6 +14,7 @@ from gateway.control.inputs import LineStatus
 from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
+from gateway.control.silence import cause_of_silence
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 
@@ -86,6 +87,16 @@ class FaultDetector:
         self._stuck_s = self._stuck_s + reading.interval_s if stuck else 0.0
 
     @property
+    def frozen_found_s(self) -> float:
+        """How long a frozen load cell would go unnoticed while the force stands still, by its noise so far; inf: for ever."""
+        return self._frozen.found_s
+
+    @property
+    def slow_words(self) -> str:
+        """W234, empty where a frozen load cell is found soon."""
+        return self._frozen.slow_words
+
+    @property
     def is_stuck(self) -> bool:
         return self._stuck_s >= _STUCK_S
 
@@ -98,6 +109,15 @@ class FaultDetector:
         if line.acknowledged_v is None or not reading.is_usable or self.is_stuck:
             return RefusalReason.NOT_READY
         return RefusalReason.NONE
+
+    def excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
+        """Why the machine, and not the device, keeps an enable back; empty where it does not."""
+        if block is RefusalReason.CELL_SILENT:
+            return cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, "")[1]
+        if block is RefusalReason.OUTPUT_FAULT and line.unanswered_since_s is not None and not line.fault:
+            silent_s = now_s - line.unanswered_since_s
+            return cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "")[1]
+        return ""
 
     def first_cause(self, now_s: float, reading: Reading, line: LineStatus, expected_n: float) -> StopCause | None:
         """expected_n: the model's rise, for the sentences."""
@@ -113,11 +133,14 @@ class FaultDetector:
         if line.fault:
             return stop_cause(line.fault, _LINE_WORDS.get(line.fault, "reported by the output line"))
         if self._is_silent(now_s, line):
-            bound_ms = self._bounds.output_timeout_s * 1e3
-            return stop_cause(
-                FaultCode.OUTPUT_SILENT, f"no answer from the output device for {bound_ms:.0f} ms: power or wires"
-            )
+            return self._no_answer(now_s, line)
         return None
+
+    def _no_answer(self, now_s: float, line: LineStatus) -> StopCause:
+        silent_s, bound_s = now_s - (line.unanswered_since_s or 0.0), self._bounds.output_timeout_s
+        seen = f"no answer from the output device for {silent_s * 1e3:.0f} ms, allowed {bound_s * 1e3:.0f} ms"
+        fault, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "power or wires")
+        return stop_cause(fault, f"{seen}: {blamed}")
 
     def _of_cell(self, reading: Reading, line: LineStatus) -> StopCause | None:
         if line.cell_lost:
@@ -126,7 +149,9 @@ class FaultDetector:
             )
         if not reading.is_fresh:
             seen = f"last sample {reading.age_s * 1e3:.0f} ms old, allowed {self._bounds.sample_timeout_s * 1e3:.0f} ms"
-            return stop_cause(FaultCode.SAMPLE_STALE, f"{seen}: power, wires or stream mode of the amplifier")
+            suspects = "power, wires or stream mode of the amplifier"
+            fault, blamed = cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, suspects)
+            return stop_cause(fault, f"{seen}: {blamed}")
         if not (reading.is_usable or reading.overload):
             return stop_cause(FaultCode.NOT_FINITE, "the load cell's reading is not a number")
         return None

@@ -4,10 +4,10 @@ Two ways to tell. While the force changes: since the value last changed, the ris
 leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five quanta. That is
 friction-proof; a single number would trip on every small reversal, where friction really holds the force. Only in contact: in
 free air a quiet cell rightly repeats itself. While the force stands still: more equal samples than the cell's own noise allows
-(cell_noise), or than the rig says (frozen_equal_samples).
+(repeated_readings), or than the rig says (frozen_equal_samples).
 """
 
-from math import inf
+from math import ceil, inf
 from typing import Final
 
 from gateway.control.sample_conditioning import Reading
@@ -16,6 +16,8 @@ from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.control.supervision.repeated_readings import RepeatedReadings
 
 _QUANTA: Final = 5.0
+SLOW_S: Final = 2.0
+"""From which on it is said how late a frozen cell would be found."""
 _WIDER_LOOP: Final = 0.5  # friction may have grown by this share of the loop since the calibration
 
 
@@ -76,6 +78,25 @@ class StuckSensorCheck:
         if self._equal >= self._noise.limit and self._equal_s >= self._frozen_s:
             return f"{seen}, while its noise has left at most {self._noise.longest} equal so far"
         return ""
+
+    @property
+    def found_s(self) -> float:
+        """How long a cell that freezes now would repeat itself, the force at rest, until it is called frozen; inf: never."""
+        limit = self._noise.limit if self._told_limit is None else self._told_limit
+        return max(self._frozen_s, ceil(limit) * self._noise.interval_s) if limit < inf else inf
+
+    @property
+    def slow_words(self) -> str:
+        """W234, empty where a frozen cell is found within SLOW_S."""
+        if self.found_s <= SLOW_S:
+            return ""
+        noise = self._noise
+        found = f"after {self.found_s:.1f} s" if self.found_s < inf else "never"
+        seen = f"{noise.counts:.2f} counts of {noise.count_n:.3g} N" if noise.counts > 0.0 else "less than it can tell"
+        return (
+            f"W234 while the force stands still a frozen load cell would be found {found}: its noise is {seen} at "
+            f"{1.0 / noise.interval_s:.0f} samples/s; set a finer count, a faster rate or less filter on the amplifier"
+        )
 
     def tripped(self) -> None:
         """The fault is told: these equal samples are not learned from."""

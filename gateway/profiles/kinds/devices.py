@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.devices import DeviceProfile, Role, cell_device, output_host
+from gateway.devices.codecs import UnknownCodecError
 from gateway.devices.rehearsal import rehearse
 from gateway.profiles.strict_yaml.faults import Fault
 from gateway.profiles.strict_yaml.text import Document
@@ -19,7 +20,9 @@ def read_device(document: Document) -> tuple[DeviceProfile | None, list[Fault]]:
         return None, faults
     try:
         _MAKE[device.role](device)
+    except UnknownCodecError as error:
+        return None, [document.fault(("codec",), str(error))]
     except ValueError as error:
-        return None, [document.fault(("codec",) if "codec" in str(error) else (), str(error))]
+        return None, [document.fault((), str(error))]
     faults = [document.fault(place, told) for place, told in rehearse(device)]
     return (None, faults) if faults else (device, [])

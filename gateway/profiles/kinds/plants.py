@@ -86,7 +86,7 @@ class _PlantReader:
         self.marks[path] = self.document.marks[(*path, "value")]
         for key in leaf:
             if key not in _LEAF_KEYS:
-                self._fault((*path, key), unknown_key(str(key), leaf, _LEAF_KEYS, {}), at_key=True)
+                self._fault((*path, key), unknown_key(str(key), leaf, _LEAF_KEYS, {})[0], at_key=True)
         value, source = leaf["value"], leaf.get("source")
         if not isinstance(source, str) or not source.strip():
             self._fault((*path, "source"), "is missing: a manual's page, a measurement, or `assumed`")

@@ -11,9 +11,5 @@ def read_registers(document: Document) -> tuple[RegisterMap | None, list[Fault]]
     try:
         return read_map(document.value), []
     except MapError as error:
-        faults = (document.fault(place, sentence, at_key=_is_about_key(sentence)) for place, sentence in error.faults)
+        faults = (document.fault(flaw.place, flaw.sentence, at_key=flaw.is_of_key) for flaw in error.faults)
         return None, sorted(dict.fromkeys(faults))
-
-
-def _is_about_key(sentence: str) -> bool:
-    return sentence.startswith("is not a known key") or sentence.endswith("is missing")

@@ -6,8 +6,11 @@ and is nowhere known.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import Final
 
+from gateway.control.supervision.repeat_law import counts_found_within
+from gateway.control.supervision.stuck_sensor import SLOW_S
 from gateway.devices import CellHost, DeviceProfile, Role, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import (
     Accepted,
@@ -22,6 +25,7 @@ from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.line_checks import of_role
 from gateway.profiles.strict_yaml.sentences import newton, number, second
 
+_COUNTS_OF_NOISE: Final = 0.7  # a rate that needs more than this to tell is worth a word
 _SLOWEST_HZ: Final = 20.0  # DEVICES: the pneumatics settle in 0.27-0.49 s and need 20-50 Hz
 
 
@@ -168,6 +172,20 @@ def counts_are_fine_enough(parts: Parts) -> Found:
             )
 
 
+def a_frozen_cell_is_found(parts: Parts) -> Found:
+    """The rate alone can be known here; the noise shows when the cell is read (W234 at a calibration's end)."""
+    if parts.supervision and parts.supervision.frozen_equal_samples is not None:
+        return
+    for reading in _readings(parts):
+        rate_hz = 1.0 / reading.period_s
+        counts = counts_found_within(SLOW_S, rate_hz)
+        if counts > _COUNTS_OF_NOISE:
+            told = f"noise of {counts:.2g} counts or more" if counts < inf else "no noise whatever: too few readings"
+            seen = f"{reading.device.name} gives {rate_hz:.3g} readings/s"
+            found = f"at a force that stands still a frozen cell is found within {SLOW_S:.0f} s by {told} (W234)"
+            yield "load_cell.device", f"{seen}: {found}"
+
+
 def settings_are_fine_enough(parts: Parts) -> Found:
     """Half a step of the output, as the calibration's mean slope makes newtons of it, must fit into the band."""
     device, calibration, defaults = of_role(parts.output_device, Role.OUTPUT), parts.calibration, parts.defaults
@@ -244,4 +262,5 @@ WARNINGS: Final[tuple[Check, ...]] = (
     the_cell_wire_is_fast_enough,
     a_lost_answer_is_survived,
     the_quantum_is_the_amplifiers,
+    a_frozen_cell_is_found,
 )

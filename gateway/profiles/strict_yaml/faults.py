@@ -7,6 +7,7 @@ collected and told together: a file with five typos takes one run to mend, not f
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from enum import Enum
 
 Path = tuple[str | int, ...]
 """Where in a document: keys and list indices from the top."""
@@ -25,15 +26,26 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
 
 
+class FaultKind(Enum):
+    """What other checks decide by; the sentence is for people."""
+
+    OTHER = "other"
+    MISSING = "missing"  # a key that must be there
+    STRANGER = "stranger"  # a key that means nothing there
+
+
 @dataclass(frozen=True, slots=True, order=True)
 class Fault:
-    """One thing to mend. line and column count from 1; line 0: the file as a whole (it could not be found or read)."""
+    """One thing to mend. line and column count from 1; line 0: the file as a whole (it could not be found or read). meant:
+    the key that a STRANGER probably is, empty where nobody knows."""
 
     file: str
     line: int
     column: int
     path: str
     message: str
+    kind: FaultKind = field(default=FaultKind.OTHER, compare=False)
+    meant: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file

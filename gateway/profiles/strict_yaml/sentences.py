@@ -72,38 +72,31 @@ def shown(value: object) -> str:
     return "a list" if isinstance(value, list) else "a group of keys"
 
 
-def unknown_key(key: str, group: Mapping[Any, Any], known: Iterable[str], elsewhere: Mapping[str, str]) -> str:
-    """The sentence for a key that its group does not have. group: what stands there; elsewhere: key -> where it belongs.
+def unknown_key(
+    key: str, group: Mapping[Any, Any], known: Iterable[str], elsewhere: Mapping[str, str]
+) -> tuple[str, str]:
+    """(sentence, key that was meant) for a key that its group does not have; the latter empty where nobody knows. group: what
+    stands there; elsewhere: key -> where it belongs.
 
     A key that the group has already cannot have been meant.
     """
     known = list(known)
     free = [name for name in known if name not in group]
     if (scaled := _other_unit(key, group.get(key), free)) is not None:
-        return f"is not a known key; this quantity is given as {scaled}"
+        name, amount = scaled
+        return f"is not a known key; this quantity is given as {name}{amount}", name
     for name in free:
         if name != key and without_unit(name) == key:
-            return f"is not a known key; did you mean {name}? (a key ends with its unit)"
+            return f"is not a known key; did you mean {name}? (a key ends with its unit)", name
     if key in elsewhere:
-        return f"is not a known key here; it belongs under {elsewhere[key]}"
+        return f"is not a known key here; it belongs under {elsewhere[key]}", ""
     if (near := closest(key, free)) is not None:
-        return f"is not a known key; did you mean {near}?"
-    return f"is not a known key; known are {one_of(known)}"
+        return f"is not a known key; did you mean {near}?", near
+    return f"is not a known key; known are {one_of(known)}", ""
 
 
-def meant_key(sentence: str) -> str | None:
-    """The key that an `unknown_key` sentence proposes."""
-    found = re.search(r"did you mean (\w+)\?|is given as (\w+)", sentence)
-    return (found[1] or found[2]) if found and sentence.startswith("is not a known key") else None
-
-
-def is_stranger(sentence: str) -> bool:
-    """True for an `unknown_key` sentence that knows no key that was meant."""
-    return sentence.startswith("is not a known key") and meant_key(sentence) is None
-
-
-def _other_unit(key: str, value: object, known: list[str]) -> str | None:
-    """`lease_ms: 200` -> `lease_s: 0.2`: the same stem with another unit of the same kind."""
+def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | None:
+    """`lease_ms: 200` -> (`lease_s`, `: 0.2`): the same stem with another unit of the same kind."""
     stem, _, unit = key.rpartition("_")
     for scale in _SCALES:
         if unit not in scale:
@@ -112,7 +105,7 @@ def _other_unit(key: str, value: object, known: list[str]) -> str | None:
             if other != unit and f"{stem}_{other}" in known:
                 is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
                 amount = f": {float(value) * scale[unit] / scale[other]:.6g}" if is_number else ""  # type: ignore[arg-type]
-                return f"{stem}_{other}{amount}"
+                return f"{stem}_{other}", amount
     return None
 
 

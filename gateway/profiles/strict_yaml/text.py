@@ -16,7 +16,7 @@ import yaml
 
 from gateway.profiles.strict_yaml.faults import Fault, Path, ProfileError, path_text
 from gateway.profiles.strict_yaml.scalars import plain_scalar
-from gateway.profiles.strict_yaml.syntax import syntax_sentence
+from gateway.profiles.strict_yaml.syntax import TooDeepError, syntax_sentence
 
 _PARSER: Final[Any] = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _LARGEST_BYTES: Final = 1 << 20
@@ -140,7 +140,7 @@ class _Reader:
         if event.tag is not None:
             self._fault(event, path, f"tag `{event.tag}`: tags are not used here")
         if len(path) >= _DEEPEST:
-            raise yaml.MarkedYAMLError(problem=f"{_DEEPEST} levels deep", problem_mark=start)
+            raise TooDeepError(problem=f"{_DEEPEST} levels deep", problem_mark=start)
         if isinstance(event, yaml.MappingStartEvent):
             return self._mapping(events, path)
         return self._sequence(events, path)

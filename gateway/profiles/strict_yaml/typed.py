@@ -7,15 +7,15 @@ dataclasses themselves (`Annotated[float, Gt(0)]`, `__pydantic_config__ = {"extr
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from types import UnionType
 from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from gateway.profiles.strict_yaml.faults import Fault, Path, path_text
-from gateway.profiles.strict_yaml.sentences import is_stranger, meant_key, type_sentence, unit_of, unknown_key
+from gateway.profiles.strict_yaml.faults import Fault, FaultKind, Path, path_text
+from gateway.profiles.strict_yaml.sentences import type_sentence, unit_of, unknown_key
 from gateway.profiles.strict_yaml.text import Document
 
 T = TypeVar("T")
@@ -42,7 +42,7 @@ def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None,
 def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
     """The dataclass at `path`, for cross-checks: keys that mean nothing there are left out, any other fault gives None."""
     value, faults = build(kind, document, path)
-    strangers = {fault.path for fault in faults if is_stranger(fault.message)}
+    strangers = {fault.path for fault in faults if fault.kind is FaultKind.STRANGER and not fault.meant}
     group = document.at(*path)
     if value is not None or not isinstance(group, dict) or len(strangers) < len(faults):
         return value
@@ -59,10 +59,8 @@ def _told_once(error: ValidationError) -> list[Any]:
 
 def _without_echoes(faults: list[Fault]) -> list[Fault]:
     """A misspelt key is also a missing one: the second finding goes, for the first tells what was meant."""
-    meant = {
-        f"{fault.path.rpartition('.')[0]}.{key}".lstrip(".") for fault in faults if (key := meant_key(fault.message))
-    }
-    return [fault for fault in faults if not (fault.path in meant and fault.message.startswith("is missing"))]
+    meant = {f"{fault.path.rpartition('.')[0]}.{fault.meant}".lstrip(".") for fault in faults if fault.meant}
+    return [fault for fault in faults if not (fault.path in meant and fault.kind is FaultKind.MISSING)]
 
 
 def _steps(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
@@ -73,11 +71,12 @@ def _fault(kind: type, document: Document, path: Path, found: Mapping[str, Any])
     place = _place(document, path, found["loc"])
     key = place[-1] if place else ""
     if found["type"] == "missing":
-        return document.fault(place, f"is missing{_what_it_is(kind, place[len(path) :])}", at_key=True)
+        missing = f"is missing{_what_it_is(kind, place[len(path) :])}"
+        return replace(document.fault(place, missing, at_key=True), kind=FaultKind.MISSING)
     if found["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         known = names(kind_at(kind, place[len(path) : -1]) or kind)
-        sentence = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
-        return document.fault(place, sentence, at_key=True)
+        sentence, meant = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
+        return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=meant)
     return document.fault(place, type_sentence(found, document.at(*place), key))
 
 

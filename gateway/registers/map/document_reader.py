@@ -4,11 +4,20 @@ import re
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from gateway.registers.values import WordOrder
 
 Place = tuple[str | int, ...]
+
+
+class Flaw(NamedTuple):
+    """One fault of a document. is_of_key: a key that is missing or unknown, not the value that stands there."""
+
+    place: Place
+    sentence: str
+    is_of_key: bool = False
+
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -17,20 +26,20 @@ class DocumentReader:
     """Collects faults; what its methods return is of use only when there are none."""
 
     def __init__(self) -> None:
-        self.faults: list[tuple[Place, str]] = []
+        self.faults: list[Flaw] = []
 
-    def fault(self, place: Place, sentence: str) -> None:
-        self.faults.append((place, sentence))
+    def fault(self, place: Place, sentence: str, *, is_of_key: bool = False) -> None:
+        self.faults.append(Flaw(place, sentence, is_of_key))
 
     def keys(self, place: Place, content: Mapping[str, Any], known: tuple[str, ...]) -> None:
         for key in content:
             if key not in known:
-                self.fault((*place, key), f"is not a known key{suggest(str(key), known)}")
+                self.fault((*place, key), f"is not a known key{suggest(str(key), known)}", is_of_key=True)
 
     def group(self, place: Place, content: Any) -> Mapping[str, Any]:
         if isinstance(content, Mapping):
             return content
-        self.fault(place, "is missing" if content is None else "is not a group of keys")
+        self.fault(place, "is missing" if content is None else "is not a group of keys", is_of_key=content is None)
         return {}
 
     def is_name(self, place: Place, name: str) -> None:
@@ -43,6 +52,7 @@ class DocumentReader:
             self.fault(
                 (*place, key) if key in content else place,
                 f"{key} is not text" if key in content else f"{key} is missing",
+                is_of_key=key not in content,
             )
             return ""
         return found
@@ -57,7 +67,7 @@ class DocumentReader:
     def whole(self, place: Place, content: Mapping[str, Any], key: str, low: int, high: int) -> int:
         found = content.get(key)
         if found is None:
-            self.fault(place, f"{key} is missing")
+            self.fault(place, f"{key} is missing", is_of_key=True)
         elif not isinstance(found, int) or isinstance(found, bool) or not low <= found <= high:
             self.fault((*place, key), f"{found} is not a whole number {low} .. {high}")
         else:

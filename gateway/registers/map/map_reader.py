@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any, Final
 
-from gateway.registers.map.document_reader import DocumentReader, Place, suggest
+from gateway.registers.map.document_reader import DocumentReader, Flaw, Place, suggest
 from gateway.registers.map.register_map import Block, Register, RegisterMap, repeat_as_float
 from gateway.registers.map.value_names import BIT_NAMES, VALUE_NAMES
 from gateway.registers.values import RAW_LIMITS, TYPES, words_of
@@ -29,10 +29,10 @@ _REGISTER_KEYS: Final = (
 
 
 class MapError(ValueError):
-    """The document is no register map. faults: (place in the document, sentence)."""
+    """The document is no register map. faults: each with its place in the document."""
 
-    def __init__(self, faults: list[tuple[Place, str]]) -> None:
-        super().__init__("; ".join(f"{'.'.join(map(str, place)) or 'map'}: {sentence}" for place, sentence in faults))
+    def __init__(self, faults: list[Flaw]) -> None:
+        super().__init__("; ".join(f"{'.'.join(map(str, one.place)) or 'map'}: {one.sentence}" for one in faults))
         self.faults = tuple(faults)
 
 

@@ -68,7 +68,7 @@ class CalibrationRuns:
         if asked.dry_run:
             return self._tried(_parse_plan(asked.plan))
         if asked.stop:
-            self._calibrating.ask_stop("info calibration stopped at this machine")
+            self._calibrating.ask_stop("calibration stopped at this machine")
         elif asked.plan is not None:
             self._start(asked.plan, asked.continues)
             self._name = asked.name
@@ -203,7 +203,7 @@ class CalibrationRuns:
             self._ended = recorder.failure
             self._calibrating.phase = CalibrationPhase.STOPPED
         elif self._calibrating.phase is CalibrationPhase.RECORDED:
-            self._log("calibration", f"info experiment recorded in {recorder.path}; force-gateway diagnose takes it")
+            self._log("calibration", f"experiment recorded in {recorder.path}; force-gateway diagnose takes it")
 
     def _close_ladder(self) -> None:
         """A finished ladder is fitted, if the disk took all of it."""
@@ -221,7 +221,7 @@ class CalibrationRuns:
         if "stored" in result:
             self.stored = int(result["stored"])
             self._calibrating.phase = CalibrationPhase.STORED
-            self._log("calibration", f"info calibration {self.stored} stored, not active; report {result['report']}")
+            self._log("calibration", f"calibration {self.stored} stored, not active; report {result['report']}")
         else:
             self._calibrating.phase = CalibrationPhase.REFUSED
             told = f"; report {result['report']}" if "report" in result else ""

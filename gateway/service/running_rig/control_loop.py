@@ -11,11 +11,13 @@ import traceback
 from collections.abc import Callable
 from dataclasses import replace
 from math import nan
+from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.control.inputs import LineStatus, Output
+from gateway.control.silence import NOT_HELD, Held
 from gateway.devices.messages import ForceSample
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
@@ -23,11 +25,15 @@ from gateway.registers.command import Command
 from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
+from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from gateway.service.running_rig.recorded_row import row_of
 from gateway.service.running_rig.recordings import Recordings
+
+_LONG_SILENCE_S: Final = 0.03
+_LONGEST_SILENCE_S: Final = 10.0  # then it is no hiccup any more
 
 Log = Callable[[str, str], None]
 """log(cause, sentence): the cause groups lines for rate limits, the sentence is for people."""
@@ -69,6 +75,7 @@ class ControlLoop:
         self._log = log
         self.waited_s: Callable[[], float | None] = lambda: None
         """Seconds that this process has waited for a processor until now, where the machine counts that."""
+        self.lateness: Lateness | None = None
         self._last_tick_s: float | None = None
         self._last_waited_s: float | None = None
         bank.on_command = self._on_command
@@ -106,6 +113,8 @@ class ControlLoop:
         self._cell.tick(now_s)
         self._step(now_s)
         self._last_tick_s, self._last_waited_s = now_s, self.waited_s()
+        if self.lateness:
+            self.lateness.tick(now_s, self._last_waited_s)
 
     def output_opened(self) -> None:
         self.output.opened()
@@ -135,6 +144,12 @@ class ControlLoop:
             return None
         return waited_s - self._last_waited_s
 
+    def _held(self, since_s: float | None, now_s: float) -> Held:
+        """Asked of the kernel only once a device has not been heard for a while."""
+        if self.lateness is None or since_s is None or not _LONG_SILENCE_S <= now_s - since_s <= _LONGEST_SILENCE_S:
+            return NOT_HELD
+        return self.lateness.since(since_s, now_s, self.waited_s())
+
     def _line(self, now_s: float) -> LineStatus:
         return LineStatus(
             acknowledged_v=self.output.acknowledged_v,
@@ -149,6 +164,8 @@ class ControlLoop:
             warnings=self.warnings,
             sent_v=self.output.sent_v,
             wire_s=self.output.round_trip_s,
+            cell_held=self._held(self.sample.time_s if self.sample else None, now_s),
+            output_held=self._held(self.output.unanswered_since_s, now_s),
         )
 
     def _decide(self, now_s: float) -> Output:

@@ -13,6 +13,7 @@ from gateway.calibrations.activation import ActiveCalibration
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
+from gateway.control.silence import cause_of_silence
 from gateway.devices import cell_host, output_host
 from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.modbus import Peer
@@ -33,6 +34,7 @@ from gateway.service.running_rig.baud_probe import explain_silent_device
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.calibrations import RigCalibrations
 from gateway.service.running_rig.control_loop import ControlLoop
+from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.recordings import Recordings
@@ -80,6 +82,12 @@ class RunningRig:
         self._closing = False
         self._not_opened: dict[str, PortError] = {}  # after a restart, by path
         self._spoke = asyncio.Event()
+        supervision = rig.control.supervision
+        self._running: dict[str, Any] = {
+            "rig": rig.name,
+            "lease_s": supervision.lease_s,
+            "lease_action": supervision.lease_action.value,
+        }
         self.ring: SampleRing | None = None
         self.failed = asyncio.Event()
         asyncio.get_running_loop().set_exception_handler(self._on_defect)
@@ -104,6 +112,8 @@ class RunningRig:
         )
         self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
         self._turns = SchedulerCounters(os.getpid())
+        self._lateness = Lateness(1.0 / rig.loop_hz)
+        self._follow_rig()
         cell = rig.load_cell
         self._cell_line = CellExchange(cell_host(cell.device, cell.sign, cell.unit), self._write_cell, cell.device)
         self._tick = ClockTick(1.0 / rig.loop_hz, self._on_tick)
@@ -129,6 +139,7 @@ class RunningRig:
                 upload=self._upload,
                 ladder=self._ladder,
                 watch=self.watch_desk,
+                running=self._running,
             ),
             self._log,
         )
@@ -161,6 +172,7 @@ class RunningRig:
         self.gateway.ring = self.ring
         self.gateway.restart_cause = cause
         self.gateway.waited_s = self._turns.waited_s
+        self.gateway.lateness = self._lateness
         if self._tick.is_fallback:
             self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
 
@@ -180,6 +192,7 @@ class RunningRig:
         for note in notes:
             self._log.note("start", note)
         modbus = await self._listen(bind)
+        self._running["port"] = modbus[1]
         return banner.Ready(
             rig=self._rig,
             modbus=modbus,
@@ -205,8 +218,13 @@ class RunningRig:
                     return port.begin_lost(error)
             await asyncio.sleep(_HELD_AGAIN_S)
 
+    def _follow_rig(self) -> None:
+        pid = self._guardian.rig_pid
+        self._lateness.follow_rig(SchedulerCounters(pid) if pid else None)
+
     def move_ports(self, ports: dict[str, str]) -> None:
         """The simulated rig has been started again, elsewhere: what was lost is opened there."""
+        self._follow_rig()
         self._output_port.move(ports["output"])
         self._cell_port.move(ports["load_cell"])
 
@@ -231,12 +249,17 @@ class RunningRig:
     async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, restarted: Ending | None) -> str:
         """The port is ours alone: it is closed while the probe listens at other speeds, and opened again.
 
-        Not after a restart: seconds of listening would tell what the start has told already.
+        Not after a restart: seconds of listening would tell what the start has told already. Nor where the machine did not
+        let us, or a simulated rig, run.
         """
         if restarted and port.path in self._not_opened:
             return str(self._not_opened[port.path])
-        if restarted:
-            return f"E111 {port.path}: nothing heard within {_WORDS_AGAIN_S:g} s of the restart; power, wires?"
+        waited_s, now_s = _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S, time.monotonic()
+        held = self._lateness.since(now_s - waited_s, now_s, self._turns.waited_s())
+        _, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, waited_s, held, "")
+        if restarted or blamed:
+            start = "restart" if restarted else "start"
+            return f"E111 {port.path}: nothing heard within {waited_s:g} s of the {start}; {blamed or 'power, wires?'}"
         port.close()
         sentence = await explain_silent_device(line, port.path)
         await port.open()
@@ -278,6 +301,7 @@ class RunningRig:
         self._cell_port.close()
         self._upload.close()
         self._turns.close()
+        self._lateness.close()
         self._flag.lower()
 
     def _on_defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

@@ -120,7 +120,7 @@ def test_a_run_goes_through_zero_and_check_and_then_by_the_clock_to_its_end_at_z
     assert bench.last.state is State.CALIBRATING, "the force goes to 0 along the ramp"
     bench.run(0.5)
     assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
-    assert any(event.startswith("info experiment short done") for event in bench.events)
+    assert any(event.startswith("experiment short done") for event in bench.events)
 
 
 def test_without_the_check_it_begins_after_the_zero() -> None:
@@ -142,7 +142,7 @@ def test_a_stop_ends_it_at_zero_volts() -> None:
     bench = begun(Bench(seed=6), SHORT)
     bench.run(1.5)
     assert bench.last.voltage_v > 2.0
-    bench.controller.active_run.ask_stop("info calibration stopped at this machine")
+    bench.controller.active_run.ask_stop("calibration stopped at this machine")
     bench.run(0.4)
     assert (bench.last.state, bench.last.voltage_v) == (State.OFF, 0.0)
     assert bench.last.calibration_phase == CalibrationPhase.STOPPED

@@ -123,7 +123,7 @@ def test_a_run_of_this_machine_is_stopped_by_0_in_the_control_word_alone_and_not
 def test_a_run_of_this_machine_needs_no_heartbeat_on_its_way_to_0() -> None:
     control = settings(lease_s=LEASE_S)
     rack = Rack(replace(control, defaults=replace(control.defaults, force_ramp_n_per_s=10.0)))
-    locally(rack).run(3.0).controller.active_run.ask_stop("info calibration stopped at this machine")
+    locally(rack).run(3.0).controller.active_run.ask_stop("calibration stopped at this machine")
     rack.until(State.OFF, 6.0)
 
 
@@ -163,7 +163,7 @@ def test_one_write_begins_a_run_again_and_again() -> None:
     rack = Rack()
     for _ in range(2):
         rack.calibrating()
-        rack.controller.active_run.ask_stop("info calibration stopped at this machine")
+        rack.controller.active_run.ask_stop("calibration stopped at this machine")
         rack.until(State.OFF)
 
 
@@ -292,9 +292,9 @@ def test_an_edge_bit_acts_each_time_it_is_written() -> None:
     rack = Rack()
     for _ in range(3):
         rack.write(0, TARE)
-    assert sum(sentence.startswith("info tare") for sentence in rack.log) == 3
+    assert sum(sentence.startswith("tare") for sentence in rack.log) == 3
     rack.write(4, 1)
-    assert sum(sentence.startswith("info tare") for sentence in rack.log) == 3
+    assert sum(sentence.startswith("tare") for sentence in rack.log) == 3
 
 
 def test_a_reset_with_a_new_heartbeat_counts_in_the_very_moment_of_the_fault() -> None:

@@ -1,0 +1,58 @@
+"""A device was not heard in time: was it silent, or did the machine not let us hear it?
+
+What is late is late, and the force goes; only the cause that is told differs. Where at least half of the silence was ours (or
+of the process behind a simulated rig), no wire is to blame: MACHINE_BUSY where the kernel counts so much waiting for a
+processor, else the fault of the line with what was seen, for a machine that stands still as a whole (a virtual one on a
+busy host) counts nothing.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.codes.faults import FaultCode
+
+_SHARE: Final = 0.5
+_CURE: Final = "the machine is too busy: end other programs, or `run --realtime`"
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What kept processes from running since a device was last heard, in seconds.
+
+    loop_late_s: how late our own loop came, in sum; loop_waited_s: so much of it waiting for a processor, None where the
+    machine does not count that. Of the process behind a simulated rig, 0 for a real one: rig_waited_s: runnable, and not let;
+    rig_stopped_s: held by a signal or a debugger.
+    """
+
+    loop_late_s: float = 0.0
+    loop_waited_s: float | None = None
+    rig_waited_s: float = 0.0
+    rig_stopped_s: float = 0.0
+
+
+NOT_HELD: Final = Held()
+
+
+def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: str) -> tuple[FaultCode, str]:
+    """The fault and what is to blame, in words. suspects: what it is where the machine did let us run; nan s: never heard."""
+    enough_s = _SHARE * silent_s
+    waited_s = held.loop_waited_s
+    ours = f"our own loop came {_ms(held.loop_late_s)} late in that time"
+    if held.rig_stopped_s >= enough_s:
+        return (
+            fault,
+            f"the simulated rig's process was stopped for {_ms(held.rig_stopped_s)} of them (a signal, a debugger)",
+        )
+    if held.rig_waited_s >= enough_s:
+        seen = f"the simulated rig's process waited {_ms(held.rig_waited_s)} of them for a processor"
+        return FaultCode.MACHINE_BUSY, f"{seen}: {_CURE}"
+    if not held.loop_late_s >= enough_s:  # nor where silent_s is nan
+        return fault, f"{ours}: {suspects}" if held.loop_late_s > 0.0 and suspects else suspects
+    if waited_s is not None and waited_s >= _SHARE * held.loop_late_s:
+        return FaultCode.MACHINE_BUSY, f"{ours}, {_ms(waited_s)} of them waiting for a processor: {_CURE}"
+    counted = "not counted why" if waited_s is None else f"only {_ms(waited_s)} of them waiting for a processor"
+    return fault, f"{ours}, {counted}: this machine stood still (a virtual one on a busy host, a stop), not the device"
+
+
+def _ms(seconds: float) -> str:
+    return f"{seconds * 1e3:.0f} ms"

@@ -1,0 +1,110 @@
+"""What kept our loop, or the process behind a simulated rig, from running: read from ticks and from the kernel's counters."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.control.silence import Held
+from gateway.processes.scheduler_counters import SchedulerCounters
+from gateway.service.running_rig.lateness import Lateness
+
+TICK_S = 0.01
+PID = 7
+
+
+class Kernel:
+    """A rig's process whose counters the test writes, beside a loop that ticks."""
+
+    def __init__(self, folder: Path) -> None:
+        self._process = folder / str(PID)
+        self._process.mkdir()
+        self.now_s, self.waited_s = 100.0, 5.0
+        self.ran_ns = self.rig_waited_ns = 0
+        self.write("S")
+        self.lateness = Lateness(TICK_S)
+        self.lateness.follow_rig(SchedulerCounters(PID, folder))
+
+    def write(self, state: str) -> None:
+        (self._process / "schedstat").write_text(f"{self.ran_ns} {self.rig_waited_ns} 1\n")
+        (self._process / "stat").write_text(f"{PID} (rig) {state} 1\n")
+
+    def ticks(self, count: int, *, rig_runs: bool = True, rig_waits_s: float = 0.0) -> None:
+        for _ in range(count):
+            self.now_s += TICK_S
+            self.ran_ns += 100_000 if rig_runs else 0
+            self.rig_waited_ns += round(rig_waits_s * 1e9)
+            self.write("S")
+            self.lateness.tick(self.now_s, self.waited_s)
+
+    def stall(self, seconds: float, waited_s: float) -> None:
+        """Our loop does not come by."""
+        self.now_s += seconds
+        self.waited_s += waited_s
+
+    def held(self, silent_s: float) -> Held:
+        return self.lateness.since(self.now_s - silent_s, self.now_s, self.waited_s)
+
+
+@pytest.fixture
+def kernel(tmp_path: Path) -> Iterator[Kernel]:
+    one = Kernel(tmp_path)
+    one.ticks(50)
+    yield one
+    one.lateness.close()
+
+
+def test_a_loop_and_a_rig_that_come_in_time_explain_no_silence(kernel: Kernel) -> None:
+    assert kernel.held(0.3) == Held(loop_waited_s=0.0)
+
+
+@pytest.mark.parametrize("is_over", [True, False])
+def test_a_loop_that_came_late_says_how_late_and_how_much_it_waited(kernel: Kernel, is_over: bool) -> None:
+    kernel.stall(0.25, waited_s=0.2)
+    if is_over:
+        kernel.ticks(1)
+    held = kernel.held(0.25 + is_over * TICK_S)
+    assert held.loop_late_s == pytest.approx(0.24 + 0.01 * is_over, abs=0.011)
+    assert held.loop_waited_s == pytest.approx(0.2, abs=0.02)
+    kernel.ticks(100)
+    assert kernel.held(0.5).loop_late_s == 0.0, "what was before the silence explains nothing"
+
+
+def test_a_rig_that_waits_for_a_processor_is_seen_while_it_waits_and_after(kernel: Kernel) -> None:
+    kernel.ticks(20, rig_runs=False)
+    kernel.write("R")
+    assert kernel.held(0.2).rig_waited_s == pytest.approx(0.2, abs=0.011)
+    kernel.ticks(1, rig_waits_s=0.2)
+    assert kernel.held(0.21).rig_waited_s == pytest.approx(0.2, abs=0.011)
+
+
+@pytest.mark.parametrize(("state", "stopped_s"), [("T", 0.2), ("t", 0.2), ("S", 0.0), ("D", 0.0)])
+def test_a_rig_that_sleeps_is_silent_of_its_own(kernel: Kernel, state: str, stopped_s: float) -> None:
+    kernel.ticks(20, rig_runs=False)
+    kernel.write(state)
+    held = kernel.held(0.2)
+    assert held.rig_stopped_s == pytest.approx(stopped_s, abs=0.011)
+    assert held.rig_waited_s == 0.0
+
+
+def test_a_stopped_process_is_told_from_a_silent_one() -> None:
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    lateness = Lateness(TICK_S)
+    lateness.follow_rig(SchedulerCounters(process.pid))
+    try:
+        os.kill(process.pid, signal.SIGSTOP)
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED)
+        began_s = time.monotonic()
+        lateness.tick(began_s, None)
+        held = lateness.since(began_s, began_s + 0.1, None)
+        assert held.rig_stopped_s == pytest.approx(0.1)
+        assert held.loop_waited_s is None
+    finally:
+        process.kill()
+        process.communicate()
+        lateness.close()
