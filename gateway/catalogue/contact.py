@@ -7,14 +7,14 @@ from gateway.catalogue.effect import (
     PRESSURE,
     By,
     Effect,
-    Form,
+    EffectForm,
     Parameter,
     PartName,
     Recipe,
-    Scene,
+    SearchHints,
     Start,
     Treatment,
-    fixed,
+    fixed_starts,
 )
 from gateway.catalogue.regulator import LIMITS, TOO_FAST, TRIM, limits
 
@@ -54,17 +54,17 @@ _WHOLE_WAY: Final = Recipe(
 _NO_PLACE: Final = "the command block carries no place along the path; what is slow the trim takes back"
 
 
-def _stroke(scene: Scene) -> tuple[Start, ...]:
+def _stroke(hints: SearchHints) -> tuple[Start, ...]:
     """Travel at which the pad carries a force that was nearly reached; the pad's stiffness is the default plant's."""
-    return tuple((force_n / 4.1e4 - STROKE.null,) for force_n in limits(scene.forces_n) if force_n > 1.0)
+    return tuple((force_n / 4.1e4 - STROKE.null,) for force_n in limits(hints.forces_n) if force_n > 1.0)
 
 
-def _stop(scene: Scene) -> tuple[Start, ...]:
-    return tuple((0.5, position_mm) for position_mm in scene.positions_mm)
+def _stop(hints: SearchHints) -> tuple[Start, ...]:
+    return tuple((0.5, position_mm) for position_mm in hints.positions_mm)
 
 
-def _ripple(scene: Scene) -> tuple[Start, ...]:
-    return tuple((0.1, pitch_mm, 0.0) for pitch_mm in scene.pitches_mm)
+def _ripple(hints: SearchHints) -> tuple[Start, ...]:
+    return tuple((0.1, pitch_mm, 0.0) for pitch_mm in hints.pitches_mm)
 
 
 CONTACT: Final = (
@@ -79,9 +79,9 @@ CONTACT: Final = (
         recipe=Recipe(parts=(PartName.DWELLS, PartName.CYCLES)),
         treatments=(Treatment(why_not=TRIM),),
         forms=(
-            Form(
+            EffectForm(
                 parameters=(CREEP, CREEP_TIME),
-                probes=fixed((0.02, 1.0), (0.02, 3.0), (0.02, 10.0), (0.02, 40.0)),
+                probes=fixed_starts((0.02, 1.0), (0.02, 3.0), (0.02, 10.0), (0.02, 40.0)),
                 proportional=True,
             ),
         ),
@@ -97,7 +97,7 @@ CONTACT: Final = (
         experiment="dead weights on the load cell: they tell a bent cell from a bent contact",
         recipe=DEAD_WEIGHTS,
         treatments=(Treatment(by=By.MODEL),),
-        forms=(Form(parameters=(HARDENING,), probes=fixed((0.01,)), proportional=True),),
+        forms=(EffectForm(parameters=(HARDENING,), probes=fixed_starts((0.01,)), proportional=True),),
         group=LIMITS,
     ),
     Effect(
@@ -115,8 +115,8 @@ CONTACT: Final = (
         ),
         treatments=(Treatment(why_not="beyond it the slide carries no more force: mount the tool nearer"),),
         forms=(
-            Form(parameters=(STROKE,), probes=_stroke),
-            Form(parameters=(STOP_STIFFNESS, STOP), probes=_stop, needs=("position_mm",), proportional=True),
+            EffectForm(parameters=(STROKE,), probes=_stroke),
+            EffectForm(parameters=(STOP_STIFFNESS, STOP), probes=_stop, needs=("position_mm",), proportional=True),
         ),
         group=LIMITS,
     ),
@@ -135,9 +135,9 @@ CONTACT: Final = (
         ),
         treatments=(Treatment(by=By.OUTSIDE),),
         forms=(
-            Form(
+            EffectForm(
                 parameters=(TILT, TILT_ZERO),
-                probes=fixed((1.0, 0.0)),
+                probes=fixed_starts((1.0, 0.0)),
                 needs=("tilt_deg",),
                 proportional=True,
                 quadrature=True,
@@ -155,9 +155,13 @@ CONTACT: Final = (
         recipe=Recipe(parts=(PartName.LEVEL,), meanwhile="let the robot feed at 0, 5 and 15 mm/s in both directions"),
         treatments=(Treatment(by=By.OUTSIDE),),
         forms=(
-            Form(parameters=(FEED_DRAG,), probes=fixed((0.02,)), needs=("feed_mm_s",), proportional=True),
-            Form(parameters=(FEED_DRAG_DRY,), probes=fixed((0.2,)), needs=("feed_mm_s",), proportional=True),
-            Form(parameters=(FEED_DRAG_ABS,), probes=fixed((0.02,)), needs=("feed_mm_s",), proportional=True),
+            EffectForm(parameters=(FEED_DRAG,), probes=fixed_starts((0.02,)), needs=("feed_mm_s",), proportional=True),
+            EffectForm(
+                parameters=(FEED_DRAG_DRY,), probes=fixed_starts((0.2,)), needs=("feed_mm_s",), proportional=True
+            ),
+            EffectForm(
+                parameters=(FEED_DRAG_ABS,), probes=fixed_starts((0.02,)), needs=("feed_mm_s",), proportional=True
+            ),
         ),
     ),
     Effect(
@@ -181,16 +185,16 @@ CONTACT: Final = (
             ),
         ),
         forms=(
-            Form(
+            EffectForm(
                 parameters=(SPINDLE, SPINDLE_PHASE),
-                probes=fixed((0.1, 0.0)),
+                probes=fixed_starts((0.1, 0.0)),
                 needs=("spindle_rpm",),
                 proportional=True,
                 quadrature=True,
             ),
-            Form(
+            EffectForm(
                 parameters=(SPINDLE_SQUARE, SPINDLE_PHASE),
-                probes=fixed((0.02, 0.0)),
+                probes=fixed_starts((0.02, 0.0)),
                 needs=("spindle_rpm",),
                 proportional=True,
                 quadrature=True,
@@ -213,8 +217,8 @@ CONTACT: Final = (
         ),
         treatments=(Treatment(why_not=TRIM),),
         forms=(
-            Form(parameters=(WEAR,), probes=fixed((0.01,)), needs=("distance_m",), proportional=True),
-            Form(parameters=(WEAR_N,), probes=fixed((0.01,)), needs=("distance_m",), proportional=True),
+            EffectForm(parameters=(WEAR,), probes=fixed_starts((0.01,)), needs=("distance_m",), proportional=True),
+            EffectForm(parameters=(WEAR_N,), probes=fixed_starts((0.01,)), needs=("distance_m",), proportional=True),
         ),
         group=MONOTONE,
     ),
@@ -229,10 +233,10 @@ CONTACT: Final = (
         recipe=_WHOLE_WAY,
         treatments=(Treatment(why_not=_NO_PLACE),),
         forms=(
-            Form(parameters=(SLOPE,), probes=fixed((0.02,)), needs=("position_mm",), proportional=True),
-            Form(
+            EffectForm(parameters=(SLOPE,), probes=fixed_starts((0.02,)), needs=("position_mm",), proportional=True),
+            EffectForm(
                 parameters=(SLOPE, CURVE),
-                probes=fixed((0.02, 0.0), (0.0, 1.0e-3)),
+                probes=fixed_starts((0.02, 0.0), (0.0, 1.0e-3)),
                 needs=("position_mm",),
                 proportional=True,
             ),
@@ -249,7 +253,7 @@ CONTACT: Final = (
         recipe=_WHOLE_WAY,
         treatments=(Treatment(why_not=_NO_PLACE),),
         forms=(
-            Form(
+            EffectForm(
                 parameters=(RIPPLE, RIPPLE_PITCH, RIPPLE_PHASE),
                 probes=_ripple,
                 needs=("position_mm",),
@@ -269,7 +273,7 @@ CONTACT: Final = (
         recipe=Recipe(parts=(PartName.TOUCHES, PartName.REVERSALS)),
         treatments=(Treatment(by=By.MODEL, fields=("contact.backlash_n", "contact.lost_n")),),
         forms=(
-            Form(parameters=(LOST,), probes=fixed((0.5,), (2.0,))),
+            EffectForm(parameters=(LOST,), probes=fixed_starts((0.5,), (2.0,))),
         ),  # the other play is friction's: one cannot tell
         group=("sign-loss", "asymmetric-friction"),
         rarity=4.0,

@@ -2,7 +2,17 @@
 
 from typing import Final
 
-from gateway.catalogue.effect import PRESSURE, By, Effect, Form, Parameter, PartName, Recipe, Treatment, fixed
+from gateway.catalogue.effect import (
+    PRESSURE,
+    By,
+    Effect,
+    EffectForm,
+    Parameter,
+    PartName,
+    Recipe,
+    Treatment,
+    fixed_starts,
+)
 from gateway.catalogue.regulator import SLOW_LAGS
 
 AREA: Final = Parameter("cylinder", "area_m2", "m2", 1.0e-4, 1.0e-7, 1.0, 2.0e-6)
@@ -39,7 +49,7 @@ CYLINDER: Final = (
         experiment="the same strokes at three speeds (10, 40 and 150 mm/s, or ramps of 0.1, 0.5 and 2 V/s), pressure recorded",
         recipe=_AT_THREE_SPEEDS,
         treatments=(Treatment(by=By.MODEL),),
-        forms=(Form(parameters=(COULOMB,), probes=fixed((0.3,), (1.0,))),),
+        forms=(EffectForm(parameters=(COULOMB,), probes=fixed_starts((0.3,), (1.0,))),),
         group=("regulator-hysteresis", "backlash", "asymmetric-friction", *_ONE_SPEED),
     ),
     Effect(
@@ -53,9 +63,11 @@ CYLINDER: Final = (
         recipe=Recipe(parts=(PartName.RAMPS, PartName.RESTS)),
         treatments=(Treatment(why_not=_SPEED, fields=("friction.stribeck_n", "friction.stribeck_speed_m_per_s")),),
         forms=(
-            Form(parameters=(STRIBECK, STRIBECK_SPEED), probes=fixed((0.3, 1.0e-4), (0.3, 1.0e-3), (0.3, 6.0e-3))),
-            Form(
-                parameters=(STICTION, AT_ONCE), probes=fixed((0.15, 0.1), (0.15, 0.3))
+            EffectForm(
+                parameters=(STRIBECK, STRIBECK_SPEED), probes=fixed_starts((0.3, 1.0e-4), (0.3, 1.0e-3), (0.3, 6.0e-3))
+            ),
+            EffectForm(
+                parameters=(STICTION, AT_ONCE), probes=fixed_starts((0.15, 0.1), (0.15, 0.3))
             ),  # of a slide that sticks and slips
         ),
         group=("coulomb-friction", "dwell-stiction"),
@@ -71,7 +83,7 @@ CYLINDER: Final = (
         recipe=_AT_THREE_SPEEDS,
         treatments=(Treatment(why_not=_SPEED),),
         least=25.0,
-        forms=(Form(parameters=(VISCOUS,), probes=fixed((50.0,), (500.0,))),),
+        forms=(EffectForm(parameters=(VISCOUS,), probes=fixed_starts((50.0,), (500.0,))),),
         group=tuple(dict.fromkeys((*SLOW_LAGS, *_ONE_SPEED))),
     ),
     Effect(
@@ -85,7 +97,7 @@ CYLINDER: Final = (
         recipe=_LOOPS,
         treatments=(Treatment(by=By.MODEL),),
         least=3.0e-6,
-        forms=(Form(parameters=(PRESLIDING,), probes=fixed((3.0e-5,), (1.0e-4,), (4.0e-4,))),),
+        forms=(EffectForm(parameters=(PRESLIDING,), probes=fixed_starts((3.0e-5,), (1.0e-4,), (4.0e-4,))),),
         group=_ONE_SPEED,
     ),
     Effect(
@@ -99,9 +111,9 @@ CYLINDER: Final = (
         recipe=_LOOPS,
         treatments=(Treatment(by=By.MODEL),),
         forms=(
-            Form(
+            EffectForm(
                 parameters=(LOAD,),
-                probes=fixed((0.003,), (0.02,)),
+                probes=fixed_starts((0.003,), (0.02,)),
             ),
         ),
     ),
@@ -119,8 +131,10 @@ CYLINDER: Final = (
             Treatment(why_not=_SPEED, fields=("friction.asymmetry_n_s_per_m",)),
         ),
         forms=(
-            Form(parameters=(ASYMMETRY,), probes=fixed((0.2,)), proportional=True),
-            Form(parameters=(DRAG_ASYMMETRY,), probes=fixed((40.0,), (-40.0,), (300.0,), (-300.0,)), least=25.0),
+            EffectForm(parameters=(ASYMMETRY,), probes=fixed_starts((0.2,)), proportional=True),
+            EffectForm(
+                parameters=(DRAG_ASYMMETRY,), probes=fixed_starts((40.0,), (-40.0,), (300.0,), (-300.0,)), least=25.0
+            ),
         ),
         group=("coulomb-friction", "viscous-friction"),
         rarity=10.0,
@@ -135,7 +149,7 @@ CYLINDER: Final = (
         experiment="at one level: rests of 1, 3, 10 and 30 s, each followed by a ramp of 0.2 V/s",
         recipe=Recipe(parts=(PartName.RESTS,)),
         treatments=(Treatment(why_not="the model has no memory of how long the slide has rested"),),
-        forms=(Form(parameters=(STICTION, STICTION_TIME), probes=fixed((0.3, 1.0), (0.3, 5.0))),),
+        forms=(EffectForm(parameters=(STICTION, STICTION_TIME), probes=fixed_starts((0.3, 1.0), (0.3, 5.0))),),
         group=("stribeck-friction",),
     ),
 )
@@ -154,10 +168,10 @@ SIDE_LOAD: Final = Effect(
     ),
     treatments=(Treatment(why_not="the model's loop has one width, whatever presses from the side"),),
     forms=(
-        Form(parameters=(SIDE_FEED,), probes=fixed((0.003,), (0.02,)), needs=("feed_mm_s",)),
-        Form(parameters=(SIDE_GRIP,), probes=fixed((0.003,), (0.02,)), needs=("feed_mm_s",)),
-        Form(parameters=(SIDE_TILT,), probes=fixed((0.05,), (0.4,)), needs=("tilt_deg",)),
-        Form(parameters=(SIDE_POSITION,), probes=fixed((0.002,), (0.02,)), needs=("position_mm",)),
+        EffectForm(parameters=(SIDE_FEED,), probes=fixed_starts((0.003,), (0.02,)), needs=("feed_mm_s",)),
+        EffectForm(parameters=(SIDE_GRIP,), probes=fixed_starts((0.003,), (0.02,)), needs=("feed_mm_s",)),
+        EffectForm(parameters=(SIDE_TILT,), probes=fixed_starts((0.05,), (0.4,)), needs=("tilt_deg",)),
+        EffectForm(parameters=(SIDE_POSITION,), probes=fixed_starts((0.002,), (0.02,)), needs=("position_mm",)),
     ),
     group=("load-dependent-friction",),
 )

@@ -44,7 +44,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class SearchHints:
     """What a form may know of a recording to place its starts. Empty tuples where there is nothing."""
 
     duration_s: float
@@ -63,7 +63,7 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Form:
+class EffectForm:
     """One way in which an effect shows.
 
     proportional: the response is proportional to the sizes together, whatever their signs; quadrature: the first size is
@@ -73,7 +73,7 @@ class Form:
     """
 
     parameters: tuple[Parameter, ...]
-    probes: Callable[[Scene], tuple[Start, ...]]
+    probes: Callable[[SearchHints], tuple[Start, ...]]
     needs: tuple[str, ...] = ()
     proportional: bool = False
     quadrature: bool = False
@@ -159,7 +159,7 @@ class Effect:
     experiment: str
     recipe: Recipe
     treatments: tuple[Treatment, ...]
-    forms: tuple[Form, ...]
+    forms: tuple[EffectForm, ...]
     group: tuple[str, ...] = ()
     rarity: float = 0.0  # chi-square by which it must beat a commoner cause that explains as much
     least: float = 0.0  # of the first parameter, below which it is part of every machine
@@ -189,6 +189,6 @@ class Effect:
         return tuple(name for name in self.needs if name not in RECORDED)
 
 
-def fixed(*starts: Start) -> Callable[[Scene], tuple[Start, ...]]:
+def fixed_starts(*starts: Start) -> Callable[[SearchHints], tuple[Start, ...]]:
     """Return a `probes` whose starts do not depend on the recording."""
-    return lambda scene: starts
+    return lambda hints: starts

@@ -6,14 +6,14 @@ from gateway.catalogue.effect import (
     PRESSURE,
     By,
     Effect,
-    Form,
+    EffectForm,
     Parameter,
     PartName,
     Recipe,
-    Scene,
+    SearchHints,
     Start,
     Treatment,
-    fixed,
+    fixed_starts,
 )
 
 DELAY: Final = Parameter("regulator", "delay_s", "s", 0.0, 0.0, 1.0, 0.001)
@@ -53,9 +53,9 @@ _TRANSIENTS: Final = "steps or ramps of the command, several times its lag apart
 _SLOW_STEPS: Final = "a slow staircase up and down over the whole range with small steps"
 
 
-def _supply(scene: Scene) -> tuple[Start, ...]:
+def _supply(hints: SearchHints) -> tuple[Start, ...]:
     """A fall from UNLIMITED to just below the pressures that were reached."""
-    return tuple((limit_pa - SUPPLY.null,) for limit_pa in limits(scene.pressures_pa) if limit_pa > 2.0e4)
+    return tuple((limit_pa - SUPPLY.null,) for limit_pa in limits(hints.pressures_pa) if limit_pa > 2.0e4)
 
 
 def limits(reached: tuple[float, ...]) -> tuple[float, ...]:
@@ -63,21 +63,21 @@ def limits(reached: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(0.97 * quantile for quantile in reached[1:-1]) + tuple(share * reached[-1] for share in NEAR)
 
 
-def _slew(scene: Scene) -> tuple[Start, ...]:
-    fastest = max(scene.pressure_rate_pa_per_s, 1.0e4)
+def _slew(hints: SearchHints) -> tuple[Start, ...]:
+    fastest = max(hints.pressure_rate_pa_per_s, 1.0e4)
     return tuple((share * fastest - SLEW.null,) for share in (0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.2))
 
 
-def _steps(scene: Scene) -> tuple[Start, ...]:
-    return tuple((step_v,) for step_v in scene.command_steps_v)
+def _steps(hints: SearchHints) -> tuple[Start, ...]:
+    return tuple((step_v,) for step_v in hints.command_steps_v)
 
 
-def _dead_band(scene: Scene) -> tuple[Start, ...]:
-    return tuple((band_pa,) for band_pa in scene.dead_bands_pa)
+def _dead_band(hints: SearchHints) -> tuple[Start, ...]:
+    return tuple((band_pa,) for band_pa in hints.dead_bands_pa)
 
 
-def _hunting(scene: Scene) -> tuple[Start, ...]:
-    return tuple((1.0e3, line_hz, 0.0) for line_hz in scene.lines_hz if 0.7 <= line_hz <= 40.0)
+def _hunting(hints: SearchHints) -> tuple[Start, ...]:
+    return tuple((1.0e3, line_hz, 0.0) for line_hz in hints.lines_hz if 0.7 <= line_hz <= 40.0)
 
 
 REGULATOR: Final = (
@@ -92,7 +92,7 @@ REGULATOR: Final = (
         recipe=_STEPS_RECIPE,
         treatments=(Treatment(by=By.TIMING),),
         least=7.0e-4,
-        forms=(Form(parameters=(DELAY,), probes=fixed((0.004,), (0.02,), (0.06,))),),
+        forms=(EffectForm(parameters=(DELAY,), probes=fixed_starts((0.004,), (0.02,), (0.06,))),),
         group=SLOW_LAGS,
     ),
     Effect(
@@ -106,7 +106,7 @@ REGULATOR: Final = (
         recipe=_STEPS_RECIPE,
         treatments=(Treatment(by=By.TIMING, fields=("regulator.lag_s", "regulator.second_lag_s", "cell.filter_s")),),
         least=7.0e-4,
-        forms=(Form(parameters=(SECOND_LAG,), probes=fixed((0.005,), (0.02,), (0.06,))),),
+        forms=(EffectForm(parameters=(SECOND_LAG,), probes=fixed_starts((0.005,), (0.02,), (0.06,))),),
         group=SLOW_LAGS,
     ),
     Effect(
@@ -119,7 +119,7 @@ REGULATOR: Final = (
         experiment="a staircase of 0.01 V steps up and down around three levels",
         recipe=Recipe(parts=(PartName.FINE,), columns=PRESSURE),
         treatments=(Treatment(why_not="changes of the command within it are not heard, whatever they are"),),
-        forms=(Form(parameters=(DEAD_BAND,), probes=_dead_band, exact=True),),
+        forms=(EffectForm(parameters=(DEAD_BAND,), probes=_dead_band, exact=True),),
         group=("regulator-hysteresis", "command-quantisation"),
     ),
     Effect(
@@ -132,7 +132,7 @@ REGULATOR: Final = (
         experiment="a staircase up and down with the pressure recorded: the loop stands between command and pressure",
         recipe=Recipe(parts=(PartName.STAIRCASE, PartName.FINE), columns=PRESSURE),
         treatments=(Treatment(by=By.MODEL),),
-        forms=(Form(parameters=(HYSTERESIS,), probes=fixed((600.0,), (3.0e3,), (1.0e4,), (3.0e4,))),),
+        forms=(EffectForm(parameters=(HYSTERESIS,), probes=fixed_starts((600.0,), (3.0e3,), (1.0e4,), (3.0e4,))),),
         group=("coulomb-friction",),
     ),
     Effect(
@@ -145,7 +145,7 @@ REGULATOR: Final = (
         experiment="a ramp of 0.05 V/s over two volts",
         recipe=Recipe(parts=(PartName.SLOW_RAMP,)),
         treatments=(Treatment(why_not="nothing between two steps can be sent"),),
-        forms=(Form(parameters=(COMMAND_STEP,), probes=_steps, exact=True, everywhere=True),),
+        forms=(EffectForm(parameters=(COMMAND_STEP,), probes=_steps, exact=True, everywhere=True),),
         group=("dead-band",),
     ),
     Effect(
@@ -159,8 +159,8 @@ REGULATOR: Final = (
         recipe=_STAIRS_AND_STEPS,
         treatments=(Treatment(by=By.COMMAND),),
         forms=(
-            Form(parameters=(BOW,), probes=fixed((0.01,)), proportional=True),
-            Form(parameters=(S_SHAPE,), probes=fixed((0.01,)), proportional=True),
+            EffectForm(parameters=(BOW,), probes=fixed_starts((0.01,)), proportional=True),
+            EffectForm(parameters=(S_SHAPE,), probes=fixed_starts((0.01,)), proportional=True),
         ),
         group=LIMITS,
     ),
@@ -174,7 +174,7 @@ REGULATOR: Final = (
         experiment="a staircase to full scale with supply_kpa or pressure_kpa recorded",
         recipe=_STAIRS_AND_STEPS,
         treatments=(Treatment(why_not="the air line has no more pressure"),),
-        forms=(Form(parameters=(SUPPLY,), probes=_supply), Form(parameters=(CEILING,), probes=_supply)),
+        forms=(EffectForm(parameters=(SUPPLY,), probes=_supply), EffectForm(parameters=(CEILING,), probes=_supply)),
         group=LIMITS,
     ),
     Effect(
@@ -196,8 +196,10 @@ REGULATOR: Final = (
             ),
         ),
         forms=(
-            Form(parameters=(DROOP,), probes=fixed((0.02,)), needs=("supply_kpa",), proportional=True),
-            Form(parameters=(DROOP_SHARE,), probes=fixed((1.0e-7,)), needs=("supply_kpa",), proportional=True),
+            EffectForm(parameters=(DROOP,), probes=fixed_starts((0.02,)), needs=("supply_kpa",), proportional=True),
+            EffectForm(
+                parameters=(DROOP_SHARE,), probes=fixed_starts((1.0e-7,)), needs=("supply_kpa",), proportional=True
+            ),
         ),
     ),
     Effect(
@@ -215,8 +217,8 @@ REGULATOR: Final = (
             ),
         ),
         forms=(
-            Form(parameters=(LEAK,), probes=fixed((0.003,), (0.03,))),
-            Form(parameters=(LEAK_FLOW,), probes=fixed((5.0e3,)), proportional=True),
+            EffectForm(parameters=(LEAK,), probes=fixed_starts((0.003,), (0.03,))),
+            EffectForm(parameters=(LEAK_FLOW,), probes=fixed_starts((5.0e3,)), proportional=True),
         ),
         group=LIMITS,
         rarity=2.0,
@@ -232,7 +234,9 @@ REGULATOR: Final = (
         recipe=Recipe(parts=(PartName.REST, PartName.DWELLS), columns=PRESSURE),
         treatments=(Treatment(why_not=TOO_FAST),),
         forms=(
-            Form(parameters=(HUNTING, HUNTING_HZ, HUNTING_PHASE), probes=_hunting, proportional=True, quadrature=True),
+            EffectForm(
+                parameters=(HUNTING, HUNTING_HZ, HUNTING_PHASE), probes=_hunting, proportional=True, quadrature=True
+            ),
         ),
         group=("mains-hum", "spindle-vibration"),
     ),
@@ -246,7 +250,7 @@ REGULATOR: Final = (
         experiment="steps of 0.5, 1, 2 and 4 V up and down",
         recipe=_STEPS_RECIPE,
         treatments=(Treatment(why_not="the regulator cannot be faster than it is"),),
-        forms=(Form(parameters=(SLEW,), probes=_slew),),
+        forms=(EffectForm(parameters=(SLEW,), probes=_slew),),
         group=("leak",),
     ),
 )

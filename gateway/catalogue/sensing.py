@@ -7,14 +7,14 @@ from gateway.catalogue.effect import (
     PRESSURE,
     By,
     Effect,
-    Form,
+    EffectForm,
     Parameter,
     PartName,
     Recipe,
-    Scene,
+    SearchHints,
     Start,
     Treatment,
-    fixed,
+    fixed_starts,
 )
 from gateway.catalogue.regulator import LIMITS, SLOW_LAGS
 
@@ -48,16 +48,16 @@ _UNKNOWN_ZERO: Final = "the cell shows it as force, and its size now is not know
 _TEMPERATURE: Final = "a temperature that goes up and down by some kelvin, recorded as temperature_c"
 
 
-def _hum(scene: Scene) -> tuple[Start, ...]:
-    return tuple((0.1, mains_hz, 0.0) for mains_hz in scene.mains_hz)
+def _hum(hints: SearchHints) -> tuple[Start, ...]:
+    return tuple((0.1, mains_hz, 0.0) for mains_hz in hints.mains_hz)
 
 
-def _warm_up(scene: Scene) -> tuple[Start, ...]:
-    return tuple((0.2, share * scene.duration_s) for share in (0.05, 0.15, 0.4))
+def _warm_up(hints: SearchHints) -> tuple[Start, ...]:
+    return tuple((0.2, share * hints.duration_s) for share in (0.05, 0.15, 0.4))
 
 
-def _drift(scene: Scene) -> tuple[Start, ...]:
-    return ((0.3 / max(scene.duration_s, 1.0),),)
+def _drift(hints: SearchHints) -> tuple[Start, ...]:
+    return ((0.3 / max(hints.duration_s, 1.0),),)
 
 
 SENSING: Final = (
@@ -71,7 +71,11 @@ SENSING: Final = (
         experiment="a warm-up and a cool-down without force and under force, with temperature_c recorded",
         recipe=_WARM_UP_AND_DOWN,
         treatments=(Treatment(by=By.CELL),),
-        forms=(Form(parameters=(ZERO_PER_K,), probes=fixed((0.02,)), needs=("temperature_c",), proportional=True),),
+        forms=(
+            EffectForm(
+                parameters=(ZERO_PER_K,), probes=fixed_starts((0.02,)), needs=("temperature_c",), proportional=True
+            ),
+        ),
         group=MONOTONE,
     ),
     Effect(
@@ -84,7 +88,11 @@ SENSING: Final = (
         experiment="reversals over the whole range at two temperatures, with temperature_c recorded",
         recipe=_WARM_UP_AND_DOWN,
         treatments=(Treatment(by=By.CELL),),
-        forms=(Form(parameters=(SPAN_PER_K,), probes=fixed((0.001,)), needs=("temperature_c",), proportional=True),),
+        forms=(
+            EffectForm(
+                parameters=(SPAN_PER_K,), probes=fixed_starts((0.001,)), needs=("temperature_c",), proportional=True
+            ),
+        ),
     ),
     Effect(
         name="warm-up",
@@ -100,7 +108,7 @@ SENSING: Final = (
             apart="switch the amplifier off for half an hour before",
         ),
         treatments=(Treatment(why_not=_UNKNOWN_ZERO),),
-        forms=(Form(parameters=(WARM_UP, WARM_UP_TIME), probes=_warm_up, proportional=True),),
+        forms=(EffectForm(parameters=(WARM_UP, WARM_UP_TIME), probes=_warm_up, proportional=True),),
         group=MONOTONE,
     ),
     Effect(
@@ -113,7 +121,7 @@ SENSING: Final = (
         experiment="ten minutes without force, then ten at one force, with temperature_c and distance_m recorded",
         recipe=Recipe(parts=(PartName.CYCLES,)),
         treatments=(Treatment(why_not=_UNKNOWN_ZERO),),
-        forms=(Form(parameters=(DRIFT,), probes=_drift, proportional=True),),
+        forms=(EffectForm(parameters=(DRIFT,), probes=_drift, proportional=True),),
         group=MONOTONE,
     ),
     Effect(
@@ -126,7 +134,7 @@ SENSING: Final = (
         experiment="dead weights on the load cell, five levels",
         recipe=DEAD_WEIGHTS,
         treatments=(Treatment(by=By.CELL),),
-        forms=(Form(parameters=(QUADRATIC,), probes=fixed((2.0e-4,)), proportional=True),),
+        forms=(EffectForm(parameters=(QUADRATIC,), probes=fixed_starts((2.0e-4,)), proportional=True),),
         group=LIMITS,
     ),
     Effect(
@@ -139,7 +147,7 @@ SENSING: Final = (
         experiment="dead weights on the load cell, seven levels",
         recipe=DEAD_WEIGHTS,
         treatments=(Treatment(by=By.CELL),),
-        forms=(Form(parameters=(CUBIC,), probes=fixed((5.0e-6,)), proportional=True),),
+        forms=(EffectForm(parameters=(CUBIC,), probes=fixed_starts((5.0e-6,)), proportional=True),),
         group=LIMITS,
     ),
     Effect(
@@ -152,7 +160,7 @@ SENSING: Final = (
         experiment="ten seconds at rest at 500 rows a second",
         recipe=Recipe(parts=(PartName.REST, PartName.DWELLS)),
         treatments=(Treatment(why_not=_SINGLE_READINGS),),
-        forms=(Form(parameters=(HUM, HUM_HZ, HUM_PHASE), probes=_hum, proportional=True, quadrature=True),),
+        forms=(EffectForm(parameters=(HUM, HUM_HZ, HUM_PHASE), probes=_hum, proportional=True, quadrature=True),),
         group=("spindle-vibration", "regulator-hunting"),
     ),
     Effect(
@@ -167,7 +175,7 @@ SENSING: Final = (
         treatments=(Treatment(why_not=_ONE_CLOCK),),
         least=7.0e-4,
         rarity=3.0,
-        forms=(Form(parameters=(CLOCK_OFFSET,), probes=fixed((0.003,), (0.03,), (-0.02,))),),
+        forms=(EffectForm(parameters=(CLOCK_OFFSET,), probes=fixed_starts((0.003,), (0.03,), (-0.02,))),),
         group=SLOW_LAGS,
     ),
     Effect(
@@ -180,7 +188,9 @@ SENSING: Final = (
         experiment="steps of the command over ten minutes",
         recipe=Recipe(parts=(PartName.LASTING,)),
         treatments=(Treatment(why_not=_ONE_CLOCK),),
-        forms=(Form(parameters=(CLOCK_SKEW,), probes=fixed((2.0e-4,), (2.0e-3,), (-2.0e-4,), (-2.0e-3,))),),
+        forms=(
+            EffectForm(parameters=(CLOCK_SKEW,), probes=fixed_starts((2.0e-4,), (2.0e-3,), (-2.0e-4,), (-2.0e-3,))),
+        ),
     ),
     Effect(
         name="repeated-samples",
@@ -238,7 +248,9 @@ SENSING: Final = (
             check=False,
         ),
         treatments=(Treatment(by=By.CELL),),
-        forms=(Form(parameters=(CROSSTALK,), probes=fixed((0.02,)), needs=("command_v",), proportional=True),),
+        forms=(
+            EffectForm(parameters=(CROSSTALK,), probes=fixed_starts((0.02,)), needs=("command_v",), proportional=True),
+        ),
     ),
     Effect(
         name="sign-loss",
@@ -257,7 +269,11 @@ SENSING: Final = (
                 why_not="a lost sign cannot be brought back: check the amplifier's settings", fields=("cell.sign_lost",)
             ),
         ),
-        forms=(Form(parameters=(SIGN_LOST, ZERO), probes=fixed((1.0, 0.0), (1.0, -0.3), (1.0, -1.0)), exact=True),),
+        forms=(
+            EffectForm(
+                parameters=(SIGN_LOST, ZERO), probes=fixed_starts((1.0, 0.0), (1.0, -0.3), (1.0, -1.0)), exact=True
+            ),
+        ),
         group=("backlash",),
     ),
 )

@@ -1,10 +1,11 @@
 """Measured against simulated: what the model gets wrong, the named cause, the extended model, the gain on unseen data.
 
-In the order of the work: measurement (what came in), suspects (wrong units, swapped columns), bench (recordings beside the
-twin), base_fit, start (what friction remembers at the first row), direct (what the readings tell by themselves), catalogue
-and effect (43 causes and where a search for them begins), scene, candidates, contest and search (naming), noise and gram
-(the mathematics of it), screen (what is left), worth (what is a finding), identifiability, floor, diagnose (the whole),
-result (the answer). Pure: time and chance are arguments.
+In the order of the work: measurement (what came in), excerpt, input_checks (wrong units, swapped columns); search/: bench
+(recordings beside the twin), base_fit, initial_friction (what friction remembers at the first row), direct_evidence (what
+the readings tell by themselves), hints, candidates, model_comparison and search (naming one of the effects of
+gateway/catalogue), normal_equations and levenberg_marquardt (the mathematics of it), significance (what is a finding);
+noise, residual_tests and residual_questions (what is left), noise_floor, experiments/ (what the recording cannot show, and
+what to record next), verdict and notes, diagnose (the whole), result (the answer). Pure: time and chance are arguments.
 """
 
 from gateway.catalogue.catalogue import BY_NAME, EFFECTS

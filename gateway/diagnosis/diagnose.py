@@ -1,11 +1,11 @@
 """The diagnosis of recordings: what the model gets wrong, the cause with its confidence, the gain on unseen data.
 
 The way: choose how motion is known, fit the base model, take out what the readings themselves tell, search for effects,
-look at what is left, and judge. `confirmed` is a strong word: it needs an empty screen and a residual that reaches a
-noise floor which is known, from replicate cycles or from the user.
+test what is left, and give the verdict. `confirmed` is a strong word: it needs residual tests that find nothing, and a
+residual that reaches a noise floor which is known, from replicate cycles or from the user.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,22 +14,22 @@ import numpy as np
 from gateway.catalogue.catalogue import BY_NAME, EFFECTS
 from gateway.catalogue.cylinder import COULOMB, DRAG_ASYMMETRY
 from gateway.catalogue.effect import Effect, Parameter
-from gateway.diagnosis.excerpt import MOST_ROWS, excerpt
-from gateway.diagnosis.input_checks import Suspect, suspects
+from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt
+from gateway.diagnosis.input_checks import Suspect, find_suspects
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.noise import Whitener, fast_noise_n, timing_weights, white
-from gateway.diagnosis.notes import blind, nothing_to_switch_off, strange_area
-from gateway.diagnosis.residual_tests import screen
+from gateway.diagnosis.noise import Whitener, fast_noise_n, timing_weights, white_whitener
+from gateway.diagnosis.notes import implausible_area, nothing_to_switch_off, uninformative_force
+from gateway.diagnosis.residual_tests import find_dependences
 from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdict
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
 from gateway.diagnosis.search.bench import Bench, bench_of
-from gateway.diagnosis.search.direct_evidence import Direct, coarse, repeats, spikes
-from gateway.diagnosis.search.initial_friction import felt
-from gateway.diagnosis.search.levenberg_marquardt import Fitted
-from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
+from gateway.diagnosis.search.initial_friction import drop_unfelt_strains
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.diagnosis.search.recording_drive import MOTIONS
-from gateway.diagnosis.search.search import search
-from gateway.diagnosis.verdict import judged
+from gateway.diagnosis.search.search import search_effects
+from gateway.diagnosis.verdict import Findings, compose_diagnosis
 from gateway.twin.plant import Plant, with_value
 
 _LEAST_CHANCE_S, _MOST_CHANCE_S = 1.0e-3, 9.0e-3
@@ -42,7 +42,6 @@ class Options:
 
     late_s: readings may come up to so much late without being a finding (the wires of a gateway's own recording).
     quantum_n: step of the readings that is known and no finding either. is_own: the plant is that of the recording's rig.
-    clock: seconds from anywhere, for the account of where the time went; None: no account.
     """
 
     without: str | None = None
@@ -50,7 +49,6 @@ class Options:
     late_s: float = 0.0
     quantum_n: float = 0.0
     is_own: bool = False
-    clock: Callable[[], float] | None = None
 
 
 def diagnose(
@@ -63,43 +61,58 @@ def diagnose(
     if not measurements:
         raise ValueError("a diagnosis needs at least one recording")
     options = options or Options()
-    measurements = [excerpt(each, max(MOST_ROWS // len(measurements), 1)) for each in measurements]
-    hidden = frozenset({options.without} if options.without else ())
-    account = _Account(options.clock)
+    measurements = [take_excerpt(each, max(MOST_ROWS // len(measurements), 1)) for each in measurements]
     given = plant or DEFAULT_PLANT
-    suspected = suspects(measurements, given, is_own=options.is_own)
+    suspected = find_suspects(measurements, given, is_own=options.is_own)
     if any(each.is_sure for each in suspected):
-        return _unjudged(measurements, given, suspected)
-    bench, base, whiten = _based(measurements, _prepared(given, hidden), hidden, options.late_s)
-    account("base fit")
-    bench, base, found_direct = _direct(bench, base, whiten, max(options.quantum_n, given.cell.quantum_n))
-    if options.late_s > 0.0 or any(each.even_s for each in measurements):
-        simulated_n = bench.simulate([base.point])[0]
-        noise_n = fast_noise_n(base.residual_n[bench.judged])
-        chance_s = _chance_s(measurements, options.late_s)
-        whiten = replace(whiten, weights=timing_weights(bench, simulated_n, chance_s, noise_n))
-        base = refit(bench, base, whiten)
-    effects = _competitors(base.free, hidden, options.late_s)
-    found = search(bench, base, effects, whiten, account)
-    left = screen(found.bench, found.fitted, found.whiten, [each.leftover for each in found.nameless])
-    account("screen")
-    result = judged(bench, found, found_direct, left, effects, options.noise_floor_n)
-    account("judgement")
-    told = [nothing_to_switch_off(options.without)] if options.without and not _has(given, options.without) else []
-    if (
-        not suspected
-        and not blind(measurements)
-        and (why := strange_area(result.base.cylinder.area_m2, given.cylinder.area_m2))
-    ):
-        told.append(why)
+        return _diagnosis_of_wrong_columns(measurements, given, suspected)
+    result = _diagnose_columns(measurements, given, options)
     return replace(
         result,
-        notes=(*result.notes, *told),
+        notes=(*result.notes, *_notes_on_the_start(measurements, given, options, result, suspected)),
         suspects=suspected,
         base=_with_readings_of(given, result.base),
         plant=_with_readings_of(given, result.plant),
-        spent_s=account.spent_s,
     )
+
+
+def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options: Options) -> Diagnosis:
+    """Return the diagnosis of columns that are what they say: base model, search, residual tests, verdict."""
+    hidden = frozenset({options.without} if options.without else ())
+    bench, base, whiten = _fit_base_model(measurements, _without_hidden(given, hidden), hidden, options.late_s)
+    quantum_n = max(options.quantum_n, given.cell.quantum_n)
+    bench, base, evidence = _take_direct_evidence(bench, base, whiten, quantum_n)
+    if options.late_s > 0.0 or any(each.even_s for each in measurements):
+        base, whiten = _doubt_times(bench, base, whiten, options.late_s)
+    effects = _effects_to_search(base.free, hidden, options.late_s)
+    found = search_effects(bench, base, effects, whiten)
+    left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])
+    return compose_diagnosis(Findings(bench, found, evidence, left, effects), options.noise_floor_n)
+
+
+def _doubt_times(bench: Bench, base: FittedModel, whiten: Whitener, late_s: float) -> tuple[FittedModel, Whitener]:
+    """Return the base model where readings whose times are a matter of chance weigh less, and that weighting."""
+    simulated_n = bench.simulate([base.parameters])[0]
+    noise_n = fast_noise_n(base.residual_n[bench.judged])
+    weights = timing_weights(bench, simulated_n, _chance_s(bench.measurements, late_s), noise_n)
+    whiten = replace(whiten, weights=weights)
+    return refit(bench, base, whiten), whiten
+
+
+def _notes_on_the_start(
+    measurements: Sequence[Measurement],
+    given: Plant,
+    options: Options,
+    result: Diagnosis,
+    suspected: Sequence[Suspect],
+) -> Iterator[str]:
+    """Yield what to know of the start plant: nothing to switch off in it, or a force of another size than its piston's."""
+    if options.without and not _has_effect(given, options.without):
+        yield nothing_to_switch_off(options.without)
+    if not suspected and not uninformative_force(measurements):
+        why = implausible_area(result.base.cylinder.area_m2, given.cylinder.area_m2)
+        if why:
+            yield why
 
 
 def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
@@ -109,10 +122,14 @@ def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
     return _CHANCE_SHARE * late_s
 
 
-def _unjudged(measurements: Sequence[Measurement], given: Plant, suspected: tuple[Suspect, ...]) -> Diagnosis:
+def _diagnosis_of_wrong_columns(
+    measurements: Sequence[Measurement], given: Plant, suspected: tuple[Suspect, ...]
+) -> Diagnosis:
     """The answer where columns are wrong: what stands in them, and no cause."""
     bench = bench_of(measurements)
-    simulated_n = bench.simulate([Point(_prepared(given, frozenset()), tuple(0.0 for _ in measurements))])[0]
+    simulated_n = bench.simulate(
+        [ModelParameters(_without_hidden(given, frozenset()), tuple(0.0 for _ in measurements))]
+    )[0]
     rms_n = float(np.std((bench.measured_n - simulated_n)[bench.judged]))
     floor_n = min(fast_noise_n(bench.measured_n[bench.judged]), rms_n)
     return Diagnosis(
@@ -126,31 +143,16 @@ def _unjudged(measurements: Sequence[Measurement], given: Plant, suspected: tupl
         base=given,
         plant=given,
         traces=tuple(
-            Trace(bench.measurements[segment.recording], simulated_n[segment.rows], simulated_n[segment.rows])
-            for segment in bench.segments
-            if segment.is_force
+            Trace(bench.measurements[channel.recording], simulated_n[channel.rows], simulated_n[channel.rows])
+            for channel in bench.channels
+            if channel.is_force
         ),
         notes=tuple(note for each in measurements for note in each.notes),
         suspects=suspected,
     )
 
 
-class _Account:
-    """Seconds per stage, by the caller's clock."""
-
-    def __init__(self, clock: Callable[[], float] | None) -> None:
-        self._clock = clock
-        self._last_s = clock() if clock else 0.0
-        self.spent_s: dict[str, float] = {}
-
-    def __call__(self, stage: str) -> None:
-        if self._clock:
-            now_s = self._clock()
-            self.spent_s[stage] = self.spent_s.get(stage, 0.0) + now_s - self._last_s
-            self._last_s = now_s
-
-
-def _prepared(plant: Plant, hidden: frozenset[str]) -> Plant:
+def _without_hidden(plant: Plant, hidden: frozenset[str]) -> Plant:
     """The plant without noise and rounding, and without the effects that are to be found again."""
     plant = with_value(with_value(plant, "cell", "noise_n", 0.0), "cell", "quantum_n", 0.0)
     for name in hidden:
@@ -160,7 +162,7 @@ def _prepared(plant: Plant, hidden: frozenset[str]) -> Plant:
     return plant
 
 
-def _has(plant: Plant, name: str) -> bool:
+def _has_effect(plant: Plant, name: str) -> bool:
     """Has the plant this effect, or would the base model fit it?"""
     sizes = [parameter for parameter in BY_NAME[name].parameters if not parameter.shape]
     if any(parameter.path == COULOMB.path for parameter in sizes):
@@ -174,34 +176,37 @@ def _with_readings_of(given: Plant, plant: Plant) -> Plant:
     return with_value(with_value(plant, "cell", "noise_n", given.cell.noise_n), "cell", "quantum_n", quantum_n)
 
 
-def _based(
+def _fit_base_model(
     measurements: Sequence[Measurement], start: Plant, hidden: frozenset[str], late_s: float
-) -> tuple[Bench, Fitted, Whitener]:
+) -> tuple[Bench, FittedModel, Whitener]:
     """The bench and base model that fit best, over the ways in which motion may be known."""
     measured = any(each.position_m is not None for each in measurements)
     motions = MOTIONS if measured else MOTIONS[:1]
     tries = []
     for motion in motions:
         bench = bench_of(measurements, motion)
-        whiten = white(bench, bench.measured_n)
+        whiten = white_whitener(bench, bench.measured_n)
         free = base_parameters(bench, hidden - {"coulomb-friction"}, late_s)  # friction tells which way is which
         tries.append((fit_base(bench, start, free, whiten), motion, bench, whiten))
     fitted, motion, bench, whiten = min(tries, key=lambda each: each[0].chi2)
     free = base_parameters(bench, hidden, late_s)
     if free != fitted.free[: len(free)] or hidden - {"coulomb-friction"} != hidden:
         fitted = fit_base(bench, start, free, whiten)
-    bench, fitted = felt(bench, fitted, whiten)
+    bench, fitted = drop_unfelt_strains(bench, fitted, whiten)
     return bench, fitted, whiten
 
 
-def _direct(
-    bench: Bench, base: Fitted, whiten: Whitener, known_quantum_n: float
-) -> tuple[Bench, Fitted, tuple[Direct, ...]]:
+def _take_direct_evidence(
+    bench: Bench, base: FittedModel, whiten: Whitener, known_quantum_n: float
+) -> tuple[Bench, FittedModel, tuple[DirectEvidence, ...]]:
     """What the readings tell by themselves; rows that are no witness are left out and the base is fitted again."""
-    lattice = coarse(bench, base.residual_n, known_quantum_n)
+    lattice = find_quantisation(bench, base.residual_n, known_quantum_n)
     found = [lattice] if lattice else []
     quantum_n = lattice.values[0][1] if lattice else 0.0
-    for direct in (spikes(bench, base.residual_n, quantum_n), None if lattice else repeats(bench, base.residual_n)):
+    for direct in (
+        find_outliers(bench, base.residual_n, quantum_n),
+        None if lattice else find_repeats(bench, base.residual_n),
+    ):
         if direct is not None:
             found.append(direct)
             bench = bench.without_rows(direct.rows)
@@ -209,7 +214,7 @@ def _direct(
     return bench, base, tuple(found)
 
 
-def _competitors(free: Sequence[Parameter], hidden: frozenset[str], late_s: float) -> tuple[Effect, ...]:
+def _effects_to_search(free: Sequence[Parameter], hidden: frozenset[str], late_s: float) -> tuple[Effect, ...]:
     """Effects that may be found: all that the base model does not fit anyway.
 
     Where wires may be late by themselves, a drag that differs by direction is not looked for: on the pad it comes late

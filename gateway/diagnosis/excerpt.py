@@ -18,7 +18,7 @@ _UNJUDGED: Final = 0.05  # of a stretch, at its beginning: a rest there is none 
 _CLOSEST_S: Final = 2.0e-3  # rows closer than this may be taken together: a regulator's lag is tens of milliseconds
 
 
-def excerpt(measurement: Measurement, most_rows: int) -> Measurement:
+def take_excerpt(measurement: Measurement, most_rows: int) -> Measurement:
     """A thinner recording where rows are closer than they need to be; of that the liveliest stretch of at most
     `most_rows` rows, with a note; the measurement itself if it is short enough."""
     if measurement.rows <= most_rows:

@@ -81,7 +81,7 @@ class Suspect:
 
 
 @dataclass(frozen=True, slots=True)
-class _Fit:
+class _ColumnFit:
     """Measured = gain x simulated + offset; alike: their correlation, with its sign."""
 
     gain: float
@@ -96,14 +96,14 @@ class _Fit:
         return abs(log(self.gain / factor)) if self.gain > 0.0 else inf
 
 
-def suspects(measurements: Sequence[Measurement], plant: Plant, *, is_own: bool) -> tuple[Suspect, ...]:
+def find_suspects(measurements: Sequence[Measurement], plant: Plant, *, is_own: bool) -> tuple[Suspect, ...]:
     """At most one for each recording, None for those that are as they should be. is_own: the plant is the recording's rig's."""
     against = "the rig's plant" if is_own else "the start plant"
     found = (_suspect(_thin(each), plant, is_own) for each in measurements)
     return tuple(replace(each, against=against) for each in found if each is not None)
 
 
-def mended(found: Sequence[Suspect], given: str = "") -> tuple[Suspect, ...]:
+def name_options(found: Sequence[Suspect], given: str = "") -> tuple[Suspect, ...]:
     """The same with the option that mends each. given: what --columns said."""
     return tuple(replace(each, option=columns_option(each, given)) for each in found)
 
@@ -135,7 +135,9 @@ def _suspect(measurement: Measurement, plant: Plant, is_own: bool) -> Suspect | 
     return replace(best[1], recording=measurement.name, factor=best[1].factor or as_is.gain)
 
 
-def _explanations(measurement: Measurement, plant: Plant, as_is: _Fit, is_own: bool) -> Iterator[tuple[float, Suspect]]:
+def _explanations(
+    measurement: Measurement, plant: Plant, as_is: _ColumnFit, is_own: bool
+) -> Iterator[tuple[float, Suspect]]:
     """(how far off it leaves the force, what it would be), for everything that explains the recording."""
     if as_is.alike < -_ALIKE:
         yield 0.0, Suspect(TURNED, "", "force_n", 0.0, "-n")
@@ -232,7 +234,7 @@ def _beyond(measurement: Measurement, plant: Plant) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _fit(measurement: Measurement, plant: Plant) -> _Fit:
+def _fit(measurement: Measurement, plant: Plant) -> _ColumnFit:
     """Regression of the measured force on what the plant gives, without the first second."""
     quiet = with_value(with_value(plant, "cell", "noise_n", 0.0), "cell", "quantum_n", 0.0)
     drive = replace(drive_of(measurement, "inferred"), position_m=None)
@@ -241,13 +243,13 @@ def _fit(measurement: Measurement, plant: Plant) -> _Fit:
     return _regression(x, y)
 
 
-def _regression(x: Floats, y: Floats) -> _Fit:
+def _regression(x: Floats, y: Floats) -> _ColumnFit:
     """Of y on x, by the ratio of their spreads: noise does not shrink it."""
     spread_x, spread_y = float(np.std(x)), float(np.std(y))
     if not (spread_x > 1.0e-9 and spread_y > 1.0e-12):
-        return _Fit(0.0, 0.0)
+        return _ColumnFit(0.0, 0.0)
     alike = float(np.mean((x - x.mean()) * (y - y.mean())) / (spread_x * spread_y))
-    return _Fit(float(np.copysign(spread_y / spread_x, alike)), alike)
+    return _ColumnFit(float(np.copysign(spread_y / spread_x, alike)), alike)
 
 
 def _converted(measurement: Measurement, column: str, factor: float) -> Measurement | None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.search.bench import Bench, Segment
+from gateway.diagnosis.search.bench import Bench, Channel
 
 _LEAST_LEFT: Final = 0.15
 _BINS: Final = 64
@@ -39,17 +39,17 @@ class Whitener:
     A row weighs less where its own time is in doubt while the force moves; 1 where its time is known.
     """
 
-    segments: tuple[Segment, ...]
+    channels: tuple[Channel, ...]
     noises: tuple[Noise, ...]
     weights: Floats
 
     def __call__(self, vectors: Floats) -> Floats:
         """Whitened vectors (..., rows)."""
-        white = np.empty_like(vectors)
-        for segment, noise in zip(self.segments, self.noises, strict=True):
-            part = vectors[..., segment.rows] * self.weights[segment.rows]
-            white[..., segment.rows] = np.fft.irfft(np.fft.rfft(part) * noise.weights, part.shape[-1])
-        return white
+        whitened = np.empty_like(vectors)
+        for channel, noise in zip(self.channels, self.noises, strict=True):
+            part = vectors[..., channel.rows] * self.weights[channel.rows]
+            whitened[..., channel.rows] = np.fft.irfft(np.fft.rfft(part) * noise.weights, part.shape[-1])
+        return whitened
 
     @property
     def knows_times(self) -> bool:
@@ -60,24 +60,24 @@ class Whitener:
     def floor_n(self) -> float:
         """Standard deviation of the force's noise over all recordings, N."""
         forces = [
-            (noise.total_n**2, segment.rows.stop - segment.rows.start)
-            for segment, noise in zip(self.segments, self.noises, strict=True)
-            if segment.is_force
+            (noise.total_n**2, channel.rows.stop - channel.rows.start)
+            for channel, noise in zip(self.channels, self.noises, strict=True)
+            if channel.is_force
         ]
         return float(np.sqrt(sum(power * rows for power, rows in forces) / sum(rows for _, rows in forces)))
 
 
-def white(bench: Bench, residual_n: Floats, weights: Floats | None = None) -> Whitener:
+def white_whitener(bench: Bench, residual_n: Floats, weights: Floats | None = None) -> Whitener:
     """Return a first guess, before anything is known: each segment white, with the size of its fastest part.
 
     weights: of the rows; None: all alike.
     """
     noises = []
-    for segment in bench.segments:
-        sigma = fast_noise_n(residual_n[segment.rows][bench.usable[segment.rows]])
-        lines = (segment.rows.stop - segment.rows.start) // 2 + 1
+    for channel in bench.channels:
+        sigma = fast_noise_n(residual_n[channel.rows][bench.usable[channel.rows]])
+        lines = (channel.rows.stop - channel.rows.start) // 2 + 1
         noises.append(Noise(sigma, sigma, np.full(lines, 1.0 / sigma)))
-    return Whitener(bench.segments, tuple(noises), np.ones(bench.rows) if weights is None else weights)
+    return Whitener(bench.channels, tuple(noises), np.ones(bench.rows) if weights is None else weights)
 
 
 def timing_weights(bench: Bench, simulated_n: Floats, late_s: float, noise_n: float) -> Floats:
@@ -97,18 +97,18 @@ def fast_noise_n(values: Floats) -> float:
     return float(max(spread, 1.0e-3 * float(np.std(values)), 1.0e-9))
 
 
-def coloured(bench: Bench, remainder_n: Floats, basis: Floats, weights: Floats) -> Whitener:
+def coloured_whitener(bench: Bench, remainder_n: Floats, basis: Floats, weights: Floats) -> Whitener:
     """Return the noise of what is left after the orthonormal columns `basis` (k, rows) were fitted; weights of the rows.
 
     They took most at the slow end, where trends and steps live: each line of the periodogram is divided by the share
     that they left there, or the noise would look too small just where false causes are likeliest.
     """
     noises = []
-    for segment in bench.segments:
-        part, usable = remainder_n[segment.rows] * weights[segment.rows], bench.usable[segment.rows]
-        taken = np.sum(np.abs(np.fft.rfft(basis[:, segment.rows])) ** 2, axis=0) / part.size
+    for channel in bench.channels:
+        part, usable = remainder_n[channel.rows] * weights[channel.rows], bench.usable[channel.rows]
+        taken = np.sum(np.abs(np.fft.rfft(basis[:, channel.rows])) ** 2, axis=0) / part.size
         noises.append(_fit(part, np.clip(1.0 - taken, _LEAST_LEFT, 1.0) * max(float(np.mean(usable)), 0.05)))
-    return Whitener(bench.segments, tuple(noises), weights)
+    return Whitener(bench.channels, tuple(noises), weights)
 
 
 def _fit(part: Floats, left: Floats) -> Noise:

@@ -14,7 +14,7 @@ _STRANGE: Final = 30.0  # times larger or smaller than the start: a unit, more l
 _APART: Final = 10.0  # times the floor, from which offsets are told
 
 
-def remarks(measurements: Sequence[Measurement], offsets_n: Sequence[float], floor_n: float) -> Iterator[str]:
+def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[float], floor_n: float) -> Iterator[str]:
     """Each recording's own notes, then what only all of them together show."""
     for each in measurements:
         yield from each.notes
@@ -29,7 +29,7 @@ def remarks(measurements: Sequence[Measurement], offsets_n: Sequence[float], flo
         )
 
 
-def blind(measurements: Sequence[Measurement]) -> str:
+def uninformative_force(measurements: Sequence[Measurement]) -> str:
     """Why these recordings say nothing of the machine, as a sentence; empty where one of them does: its force moves."""
     whys = [_blind(each) for each in measurements]
     return whys[0] if all(whys) else ""
@@ -62,7 +62,7 @@ def _movement(measurement: Measurement) -> str:
     return ""
 
 
-def strange_area(area_m2: float, start_m2: float) -> str:
+def implausible_area(area_m2: float, start_m2: float) -> str:
     """A sentence where the force is of another size than the piston can give; empty else."""
     times = area_m2 / start_m2
     if 1.0 / _STRANGE < times < _STRANGE:

@@ -24,7 +24,7 @@ _MOST_PAIRED: Final = 8  # covariates whose products are asked
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class Regressors:
     """What the residual may depend on, in which shape; columns (k, rows); among: how many places were tried."""
 
     depends_on: str
@@ -34,10 +34,10 @@ class Question:
     among: int = 1
 
 
-def questions(bench: Bench, residual_n: Floats, white: Floats) -> Iterator[Question]:
+def list_regressors(bench: Bench, residual_n: Floats, white: Floats) -> Iterator[Regressors]:
     """All of them, for the raw and the whitened residual of the present model."""
     simulated = bench.measured_n - residual_n
-    force = standard(simulated, bench)
+    force = standardise(simulated, bench)
     yield from _of_columns(bench, force)
     yield from _of_time(bench, force)
     yield from _of_lines(bench, white)
@@ -45,7 +45,7 @@ def questions(bench: Bench, residual_n: Floats, white: Floats) -> Iterator[Quest
         yield from _of_motion(bench, simulated, force)
 
 
-def standard(column: Floats, bench: Bench) -> Floats:
+def standardise(column: Floats, bench: Bench) -> Floats:
     """Mean 0 and spread 1 over the judged force rows, zero elsewhere."""
     rows = bench.judged & np.isfinite(column)
     if not rows.any():
@@ -55,21 +55,21 @@ def standard(column: Floats, bench: Bench) -> Floats:
     return centred / spread if spread > 1.0e-12 else np.zeros(bench.rows)
 
 
-def _of_columns(bench: Bench, force: Floats) -> Iterator[Question]:
+def _of_columns(bench: Bench, force: Floats) -> Iterator[Regressors]:
     columns = {}
     for name in sorted(bench.columns() - {"command_v", "pressure_kpa"}):
-        column = standard(bench.covariate(name), bench)
+        column = standardise(bench.covariate(name), bench)
         if np.any(column):
             columns[name] = column
     for name, column in columns.items():
         foreign = name not in SURROUNDINGS
-        yield Question(name, "in proportion", column[None], foreign)
-        yield Question(name, "in proportion to it times the force", (column * force)[None], foreign)
-        yield Question(name, "curved", np.vstack([column, column**2]), name != "position_mm")
-        yield Question(name, "follows it late, by seconds", _late(bench, column), True)
+        yield Regressors(name, "in proportion", column[None], foreign)
+        yield Regressors(name, "in proportion to it times the force", (column * force)[None], foreign)
+        yield Regressors(name, "curved", np.vstack([column, column**2]), name != "position_mm")
+        yield Regressors(name, "follows it late, by seconds", _late(bench, column), True)
     for first, second in combinations(list(columns)[:_MOST_PAIRED], 2):
-        product = standard(columns[first] * columns[second], bench)
-        yield Question(f"{first} x {second}", "in proportion to their product", product[None], True)
+        product = standardise(columns[first] * columns[second], bench)
+        yield Regressors(f"{first} x {second}", "in proportion to their product", product[None], True)
 
 
 def _late(bench: Bench, column: Floats) -> Floats:
@@ -77,63 +77,65 @@ def _late(bench: Bench, column: Floats) -> Floats:
     from scipy.signal import lfilter
 
     found = np.zeros((len(_LATE_S), bench.rows))
-    for segment in bench.segments:
-        if segment.is_force:
-            row_s = float(np.median(np.diff(bench.measurements[segment.recording].time_s)))
+    for channel in bench.channels:
+        if channel.is_force:
+            row_s = float(np.median(np.diff(bench.measurements[channel.recording].time_s)))
             for k, late_s in enumerate(_LATE_S):
                 share = 1.0 - np.exp(-row_s / late_s)
-                start = column[segment.rows][0]
-                found[k, segment.rows] = start + lfilter([share], [1.0, share - 1.0], column[segment.rows] - start)
+                start = column[channel.rows][0]
+                found[k, channel.rows] = start + lfilter([share], [1.0, share - 1.0], column[channel.rows] - start)
     return np.asarray(found * bench.force_rows)
 
 
 def _waves(bench: Bench) -> Floats:
     """Sines and cosines of one to three periods over each recording, (6, rows)."""
     phase = np.zeros(bench.rows)
-    for segment in bench.segments:
-        rows = segment.rows.stop - segment.rows.start
-        phase[segment.rows] = 2.0 * np.pi * np.arange(rows) / rows
+    for channel in bench.channels:
+        rows = channel.rows.stop - channel.rows.start
+        phase[channel.rows] = 2.0 * np.pi * np.arange(rows) / rows
     return np.vstack([turn(count * phase) for count in (1, 2, 3) for turn in (np.sin, np.cos)])
 
 
-def _of_time(bench: Bench, force: Floats) -> Iterator[Question]:
+def _of_time(bench: Bench, force: Floats) -> Iterator[Regressors]:
     seconds = bench.time_s()
-    time = standard(seconds, bench)
-    yield Question("time", "a slow trend", np.vstack([time, time**2, time**3]), False)
-    yield Question("time", "the gain drifts: a trend times the force", np.vstack([time * force, time**2 * force]), True)
-    yield Question("time", "the gain wanders", _waves(bench) * force, True)
+    time = standardise(seconds, bench)
+    yield Regressors("time", "a slow trend", np.vstack([time, time**2, time**3]), False)
+    yield Regressors(
+        "time", "the gain drifts: a trend times the force", np.vstack([time * force, time**2 * force]), True
+    )
+    yield Regressors("time", "the gain wanders", _waves(bench) * force, True)
     for place in range(1, _STEPS):
         part = np.zeros(bench.rows)
-        for segment in bench.segments:
-            if segment.is_force:
-                rows = segment.rows.stop - segment.rows.start
-                part[segment.rows] = np.arange(rows) * _STEPS >= place * rows
+        for channel in bench.channels:
+            if channel.is_force:
+                rows = channel.rows.stop - channel.rows.start
+                part[channel.rows] = np.arange(rows) * _STEPS >= place * rows
         at_s = float(np.min(seconds[part > 0.0])) if np.any(part) else 0.0
-        yield Question("time", f"a jump at {at_s:.0f} s", (part * bench.force_rows)[None], True)
-        yield Question("time", f"the gain jumps at {at_s:.0f} s", np.vstack([part * force, part]), True)
+        yield Regressors("time", f"a jump at {at_s:.0f} s", (part * bench.force_rows)[None], True)
+        yield Regressors("time", f"the gain jumps at {at_s:.0f} s", np.vstack([part * force, part]), True)
 
 
-def _of_lines(bench: Bench, white: Floats) -> Iterator[Question]:
+def _of_lines(bench: Bench, white: Floats) -> Iterator[Regressors]:
     seconds = bench.time_s()
     for line_hz in lines_hz(bench, white):
         angle = 2.0 * np.pi * line_hz * seconds
         waves = np.vstack([np.sin(angle), np.cos(angle)]) * bench.force_rows
-        yield Question("time", f"a line at {line_hz:.3g} Hz", waves, False, max(bench.rows // 2, 1))
+        yield Regressors("time", f"a line at {line_hz:.3g} Hz", waves, False, max(bench.rows // 2, 1))
         for name, half in (("first", 0), ("second", 1)):
             inside = (bench.block_of_row % BLOCKS) // (BLOCKS // 2) == half
             shape = f"a line at {line_hz:.3g} Hz in the {name} half"
-            yield Question("time", shape, waves * inside, True, max(bench.rows // 2, 1))
+            yield Regressors("time", shape, waves * inside, True, max(bench.rows // 2, 1))
 
 
-def _of_motion(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Question]:
+def _of_motion(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Regressors]:
     slope = bench.slope_n_per_s(simulated_n)
     moving = np.sign(slope) * bench.force_rows
-    time = standard(bench.time_s(), bench)
-    command = standard(bench.command(), bench)
-    yield Question("force", "curved", np.vstack([force**2, force**3, force**4]), False)
-    yield Question("direction", "differs between rising and falling", moving[None], False)
-    yield Question("direction", "differs between rising and falling, with the force", (moving * force)[None], False)
+    time = standardise(bench.time_s(), bench)
+    command = standardise(bench.command(), bench)
+    yield Regressors("force", "curved", np.vstack([force**2, force**3, force**4]), False)
+    yield Regressors("direction", "differs between rising and falling", moving[None], False)
+    yield Regressors("direction", "differs between rising and falling, with the force", (moving * force)[None], False)
     drifting = np.vstack([time, time**2, _waves(bench)]) * moving
-    yield Question("direction", "the difference between rising and falling changes in time", drifting, True)
-    yield Question("speed", "in proportion to the rate of the force", standard(slope, bench)[None], False)
-    yield Question("command", "curved", np.vstack([command, command**2, command**3]), False)
+    yield Regressors("direction", "the difference between rising and falling changes in time", drifting, True)
+    yield Regressors("speed", "in proportion to the rate of the force", standardise(slope, bench)[None], False)
+    yield Regressors("command", "curved", np.vstack([command, command**2, command**3]), False)

@@ -14,11 +14,11 @@ import numpy as np
 
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.residual_questions import Question, questions
+from gateway.diagnosis.residual_questions import Regressors, list_regressors
 from gateway.diagnosis.result import Leftover
 from gateway.diagnosis.search.bench import BLOCKS, Bench
-from gateway.diagnosis.search.levenberg_marquardt import Fitted
-from gateway.diagnosis.search.normal_equations import Normal
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.search.normal_equations import NormalEquations
 
 _LEVEL: Final = 1.0e-3  # of a false answer over all questions
 _LEAST_SHARE: Final = 0.01  # of the whitened squared residual
@@ -29,34 +29,34 @@ _STANDS_OUT: Final = 16.0  # times their mean
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Dependence:
     """A question that the residual answers. gain: chi-square beside the model; share: of the whitened squared residual."""
 
-    question: Question
+    regressors: Regressors
     gain: float
     share: float
     log_chance: float
 
     @property
     def leftover(self) -> Leftover:
-        return Leftover(self.question.depends_on, self.question.shape, min(self.share, 1.0))
+        return Leftover(self.regressors.depends_on, self.regressors.shape, min(self.share, 1.0))
 
 
-def best_answer(
-    bench: Bench, fitted: Fitted, whiten: Whitener, given: Collection[Leftover], *, outside: bool
-) -> Answer | None:
+def strongest_dependence(
+    bench: Bench, fitted: FittedModel, whiten: Whitener, given: Collection[Leftover], *, outside: bool
+) -> Dependence | None:
     """The most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
     white = whiten(fitted.residual_n)
     known = {(each.depends_on, each.shape) for each in given}
     asked = (
         each
-        for each in questions(bench, fitted.residual_n, white)
+        for each in list_regressors(bench, fitted.residual_n, white)
         if (each.outside or not outside) and (each.depends_on, each.shape) not in known
     )
     return _best(bench, fitted, whiten, asked)
 
 
-def _best(bench: Bench, fitted: Fitted, whiten: Whitener, asked: Iterator[Question]) -> Answer | None:
+def _best(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Iterator[Regressors]) -> Dependence | None:
     """Some at a time: a thousand columns would be gigabytes at once."""
     model, white = whiten(fitted.jacobian), whiten(fitted.residual_n)
     total = max(float(white @ white), 1.0)
@@ -64,51 +64,55 @@ def _best(bench: Bench, fitted: Fitted, whiten: Whitener, asked: Iterator[Questi
     while some := list(islice(asked, _AT_ONCE)):
         tried += sum(each.among for each in some)
         columns = whiten(bench.reduced(np.vstack([each.columns for each in some])))
-        found = [each for each in _answers(Normal(model, columns, white), some, total) if each.share >= _LEAST_SHARE]
+        found = [
+            each for each in _answers(NormalEquations(model, columns, white), some, total) if each.share >= _LEAST_SHARE
+        ]
         best = min([*found, *([best] if best else [])], key=lambda each: each.log_chance, default=None)
     return best if best and best.log_chance < np.log(_LEVEL / tried) else None
 
 
-def _answers(normal: Normal, asked: Sequence[Question], total: float) -> Iterator[Answer]:
+def _answers(normal: NormalEquations, asked: Sequence[Regressors], total: float) -> Iterator[Dependence]:
     """Each question's gain beside the model; `normal` holds the columns of all of them in order."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
     at = 0
-    for question in asked:
-        indices = list(range(at, at + question.columns.shape[0]))
+    for regressors in asked:
+        indices = list(range(at, at + regressors.columns.shape[0]))
         at += len(indices)
         usable = [k for k in indices if normal.power[k] > 1.0e-6 * max(normal.raw_power[k], 1.0e-300)]
         gain = normal.add(usable).gain if usable else 0.0
-        chance = float(chi2_law.logsf(gain, len(indices))) + float(np.log(question.among))
-        yield Answer(question, gain, gain / total, chance)
+        chance = float(chi2_law.logsf(gain, len(indices))) + float(np.log(regressors.among))
+        yield Dependence(regressors, gain, gain / total, chance)
 
 
-def screen(bench: Bench, fitted: Fitted, whiten: Whitener, given: Sequence[Leftover]) -> tuple[Leftover, ...]:
+def find_dependences(
+    bench: Bench, fitted: FittedModel, whiten: Whitener, given: Sequence[Leftover]
+) -> tuple[Leftover, ...]:
     """What the search gave already, then everything that the residual still depends on, the most telling first.
 
     Each answer is taken out before the next question.
     """
     leftovers = list(given)
     while len(leftovers) < _MOST:
-        answer = best_answer(bench, fitted, whiten, leftovers, outside=False)
-        if answer is None:
+        dependence = strongest_dependence(bench, fitted, whiten, leftovers, outside=False)
+        if dependence is None:
             break
-        leftovers.append(answer.leftover)
-        taken = np.vstack([fitted.jacobian, bench.reduced(answer.question.columns)])
-        fitted = Fitted(fitted.point, fitted.free, fitted.residual_n, fitted.chi2, taken)
+        leftovers.append(dependence.leftover)
+        taken = np.vstack([fitted.jacobian, bench.reduced(dependence.regressors.columns)])
+        fitted = FittedModel(fitted.parameters, fitted.free, fitted.residual_n, fitted.chi2, taken)
     return (*leftovers, *_unsteady(bench, fitted, whiten))
 
 
-def _unsteady(bench: Bench, fitted: Fitted, whiten: Whitener) -> Iterator[Leftover]:
+def _unsteady(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Iterator[Leftover]:
     """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
     white = whiten(fitted.residual_n)
     times_are_sure = whiten.knows_times and all(map(_evenly_sampled, bench.measurements))
-    for segment in bench.segments:
-        if segment.is_force:
-            part = white[segment.rows]
-            counted = part[bench.usable[segment.rows]]
+    for channel in bench.channels:
+        if channel.is_force:
+            part = white[channel.rows]
+            counted = part[bench.usable[channel.rows]]
             if counted.size < BLOCKS or not counted.any():
                 continue
             levels = np.array([np.mean(block**2) for block in np.array_split(counted, BLOCKS)])

@@ -128,4 +128,3 @@ class Diagnosis:
     experiments: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     suspects: tuple[Suspect, ...] = ()
-    spent_s: Mapping[str, float] = field(default_factory=dict)

@@ -1,20 +1,21 @@
 """From what the search found to the answer: gains on unseen blocks, intervals, the verdict.
 
-What is a finding is decided in worth.py. Standard errors are the larger of the whitened fit's own and the
+What is a finding is decided in search/significance.py. Standard errors are the larger of the whitened fit's own and the
 jackknife's over blocks, which believes in no noise model.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from gateway.catalogue.catalogue import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
-from gateway.diagnosis.experiments.identifiability import invisible
+from gateway.diagnosis.experiments.identifiability import find_invisible_effects
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.noise_floor import replicate_floor_n
-from gateway.diagnosis.notes import remarks, too_high_a_floor
+from gateway.diagnosis.notes import recording_notes, too_high_a_floor
 from gateway.diagnosis.result import (
     Baseline,
     Cause,
@@ -23,17 +24,24 @@ from gateway.diagnosis.result import (
     Extended,
     Gain,
     Leftover,
+    NotIdentifiable,
     Rejected,
     Trace,
     Verdict,
 )
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.direct_evidence import Direct
-from gateway.diagnosis.search.levenberg_marquardt import Fitted
-from gateway.diagnosis.search.normal_equations import covariance, held_out
+from gateway.diagnosis.search.direct_evidence import DirectEvidence
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.search.normal_equations import covariance, held_out_errors
 from gateway.diagnosis.search.parameters import STARTS
-from gateway.diagnosis.search.search import Found
-from gateway.diagnosis.search.significance import Dropped, Reported, gain_of, share_of_excess, worthy
+from gateway.diagnosis.search.search import SearchResult
+from gateway.diagnosis.search.significance import (
+    DoubtfulEffect,
+    ReportedModels,
+    drop_doubtful_effects,
+    gain_of,
+    share_of_excess,
+)
 from gateway.twin.plant import Plant, with_value
 
 _REACHED: Final = 1.05  # residual over floor that counts as reached
@@ -43,48 +51,90 @@ _DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
 _LEAST_REJECTED: Final = 5.0e-3  # of the RMS
 
 
-def judged(
-    bench: Bench,
-    found: Found,
-    direct: Sequence[Direct],
-    left: Sequence[Leftover],
-    effects: Sequence[Effect],
-    given_floor_n: float | None,
-) -> Diagnosis:
-    """The answer, without the account of time. given_floor_n: noise floor that the user knows, N."""
-    found, reported, dropped = worthy(bench, found)
-    rms_n = bench.rms_n(reported.base.residual_n)
-    too_high = given_floor_n is not None and given_floor_n > rms_n
-    known_n = _replicates(bench) if given_floor_n is None or too_high else given_floor_n
-    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n, reported.held_out.rms_n)
-    reaches = reported.held_out.rms_n <= _REACHED * floor_n
-    causes = _causes(bench, found, reported, floor_n) + _direct_causes(bench, reported, direct, floor_n)
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What was found before anything is decided. bench: without rows that are no witness; evidence: what the readings tell by
+    themselves; left: what the residual still depends on; effects: those that were searched for."""
+
+    bench: Bench
+    found: SearchResult
+    evidence: Sequence[DirectEvidence]
+    left: Sequence[Leftover]
+    effects: Sequence[Effect]
+
+
+@dataclass(frozen=True, slots=True)
+class _NoiseFloor:
+    """known_n: from the user or from replicates, N, None where nobody knows; floor_n: that, or what the search found.
+
+    too_high_n: what the user gave, where it is more than the base model leaves; rms_n: of the base model.
+    """
+
+    rms_n: float
+    known_n: float | None
+    floor_n: float
+    too_high_n: float | None
+
+
+def compose_diagnosis(findings: Findings, given_floor_n: float | None) -> Diagnosis:
+    """Return the diagnosis. given_floor_n: noise floor that the user knows, N."""
+    bench, left = findings.bench, findings.left
+    found, reported, dropped = drop_doubtful_effects(bench, findings.found)
+    noise = _noise_floor(bench, found, reported, given_floor_n)
+    reaches = reported.held_out.rms_n <= _REACHED * noise.floor_n
+    causes = _causes(bench, found, reported, noise.floor_n)
+    causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
     causes.sort(key=lambda cause: -cause.gain.share_of_excess)
-    names = frozenset(cause.name for cause in causes)
-    fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in effects}
-    unseen = invisible(bench, effects, found.first.scores, names | fixed)
-    unexplained = known_n is not None and rms_n > _ABOVE * known_n
+    unseen = _unseen(findings, found, causes)
+    told = {*_grouped(causes), *(each.name for each in causes), *(each.name for each in unseen)}
+    unexplained = noise.known_n is not None and noise.rms_n > _ABOVE * noise.known_n
+    duration_s = sum(each.duration_s for each in bench.measurements)
     return Diagnosis(
-        verdict=_verdict(causes, left, reached=known_n is not None and reaches, unexplained=unexplained),
-        baseline=Baseline(rms_n, floor_n, int(bench.judged.sum()), sum(each.duration_s for each in bench.measurements)),
+        verdict=_verdict(causes, left, reached=noise.known_n is not None and reaches, unexplained=unexplained),
+        baseline=Baseline(noise.rms_n, noise.floor_n, int(bench.judged.sum()), duration_s),
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
-        rejected=_rejected(bench, found, rms_n, {*names, *_grouped(causes), *(each.name for each in unseen)}, dropped),
+        rejected=_rejected(bench, found, noise.rms_n, told, dropped),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant(reported.base),
         plant=_extended(reported, causes),
-        base_parameters=_estimates(
-            bench, reported.base, [each for each in reported.base.free if each.section != STARTS], reported.whiten
-        ),
+        base_parameters=_base_estimates(bench, reported),
         traces=_traces(bench, reported),
         experiments=_experiments(causes),
-        notes=(
-            *remarks(bench.measurements, reported.fitted.point.offsets_n, floor_n),
-            *(each.note for each in dropped),
-            *((too_high_a_floor(given_floor_n, rms_n),) if too_high and given_floor_n is not None else ()),
-        ),
+        notes=tuple(_notes(bench, reported, noise, dropped)),
     )
+
+
+def _noise_floor(
+    bench: Bench, found: SearchResult, reported: ReportedModels, given_floor_n: float | None
+) -> _NoiseFloor:
+    rms_n = bench.rms_n(reported.base.residual_n)
+    too_high_n = given_floor_n if given_floor_n is not None and given_floor_n > rms_n else None
+    known_n = _replicates(bench) if given_floor_n is None or too_high_n is not None else given_floor_n
+    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n, reported.held_out.rms_n)
+    return _NoiseFloor(rms_n, known_n, floor_n, too_high_n)
+
+
+def _unseen(findings: Findings, found: SearchResult, causes: Sequence[Cause]) -> tuple[NotIdentifiable, ...]:
+    """Effects that the recording cannot show: not those found, and not those that the base model has anyway."""
+    fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in findings.effects}
+    names = frozenset(cause.name for cause in causes)
+    return find_invisible_effects(findings.bench, findings.effects, found.first.scores, names | fixed)
+
+
+def _notes(
+    bench: Bench, reported: ReportedModels, noise: _NoiseFloor, dropped: Sequence[DoubtfulEffect]
+) -> Iterator[str]:
+    yield from recording_notes(bench.measurements, reported.fitted.parameters.offsets_n, noise.floor_n)
+    yield from (each.note for each in dropped)
+    if noise.too_high_n is not None:
+        yield too_high_a_floor(noise.too_high_n, noise.rms_n)
+
+
+def _base_estimates(bench: Bench, reported: ReportedModels) -> dict[str, Estimate]:
+    of_plant = [each for each in reported.base.free if each.section != STARTS]
+    return _estimates(bench, reported.base, of_plant, reported.whiten)
 
 
 def _verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
@@ -98,22 +148,24 @@ def _replicates(bench: Bench) -> float | None:
     return max(floors) if len(floors) == len(bench.measurements) else None
 
 
-def _causes(bench: Bench, found: Found, reported: Reported, floor_n: float) -> list[Cause]:
+def _causes(bench: Bench, found: SearchResult, reported: ReportedModels, floor_n: float) -> list[Cause]:
     return [
         Cause(
             accepted.effect.name,
-            accepted.contest.group(accepted.effect.name),
-            accepted.contest.shares.get(accepted.effect.name, 0.0),
+            accepted.comparison.group(accepted.effect.name),
+            accepted.comparison.shares.get(accepted.effect.name, 0.0),
             _estimates(bench, reported.fitted, accepted.form.parameters, reported.whiten),
-            gain_of(held_out(bench, without, reported.whiten), reported.held_out, floor_n),
+            gain_of(held_out_errors(bench, without, reported.whiten), reported.held_out, floor_n),
         )
         for accepted, without in zip(found.accepted, reported.without, strict=True)
     ]
 
 
-def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], floor_n: float) -> list[Cause]:
+def _direct_causes(
+    bench: Bench, reported: ReportedModels, direct: Sequence[DirectEvidence], floor_n: float
+) -> list[Cause]:
     """Findings of the readings themselves, as far as they matter beside the extended model."""
-    residual = bench.raw_n - bench.simulate([reported.fitted.point])[0]
+    residual = bench.raw_n - bench.simulate([reported.fitted.parameters])[0]
     after_n = float(np.sqrt(np.mean(residual[bench.judged] ** 2)))
     causes = []
     for each in direct:
@@ -131,7 +183,7 @@ def _direct_causes(bench: Bench, reported: Reported, direct: Sequence[Direct], f
     return causes
 
 
-def _direct_estimates(direct: Direct) -> dict[str, Estimate]:
+def _direct_estimates(direct: DirectEvidence) -> dict[str, Estimate]:
     return {
         parameter.name: Estimate(parameter.section, value, parameter.unit, _interval(value, error))
         for parameter, value, error in direct.values
@@ -142,25 +194,27 @@ def _interval(value: float, error: float) -> tuple[float, float]:
     return value - _DEVIATIONS * error, value + _DEVIATIONS * error
 
 
-def _estimates(bench: Bench, fitted: Fitted, parameters: Sequence[Parameter], whiten: Whitener) -> dict[str, Estimate]:
+def _estimates(
+    bench: Bench, fitted: FittedModel, parameters: Sequence[Parameter], whiten: Whitener
+) -> dict[str, Estimate]:
     own = np.sqrt(np.maximum(np.diag(covariance(fitted, whiten)), 0.0))
-    errors = np.maximum(own, held_out(bench, fitted, whiten).jackknife)[len(fitted.point.offsets_n) :]
+    errors = np.maximum(own, held_out_errors(bench, fitted, whiten).jackknife)[len(fitted.parameters.offsets_n) :]
     settled = [(each, 0.0) for each in parameters if each.settled]
     estimates = {}
     for parameter, error in (*zip(fitted.free, errors, strict=True), *settled):
         if parameter in parameters:
-            value = fitted.point.value(parameter)
+            value = fitted.parameters.value(parameter)
             low, high = _interval(value, float(error))
             within = (max(low, parameter.low), min(high, parameter.high))
             estimates[parameter.name] = Estimate(parameter.section, value, parameter.unit, within)
     return estimates
 
 
-def _plant(fitted: Fitted) -> Plant:
-    return with_value(fitted.point.plant, "cell", "zero_n", float(np.mean(fitted.point.offsets_n)))
+def _plant(fitted: FittedModel) -> Plant:
+    return with_value(fitted.parameters.plant, "cell", "zero_n", float(np.mean(fitted.parameters.offsets_n)))
 
 
-def _extended(reported: Reported, causes: Sequence[Cause]) -> Plant:
+def _extended(reported: ReportedModels, causes: Sequence[Cause]) -> Plant:
     """The extended plant, with what the readings told by themselves."""
     plant = _plant(reported.fitted)
     for cause in causes:
@@ -175,27 +229,27 @@ def _grouped(causes: Sequence[Cause]) -> set[str]:
 
 
 def _rejected(
-    bench: Bench, found: Found, rms_n: float, told: set[str], dropped: Sequence[Dropped]
+    bench: Bench, found: SearchResult, rms_n: float, told: set[str], dropped: Sequence[DoubtfulEffect]
 ) -> tuple[Rejected, ...]:
-    """Losers of the first contest and of the last, by the part of the RMS that they would save of unseen blocks, N."""
+    """Effects that lost the first comparison and the last, by the part of the RMS that they would save of unseen blocks, N."""
     gains = {each.name: each.gain_n for each in dropped}
-    for contest in (found.first, found.last):
-        before_n = held_out(bench, contest.beside, found.whiten).rms_n
-        for finalist in contest.finalists:
-            if finalist.effect.name not in {*told, *(each.name for each in dropped)}:
-                share = 1.0 - held_out(bench, finalist.fitted, found.whiten).rms_n / before_n
-                gains[finalist.effect.name] = rms_n * share
+    for comparison in (found.first, found.last):
+        before_n = held_out_errors(bench, comparison.beside, found.whiten).rms_n
+        for refined in comparison.ranked:
+            if refined.effect.name not in {*told, *(each.name for each in dropped)}:
+                share = 1.0 - held_out_errors(bench, refined.fitted, found.whiten).rms_n / before_n
+                gains[refined.effect.name] = rms_n * share
     best = sorted(gains.items(), key=lambda item: -item[1])
     known = {each.name for each in dropped}
     return tuple(Rejected(name, gain_n) for name, gain_n in best if name in known or gain_n > _LEAST_REJECTED * rms_n)
 
 
-def _traces(bench: Bench, reported: Reported) -> tuple[Trace, ...]:
-    before, after = bench.simulate([reported.base.point, reported.fitted.point])
+def _traces(bench: Bench, reported: ReportedModels) -> tuple[Trace, ...]:
+    before, after = bench.simulate([reported.base.parameters, reported.fitted.parameters])
     return tuple(
-        Trace(bench.measurements[segment.recording], before[segment.rows], after[segment.rows])
-        for segment in bench.segments
-        if segment.is_force
+        Trace(bench.measurements[channel.recording], before[channel.rows], after[channel.rows])
+        for channel in bench.channels
+        if channel.is_force
     )
 
 

@@ -16,7 +16,7 @@ from gateway.twin.simulation import STEP_S, Twin
 from gateway.twin.surroundings import Surroundings
 
 if TYPE_CHECKING:
-    from gateway.twin.replay.replay import Drive, Replay, Response
+    from gateway.twin.replay.replay import Drive, Replay, ReplayResult
 
 __all__ = [
     "STEP_S",
@@ -29,7 +29,7 @@ __all__ = [
     "Plant",
     "Regulator",
     "Replay",
-    "Response",
+    "ReplayResult",
     "Surroundings",
     "Twin",
     "stack",
@@ -37,7 +37,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("Drive", "Replay", "Response"):
+    if name in ("Drive", "Replay", "ReplayResult"):
         from gateway.twin.replay import replay
 
         return getattr(replay, name)

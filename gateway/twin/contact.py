@@ -7,13 +7,13 @@ from gateway.twin.effects.term import active, switched_on
 from gateway.twin.elementwise import Real
 from gateway.twin.regulator import lag_factor, play
 from gateway.twin.sections import Contact
-from gateway.twin.surroundings import Moment
+from gateway.twin.surroundings import TwinConditions
 
 
 class ContactState:
     """`step` takes the slide's force and returns the contact force, N. is_on: is there anything to do at all?"""
 
-    def __init__(self, contact: Contact, step_s: float, moment: Moment, zero: Real) -> None:
+    def __init__(self, contact: Contact, step_s: float, moment: TwinConditions, zero: Real) -> None:
         self._contact, self._moment = contact, moment
         self._backlash = bool(np.any(contact.backlash_n))
         self._creep = lag_factor(contact.creep_s, step_s) if np.any(contact.creep_share) else None

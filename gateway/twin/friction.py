@@ -22,7 +22,7 @@ import numpy as np
 from gateway.twin.effects.term import switched_on
 from gateway.twin.elementwise import Real, clip, exponential, larger, sign, sine
 from gateway.twin.sections import Friction
-from gateway.twin.surroundings import Moment
+from gateway.twin.surroundings import TwinConditions
 
 _RADIAN_PER_DEGREE: Final = math.pi / 180.0
 _DRAGGED_MM_PER_S: Final = 1.0
@@ -44,7 +44,7 @@ DRY: Final = (
 """Fields without which there is no dry friction at all."""
 
 
-def side_load_n(friction: Friction, moment: Moment) -> Real:
+def side_load_n(friction: Friction, moment: TwinConditions) -> Real:
     """side-load: what the surroundings add to the limit, N; a column that is not known adds nothing."""
     load: Real = 0.0
     if moment.feed_mm_s is not None:
@@ -56,7 +56,7 @@ def side_load_n(friction: Friction, moment: Moment) -> Real:
     return load
 
 
-def side_share(friction: Friction, moment: Moment) -> Real:
+def side_share(friction: Friction, moment: TwinConditions) -> Real:
     """side-load: the surface's grip grows with the thrust as soon as the tool is dragged, N/N."""
     if moment.feed_mm_s is None:
         return 0.0

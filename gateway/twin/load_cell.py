@@ -12,7 +12,7 @@ from gateway.twin.effects.term import active
 from gateway.twin.elementwise import Real, chosen
 from gateway.twin.regulator import lag_factor
 from gateway.twin.sections import LoadCell
-from gateway.twin.surroundings import Moment
+from gateway.twin.surroundings import TwinConditions
 
 _SPARE = 4096  # steps of history that are dropped at once
 
@@ -69,13 +69,13 @@ class LoadCellState:
         self._loses_sign = bool(np.any(cell.sign_lost))
         shifted = bool(np.any(cell.clock_offset_s)) or bool(np.any(cell.clock_skew))
         self._history = History(step_s, zero) if shifted else None
-        self._terms = active(TERMS, cell, Moment())
+        self._terms = active(TERMS, cell, TwinConditions())
         self._zero = zero
         self._last_n: Real = None
         self.filtered_n: Real = zero
         self.sign = 1.0
 
-    def look(self, moment: Moment) -> None:
+    def look(self, moment: TwinConditions) -> None:
         """Which effects are on follows from what is known of the surroundings."""
         self._terms = active(TERMS, self._cell, moment)
 
@@ -85,7 +85,7 @@ class LoadCellState:
         if self._history is not None:
             self._history.put(self.filtered_n)
 
-    def read(self, rng: Generator, moment: Moment) -> Real:
+    def read(self, rng: Generator, moment: TwinConditions) -> Real:
         """One reading, N, with the sign of the wiring. Chance is the same draw for all lanes, as one rig's is."""
         cell = self._cell
         force = self.filtered_n if self._history is None else self._shown_n(moment)
@@ -101,7 +101,7 @@ class LoadCellState:
             force = without_sign(cell, force)
         return self._kept(converted(cell, force), rng)
 
-    def _shown_n(self, moment: Moment) -> Real:
+    def _shown_n(self, moment: TwinConditions) -> Real:
         """What a wrong clock shows."""
         assert self._history is not None
         return self._history.at(earlier_s(self._cell, moment.time_s))

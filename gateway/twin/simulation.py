@@ -17,7 +17,7 @@ from gateway.twin.load_cell import LoadCellState
 from gateway.twin.plant import Plant, lane_count, plain
 from gateway.twin.regulator import RegulatorState
 from gateway.twin.slide import SlideState
-from gateway.twin.surroundings import Moment, Surroundings
+from gateway.twin.surroundings import Surroundings, TwinConditions
 
 STEP_S: Final = 1.0e-3
 _ROUNDING: Final = 1.0e-6  # of a step: ten times 0.001 s are ten steps
@@ -36,7 +36,7 @@ class Twin:
         """Back to the start: state, time, faults and noise."""
         lanes = lane_count(self.plant)
         zero: Real = 0.0 if lanes is None else np.zeros(lanes)
-        self._moment = Moment(command_v=zero)
+        self._moment = TwinConditions(command_v=zero)
         self._regulator = RegulatorState(self.plant.regulator, STEP_S, zero)
         self._slide = SlideState(self.plant, STEP_S, zero)
         self._contact = ContactState(self.plant.contact, STEP_S, self._moment, zero)

@@ -30,7 +30,7 @@ COLUMNS = tuple(entry.name for entry in fields(Surroundings))
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class Moment:
+class TwinConditions:
     """An instant, or all of a recording's: surroundings, and what follows from them.
 
     aside_mm: position minus its mean over the recording; the running twin, which knows no mean, takes the position as it

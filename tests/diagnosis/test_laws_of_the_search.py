@@ -10,12 +10,12 @@ import pytest
 
 from gateway.catalogue.sensing import DRIFT, ZERO_PER_K
 from gateway.diagnosis import BY_NAME, Diagnosis, Measurement, Options, diagnose
-from gateway.diagnosis.noise import coloured, timing_weights, white
+from gateway.diagnosis.noise import coloured_whitener, timing_weights, white_whitener
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
 from gateway.diagnosis.search.bench import Bench, bench_of
-from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
-from gateway.diagnosis.search.normal_equations import Normal, held_out
-from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.search.normal_equations import NormalEquations, held_out_errors
+from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.recording import Recording
 from gateway.recording.measurement import measurement_of
 from gateway.reports.diagnosis.document import diagnosis_document
@@ -35,7 +35,7 @@ def test_the_gain_of_added_columns_is_that_of_least_squares() -> None:
     rng = np.random.default_rng(1)
     model, columns = rng.normal(size=(4, 300)), rng.normal(size=(6, 300)) * np.logspace(-6, 6, 6)[:, None]
     residual = rng.normal(size=300) + 0.3 * columns[2] / 1.0e-2 + model[1]
-    normal = Normal(model, columns, residual)
+    normal = NormalEquations(model, columns, residual)
     for indices in ([0], [2], [5], [1, 2], [0, 3, 5]):
         joined = np.vstack([model, columns[indices] / np.linalg.norm(columns[indices], axis=1)[:, None]])
         found = normal.add(indices)
@@ -50,7 +50,7 @@ def test_a_column_of_the_model_gains_nothing() -> None:
     rng = np.random.default_rng(2)
     model = rng.normal(size=(3, 200))
     columns = np.vstack([2.0 * model[0] - model[2], rng.normal(size=200)])
-    normal = Normal(model, columns, rng.normal(size=200))
+    normal = NormalEquations(model, columns, rng.normal(size=200))
     assert normal.add([0]).gain == 0.0
     assert normal.add([1]).gain > 0.0
 
@@ -61,20 +61,20 @@ def short(constant_n: float = 0.0, columns: tuple[str, ...] = (), *, seed: int =
     return replace(found, force_n=found.force_n + constant_n)
 
 
-def linear_problem(rng: np.random.Generator) -> tuple[Bench, Fitted]:
+def linear_problem(rng: np.random.Generator) -> tuple[Bench, FittedModel]:
     """A bench with a model of three columns at its optimum, where a search always asks."""
     bench = bench_of([short()])
     jacobian = bench.reduced(rng.normal(size=(3, bench.rows)) * np.array([[1.0e-3], [1.0], [1.0e4]]))
     residual = bench.reduced(rng.normal(size=bench.rows))
     residual -= jacobian.T @ np.linalg.lstsq(jacobian.T, residual, rcond=None)[0]
-    return bench, Fitted(Point(DEFAULT_PLANT, (0.0,)), (), residual, 0.0, jacobian)
+    return bench, FittedModel(ModelParameters(DEFAULT_PLANT, (0.0,)), (), residual, 0.0, jacobian)
 
 
 def test_held_out_is_leaving_out_and_fitting_again() -> None:
     """But for a ridge of a hundredth, which keeps a block solvable that holds all of a parameter."""
     bench, fitted = linear_problem(np.random.default_rng(3))
-    whiten = white(bench, fitted.residual_n)
-    found = held_out(bench, fitted, whiten)
+    whiten = white_whitener(bench, fitted.residual_n)
+    found = held_out_errors(bench, fitted, whiten)
     for block in range(found.errors.size):
         inside = bench.block_of_row == block
         rest = ~inside & bench.usable
@@ -105,7 +105,7 @@ def test_a_known_spectrum_is_recovered_and_whitened(seed: int) -> None:
     """White level, total and the whole curve within 20 % in amplitude; whitened, every part of the band has variance 1."""
     bench = quiet_bench()
     noise_n, level = coloured_noise(np.random.default_rng(seed), bench.rows)
-    whiten = coloured(bench, noise_n, np.empty((0, bench.rows)), np.ones(bench.rows))
+    whiten = coloured_whitener(bench, noise_n, np.empty((0, bench.rows)), np.ones(bench.rows))
     found = whiten.noises[0]
     assert found.white_n == pytest.approx(0.1, rel=0.2)
     assert whiten.floor_n == pytest.approx(float(np.std(noise_n)), rel=0.2)
@@ -120,7 +120,7 @@ def test_a_known_spectrum_is_recovered_and_whitened(seed: int) -> None:
 def test_white_noise_stays_white_under_its_whitening() -> None:
     bench = quiet_bench()
     noise_n = np.random.default_rng(7).normal(0.0, 0.3, bench.rows)
-    whiten = coloured(bench, noise_n, np.empty((0, bench.rows)), np.ones(bench.rows))
+    whiten = coloured_whitener(bench, noise_n, np.empty((0, bench.rows)), np.ones(bench.rows))
     assert whiten.noises[0].white_n == pytest.approx(0.3, rel=0.05)
     assert whiten.noises[0].total_n == pytest.approx(0.3, rel=0.05)
     np.testing.assert_allclose(whiten(noise_n), noise_n / 0.3, atol=0.5)
@@ -134,13 +134,13 @@ def test_a_linear_problem_is_solved_in_one_wave() -> None:
     volts = command_v(time_s)
     force_n = readings_n(machine, time_s, volts, columns) + np.random.default_rng(8).normal(0.0, 0.1, time_s.size)
     bench = bench_of([measurement(time_s, volts, force_n, columns)])
-    whiten = white(bench, bench.measured_n)
-    start = Problem(Point(MACHINE, (0.0,)), (DRIFT, ZERO_PER_K))
+    whiten = white_whitener(bench, bench.measured_n)
+    start = FitProblem(ModelParameters(MACHINE, (0.0,)), (DRIFT, ZERO_PER_K))
     (found,) = refine(bench, [start], whiten, waves=1)
     left = squares(whiten(found.jacobian), whiten(found.residual_n))
     assert found.chi2 == pytest.approx(left, rel=1e-7)
-    assert found.point.value(DRIFT) == pytest.approx(0.05, abs=0.003)
-    assert found.point.value(ZERO_PER_K) == pytest.approx(-0.3, abs=0.005)
+    assert found.parameters.value(DRIFT) == pytest.approx(0.05, abs=0.003)
+    assert found.parameters.value(ZERO_PER_K) == pytest.approx(-0.3, abs=0.005)
 
 
 def told(found: Diagnosis) -> list[tuple[str, tuple[str, ...]]]:
@@ -203,9 +203,9 @@ def test_a_shift_in_time_changes_nothing() -> None:
 def test_recordings_with_their_own_offsets_share_one_model(plain: Diagnosis) -> None:
     two = [short(), short(-7.0, seed=5)]
     bench = bench_of(two)
-    whiten = white(bench, bench.measured_n)
+    whiten = white_whitener(bench, bench.measured_n)
     base = fit_base(bench, DEFAULT_PLANT, base_parameters(bench, frozenset()), whiten)
-    assert base.point.offsets_n[0] - base.point.offsets_n[1] == pytest.approx(7.0, abs=0.05)
+    assert base.parameters.offsets_n[0] - base.parameters.offsets_n[1] == pytest.approx(7.0, abs=0.05)
     found = diagnose(two)
     assert told(found)[0][0] == "load-dependent-friction"
     assert sizes(found)["load_dependent_n_per_n"] == pytest.approx(0.05, rel=0.1)
@@ -251,7 +251,7 @@ def test_a_bench_is_a_value_that_no_step_of_a_search_changes() -> None:
     rng = np.random.default_rng(6)
     bench, fitted = linear_problem(rng)
     columns, rows = rng.normal(size=(2, bench.rows)), np.arange(bench.rows) == 1500
-    whiten = white(bench, fitted.residual_n)
+    whiten = white_whitener(bench, fitted.residual_n)
     before = bench.usable.copy(), bench.reduced(columns), whiten(fitted.residual_n)
     fewer = bench.without_rows(rows).without_columns(columns)
     np.testing.assert_array_equal(bench.usable, before[0])
@@ -269,6 +269,6 @@ def test_rows_whose_times_are_in_doubt_weigh_less_only_while_the_force_moves() -
     weights = timing_weights(bench, ramp_n, late_s=0.1, noise_n=0.1)
     assert weights[100] == 1.0
     assert weights[1500] == pytest.approx(1.0 / np.sqrt(2.0))
-    whiten = white(bench, fitted.residual_n, weights)
+    whiten = white_whitener(bench, fitted.residual_n, weights)
     assert not whiten.knows_times
-    assert white(bench, fitted.residual_n).knows_times
+    assert white_whitener(bench, fitted.residual_n).knows_times

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement, Options, Verdict, diagnose
-from gateway.diagnosis.input_checks import SWAPPED, TURNED, UNIT, columns_option, suspects
-from gateway.diagnosis.search.base_fit import bare
+from gateway.diagnosis.input_checks import SWAPPED, TURNED, UNIT, columns_option, find_suspects
+from gateway.diagnosis.search.base_fit import without_effects
 from gateway.twin.plant import Plant, with_value
 from gateway.twin.replay.replay import Drive, Replay
 from gateway.units import LINEAR
@@ -30,7 +30,7 @@ def written_in(unit: str, quantity: str, own: str, values: np.ndarray) -> np.nda
 
 
 def only(found: Measurement, plant: Plant = MACHINE, *, is_own: bool = True) -> tuple[str, str, str]:
-    (one,) = suspects([found], plant, is_own=is_own)
+    (one,) = find_suspects([found], plant, is_own=is_own)
     return one.code, one.column, one.unit or one.other
 
 
@@ -40,7 +40,9 @@ def only(found: Measurement, plant: Plant = MACHINE, *, is_own: bool = True) -> 
 def test_a_force_in_another_unit(given: Measurement, unit: str, is_own: bool) -> None:
     wrong = replace(given, force_n=written_in(unit, "force", "n", FORCE_N))
     assert only(wrong, is_own=is_own) == (UNIT, "force_n", unit)
-    assert suspects([wrong], MACHINE, is_own=True)[0].factor == pytest.approx(1.0 / LINEAR["force"][unit][0], rel=0.02)
+    assert find_suspects([wrong], MACHINE, is_own=True)[0].factor == pytest.approx(
+        1.0 / LINEAR["force"][unit][0], rel=0.02
+    )
 
 
 @pytest.mark.parametrize("is_own", [True, False])
@@ -67,11 +69,11 @@ def test_swapped_columns_and_a_turned_sign(is_own: bool) -> None:
 
 def test_what_is_right_is_left_alone_and_a_foreign_machine_may_be_of_another_size() -> None:
     for right in (COMMANDED, PRESSED, BOTH):
-        assert suspects([right], MACHINE, is_own=True) == ()
-        assert suspects([right], bare(MACHINE), is_own=False) == ()
-    assert suspects([COMMANDED], SMALLER, is_own=False) == ()
+        assert find_suspects([right], MACHINE, is_own=True) == ()
+        assert find_suspects([right], without_effects(MACHINE), is_own=False) == ()
+    assert find_suspects([COMMANDED], SMALLER, is_own=False) == ()
     quiet = replace(COMMANDED, command_v=np.full(TIME_S.size, 2.0))
-    assert suspects([quiet], MACHINE, is_own=True) == ()
+    assert find_suspects([quiet], MACHINE, is_own=True) == ()
 
 
 def test_no_cause_is_looked_for_where_columns_are_wrong() -> None:
@@ -84,9 +86,9 @@ def test_no_cause_is_looked_for_where_columns_are_wrong() -> None:
 
 
 def test_the_option_keeps_the_sources_that_were_given() -> None:
-    (unit,) = suspects([replace(COMMANDED, force_n=FORCE_N / 9.80665)], MACHINE, is_own=True)
+    (unit,) = find_suspects([replace(COMMANDED, force_n=FORCE_N / 9.80665)], MACHINE, is_own=True)
     assert columns_option(unit) == "--columns force_n=force_n:kgf"
     assert columns_option(unit, "time_s=1:ms,force_n=7:n") == "--columns time_s=1:ms,force_n=7:kgf"
-    (swapped,) = suspects([replace(COMMANDED, command_v=FORCE_N, force_n=VOLTS)], MACHINE, is_own=True)
+    (swapped,) = find_suspects([replace(COMMANDED, command_v=FORCE_N, force_n=VOLTS)], MACHINE, is_own=True)
     assert columns_option(swapped) == "--columns command_v=force_n,force_n=command_v"
     assert columns_option(swapped, "command_v=2,force_n=3:n") == "--columns command_v=3,force_n=2"

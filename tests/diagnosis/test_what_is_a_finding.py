@@ -9,19 +9,19 @@ import pytest
 from gateway.catalogue.catalogue import BY_NAME
 from gateway.diagnosis import Options, Verdict, diagnose
 from gateway.diagnosis.result import Gain
-from gateway.diagnosis.search.model_comparison import Contest
-from gateway.diagnosis.search.normal_equations import HeldOut
-from gateway.diagnosis.search.search import Accepted
-from gateway.diagnosis.search.significance import doubt, gain_of
+from gateway.diagnosis.search.model_comparison import ModelComparison, RefinedEffect
+from gateway.diagnosis.search.normal_equations import HeldOutErrors
+from gateway.diagnosis.search.search import AcceptedEffect
+from gateway.diagnosis.search.significance import gain_of, reason_for_doubt
 from gateway.reports.diagnosis import wording as words
 from tests.diagnosis.machine import MACHINE, recorded, times_s
 
 UNSET: Any = None
 
 
-def accepted(name: str, shares: dict[str, float]) -> Accepted:
+def accepted(name: str, shares: dict[str, float]) -> AcceptedEffect:
     effect = BY_NAME[name]
-    return Accepted(effect, effect.forms[0], Contest(UNSET, (), shares, UNSET, 1, ()))
+    return AcceptedEffect(effect, effect.forms[0], ModelComparison(UNSET, (), shares, UNSET, 1, ()))
 
 
 SURE = accepted("creep", {"creep": 0.97})
@@ -37,15 +37,27 @@ SURE = accepted("creep", {"creep": 0.97})
         (accepted("creep", {"creep": 0.3, "warm-up": 0.4, "pad-wear": 0.2}), Gain(0.3, 0.2, (0.05, 0.15), 0.8), ""),
     ],
 )
-def test_what_is_no_finding_is_told_why(taken: Accepted, gain: Gain, why: str) -> None:
-    told = doubt(taken, gain)
+def test_what_is_no_finding_is_told_why(taken: AcceptedEffect, gain: Gain, why: str) -> None:
+    told = reason_for_doubt(taken, gain)
     assert why in told
     assert bool(told) == bool(why)
 
 
-def held(squares: np.ndarray) -> HeldOut:
+def test_names_that_win_equally_often_stand_in_the_order_of_their_gain() -> None:
+    """A set's order differs from process to process, and the answer with it."""
+    relatives = ("extra-lag", "clock-offset", "viscous-friction")
+    ranked = tuple(
+        RefinedEffect(BY_NAME[name], BY_NAME[name].forms[0], UNSET, 10.0 - 0.1 * k, 1, UNSET)
+        for k, name in enumerate(("transport-delay", *relatives))
+    )
+    shares = {"transport-delay": 1.0, **dict.fromkeys(relatives, 0.0)}
+    found = ModelComparison(UNSET, ranked, shares, UNSET, 1, ())
+    assert found.group("transport-delay") == ("transport-delay", *relatives)
+
+
+def held(squares: np.ndarray) -> HeldOutErrors:
     blocks = squares.reshape(20, -1)
-    return HeldOut(blocks.sum(axis=1), np.full(20, float(blocks.shape[1])), np.zeros((20, 1)), squares)
+    return HeldOutErrors(blocks.sum(axis=1), np.full(20, float(blocks.shape[1])), np.zeros((20, 1)), squares)
 
 
 def test_a_gain_s_interval_holds_0_where_noise_alone_gained() -> None:

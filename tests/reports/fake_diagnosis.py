@@ -93,6 +93,5 @@ def diagnosis(**changes: Any) -> Diagnosis:
         traces=(trace(),),
         experiments=("dwell 60 s at 20 N while the room warms by 5 K, to tell the drifts apart",),
         notes=("the noise is coloured: a line of 3 Hz width was whitened", "line 812, force_n: '--' is no number"),
-        spent_s={"base": 0.4, "search": 1.9},
     )  # fmt: skip
     return replace(fake, **changes)

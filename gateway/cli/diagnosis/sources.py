@@ -11,7 +11,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.options import state_directory
 from gateway.devices import cell_host
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.search.base_fit import bare
+from gateway.diagnosis.search.base_fit import without_effects
 from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.measurement import measurement_of
@@ -112,7 +112,7 @@ def _recorded(recordings: Sequence[Recording], plant: PlantProfile | None) -> tu
 
 def _foreign(profile: PlantProfile) -> PlantProfile:
     """The start for a machine that nobody described: nobody said that it has this one's delay or seals."""
-    plant = bare(profile.plant)
+    plant = without_effects(profile.plant)
     now = {f"{section}.{name}": value for section, name, value in values(plant)}
     origins = {path: origin for path, origin in profile.origins.items() if origin.value == now[path]}
     return replace(profile, plant=plant, origins=origins)

@@ -22,7 +22,7 @@ _MOST_PROPOSALS = 4
 _MOST_NAMES = 4
 
 
-def told(
+def render_diagnosis(
     diagnosis: Diagnosis, notes: tuple[str, ...] = (), loop: tuple[str, ...] = (), run: str = ""
 ) -> Iterator[RenderableType]:
     """In reading order, columns that are wrong before all else; every paragraph hangs behind its keyword, so that it wraps at

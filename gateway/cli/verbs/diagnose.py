@@ -121,7 +121,7 @@ def _diagnosed(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis,
     from rich.console import Console
 
     from gateway.diagnosis import Options, diagnose
-    from gateway.diagnosis.input_checks import mended
+    from gateway.diagnosis.input_checks import name_options
 
     asked = Options(
         without=options["without"],
@@ -129,12 +129,11 @@ def _diagnosed(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis,
         late_s=sources.late_s,
         quantum_n=sources.quantum_n,
         is_own=sources.is_own,
-        clock=time.perf_counter,
     )
     began_s = time.perf_counter()
     with Console(stderr=True).status("diagnosing"):
         diagnosis = diagnose(sources.measurements, sources.plant.plant, asked)
-    diagnosis = replace(diagnosis, suspects=mended(diagnosis.suspects, options["columns"] or ""))
+    diagnosis = replace(diagnosis, suspects=name_options(diagnosis.suspects, options["columns"] or ""))
     return diagnosis, time.perf_counter() - began_s
 
 
@@ -237,12 +236,12 @@ def _plant(diagnosis: "Diagnosis", sources: "Sources", name: str) -> str:
 def _show(answer: Answer, written: dict[Path, str]) -> None:
     from rich.console import Console
 
-    from gateway.cli.diagnosis.terminal import told
+    from gateway.cli.diagnosis.terminal import render_diagnosis
 
     console, sources = Console(), answer.sources
     rig = sources.rig or "not named"
     console.print(f"{sources.name} · rig {rig} · plant {sources.plant.name}", style="dim", highlight=False)
-    for part in told(answer.diagnosis, sources.notes, _loop_sentences(answer), answer.run):
+    for part in render_diagnosis(answer.diagnosis, sources.notes, _loop_sentences(answer), answer.run):
         console.print(part, highlight=False)
     for path in written:
         click.echo(f"wrote {path}", err=True)

@@ -1,4 +1,4 @@
-"""What this recording can show at all, asked before any judgement.
+"""What this recording can show at all, asked before any verdict.
 
 An effect is visible if one of its starts, which are sizes that one would notice, changes the readings beyond what the
 base model could absorb and the noise could hide.
@@ -10,13 +10,13 @@ from typing import Final
 from gateway.catalogue.effect import Effect
 from gateway.diagnosis.result import NotIdentifiable
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.candidates import Score
+from gateway.diagnosis.search.candidates import CandidateScore
 
 _VISIBLE: Final = 30.0  # chi-square that an effect must reach at a noticeable size
 
 
-def invisible(
-    bench: Bench, effects: Sequence[Effect], scores: Sequence[Score], taken: frozenset[str]
+def find_invisible_effects(
+    bench: Bench, effects: Sequence[Effect], scores: Sequence[CandidateScore], taken: frozenset[str]
 ) -> tuple[NotIdentifiable, ...]:
     """Effects that this recording cannot show, with the reason; `taken` are part of the base model or found."""
     strength: dict[str, float] = {}

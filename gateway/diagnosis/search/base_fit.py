@@ -19,9 +19,9 @@ from gateway.catalogue.sensing import CLOCK_OFFSET
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.initial_friction import begun, start_parameters
-from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
-from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.initial_friction import start_parameters, try_initial_strains
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.twin.plant import UNLIMITED, Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
 DEFAULT_PLANT: Final = Plant(
@@ -35,7 +35,7 @@ _LAGS_S: Final = (0.005, 0.02, 0.05, 0.1, 0.2)
 _COULOMBS_N: Final = (0.0, 0.3, 1.0, 2.5, 6.0)
 
 
-def bare(plant: Plant) -> Plant:
+def without_effects(plant: Plant) -> Plant:
     """The plant's dimensions and base parameters, every effect at its null value: what is known of a foreign machine."""
     kept = {AREA.path, LAG.path, COULOMB.path}
     for effect in EFFECTS:
@@ -57,39 +57,41 @@ def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -
     return tuple(found)
 
 
-def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Whitener) -> Fitted:
+def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Whitener) -> FittedModel:
     """The refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
-    start = Point(plant, tuple(0.0 for _ in bench.measurements))
+    start = ModelParameters(plant, tuple(0.0 for _ in bench.measurements))
     coarse, strains = _coarse(bench, start, free, whiten), start_parameters(bench, plant)
-    coarse_ones = begun(bench, coarse, whiten) if strains else [coarse]
-    problems = [Problem(point, (*free, *strains)) for point in coarse_ones]
+    coarse_ones = try_initial_strains(bench, coarse, whiten) if strains else [coarse]
+    problems = [FitProblem(parameters, (*free, *strains)) for parameters in coarse_ones]
     return min(refine(bench, problems, whiten, waves=16 if strains else 8), key=lambda each: each.chi2)
 
 
-def refit(bench: Bench, fitted: Fitted, whiten: Whitener, waves: int = 3) -> Fitted:
+def refit(bench: Bench, fitted: FittedModel, whiten: Whitener, waves: int = 3) -> FittedModel:
     """The same model again, after rows or noise have changed."""
-    return refine(bench, [Problem(fitted.point, fitted.free)], whiten, waves)[0]
+    return refine(bench, [FitProblem(fitted.parameters, fitted.free)], whiten, waves)[0]
 
 
-def _coarse(bench: Bench, start: Point, free: tuple[Parameter, ...], whiten: Whitener) -> Point:
+def _coarse(bench: Bench, start: ModelParameters, free: tuple[Parameter, ...], whiten: Whitener) -> ModelParameters:
     """The best of a grid, gain and offset by linear regression."""
     start = _scaled(bench, start, bench.simulate([start])[0])
     lags = {start.value(LAG), *_LAGS_S} if LAG in free else {start.value(LAG)}
     frictions = {start.value(COULOMB), *_COULOMBS_N} if COULOMB in free else {start.value(COULOMB)}
-    points = [start.moved(LAG, lag).moved(COULOMB, friction) for lag, friction in product(lags, frictions)]
-    simulated = bench.simulate(points)
-    costs = [_regression(bench, simulated[k], whiten)[2] for k in range(len(points))]
+    parameter_sets = [
+        start.with_value(LAG, lag).with_value(COULOMB, friction) for lag, friction in product(lags, frictions)
+    ]
+    simulated = bench.simulate(parameter_sets)
+    costs = [_regression(bench, simulated[k], whiten)[2] for k in range(len(parameter_sets))]
     best = int(np.argmin(costs))
-    return _scaled(bench, points[best], simulated[best])
+    return _scaled(bench, parameter_sets[best], simulated[best])
 
 
-def _scaled(bench: Bench, point: Point, simulated_n: Floats) -> Point:
+def _scaled(bench: Bench, parameters: ModelParameters, simulated_n: Floats) -> ModelParameters:
     """The point with area and offsets that regression finds; unchanged where the force does not answer."""
     gain, offset, _ = _regression(bench, simulated_n, None)
     if not 0.02 < gain < 50.0:
-        return point.with_offsets([offset + point.offsets_n[0]] * len(point.offsets_n))
-    offsets = [offset] * len(point.offsets_n)
-    return replace(point, offsets_n=tuple(offsets)).moved(AREA, point.value(AREA) * gain)
+        return parameters.with_offsets([offset + parameters.offsets_n[0]] * len(parameters.offsets_n))
+    offsets = [offset] * len(parameters.offsets_n)
+    return replace(parameters, offsets_n=tuple(offsets)).with_value(AREA, parameters.value(AREA) * gain)
 
 
 def _regression(bench: Bench, simulated_n: Floats, whiten: Whitener | None) -> tuple[float, float, float]:

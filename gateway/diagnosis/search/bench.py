@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
-from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.diagnosis.search.recording_drive import begins_at_rest, replay_of, settled_s
 from gateway.twin.plant import with_value
 from gateway.twin.replay.drive import Motion
@@ -27,7 +27,7 @@ NOMINAL_AREA_M2: Final = 1.0e-4  # turns a measured pressure into newtons
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class Channel:
     """Rows of one channel of one recording within the stacked vectors."""
 
     rows: slice
@@ -47,7 +47,7 @@ class Bench:
     measurements: tuple[Measurement, ...]
     motion: Motion
     replays: tuple[Replay, ...]
-    segments: tuple[Segment, ...]
+    channels: tuple[Channel, ...]
     raw_n: Floats
     usable: Flags
     block_of_row: NDArray[np.int64]
@@ -62,7 +62,7 @@ class Bench:
     @cached_property
     def force_rows(self) -> Flags:
         """Rows of force channels."""
-        return np.concatenate([np.full(each.rows.stop - each.rows.start, each.is_force) for each in self.segments])
+        return np.concatenate([np.full(each.rows.stop - each.rows.start, each.is_force) for each in self.channels])
 
     @cached_property
     def _nuisance(self) -> Floats:
@@ -77,16 +77,19 @@ class Bench:
         """Force rows that count."""
         return np.asarray(self.force_rows & self.usable)
 
-    def simulate(self, points: Sequence[Point]) -> Floats:
+    def simulate(self, parameter_sets: Sequence[ModelParameters]) -> Floats:
         """Readings, N; shape (points, rows), all rows."""
-        result = np.empty((len(points), self.rows))
+        result = np.empty((len(parameter_sets), self.rows))
         for recording, replay in enumerate(self.replays):
-            plants = [with_value(point.plant, "cell", "zero_n", point.offsets_n[recording]) for point in points]
-            response = replay.run(plants, [point.start(recording) for point in points])
-            for segment in self.segments:
-                if segment.recording == recording:
-                    result[:, segment.rows] = (
-                        response.reading_n if segment.is_force else response.pressure_pa * NOMINAL_AREA_M2
+            plants = [
+                with_value(parameters.plant, "cell", "zero_n", parameters.offsets_n[recording])
+                for parameters in parameter_sets
+            ]
+            response = replay.run(plants, [parameters.start(recording) for parameters in parameter_sets])
+            for channel in self.channels:
+                if channel.recording == recording:
+                    result[:, channel.rows] = (
+                        response.reading_n if channel.is_force else response.pressure_pa * NOMINAL_AREA_M2
                     )
         return result
 
@@ -113,8 +116,8 @@ class Bench:
         """Rate of the simulated force, per channel."""
         slope = np.zeros(self.rows)
         seconds = self.time_s()
-        for segment in self.segments:
-            slope[segment.rows] = np.gradient(simulated_n[segment.rows], seconds[segment.rows])
+        for channel in self.channels:
+            slope[channel.rows] = np.gradient(simulated_n[channel.rows], seconds[channel.rows])
         return slope
 
     def rms_n(self, residual_n: Floats) -> float:
@@ -124,19 +127,19 @@ class Bench:
     def covariate(self, name: str) -> Floats:
         """A column of all recordings along the stacked rows; NaN where a recording lacks it."""
         parts = []
-        for segment in self.segments:
-            measurement = self.measurements[segment.recording]
+        for channel in self.channels:
+            measurement = self.measurements[channel.recording]
             parts.append(measurement.covariates.get(name, np.full(measurement.rows, np.nan)))
         return np.concatenate(parts)
 
     def time_s(self) -> Floats:
-        return np.concatenate([self.measurements[segment.recording].time_s for segment in self.segments])
+        return np.concatenate([self.measurements[channel.recording].time_s for channel in self.channels])
 
     def command(self) -> Floats:
         """Command, V, or pressure, Pa, whatever drives each recording."""
         parts = []
-        for segment in self.segments:
-            measurement = self.measurements[segment.recording]
+        for channel in self.channels:
+            measurement = self.measurements[channel.recording]
             drive = measurement.command_v if measurement.command_v is not None else measurement.pressure_pa
             parts.append(np.zeros(measurement.rows) if drive is None else drive)
         return np.concatenate(parts)
@@ -154,63 +157,63 @@ class Bench:
 
 def bench_of(measurements: Sequence[Measurement], motion: Motion = "inferred") -> Bench:
     """Return the bench of these recordings before anything is known of them; all rows count once they have settled."""
-    segments = tuple(_segments(measurements))
-    raw_n = np.concatenate([_channel_n(measurements[each.recording], each) for each in segments])
-    flags = np.concatenate([measurements[each.recording].usable for each in segments])
-    usable = flags & np.isfinite(raw_n) & ~_settling(measurements, segments)
+    channels = tuple(_channels(measurements))
+    raw_n = np.concatenate([_channel_n(measurements[each.recording], each) for each in channels])
+    flags = np.concatenate([measurements[each.recording].usable for each in channels])
+    usable = flags & np.isfinite(raw_n) & ~_settling(measurements, channels)
     return Bench(
         measurements=tuple(measurements),
         motion=motion,
         replays=tuple(replay_of(each, motion) for each in measurements),
-        segments=segments,
+        channels=channels,
         raw_n=raw_n,
         usable=usable,
-        block_of_row=np.concatenate([_blocks(each, usable) for each in segments]),
+        block_of_row=np.concatenate([_blocks(each, usable) for each in channels]),
         young=np.zeros(raw_n.size, dtype=bool),
     )
 
 
-def _settling(measurements: Sequence[Measurement], segments: Sequence[Segment]) -> Flags:
+def _settling(measurements: Sequence[Measurement], channels: Sequence[Channel]) -> Flags:
     """Rows before which nobody knows what went in; none where a recording begins at rest."""
     parts = []
-    for segment in segments:
-        measurement = measurements[segment.recording]
+    for channel in channels:
+        measurement = measurements[channel.recording]
         parts.append(measurement.time_s < (0.0 if begins_at_rest(measurement) else settled_s(measurement)))
     return np.concatenate(parts)
 
 
-def _channel_n(measurement: Measurement, segment: Segment) -> Floats:
-    if segment.is_force:
+def _channel_n(measurement: Measurement, channel: Channel) -> Floats:
+    if channel.is_force:
         return measurement.force_n
     assert measurement.pressure_pa is not None
     return measurement.pressure_pa * NOMINAL_AREA_M2
 
 
-def _segments(measurements: Sequence[Measurement]) -> list[Segment]:
-    segments: list[Segment] = []
+def _channels(measurements: Sequence[Measurement]) -> list[Channel]:
+    channels: list[Channel] = []
     start = 0
     for index, measurement in enumerate(measurements):
         both = measurement.command_v is not None and measurement.pressure_pa is not None
         for is_force in (True, False) if both else (True,):
-            segments.append(Segment(slice(start, start + measurement.rows), index, is_force))
+            channels.append(Channel(slice(start, start + measurement.rows), index, is_force))
             start += measurement.rows
-    return segments
+    return channels
 
 
-def _blocks(segment: Segment, usable: Flags) -> NDArray[np.int64]:
+def _blocks(channel: Channel, usable: Flags) -> NDArray[np.int64]:
     """Block of each row: blocks of one recording hold equally many rows that count."""
-    counted = np.cumsum(usable[segment.rows])
+    counted = np.cumsum(usable[channel.rows])
     share = np.maximum(counted - 1, 0) * BLOCKS // max(int(counted[-1]), 1)
-    return np.asarray(segment.recording * BLOCKS + share)
+    return np.asarray(channel.recording * BLOCKS + share)
 
 
 def _nuisance_basis(bench: Bench) -> Floats:
     """Orthonormal columns (rows, k): one and the pressure itself, for each pressure channel; and what was taken out."""
     columns = [column * bench.usable for column in bench.taken_out]
-    for segment in bench.segments:
-        if not segment.is_force:
+    for channel in bench.channels:
+        if not channel.is_force:
             for values in (np.ones(bench.rows), bench.measured_n):
                 column = np.zeros(bench.rows)
-                column[segment.rows] = (values * bench.usable)[segment.rows]
+                column[channel.rows] = (values * bench.usable)[channel.rows]
                 columns.append(column)
     return np.linalg.qr(np.array(columns).T)[0] if columns else np.empty((bench.rows, 0))

@@ -7,12 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from gateway.catalogue.effect import ANY, Effect, Form, Scene, Start
+from gateway.catalogue.effect import ANY, Effect, EffectForm, SearchHints, Start
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import Fitted, Whiten
-from gateway.diagnosis.search.normal_equations import Normal, Screened
-from gateway.diagnosis.search.parameters import Point, started
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel, Whiten
+from gateway.diagnosis.search.normal_equations import ColumnGain, NormalEquations
+from gateway.diagnosis.search.parameters import ModelParameters, apply_start
 
 _LARGEST_STRETCH: Final = 3.0  # how far beyond its start a response that is not proportional is believed
 _HOPELESS: Final = 8.0  # chi-square: half of what 1 % over a hundred starts asks for
@@ -25,53 +25,55 @@ class Candidate:
     """One start of one form; columns: where its one or two columns stand."""
 
     effect: Effect
-    form: Form
+    form: EffectForm
     start: Start
     columns: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Wave:
+class CandidateColumns:
     """Candidates and their raw columns (columns, rows), at the point where they were computed."""
 
     candidates: tuple[Candidate, ...]
     columns: Floats
 
 
-def wave(bench: Bench, fitted: Fitted, effects: Iterable[Effect], scene: Scene) -> Wave:
+def simulate_candidates(
+    bench: Bench, fitted: FittedModel, effects: Iterable[Effect], hints: SearchHints
+) -> CandidateColumns:
     """Every start of these effects that the recording's columns allow."""
-    points: list[Point] = []
+    parameter_sets: list[ModelParameters] = []
     candidates: list[Candidate] = []
     taken = {parameter.path for parameter in fitted.free}
     for effect in effects:
         for form in effect.forms:
-            if set(form.needs) <= scene.columns and not taken & {parameter.path for parameter in form.parameters}:
-                for start in _starts(form, fitted.point, scene):
+            if set(form.needs) <= hints.columns and not taken & {parameter.path for parameter in form.parameters}:
+                for start in _starts(form, fitted.parameters, hints):
                     starts = [start, _quarter_turn(form, start)] if form.quadrature else [start]
-                    indices = tuple(range(len(points), len(points) + len(starts)))
-                    points += [started(fitted.point, form, each) for each in starts]
+                    indices = tuple(range(len(parameter_sets), len(parameter_sets) + len(starts)))
+                    parameter_sets += [apply_start(fitted.parameters, form, each) for each in starts]
                     candidates.append(Candidate(effect, form, start, indices))
-    if not points:
-        return Wave((), np.empty((0, bench.rows)))
+    if not parameter_sets:
+        return CandidateColumns((), np.empty((0, bench.rows)))
     centre = bench.measured_n - fitted.residual_n
-    return Wave(tuple(candidates), bench.reduced(bench.simulate(points) - centre * bench.usable))
+    return CandidateColumns(tuple(candidates), bench.reduced(bench.simulate(parameter_sets) - centre * bench.usable))
 
 
-def _starts(form: Form, point: Point, scene: Scene) -> tuple[Start, ...]:
+def _starts(form: EffectForm, parameters: ModelParameters, hints: SearchHints) -> tuple[Start, ...]:
     """The form's own, and the way back to nothing where the plant already has the effect."""
-    starts, size = form.probes(scene), form.parameters[0]
-    there = point.value(size) - size.null
+    starts, size = form.probes(hints), form.parameters[0]
+    there = parameters.value(size) - size.null
     if not starts or there == 0.0 or size.null >= ANY or form.quadrature:
         return starts
     return (*starts, (-there, *starts[0][1:]))
 
 
-def _quarter_turn(form: Form, start: Start) -> Start:
+def _quarter_turn(form: EffectForm, start: Start) -> Start:
     return (*start[:-1], start[-1] + _QUARTER[form.parameters[-1].unit])
 
 
 @dataclass(frozen=True, slots=True)
-class Score:
+class CandidateScore:
     """What a candidate promises: gain in chi-square to first order, and where to begin its refinement.
 
     power: chi-square that its start would leave if it were not in the model; alone: share of it that the model cannot absorb.
@@ -79,35 +81,35 @@ class Score:
 
     candidate: Candidate
     gain: float
-    point: Point
+    parameters: ModelParameters
     power: float = 0.0
     alone: float = 0.0
 
 
-def scores(found: Wave, fitted: Fitted, whiten: Whiten) -> list[Score]:
+def score_candidates(found: CandidateColumns, fitted: FittedModel, whiten: Whiten) -> list[CandidateScore]:
     """Every candidate's promise beside the present model."""
-    normal = Normal(whiten(fitted.jacobian), whiten(found.columns), whiten(fitted.residual_n))
-    return [_with_power(_score(candidate, normal, fitted.point), normal) for candidate in found.candidates]
+    normal = NormalEquations(whiten(fitted.jacobian), whiten(found.columns), whiten(fitted.residual_n))
+    return [_with_power(_score(candidate, normal, fitted.parameters), normal) for candidate in found.candidates]
 
 
-def _with_power(score: Score, normal: Normal) -> Score:
+def _with_power(score: CandidateScore, normal: NormalEquations) -> CandidateScore:
     columns = list(score.candidate.columns)
     power, raw_power = normal.power[columns], np.maximum(normal.raw_power[columns], 1.0e-300)
     return replace(score, power=float(np.max(power)), alone=float(np.max(power / raw_power)))
 
 
-def _score(candidate: Candidate, normal: Normal, point: Point) -> Score:
+def _score(candidate: Candidate, normal: NormalEquations, parameters: ModelParameters) -> CandidateScore:
     screened = normal.add(list(candidate.columns))
     if candidate.form.quadrature:
         start = _turned(candidate, screened)
-        return Score(candidate, screened.gain, started(point, candidate.form, start))
+        return CandidateScore(candidate, screened.gain, apply_start(parameters, candidate.form, start))
     size = float(screened.sizes[0])
     if candidate.form.proportional:
-        return Score(candidate, screened.gain, _sized(candidate, point, size))
-    return _bounded(candidate, normal, point, size)
+        return CandidateScore(candidate, screened.gain, _sized(candidate, parameters, size))
+    return _bounded(candidate, normal, parameters, size)
 
 
-def _turned(candidate: Candidate, screened: Screened) -> Start:
+def _turned(candidate: Candidate, screened: ColumnGain) -> Start:
     along, across = (float(size) for size in screened.sizes)
     unit = candidate.form.parameters[-1].unit
     angle = math.atan2(across, along)
@@ -116,37 +118,37 @@ def _turned(candidate: Candidate, screened: Screened) -> Start:
     return (start[0] * math.hypot(along, across), *start[1:-1], start[-1] + turn)
 
 
-def _bounded(candidate: Candidate, normal: Normal, point: Point, size: float) -> Score:
+def _bounded(candidate: Candidate, normal: NormalEquations, parameters: ModelParameters, size: float) -> CandidateScore:
     """A response that is no straight line: the size counts as far as it is believed."""
     column = candidate.columns[0]
     limit = candidate.form.exact or candidate.form.parameters[0].null >= ANY  # a fall from UNLIMITED has one size
-    kept = min(max(size, 0.0 if _at_low(candidate, point) else -1.0), 1.0 if limit else _LARGEST_STRETCH)
+    kept = min(max(size, 0.0 if _at_low(candidate, parameters) else -1.0), 1.0 if limit else _LARGEST_STRETCH)
     kept = 1.0 if candidate.form.exact else kept
     gain = float(2.0 * kept * normal.slope[column] - kept**2 * normal.power[column])
     begin = (
-        started(point, candidate.form, candidate.start)
+        apply_start(parameters, candidate.form, candidate.start)
         if limit
-        else _sized(candidate, point, kept if kept < 0.0 else max(kept, 0.2))
+        else _sized(candidate, parameters, kept if kept < 0.0 else max(kept, 0.2))
     )
-    return Score(candidate, max(gain, 0.0) if kept != 0.0 else 0.0, begin)
+    return CandidateScore(candidate, max(gain, 0.0) if kept != 0.0 else 0.0, begin)
 
 
-def _at_low(candidate: Candidate, point: Point) -> bool:
+def _at_low(candidate: Candidate, parameters: ModelParameters) -> bool:
     """Would a smaller size than now leave the bounds? Asked in the direction of the start."""
     parameter, way = candidate.form.parameters[0], candidate.start[0]
-    value = point.value(parameter)
+    value = parameters.value(parameter)
     return value <= parameter.low if way > 0.0 else value >= parameter.high
 
 
-def _sized(candidate: Candidate, point: Point, size: float) -> Point:
+def _sized(candidate: Candidate, parameters: ModelParameters, size: float) -> ModelParameters:
     sizes = tuple(
         number if parameter.shape else number * size
         for parameter, number in zip(candidate.form.parameters, candidate.start, strict=True)
     )
-    return started(point, candidate.form, sizes)
+    return apply_start(parameters, candidate.form, sizes)
 
 
-def best_of_each(found: Sequence[Score], most: int) -> list[Score]:
+def best_scores(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
     """The best starts, at most one per form, the strongest `most` effects (each with up to two forms).
 
     None at all where the best could not be significant even if its refinement doubled its gain, and none that is far
@@ -156,11 +158,11 @@ def best_of_each(found: Sequence[Score], most: int) -> list[Score]:
     if best < _HOPELESS:
         return []
     found = [each for each in found if each.gain > _FAR_BEHIND * best]
-    chosen: dict[tuple[str, int], Score] = {}
+    chosen: dict[tuple[str, int], CandidateScore] = {}
     for score in sorted(found, key=lambda each: -each.gain):
         chosen.setdefault((score.candidate.effect.name, id(score.candidate.form)), score)
     names: list[str] = []
-    result: list[Score] = []
+    result: list[CandidateScore] = []
     for score in chosen.values():
         name = score.candidate.effect.name
         if score.gain <= 0.0 or (name not in names and len(names) == most):
@@ -171,13 +173,13 @@ def best_of_each(found: Sequence[Score], most: int) -> list[Score]:
     return result
 
 
-def remainder(found: Wave, fitted: Fitted) -> tuple[Floats, Floats]:
+def unexplained_residual(found: CandidateColumns, fitted: FittedModel) -> tuple[Floats, Floats]:
     """What is left of the residual when every column may take its share, and the orthonormal columns (k, rows)."""
     rows = np.vstack([fitted.jacobian, found.columns])
     norms = np.sqrt(np.sum(rows**2, axis=1))
     rows = rows[norms > 0.0] / norms[norms > 0.0, None]
-    gram = rows @ rows.T
-    sizes, vectors = np.linalg.eigh(gram)
+    normal_matrix = rows @ rows.T
+    sizes, vectors = np.linalg.eigh(normal_matrix)
     kept = sizes > 1.0e-5
     basis = (vectors[:, kept].T @ rows) / np.sqrt(sizes[kept])[:, None]
     residual = fitted.residual_n

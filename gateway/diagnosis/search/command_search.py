@@ -18,10 +18,10 @@ from gateway.catalogue.cylinder import AREA, COULOMB
 from gateway.catalogue.regulator import DEAD_BAND, LAG
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench, Segment
-from gateway.diagnosis.search.levenberg_marquardt import Fitted
-from gateway.diagnosis.search.normal_equations import Normal
-from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.bench import Bench, Channel
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.search.normal_equations import NormalEquations
+from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.twin.elementwise import Real, smaller
 from gateway.twin.plant import Plant
 
@@ -38,25 +38,25 @@ _BUNCH: Final = 0.25  # of the lag
 _AT_ONCE: Final = 3_000_000  # numbers of one kind in memory
 
 
-def likely_steps_v(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[float, ...]:
+def likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:
     """Steps of the command whose saw tooth is most like the residual, the best first."""
     return _likely(bench, fitted, whiten, _steps_v(_span_v(bench))) if _span_v(bench) > 0.0 else ()
 
 
-def likely_dead_bands_pa(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[float, ...]:
+def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:
     """Dead bands of the target with which the twin explains most of the residual, the best first."""
     if _span_v(bench) == 0.0:
         return ()
-    regulator = fitted.point.plant.regulator
+    regulator = fitted.parameters.plant.regulator
     bands_pa = _BANDS_V * regulator.full_scale_pa / regulator.full_scale_v
-    rigid = replace(fitted.point, plant=_rigid(fitted.point.plant))
+    rigid = replace(fitted.parameters, plant=_rigid(fitted.parameters.plant))
     without = bench.simulate([rigid])
     cost = np.zeros(bands_pa.size)
     for part in _parts(bands_pa.size, bench.rows):
         columns = bench.reduced(
-            bench.simulate([rigid.moved(DEAD_BAND, band_pa) for band_pa in bands_pa[part]]) - without
+            bench.simulate([rigid.with_value(DEAD_BAND, band_pa) for band_pa in bands_pa[part]]) - without
         )
-        normal = Normal(whiten(fitted.jacobian), whiten(columns), whiten(fitted.residual_n))
+        normal = NormalEquations(whiten(fitted.jacobian), whiten(columns), whiten(fitted.residual_n))
         cost[part] = normal.power - 2.0 * normal.slope
     return tuple(bands_pa[np.argsort(cost)[:_BEST]].tolist())
 
@@ -84,7 +84,7 @@ def _spacing(step_v: Real, span_v: float) -> Real:
     return smaller(step_v / (3.0 * span_v), 0.05)
 
 
-def _likely(bench: Bench, fitted: Fitted, whiten: Whitener, tried: Floats) -> tuple[float, ...]:
+def _likely(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> tuple[float, ...]:
     span_v, best = _span_v(bench), list[float]()
     for size in tried[np.argsort(-_promises(bench, fitted, whiten, tried))]:
         if all(abs(size / other - 1.0) > 1.5 * _spacing(size, span_v) for other in best):
@@ -97,16 +97,16 @@ def _likely(bench: Bench, fitted: Fitted, whiten: Whitener, tried: Floats) -> tu
     return tuple(sharpest[np.argsort(-np.max(gains, axis=1))[:_BEST]].tolist())
 
 
-def _promises(bench: Bench, fitted: Fitted, whiten: Whitener, tried: Floats) -> Floats:
+def _promises(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
     """How much the first wave of each step's teeth is like the residual, in no unit; rows in bunches: a lag is slow."""
     told = whiten(whiten(fitted.residual_n)) * bench.usable
     slope, power = np.zeros(tried.size), np.full(tried.size, 1.0e-300)
-    for segment, command_v, row_s in _driven(bench):
-        bunch = max(int(_BUNCH * fitted.point.value(LAG) / row_s), 1)
+    for channel, command_v, row_s in _driven(bench):
+        bunch = max(int(_BUNCH * fitted.parameters.value(LAG) / row_s), 1)
         rows = np.arange(0, command_v.size, bunch)
-        sums, some_v = np.add.reduceat(told[segment.rows], np.maximum(rows - bunch // 2, 0)), command_v[rows]
+        sums, some_v = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0)), command_v[rows]
         for part in _parts(tried.size, rows.size):
-            waves = _error(_waved(some_v[:, None], tried[part]), some_v, bunch * row_s, fitted.point)
+            waves = _error(_waved(some_v[:, None], tried[part]), some_v, bunch * row_s, fitted.parameters)
             waves -= waves.mean(axis=0)
             slope[part] += sums @ waves
             power[part] += bunch * np.einsum("ij,ij->j", waves, waves)
@@ -119,12 +119,12 @@ def _parts(columns: int, rows: int) -> Iterator[slice]:
     yield from (slice(first, first + many) for first in range(0, columns, many))
 
 
-def _driven(bench: Bench) -> Iterator[tuple[Segment, Floats, float]]:
+def _driven(bench: Bench) -> Iterator[tuple[Channel, Floats, float]]:
     """Forces that a command drives: where they stand, the command of each row, V, and the usual distance of rows, s."""
-    for segment in bench.segments:
-        measurement = bench.measurements[segment.recording]
-        if segment.is_force and measurement.command_v is not None:
-            yield segment, measurement.command_v, float(np.median(np.diff(measurement.time_s)))
+    for channel in bench.channels:
+        measurement = bench.measurements[channel.recording]
+        if channel.is_force and measurement.command_v is not None:
+            yield channel, measurement.command_v, float(np.median(np.diff(measurement.time_s)))
 
 
 def _waved(command_v: Floats, steps_v: Floats) -> Floats:
@@ -132,24 +132,24 @@ def _waved(command_v: Floats, steps_v: Floats) -> Floats:
     return np.asarray(command_v - steps_v / math.pi * np.sin(2.0 * math.pi / steps_v * command_v))
 
 
-def _gains(bench: Bench, fitted: Fitted, whiten: Whitener, tried: Floats) -> Floats:
+def _gains(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
     """Chi-square that each step explains of the whitened residual."""
     found = np.zeros(tried.size)
     for part in _parts(tried.size, bench.rows):
         vectors = np.zeros((tried[part].size, bench.rows))
-        for segment, command_v, row_s in _driven(bench):
+        for channel, command_v, row_s in _driven(bench):
             rounded = np.round(command_v[:, None] / tried[part]) * tried[part]
-            vectors[:, segment.rows] = _error(rounded, command_v, row_s, fitted.point).T
-        normal = Normal(whiten(fitted.jacobian), whiten(bench.reduced(vectors)), whiten(fitted.residual_n))
+            vectors[:, channel.rows] = _error(rounded, command_v, row_s, fitted.parameters).T
+        normal = NormalEquations(whiten(fitted.jacobian), whiten(bench.reduced(vectors)), whiten(fitted.residual_n))
         power = np.maximum(normal.power, 1.0e-300)
         found[part] = np.where(normal.slope > _WHOLE * power, normal.slope**2 / power, 0.0)
     return found
 
 
-def _error(given_v: Floats, command_v: Floats, row_s: float, point: Point) -> Floats:
+def _error(given_v: Floats, command_v: Floats, row_s: float, parameters: ModelParameters) -> Floats:
     """What it makes of the force, in volts, that these were given (rows, steps) and not the command (rows,)."""
-    both = _lagged(np.concatenate([given_v, command_v[:, None]], axis=1), point.value(LAG), row_s)
-    regulator, friction_pa = point.plant.regulator, point.value(COULOMB) / point.value(AREA)
+    both = _lagged(np.concatenate([given_v, command_v[:, None]], axis=1), parameters.value(LAG), row_s)
+    regulator, friction_pa = parameters.plant.regulator, parameters.value(COULOMB) / parameters.value(AREA)
     played = _dragged(both, friction_pa * regulator.full_scale_v / regulator.full_scale_pa)
     return np.asarray(played[:, :-1] - played[:, -1:])
 

@@ -23,7 +23,7 @@ _LEAST_COARSE: Final = 0.05  # share of the noise's power that rounding to the l
 
 
 @dataclass(frozen=True, slots=True)
-class Direct:
+class DirectEvidence:
     """A finding: its parameters with a standard error each, and rows that are no witness."""
 
     name: str
@@ -33,13 +33,13 @@ class Direct:
     after_n: float
 
 
-def spikes(bench: Bench, residual_n: Floats, quantum_n: float) -> Direct | None:
+def find_outliers(bench: Bench, residual_n: Floats, quantum_n: float) -> DirectEvidence | None:
     """Rows that stand apart from both neighbours, by the residual of the model as it is, beyond one count."""
     flagged = np.zeros(bench.rows, dtype=bool)
-    for segment in bench.segments:
-        if segment.is_force:
-            simulated_n = (bench.measured_n - residual_n)[segment.rows]
-            flagged[segment.rows] = _apart(residual_n[segment.rows], simulated_n, bench.usable[segment.rows], quantum_n)
+    for channel in bench.channels:
+        if channel.is_force:
+            simulated_n = (bench.measured_n - residual_n)[channel.rows]
+            flagged[channel.rows] = _apart(residual_n[channel.rows], simulated_n, bench.usable[channel.rows], quantum_n)
     count = int(flagged.sum())
     if count < _FEWEST_SPIKES:
         return None
@@ -50,7 +50,7 @@ def spikes(bench: Bench, residual_n: Floats, quantum_n: float) -> Direct | None:
         (OUTLIER_SHARE, share, float(np.sqrt(share / judged.sum()))),
         (OUTLIER, size, size / float(np.sqrt(2.0 * count))),
     )
-    return Direct("outliers", values, flagged, bench.rms_n(residual_n), _rms(residual_n[judged & ~flagged]))
+    return DirectEvidence("outliers", values, flagged, bench.rms_n(residual_n), _rms(residual_n[judged & ~flagged]))
 
 
 def _apart(residual_n: Floats, simulated_n: Floats, usable: Flags, quantum_n: float) -> Flags:
@@ -64,17 +64,17 @@ def _apart(residual_n: Floats, simulated_n: Floats, usable: Flags, quantum_n: fl
     return (np.abs(apart) > _SPIKE * spread + moves_n + quantum_n) & (np.abs(apart) > 4.0 * aside) & usable
 
 
-def repeats(bench: Bench, residual_n: Floats) -> Direct | None:
+def find_repeats(bench: Bench, residual_n: Floats) -> DirectEvidence | None:
     """Rows that the reader found to be copies of the one before."""
     flagged = np.zeros(bench.rows, dtype=bool)
-    for segment in bench.segments:
-        if segment.is_force:
-            flagged[segment.rows] = bench.measurements[segment.recording].repeated & bench.usable[segment.rows]
+    for channel in bench.channels:
+        if channel.is_force:
+            flagged[channel.rows] = bench.measurements[channel.recording].repeated & bench.usable[channel.rows]
     share = float(flagged.sum()) / max(int(bench.judged.sum()), 1)
     if share < max(_LEAST_REPEATED, _MORE_THAN_CHANCE * _chance_of_a_repeat(bench, residual_n)):
         return None
     values = ((REPEATED, share, float(np.sqrt(share / bench.judged.sum()))),)
-    return Direct(
+    return DirectEvidence(
         "repeated-samples", values, flagged, bench.rms_n(residual_n), _rms(residual_n[bench.judged & ~flagged])
     )
 
@@ -85,7 +85,7 @@ def _chance_of_a_repeat(bench: Bench, residual_n: Floats) -> float:
     return quantum_n / (2.0 * float(np.sqrt(np.pi)) * max(fast_noise_n(residual_n[bench.judged]), 1.0e-9))
 
 
-def coarse(bench: Bench, residual_n: Floats, known_n: float) -> Direct | None:
+def find_quantisation(bench: Bench, residual_n: Floats, known_n: float) -> DirectEvidence | None:
     """A lattice in the readings that is coarse against their noise; known_n: the quantum that the plant states."""
     quanta = [_lattice_n(each.force_n[each.usable]) for each in bench.measurements]
     quantum_n = min(quanta)
@@ -94,7 +94,9 @@ def coarse(bench: Bench, residual_n: Floats, known_n: float) -> Direct | None:
         return None
     rms = bench.rms_n(residual_n)
     after = float(np.sqrt(max(rms**2 - quantum_n**2 / 12.0, 0.0)))
-    return Direct("sensor-quantisation", ((QUANTUM, quantum_n, 0.0),), np.zeros(bench.rows, dtype=bool), rms, after)
+    return DirectEvidence(
+        "sensor-quantisation", ((QUANTUM, quantum_n, 0.0),), np.zeros(bench.rows, dtype=bool), rms, after
+    )
 
 
 def _lattice_n(force_n: Floats) -> float:

@@ -5,12 +5,12 @@ from typing import Final
 import numpy as np
 
 from gateway.catalogue.cylinder import AREA, COULOMB
-from gateway.catalogue.effect import Scene
+from gateway.catalogue.effect import SearchHints
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.command_search import likely_dead_bands_pa, likely_steps_v
-from gateway.diagnosis.search.levenberg_marquardt import Fitted
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 
 _MAINS_HZ: Final = 0.15  # how far the mains stray
 _PEAKS: Final = 3
@@ -18,21 +18,21 @@ _FEW: Final = 3  # rows
 _PITCH_BINS: Final = 4096
 
 
-def scene_of(bench: Bench, fitted: Fitted, whiten: Whitener) -> Scene:
+def search_hints(bench: Bench, fitted: FittedModel, whiten: Whitener) -> SearchHints:
     simulated = bench.measured_n - fitted.residual_n
     forces = simulated[bench.judged]
-    area_m2 = fitted.point.value(AREA)
-    offset_n = float(np.mean(fitted.point.offsets_n))
+    area_m2 = fitted.parameters.value(AREA)
+    offset_n = float(np.mean(fitted.parameters.offsets_n))
     pressures = np.maximum(forces - offset_n, 0.0) / area_m2
     white = whiten(fitted.residual_n)
     positions = _positions(bench)
-    return Scene(
+    return SearchHints(
         duration_s=max(each.duration_s for each in bench.measurements),
         row_s=_row_s(bench),
         pressures_pa=_quantiles(pressures),
         forces_n=_quantiles(forces),
         pressure_rate_pa_per_s=_fastest_n_per_s(bench, simulated) / area_m2,
-        coulomb_n=fitted.point.value(COULOMB),
+        coulomb_n=fitted.parameters.value(COULOMB),
         positions_mm=_quantiles(positions)[:4] if positions is not None else (),
         lines_hz=lines_hz(bench, white),
         mains_hz=_mains_hz(bench, white),
@@ -45,14 +45,14 @@ def scene_of(bench: Bench, fitted: Fitted, whiten: Whitener) -> Scene:
 
 def lines_hz(bench: Bench, white: Floats) -> tuple[float, ...]:
     """Frequencies of the strongest lines of the first recording's whitened residual, strongest first."""
-    part = white[bench.segments[0].rows]
+    part = white[bench.channels[0].rows]
     power = np.abs(np.fft.rfft(part, 4 * part.size)) ** 2
     return tuple(peak / (4 * part.size * _row_s(bench)) for peak in _peaks(power, least=16))
 
 
 def _mains_hz(bench: Bench, white: Floats) -> tuple[float, ...]:
     """Where the mains' 50 and 60 Hz really are: the strongest line near each, as the sampling folds it."""
-    part = white[bench.segments[0].rows]
+    part = white[bench.channels[0].rows]
     row_s = _row_s(bench)
     size = 8 * part.size
     power = np.abs(np.fft.rfft(part, size)) ** 2
@@ -97,8 +97,8 @@ def _positions(bench: Bench) -> Floats | None:
     if "position_mm" not in bench.columns():
         return None
     parts = []
-    for segment in bench.segments:
-        measurement = bench.measurements[segment.recording]
+    for channel in bench.channels:
+        measurement = bench.measurements[channel.recording]
         position_m = measurement.position_m
         parts.append(np.full(measurement.rows, np.nan) if position_m is None else position_m * 1.0e3)
     return np.concatenate(parts)
@@ -116,8 +116,8 @@ def _quantiles(values: Floats) -> tuple[float, ...]:
 def _fastest_n_per_s(bench: Bench, simulated_n: Floats) -> float:
     """Rate of the simulated force that is hardly ever exceeded, over a few rows: two alone may be next to each other."""
     rates = []
-    for segment in bench.segments:
-        if segment.is_force:
-            seconds, forces = bench.measurements[segment.recording].time_s, simulated_n[segment.rows]
+    for channel in bench.channels:
+        if channel.is_force:
+            seconds, forces = bench.measurements[channel.recording].time_s, simulated_n[channel.rows]
             rates.append(np.abs((forces[_FEW:] - forces[:-_FEW]) / (seconds[_FEW:] - seconds[:-_FEW])))
     return float(np.quantile(np.concatenate(rates), 0.999))

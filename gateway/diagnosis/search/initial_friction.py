@@ -15,10 +15,10 @@ import numpy as np
 
 from gateway.catalogue.effect import Parameter
 from gateway.diagnosis.measurement import Flags, Floats
-from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.noise import Whitener, white_whitener
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
-from gateway.diagnosis.search.parameters import Point, StrainOf
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.search.parameters import InitialStrain, ModelParameters
 from gateway.diagnosis.search.recording_drive import begins_at_rest
 from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import Strains
@@ -40,32 +40,38 @@ def start_parameters(bench: Bench, plant: Plant) -> tuple[Parameter, ...]:
         return ()
     yields = plant.friction.presliding_m > 0.0
     return tuple(
-        StrainOf(recording, elements)
+        InitialStrain(recording, elements)
         for recording in range(len(bench.measurements))
         for elements in (((0,), (1,), (2,)) if yields else ((0, 1, 2),))
     )
 
 
-def begun(bench: Bench, point: Point, whiten: Whitener, most: int = 3) -> list[Point]:
+def try_initial_strains(
+    bench: Bench, parameters: ModelParameters, whiten: Whitener, most: int = 3
+) -> list[ModelParameters]:
     """The point with the best few starts for each recording, the best first: a fit may end in the wrong one."""
-    points = [replace(point, starts=(strains,) * len(bench.measurements)) for strains in _TRIED]
-    costs = [_costs(bench, residual) for residual in whiten(_centred(bench, bench.residuals(bench.simulate(points))))]
+    parameter_sets = [replace(parameters, starts=(strains,) * len(bench.measurements)) for strains in _TRIED]
+    costs = [
+        _costs(bench, residual) for residual in whiten(_centred(bench, bench.residuals(bench.simulate(parameter_sets))))
+    ]
     ranked = np.argsort(np.array(costs), axis=0)[:most]
-    return [replace(point, starts=tuple(_TRIED[int(index)] for index in best)) for best in ranked]
+    return [replace(parameters, starts=tuple(_TRIED[int(index)] for index in best)) for best in ranked]
 
 
-def at_its_best(bench: Bench, plant: Plant) -> Fitted:
+def fit_initial_strains(bench: Bench, plant: Plant) -> FittedModel:
     """This very plant with the offset and the start that fit each recording best: what of its error is not the start's."""
-    whiten = white(bench, bench.measured_n)
-    (point,) = begun(bench, Point(plant, tuple(0.0 for _ in bench.measurements)), whiten, most=1)
-    return refine(bench, [Problem(point, start_parameters(bench, plant))], whiten, waves=_WAVES)[0]
+    whiten = white_whitener(bench, bench.measured_n)
+    (parameters,) = try_initial_strains(
+        bench, ModelParameters(plant, tuple(0.0 for _ in bench.measurements)), whiten, most=1
+    )
+    return refine(bench, [FitProblem(parameters, start_parameters(bench, plant))], whiten, waves=_WAVES)[0]
 
 
 def _centred(bench: Bench, residuals: Floats) -> Floats:
     """Without the offset of each recording."""
     found = residuals.copy()
-    for segment in bench.segments:
-        part, usable = found[:, segment.rows], bench.usable[segment.rows]
+    for channel in bench.channels:
+        part, usable = found[:, channel.rows], bench.usable[channel.rows]
         part -= usable * (part.sum(axis=1) / max(int(usable.sum()), 1))[:, None]
     return found
 
@@ -73,17 +79,17 @@ def _centred(bench: Bench, residuals: Floats) -> Floats:
 def _costs(bench: Bench, residual: Floats) -> list[float]:
     """Squared residual of each recording."""
     costs = [0.0] * len(bench.measurements)
-    for segment in bench.segments:
-        costs[segment.recording] += float(np.sum(residual[segment.rows] ** 2))
+    for channel in bench.channels:
+        costs[channel.recording] += float(np.sum(residual[channel.rows] ** 2))
     return costs
 
 
-def felt(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[Bench, Fitted]:
+def drop_unfelt_strains(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[Bench, FittedModel]:
     """The same fit without strains that its recording does not feel, on a bench whose young rows are those that feel them."""
-    offsets = len(fitted.point.offsets_n)
+    offsets = len(fitted.parameters.offsets_n)
     columns = whiten(fitted.jacobian)
     kept = [
-        not isinstance(parameter, StrainOf) or float(np.sum(column**2)) > _FELT
+        not isinstance(parameter, InitialStrain) or float(np.sum(column**2)) > _FELT
         for parameter, column in zip(fitted.free, columns[offsets:], strict=True)
     ]
     free = tuple(parameter for parameter, keep in zip(fitted.free, kept, strict=True) if keep)
@@ -92,18 +98,18 @@ def felt(bench: Bench, fitted: Fitted, whiten: Whitener) -> tuple[Bench, Fitted]
     return young, replace(fitted, free=free, jacobian=fitted.jacobian[np.array(rows)])
 
 
-def _young(bench: Bench, fitted: Fitted, whiten: Whitener) -> Flags:
+def _young(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Flags:
     """Rows until the last one that feels the start of its recording, at most the first quarter of it."""
     young = np.zeros(bench.rows, dtype=bool)
-    offsets = len(fitted.point.offsets_n)
+    offsets = len(fitted.parameters.offsets_n)
     for parameter, column in zip(fitted.free, fitted.jacobian[offsets:], strict=True):
-        if isinstance(parameter, StrainOf):
-            for segment in bench.segments:
-                if segment.recording == parameter.recording and not begins_at_rest(
-                    bench.measurements[segment.recording]
+        if isinstance(parameter, InitialStrain):
+            for channel in bench.channels:
+                if channel.recording == parameter.recording and not begins_at_rest(
+                    bench.measurements[channel.recording]
                 ):
-                    part = np.flatnonzero(np.abs(column[segment.rows]) > _FAINT * whiten.floor_n)
-                    most = int(_YOUNGEST * (segment.rows.stop - segment.rows.start))
+                    part = np.flatnonzero(np.abs(column[channel.rows]) > _FAINT * whiten.floor_n)
+                    most = int(_YOUNGEST * (channel.rows.stop - channel.rows.start))
                     last = min(int(part[-1]) + 1, most) if part.size else 0
-                    young[segment.rows.start : segment.rows.start + last] = True
+                    young[channel.rows.start : channel.rows.start + last] = True
     return young

@@ -13,7 +13,7 @@ import numpy as np
 from gateway.catalogue.effect import Parameter
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.parameters import Point
+from gateway.diagnosis.search.parameters import ModelParameters
 
 Whiten = Callable[[Floats], Floats]
 
@@ -22,14 +22,14 @@ _ENOUGH: Final = 0.02  # a gain in chi-square below this share of one row's is n
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
+class FittedModel:
     """A problem at its present point.
 
     free: parameters that move, beside one offset per recording. residual_n: raw (rows,). jacobian: raw derivatives of
     the simulation (columns, rows), offsets first, then `free`. chi2: of the whitened residual.
     """
 
-    point: Point
+    parameters: ModelParameters
     free: tuple[Parameter, ...]
     residual_n: Floats
     chi2: float
@@ -37,18 +37,18 @@ class Fitted:
 
     @property
     def size(self) -> int:
-        return len(self.point.offsets_n) + len(self.free)
+        return len(self.parameters.offsets_n) + len(self.free)
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
-    point: Point
+class FitProblem:
+    parameters: ModelParameters
     free: tuple[Parameter, ...]
 
 
-def refine(bench: Bench, problems: Sequence[Problem], whiten: Whiten, waves: int) -> list[Fitted]:
+def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten, waves: int) -> list[FittedModel]:
     """Move each problem's free parameters and offsets to the least whitened squares, in at most `waves` waves."""
-    fitted = linearised(bench, problems, whiten)
+    fitted = linearise(bench, problems, whiten)
     active = list(range(len(fitted)))
     for _ in range(waves):
         if not active:
@@ -63,80 +63,84 @@ def refine(bench: Bench, problems: Sequence[Problem], whiten: Whiten, waves: int
                     moving.append(index)
         active = moving
         for index, found in zip(
-            active, linearised(bench, [Problem(fitted[i].point, fitted[i].free) for i in active], whiten), strict=True
+            active,
+            linearise(bench, [FitProblem(fitted[i].parameters, fitted[i].free) for i in active], whiten),
+            strict=True,
         ):
             fitted[index] = found
     return fitted
 
 
-def linearised(bench: Bench, problems: Sequence[Problem], whiten: Whiten) -> list[Fitted]:
+def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten) -> list[FittedModel]:
     """Residual and derivatives of each problem where it stands; one wave."""
     if not problems:
         return []
-    points: list[Point] = []
+    parameter_sets: list[ModelParameters] = []
     for problem in problems:
-        points.append(problem.point)
-        points += [_secant(problem.point, parameter)[0] for parameter in problem.free]
-    simulated = bench.simulate(points)
+        parameter_sets.append(problem.parameters)
+        parameter_sets += [_secant(problem.parameters, parameter)[0] for parameter in problem.free]
+    simulated = bench.simulate(parameter_sets)
     result, at = [], 0
     for problem in problems:
         centre = simulated[at]
-        rows = [_offset_column(bench, recording) for recording in range(len(problem.point.offsets_n))]
+        rows = [_offset_column(bench, recording) for recording in range(len(problem.parameters.offsets_n))]
         for k, parameter in enumerate(problem.free):
-            step = _secant(problem.point, parameter)[1]
+            step = _secant(problem.parameters, parameter)[1]
             rows.append((simulated[at + 1 + k] - centre) / step if step else np.zeros_like(centre))
         at += 1 + len(problem.free)
         residual = bench.residuals(centre)
         jacobian = bench.reduced(np.array(rows)) if rows else np.empty((0, bench.rows))
-        result.append(Fitted(problem.point, problem.free, residual, float(np.sum(whiten(residual) ** 2)), jacobian))
+        result.append(
+            FittedModel(problem.parameters, problem.free, residual, float(np.sum(whiten(residual) ** 2)), jacobian)
+        )
     return result
 
 
-def _secant(point: Point, parameter: Parameter) -> tuple[Point, float]:
+def _secant(parameters: ModelParameters, parameter: Parameter) -> tuple[ModelParameters, float]:
     """A neighbour in one parameter, and how far it is: 0 where the limit is so far that no step changes it."""
-    value = point.value(parameter)
+    value = parameters.value(parameter)
     own = parameter.shape or abs(value) >= 1.0e11  # 2 % of a frequency or a pitch is many turns over a minute
     step = parameter.step if own else max(parameter.step, 0.02 * abs(value))
-    moved = point.moved(parameter, value + step if value + step <= parameter.high else value - step)
-    return moved, moved.value(parameter) - value
+    with_value = parameters.with_value(parameter, value + step if value + step <= parameter.high else value - step)
+    return with_value, with_value.value(parameter) - value
 
 
 def _offset_column(bench: Bench, recording: int) -> Floats:
     column = np.zeros(bench.rows)
-    for segment in bench.segments:
-        if segment.recording == recording and segment.is_force:
-            column[segment.rows] = 1.0
+    for channel in bench.channels:
+        if channel.recording == recording and channel.is_force:
+            column[channel.rows] = 1.0
     return column
 
 
-def _one_wave(bench: Bench, fitted: Sequence[Fitted], whiten: Whiten) -> list[Fitted | None]:
+def _one_wave(bench: Bench, fitted: Sequence[FittedModel], whiten: Whiten) -> list[FittedModel | None]:
     """The best of a few damped steps of each problem; None where no step is better."""
     trials = [[_stepped(each, whiten, damping) for damping in _DAMPINGS] for each in fitted]
-    simulated = bench.simulate([point for points in trials for point in points])
+    simulated = bench.simulate([parameters for parameter_sets in trials for parameters in parameter_sets])
     residuals = bench.residuals(simulated).reshape(len(fitted), len(_DAMPINGS), -1)
     chi2 = np.sum(whiten(residuals) ** 2, axis=-1)
-    result: list[Fitted | None] = []
+    result: list[FittedModel | None] = []
     for k, each in enumerate(fitted):
         best = int(np.argmin(chi2[k]))
         if chi2[k, best] < each.chi2:
             result.append(
-                replace(each, point=trials[k][best], residual_n=residuals[k, best], chi2=float(chi2[k, best]))
+                replace(each, parameters=trials[k][best], residual_n=residuals[k, best], chi2=float(chi2[k, best]))
             )
         else:
             result.append(None)
     return result
 
 
-def _stepped(fitted: Fitted, whiten: Whiten, damping: float) -> Point:
+def _stepped(fitted: FittedModel, whiten: Whiten, damping: float) -> ModelParameters:
     """Where a damped Gauss-Newton step leads; a parameter that would leave its bounds stays, the others step again."""
     columns, residual = whiten(fitted.jacobian), whiten(fitted.residual_n)
-    gram, slope = columns @ columns.T, columns @ residual
-    scale = np.sqrt(np.maximum(np.diag(gram), 1.0e-300))
-    scaled = gram / np.outer(scale, scale) + np.diag(np.full(scale.size, 1.0e-9 + 0.1 * damping))
+    normal_matrix, slope = columns @ columns.T, columns @ residual
+    scale = np.sqrt(np.maximum(np.diag(normal_matrix), 1.0e-300))
+    scaled = normal_matrix / np.outer(scale, scale) + np.diag(np.full(scale.size, 1.0e-9 + 0.1 * damping))
     held = np.zeros(scale.size, dtype=bool)
-    values = np.array([*fitted.point.offsets_n, *(fitted.point.value(each) for each in fitted.free)])
-    low = np.array([*(-np.inf for _ in fitted.point.offsets_n), *(each.low for each in fitted.free)])
-    high = np.array([*(np.inf for _ in fitted.point.offsets_n), *(each.high for each in fitted.free)])
+    values = np.array([*fitted.parameters.offsets_n, *(fitted.parameters.value(each) for each in fitted.free)])
+    low = np.array([*(-np.inf for _ in fitted.parameters.offsets_n), *(each.low for each in fitted.free)])
+    high = np.array([*(np.inf for _ in fitted.parameters.offsets_n), *(each.high for each in fitted.free)])
     step = np.zeros(scale.size)
     for _ in range(3):
         free = ~held
@@ -151,9 +155,9 @@ def _stepped(fitted: Fitted, whiten: Whiten, damping: float) -> Point:
     return _at(fitted, np.clip(values + step, low, high))
 
 
-def _at(fitted: Fitted, values: Floats) -> Point:
-    count = len(fitted.point.offsets_n)
-    point = fitted.point.with_offsets(values[:count].tolist())
+def _at(fitted: FittedModel, values: Floats) -> ModelParameters:
+    count = len(fitted.parameters.offsets_n)
+    parameters = fitted.parameters.with_offsets(values[:count].tolist())
     for parameter, value in zip(fitted.free, values[count:], strict=True):
-        point = point.moved(parameter, float(value))
-    return point
+        parameters = parameters.with_value(parameter, float(value))
+    return parameters

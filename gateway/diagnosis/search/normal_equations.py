@@ -12,20 +12,20 @@ import numpy as np
 
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import Fitted, Whiten
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel, Whiten
 
 _RIDGE: Final = 0.01  # of a parameter's whole weight: a block that holds all of it says nothing about itself
 
 
 @dataclass(frozen=True, slots=True)
-class Screened:
+class ColumnGain:
     """What adding columns would gain: chi-square, and the size of each."""
 
     gain: float
     sizes: Floats
 
 
-class Normal:
+class NormalEquations:
     """Normal equations of candidate columns beside the columns of the present model (whitened, (k, rows))."""
 
     def __init__(self, model: Floats, columns: Floats, residual: Floats) -> None:
@@ -38,18 +38,18 @@ class Normal:
         self.slope = self.columns @ self.residual
 
     @cached_property
-    def gram(self) -> Floats:
+    def normal_matrix(self) -> Floats:
         return np.asarray(self.columns @ self.columns.T)
 
-    def add(self, indices: list[int]) -> Screened:
+    def add(self, indices: list[int]) -> ColumnGain:
         """Gain and sizes when these columns join the model; nothing where they are part of it already."""
         if min(self.power[index] / max(self.raw_power[index], 1.0e-300) for index in indices) < 1.0e-8:
-            return Screened(0.0, np.zeros(len(indices)))
+            return ColumnGain(0.0, np.zeros(len(indices)))
         scale = np.sqrt(self.power[indices])
-        gram = self.gram[np.ix_(indices, indices)] / np.outer(scale, scale)
-        sizes = np.linalg.lstsq(gram, self.slope[indices] / scale, rcond=1.0e-9)[0]
+        normal_matrix = self.normal_matrix[np.ix_(indices, indices)] / np.outer(scale, scale)
+        sizes = np.linalg.lstsq(normal_matrix, self.slope[indices] / scale, rcond=1.0e-9)[0]
         gain = float(sizes @ (self.slope[indices] / scale))
-        return Screened(gain, sizes / scale)
+        return ColumnGain(gain, sizes / scale)
 
 
 def orthonormal(rows: Floats) -> Floats:
@@ -69,7 +69,7 @@ def block_sums(bench: Bench, values: Floats, rows: Floats | None = None) -> Floa
 
 
 @dataclass(frozen=True, slots=True)
-class HeldOut:
+class HeldOutErrors:
     """Each block judged by the model fitted without it. errors: squared error of the judged force rows; counts: rows;
     squares: squared error of each row, 0 where it is not judged.
 
@@ -93,7 +93,7 @@ class HeldOut:
         return np.asarray(np.sqrt((blocks - 1.0) / blocks * np.sum(apart**2, axis=0)))
 
 
-def held_out(bench: Bench, fitted: Fitted, whiten: Whiten) -> HeldOut:
+def held_out_errors(bench: Bench, fitted: FittedModel, whiten: Whiten) -> HeldOutErrors:
     """Leave out one block after the other.
 
     To first order around the fitted point: the step that leaving out a block would cause is computed from the blocks'
@@ -103,24 +103,24 @@ def held_out(bench: Bench, fitted: Fitted, whiten: Whiten) -> HeldOut:
     blocks = int(bench.block_of_row.max()) + 1
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
     columns = columns / scale[:, None]
-    gram, slope = columns @ columns.T + _RIDGE * np.eye(columns.shape[0]), columns @ residual
+    normal_matrix, slope = columns @ columns.T + _RIDGE * np.eye(columns.shape[0]), columns @ residual
     squares = np.zeros(bench.rows)
     errors, counts, steps = np.zeros(blocks), np.zeros(blocks), np.zeros((blocks, columns.shape[0]))
     for block in range(blocks):
         rows = bench.block_of_row == block
         inside = columns[:, rows]
-        left = gram - inside @ inside.T
+        left = normal_matrix - inside @ inside.T
         steps[block] = np.linalg.lstsq(left, slope - inside @ residual[rows], rcond=1.0e-10)[0] / scale
         judged = rows & bench.judged
         error = fitted.residual_n[judged] - steps[block] @ fitted.jacobian[:, judged]
         squares[judged] = error**2
         errors[block], counts[block] = float(error @ error), float(judged.sum())
-    return HeldOut(errors, counts, steps, squares)
+    return HeldOutErrors(errors, counts, steps, squares)
 
 
-def covariance(fitted: Fitted, whiten: Whiten) -> Floats:
+def covariance(fitted: FittedModel, whiten: Whiten) -> Floats:
     """Covariance of offsets and free parameters, from the whitened derivatives; (size, size)."""
     columns = whiten(fitted.jacobian)
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
-    gram = (columns @ columns.T) / np.outer(scale, scale)
-    return np.linalg.pinv(gram, rcond=1.0e-10) / np.outer(scale, scale)
+    normal_matrix = (columns @ columns.T) / np.outer(scale, scale)
+    return np.linalg.pinv(normal_matrix, rcond=1.0e-10) / np.outer(scale, scale)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gateway.catalogue.effect import Form, Parameter, Start
+from gateway.catalogue.effect import EffectForm, Parameter, Start
 from gateway.twin.plant import Plant, with_value
 from gateway.twin.replay.drive import Strains
 
@@ -15,7 +15,7 @@ STARTS: Final = "start"
 
 
 @dataclass(frozen=True, slots=True, init=False)
-class StrainOf(Parameter):
+class InitialStrain(Parameter):
     """Strain of some friction elements, all alike, at the beginning of one recording."""
 
     recording: int = 0
@@ -29,7 +29,7 @@ class StrainOf(Parameter):
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class ModelParameters:
     """Everything that a simulation needs; hashable, so that simulations can be remembered.
 
     starts: what friction remembers at the beginning of each recording; None, or none at all: rest without pressure.
@@ -44,23 +44,23 @@ class Point:
 
     def value(self, parameter: Parameter) -> float:
         """Of the zero: the first recording's offset, which stands for it."""
-        if isinstance(parameter, StrainOf):
+        if isinstance(parameter, InitialStrain):
             strains = self.start(parameter.recording) or _UNSTRAINED
             return sum(strains[element] for element in parameter.elements) / len(parameter.elements)
         if parameter.path == _ZERO:
             return self.offsets_n[0]
         return float(getattr(getattr(self.plant, parameter.section), parameter.name))
 
-    def moved(self, parameter: Parameter, value: float) -> "Point":
+    def with_value(self, parameter: Parameter, value: float) -> "ModelParameters":
         """The same point with one parameter at `value`, kept within its bounds."""
         kept = min(max(float(value), parameter.low), parameter.high)
-        if isinstance(parameter, StrainOf):
-            return self._strained(parameter, kept)
+        if isinstance(parameter, InitialStrain):
+            return self._with_strain(parameter, kept)
         if parameter.path == _ZERO:  # of all recordings by as much
             return self.with_offsets([offset_n + kept - self.offsets_n[0] for offset_n in self.offsets_n])
         return replace(self, plant=with_value(self.plant, parameter.section, parameter.name, kept))
 
-    def _strained(self, parameter: StrainOf, value: float) -> "Point":
+    def _with_strain(self, parameter: InitialStrain, value: float) -> "ModelParameters":
         starts = list(self.starts or (None,) * len(self.offsets_n))
         first, second, third = (
             value if element in parameter.elements else strain
@@ -69,19 +69,23 @@ class Point:
         starts[parameter.recording] = (first, second, third)
         return replace(self, starts=tuple(starts))
 
-    def with_offsets(self, offsets_n: Sequence[float]) -> "Point":
+    def with_offsets(self, offsets_n: Sequence[float]) -> "ModelParameters":
         return replace(self, offsets_n=tuple(float(offset) for offset in offsets_n))
 
 
-def started(point: Point, form: Form, start: Start) -> Point:
+def apply_start(parameters: ModelParameters, form: EffectForm, start: Start) -> ModelParameters:
     """Where a form's start leads: sizes are added to the present values, shapes are taken as they stand."""
     for parameter, number in zip(form.parameters, start, strict=True):
-        point = point.moved(parameter, number if parameter.shape else point.value(parameter) + number)
-    return point
+        parameters = parameters.with_value(
+            parameter, number if parameter.shape else parameters.value(parameter) + number
+        )
+    return parameters
 
 
-def back_at(point: Point, before: Point, parameters: Sequence[Parameter]) -> Point:
+def reset_parameters(
+    parameters: ModelParameters, before: ModelParameters, chosen: Sequence[Parameter]
+) -> ModelParameters:
     """The same point with these parameters where they were before."""
-    for parameter in parameters:
-        point = point.moved(parameter, before.value(parameter))
-    return point
+    for parameter in chosen:
+        parameters = parameters.with_value(parameter, before.value(parameter))
+    return parameters

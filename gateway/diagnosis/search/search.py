@@ -1,4 +1,4 @@
-"""The search: add the winner of a contest while it pays, then let every accepted effect compete for its place again.
+"""The search: add the best effect while it pays, then compare every accepted effect with all others again.
 
 Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
 not see, in nearly all ways to resample them, and without the blocks that still feel how the recording began; at least
@@ -12,7 +12,7 @@ leaves must not be named. What oscillates does not count there: the rest of a si
       would be done, and its name taken, by another one.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,17 +20,24 @@ import numpy as np
 from numpy.random import default_rng
 from numpy.typing import NDArray
 
-from gateway.catalogue.effect import Effect, Form, Parameter, Scene
-from gateway.diagnosis.noise import Whitener, coloured
-from gateway.diagnosis.residual_tests import Answer, best_answer
+from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
+from gateway.diagnosis.noise import Whitener, coloured_whitener
+from gateway.diagnosis.residual_tests import Dependence, strongest_dependence
 from gateway.diagnosis.search.base_fit import refit
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.candidates import remainder, wave
-from gateway.diagnosis.search.hints import scene_of
-from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, Whiten, refine
-from gateway.diagnosis.search.model_comparison import Contest, Finalist, finalist, hold, joined, significant
-from gateway.diagnosis.search.normal_equations import block_sums, held_out, orthonormal
-from gateway.diagnosis.search.parameters import back_at
+from gateway.diagnosis.search.candidates import simulate_candidates, unexplained_residual
+from gateway.diagnosis.search.hints import search_hints
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, Whiten, refine
+from gateway.diagnosis.search.model_comparison import (
+    ModelComparison,
+    RefinedEffect,
+    compare_effects,
+    is_significant,
+    joined_parameters,
+    refined_effect,
+)
+from gateway.diagnosis.search.normal_equations import block_sums, held_out_errors, orthonormal
+from gateway.diagnosis.search.parameters import reset_parameters
 
 MOST_EFFECTS: Final = 5
 _DISCREPANT: Final = 3.0  # chi-square per row of the winner
@@ -52,170 +59,166 @@ _MUCH: Final = 0.15  # ... unless it saves this much of the held-out squared err
 
 
 @dataclass(frozen=True, slots=True)
-class Accepted:
-    """An effect of the extended model, and the contest in which it holds its place."""
+class AcceptedEffect:
+    """An effect of the extended model, and the model comparison that it won."""
 
     effect: Effect
-    form: Form
-    contest: Contest
+    form: EffectForm
+    comparison: ModelComparison
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What the search ends with. bench: that of the search without what the nameless dependences explain; first: the contest
-    beside the base model alone."""
+class SearchResult:
+    """What the search ends with. bench: that of the search without what the dependences without a name explain; first: the
+    comparison beside the base model alone."""
 
     bench: Bench
-    base: Fitted
-    fitted: Fitted
-    accepted: tuple[Accepted, ...]
-    nameless: tuple[Answer, ...]
+    base: FittedModel
+    fitted: FittedModel
+    accepted: tuple[AcceptedEffect, ...]
+    unnamed: tuple[Dependence, ...]
     whiten: Whitener
-    first: Contest
-    last: Contest
+    first: ModelComparison
+    last: ModelComparison
 
 
-Clock = Callable[[str], None]
-
-
-def search(bench: Bench, base: Fitted, effects: Sequence[Effect], whiten: Whitener, clock: Clock) -> Found:
+def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], whiten: Whitener) -> SearchResult:
     """All effects that the recording shows, one after the other. `base` is the refitted base model."""
-    base, whiten, contest = _opened(bench, base, effects, whiten)
-    clock("first contest")
-    first, fitted, accepted, usual = contest, base, list[Accepted](), list[Effect]()
-    nameless: list[Answer] = []
-    while len(accepted) + len(usual) + len(nameless) < MOST_EFFECTS:
+    base, whiten, comparison = _opened(bench, base, effects, whiten)
+    first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
+    unnamed: list[Dependence] = []
+    while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
         explained = _explained(base, fitted, accepted)
         winner, saved = None, 0.0
-        if contest.finalists and significant(contest.winner, contest.starts):
-            winner, saved = contest.winner, _saved(bench, fitted, contest.winner, whiten, explained)
+        if comparison.ranked and is_significant(comparison.winner, comparison.starts):
+            winner, saved = comparison.winner, _saved(bench, fitted, comparison.winner, whiten, explained)
             if _matters(winner, saved):  # the name of a trifle is not worth foresight
-                winner = _foreseen(bench, contest, _others(effects, accepted), whiten)
-                saved = saved if winner is contest.winner else _saved(bench, fitted, winner, whiten, explained)
+                winner = _foreseen(bench, comparison, _others(effects, accepted), whiten)
+                saved = saved if winner is comparison.winner else _saved(bench, fitted, winner, whiten, explained)
             saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH
-        answer = best_answer(bench, fitted, whiten, [each.leftover for each in nameless], outside=True)
-        strongest = contest.winner if saved > 0.0 else None
-        if answer is not None and _stands_beside(answer, strongest, explained):
-            nameless.append(answer)
-            bench = bench.without_columns(answer.question.columns)
+        dependence = strongest_dependence(bench, fitted, whiten, [each.leftover for each in unnamed], outside=True)
+        strongest = comparison.winner if saved > 0.0 else None
+        if dependence is not None and _stands_beside(dependence, strongest, explained):
+            unnamed.append(dependence)
+            bench = bench.without_columns(dependence.regressors.columns)
             fitted = refit(bench, fitted, whiten)
         elif winner is None or saved == 0.0:
             break
         elif _matters(winner, saved) and _noticeable(winner, fitted):
-            accepted.append(Accepted(winner.effect, winner.form, contest))
+            accepted.append(AcceptedEffect(winner.effect, winner.form, comparison))
             fitted = winner.fitted
         else:
             usual.append(winner.effect)
             base, fitted = _widened(bench, base, winner, whiten), winner.fitted
         effects = [effect for effect in effects if effect not in usual]
-        fitted, whiten, contest = _opened(bench, fitted, _others(effects, accepted), whiten)
+        fitted, whiten, comparison = _opened(bench, fitted, _others(effects, accepted), whiten)
         base = _revalued(bench, base, whiten)
-        clock(f"contest {len(accepted) + len(nameless) + 1}")
     if len(accepted) > 1:
         fitted, accepted = _exchanged(bench, fitted, base, accepted, effects, whiten)
-        clock("exchange")
-    return Found(bench, base, fitted, tuple(accepted), tuple(nameless), whiten, first, contest)
+    return SearchResult(bench, base, fitted, tuple(accepted), tuple(unnamed), whiten, first, comparison)
 
 
 def _opened(
-    bench: Bench, fitted: Fitted, effects: Sequence[Effect], whiten: Whitener
-) -> tuple[Fitted, Whitener, Contest]:
-    """Noise as the remainder shows it, the model at its optimum under that noise, and the contest beside it.
+    bench: Bench, fitted: FittedModel, effects: Sequence[Effect], whiten: Whitener
+) -> tuple[FittedModel, Whitener, ModelComparison]:
+    """Noise as the remainder shows it, the model at its optimum under that noise, and the effects compared beside it.
 
     Where even the winner leaves several times that noise, no model is near the truth yet, and a whitening that believes
     in one would look at the fastest details only: the noise is then what the best model leaves.
     """
-    scene = scene_of(bench, fitted, whiten)
-    found = wave(bench, fitted, effects, scene)
-    whiten = coloured(bench, *remainder(found, fitted), whiten.weights)
+    hints = search_hints(bench, fitted, whiten)
+    found = simulate_candidates(bench, fitted, effects, hints)
+    whiten = coloured_whitener(bench, *unexplained_residual(found, fitted), whiten.weights)
     fitted = refit(bench, fitted, whiten)
-    contest = hold(bench, fitted, effects, scene, whiten)
-    if contest.finalists and contest.winner.fitted.chi2 > _DISCREPANT * int(bench.usable.sum()):
-        best = min((each.fitted for each in contest.finalists), key=lambda each: bench.rms_n(each.residual_n))
-        whiten = coloured(bench, best.residual_n, orthonormal(best.jacobian), whiten.weights)
+    comparison = compare_effects(bench, fitted, effects, hints, whiten)
+    if comparison.ranked and comparison.winner.fitted.chi2 > _DISCREPANT * int(bench.usable.sum()):
+        best = min((each.fitted for each in comparison.ranked), key=lambda each: bench.rms_n(each.residual_n))
+        whiten = coloured_whitener(bench, best.residual_n, orthonormal(best.jacobian), whiten.weights)
         fitted = refit(bench, fitted, whiten, waves=5)
-        contest = hold(bench, fitted, effects, scene, whiten)
-    return fitted, whiten, contest
+        comparison = compare_effects(bench, fitted, effects, hints, whiten)
+    return fitted, whiten, comparison
 
 
-def _revalued(bench: Bench, fitted: Fitted, whiten: Whitener) -> Fitted:
+def _revalued(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedModel:
     """The same model at its optimum under another noise."""
     return refit(bench, fitted, whiten, waves=2)
 
 
-def _others(effects: Sequence[Effect], accepted: Sequence[Accepted]) -> list[Effect]:
+def _others(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect]) -> list[Effect]:
     taken = {each.effect.name for each in accepted}
     return [effect for effect in effects if effect.name not in taken]
 
 
-def _stands_beside(answer: Answer, strongest: Finalist | None, explained: float) -> bool:
+def _stands_beside(dependence: Dependence, strongest: RefinedEffect | None, explained: float) -> bool:
     """Is a nameless dependence more than what the effects before it have left, and clearly more than the strongest effect?
 
     One on the effect's own column may be no more than the effect's form, which is never exact.
     """
     if strongest is None:
-        return answer.gain > _LEAST_BESIDE * explained
-    times = _CLEARLY_ALIKE if answer.question.depends_on in strongest.form.needs else _CLEARLY
-    return answer.gain > times * strongest.gain + _MARGIN
+        return dependence.gain > _LEAST_BESIDE * explained
+    times = _CLEARLY_ALIKE if dependence.regressors.depends_on in strongest.form.needs else _CLEARLY
+    return dependence.gain > times * strongest.gain + _MARGIN
 
 
-def _explained(base: Fitted, fitted: Fitted, accepted: Sequence[Accepted]) -> float:
+def _explained(base: FittedModel, fitted: FittedModel, accepted: Sequence[AcceptedEffect]) -> float:
     """Chi-square that the model explains by causes whose wrong form could look like another one: not by oscillations."""
-    gains = [(each.contest.winner.gain, each.form.quadrature) for each in accepted]
+    gains = [(each.comparison.winner.gain, each.form.quadrature) for each in accepted]
     total = sum(gain for gain, _oscillates in gains)
     shapes = sum(gain for gain, oscillates in gains if not oscillates)
     return max(base.chi2 - fitted.chi2, 0.0) * (shapes / total if total > 0.0 else 1.0)
 
 
-def _foreseen(bench: Bench, contest: Contest, effects: Sequence[Effect], whiten: Whitener) -> Finalist:
+def _foreseen(bench: Bench, comparison: ModelComparison, effects: Sequence[Effect], whiten: Whitener) -> RefinedEffect:
     """The winner; or a rival of another kind that, together with its best companion, explains clearly more.
 
     Two causes together may look like a third one. Looked at only where resampling does not decide.
     """
-    winner = contest.winner
-    rivals = [each for each in contest.finalists[1:] if _rivals(each, winner, contest)][:_RIVALS]
+    winner = comparison.winner
+    rivals = [each for each in comparison.ranked[1:] if _rivals(each, winner, comparison)][:_RIVALS]
     if not rivals:
         return winner
-    costs = [_with_companion(bench, each, effects, contest.scene, whiten) for each in (winner, *rivals)]
+    costs = [_with_companion(bench, each, effects, comparison.hints, whiten) for each in (winner, *rivals)]
     best = int(np.argmin(costs))
     return (winner, *rivals)[best] if costs[best] < costs[0] - _MARGIN else winner
 
 
-def _rivals(other: Finalist, winner: Finalist, contest: Contest) -> bool:
+def _rivals(other: RefinedEffect, winner: RefinedEffect, comparison: ModelComparison) -> bool:
     """Does resampling let this one win now and then, and is it neither the same effect nor a relative?"""
     name = other.effect.name
     is_other = name != winner.effect.name and name not in winner.effect.group
-    return is_other and contest.shares.get(name, 0.0) >= _WINS and significant(other, contest.starts)
+    return is_other and comparison.shares.get(name, 0.0) >= _WINS and is_significant(other, comparison.starts)
 
 
-def _with_companion(bench: Bench, first: Finalist, effects: Sequence[Effect], scene: Scene, whiten: Whitener) -> float:
-    """Chi-square and price of an effect and of the best one beside it; starts as in the scene without it."""
+def _with_companion(
+    bench: Bench, first: RefinedEffect, effects: Sequence[Effect], hints: SearchHints, whiten: Whitener
+) -> float:
+    """Return chi-square and penalty of an effect and of the best one beside it; starts by the same hints as without it."""
     others = [effect for effect in effects if effect.name != first.effect.name]
-    contest = hold(bench, first.fitted, others, scene, whiten, most=_COMPANIONS)
-    found = [each.fitted.chi2 + each.price for each in contest.finalists if significant(each, contest.starts)]
-    return first.price + min([first.fitted.chi2, *found])
+    comparison = compare_effects(bench, first.fitted, others, hints, whiten, most=_COMPANIONS)
+    found = [each.fitted.chi2 + each.penalty for each in comparison.ranked if is_significant(each, comparison.starts)]
+    return first.penalty + min([first.fitted.chi2, *found])
 
 
-def _matters(finalist: Finalist, saved: float) -> bool:
+def _matters(refined: RefinedEffect, saved: float) -> bool:
     """Is what it saves of the held-out squared error no trifle?"""
-    return saved > (_LEAST_SURE_GAIN if finalist.gain > _OVERWHELMING else _LEAST_GAIN)
+    return saved > (_LEAST_SURE_GAIN if refined.gain > _OVERWHELMING else _LEAST_GAIN)
 
 
-def _noticeable(finalist: Finalist, before: Fitted) -> bool:
+def _noticeable(refined: RefinedEffect, before: FittedModel) -> bool:
     """Is its size, or the change of a size that the plant had already, more than every machine has?"""
-    size = finalist.form.parameters[0]
-    return abs(finalist.fitted.point.value(size) - before.point.value(size)) >= max(
-        finalist.effect.least, finalist.form.least
+    size = refined.form.parameters[0]
+    return abs(refined.fitted.parameters.value(size) - before.parameters.value(size)) >= max(
+        refined.effect.least, refined.form.least
     )
 
 
-def _widened(bench: Bench, base: Fitted, usual: Finalist, whiten: Whiten) -> Fitted:
+def _widened(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whiten) -> FittedModel:
     """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
-    point = back_at(base.point, usual.fitted.point, usual.form.parameters)
-    return refine(bench, [Problem(point, joined(base, usual.form))], whiten, waves=3)[0]
+    parameters = reset_parameters(base.parameters, usual.fitted.parameters, usual.form.parameters)
+    return refine(bench, [FitProblem(parameters, joined_parameters(base, usual.form))], whiten, waves=3)[0]
 
 
-def _saved(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, explained: float) -> float:
+def _saved(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten: Whitener, explained: float) -> float:
     """Share of the held-out squared error that it saves; 0 unless it saves in nearly all ways to resample the blocks.
 
     An effect that shows in one block only (a slide that rests once, a force that is negative once) cannot be resampled;
@@ -223,8 +226,8 @@ def _saved(bench: Bench, before: Fitted, winner: Finalist, whiten: Whitener, exp
     tooth: it is there all the time, and among so many teeth some meet the few moments that another form got wrong.
     """
     old = _old_blocks(bench)
-    error_before = held_out(bench, before, whiten).errors[old]
-    saved = error_before - held_out(bench, winner.fitted, whiten).errors[old]
+    error_before = held_out_errors(bench, before, whiten).errors[old]
+    saved = error_before - held_out_errors(bench, winner.fitted, whiten).errors[old]
     weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
     if winner.form.everywhere:
         sure = float(np.sum(np.sort(saved)[_MOMENTS:-_MOMENTS])) > _ELSEWHERE * float(np.sum(saved))
@@ -243,12 +246,12 @@ def _old_blocks(bench: Bench) -> NDArray[np.intp]:
 
 def _exchanged(
     bench: Bench,
-    fitted: Fitted,
-    base: Fitted,
-    accepted: list[Accepted],
+    fitted: FittedModel,
+    base: FittedModel,
+    accepted: list[AcceptedEffect],
     effects: Sequence[Effect],
     whiten: Whitener,
-) -> tuple[Fitted, list[Accepted]]:
+) -> tuple[FittedModel, list[AcceptedEffect]]:
     """Take each accepted effect out and let all that are not in the model compete for its place.
 
     It competes itself with the optimum that it has already reached.
@@ -256,26 +259,37 @@ def _exchanged(
     for index in range(len(accepted) - 1, -1, -1):
         if len(accepted) < 2:
             break
-        holder, beside = accepted[index], accepted[:index] + accepted[index + 1 :]
-        lone = without(bench, fitted, base, holder, beside, whiten)
-        scene = scene_of(bench, lone, whiten)
-        held = finalist(bench, holder.effect, holder.form, fitted, lone, whiten)
-        contest = hold(bench, lone, _others(effects, beside), scene, whiten, holder=held)
-        winner = contest.winner
-        if not significant(winner, contest.starts):
+        incumbent, beside = accepted[index], accepted[:index] + accepted[index + 1 :]
+        lone = refit_without(bench, fitted, base, incumbent, beside, whiten)
+        hints = search_hints(bench, lone, whiten)
+        held = refined_effect(bench, incumbent.effect, incumbent.form, fitted, lone, whiten)
+        comparison = compare_effects(bench, lone, _others(effects, beside), hints, whiten, incumbent=held)
+        winner = comparison.winner
+        if not is_significant(winner, comparison.starts):
             fitted, accepted = lone, beside
         else:
             fitted = winner.fitted
-            accepted = [*accepted[:index], Accepted(winner.effect, winner.form, contest), *accepted[index + 1 :]]
+            accepted = [
+                *accepted[:index],
+                AcceptedEffect(winner.effect, winner.form, comparison),
+                *accepted[index + 1 :],
+            ]
     return fitted, accepted
 
 
-def without(
-    bench: Bench, fitted: Fitted, base: Fitted, taken: Accepted, beside: Sequence[Accepted], whiten: Whiten
-) -> Fitted:
+def refit_without(
+    bench: Bench,
+    fitted: FittedModel,
+    base: FittedModel,
+    taken: AcceptedEffect,
+    beside: Sequence[AcceptedEffect],
+    whiten: Whiten,
+) -> FittedModel:
     """The model without one effect, its parameters back where the base model has them, refitted."""
     kept = {parameter.path for each in beside for parameter in each.form.parameters}
     gone: tuple[Parameter, ...] = tuple(each for each in taken.form.parameters if each.path not in kept)
     paths = {each.path for each in gone}
     free = tuple(each for each in fitted.free if each.path not in paths)
-    return refine(bench, [Problem(back_at(fitted.point, base.point, gone), free)], whiten, waves=4)[0]
+    return refine(
+        bench, [FitProblem(reset_parameters(fitted.parameters, base.parameters, gone), free)], whiten, waves=4
+    )[0]

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from gateway.catalogue.catalogue import BY_NAME
 from gateway.catalogue.cylinder import AREA
-from gateway.diagnosis.noise import Whitener, white
+from gateway.diagnosis.noise import Whitener, white_whitener
 from gateway.diagnosis.result import Gain
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import Fitted, Problem, refine
-from gateway.diagnosis.search.normal_equations import HeldOut, held_out
-from gateway.diagnosis.search.search import Accepted, Found, without
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.search.normal_equations import HeldOutErrors, held_out_errors
+from gateway.diagnosis.search.search import AcceptedEffect, SearchResult, refit_without
 
 _BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
 _SAME_AREA: Final = 0.2
@@ -33,19 +33,19 @@ _SEED: Final = 43
 
 
 @dataclass(frozen=True, slots=True)
-class Reported:
+class ReportedModels:
     """The models that are reported: base, extended, and the extended one without each accepted effect."""
 
-    base: Fitted
-    fitted: Fitted
-    without: tuple[Fitted, ...]
+    base: FittedModel
+    fitted: FittedModel
+    without: tuple[FittedModel, ...]
     whiten: Whitener
-    held_out: HeldOut
+    held_out: HeldOutErrors
 
 
 @dataclass(frozen=True, slots=True)
-class Dropped:
-    """What the search had accepted and the judgement did not; gain_n: of the held-out RMS; why: as a sentence."""
+class DoubtfulEffect:
+    """What the search had accepted and is no finding; gain_n: of the held-out RMS; why: as a sentence."""
 
     name: str
     gain_n: float
@@ -56,15 +56,17 @@ class Dropped:
         return f"{self.name} is no finding: {self.why}"
 
 
-def worthy(bench: Bench, found: Found) -> tuple[Found, Reported, tuple[Dropped, ...]]:
+def drop_doubtful_effects(
+    bench: Bench, found: SearchResult
+) -> tuple[SearchResult, ReportedModels, tuple[DoubtfulEffect, ...]]:
     """What is reported once everything counts again, without effects that are no finding then, the worst of them first."""
-    reported, dropped = _reported(bench, found), list[Dropped]()
+    reported, dropped = _reported(bench, found), list[DoubtfulEffect]()
     while found.accepted:
         gains = [
-            gain_of(held_out(bench, without_it, reported.whiten), reported.held_out, 0.0)
+            gain_of(held_out_errors(bench, without_it, reported.whiten), reported.held_out, 0.0)
             for without_it in reported.without
         ]
-        doubts = [doubt(each, gain) for each, gain in zip(found.accepted, gains, strict=True)]
+        doubts = [reason_for_doubt(each, gain) for each, gain in zip(found.accepted, gains, strict=True)]
         rms_n = bench.rms_n(reported.base.residual_n)
         if not any(doubts) and reported.held_out.rms_n > _LEFT_AS_LARGE * rms_n:
             doubts = [f"with it the error is as large on unseen blocks as without: {rms_n:.3g} N"] * len(gains)
@@ -73,57 +75,57 @@ def worthy(bench: Bench, found: Found) -> tuple[Found, Reported, tuple[Dropped, 
         worst = min((k for k, why in enumerate(doubts) if why), key=lambda k: gains[k].ci95[0])
         taken, kept = found.accepted[worst], found.accepted[:worst] + found.accepted[worst + 1 :]
         won_n = gains[worst].held_out_rms_before_n - gains[worst].held_out_rms_after_n
-        dropped.append(Dropped(taken.effect.name, won_n, doubts[worst]))
-        fitted = without(bench, found.fitted, found.base, taken, kept, found.whiten) if kept else found.base
+        dropped.append(DoubtfulEffect(taken.effect.name, won_n, doubts[worst]))
+        fitted = refit_without(bench, found.fitted, found.base, taken, kept, found.whiten) if kept else found.base
         found = replace(found, fitted=fitted, accepted=kept)
         reported = _reported(bench, found)
     return found, reported, tuple(dropped)
 
 
-def doubt(accepted: Accepted, gain: Gain) -> str:
+def reason_for_doubt(accepted: AcceptedEffect, gain: Gain) -> str:
     """Why this is no finding, as a sentence; empty where it is one."""
-    name, contest = accepted.effect.name, accepted.contest
+    name, comparison = accepted.effect.name, accepted.comparison
     before_n, after_n = gain.held_out_rms_before_n, gain.held_out_rms_after_n
     if gain.ci95[0] <= 0.0:
         return f"what it gains on unseen blocks may be nothing: {gain.ci95[0]:.2g} .. {gain.ci95[1]:.2g} N"
     if after_n**2 > (1.0 - _LEAST_SAVED) * before_n**2:
         return f"it leaves the error as large: {before_n:.3g} N before, {after_n:.3g} N after"
-    wins = sum(contest.shares.get(each, 0.0) for each in {name, *BY_NAME[name].group})
+    wins = sum(comparison.shares.get(each, 0.0) for each in {name, *BY_NAME[name].group})
     return f"it wins in {100.0 * wins:.0f} % of the ways to resample the recording only" if wins < _LEAST_SURE else ""
 
 
-def _reported(bench: Bench, found: Found) -> Reported:
+def _reported(bench: Bench, found: SearchResult) -> ReportedModels:
     """Every model twice, whitened and plain; the kind whose extended model predicts better.
 
     Dependences without a name count here: the reported errors are those of the simulation, and of nothing beside it.
     """
-    plain = white(bench, found.fitted.residual_n, found.whiten.weights)
+    plain = white_whitener(bench, found.fitted.residual_n, found.whiten.weights)
     models = [found.base, found.fitted, *(_without(each, found) for each in found.accepted)]
-    problems = [Problem(each.point, each.free) for each in models]
+    problems = [FitProblem(each.parameters, each.free) for each in models]
     kinds = [(found.whiten, refine(bench, problems, found.whiten, waves=3)), (plain, _plainly(bench, problems, plain))]
-    errors = [held_out(bench, fits[1], whiten) for whiten, fits in kinds]
+    errors = [held_out_errors(bench, fits[1], whiten) for whiten, fits in kinds]
     best = 1 if errors[1].rms_n < _BETTER * errors[0].rms_n else 0
     whiten, fits = kinds[best]
-    return Reported(fits[0], fits[1], tuple(fits[2:]), whiten, errors[best])
+    return ReportedModels(fits[0], fits[1], tuple(fits[2:]), whiten, errors[best])
 
 
-def _plainly(bench: Bench, problems: Sequence[Problem], plain: Whitener) -> list[Fitted]:
+def _plainly(bench: Bench, problems: Sequence[FitProblem], plain: Whitener) -> list[FittedModel]:
     """Each model at its plain optimum. The whitened one may be far from it in the area, which slow changes tell best:
     then it is looked for from the base model's plain area, too."""
     fits = refine(bench, problems, plain, waves=3)
-    area_m2 = fits[0].point.value(AREA)
-    if all(abs(each.point.value(AREA) / area_m2 - 1.0) < _SAME_AREA for each in fits):
+    area_m2 = fits[0].parameters.value(AREA)
+    if all(abs(each.parameters.value(AREA) / area_m2 - 1.0) < _SAME_AREA for each in fits):
         return fits
-    again = [Problem(each.point.moved(AREA, area_m2), each.free) for each in fits]
+    again = [FitProblem(each.parameters.with_value(AREA, area_m2), each.free) for each in fits]
     others = refine(bench, again, plain, waves=12)
     return [min(pair, key=lambda each: each.chi2) for pair in zip(fits, others, strict=True)]
 
 
-def _without(accepted: Accepted, found: Found) -> Fitted:
-    return found.base if len(found.accepted) == 1 else accepted.contest.beside
+def _without(accepted: AcceptedEffect, found: SearchResult) -> FittedModel:
+    return found.base if len(found.accepted) == 1 else accepted.comparison.beside
 
 
-def gain_of(before: HeldOut, after: HeldOut, floor_n: float) -> Gain:
+def gain_of(before: HeldOutErrors, after: HeldOutErrors, floor_n: float) -> Gain:
     errors_before, errors_after, counts = (
         np.add.reduceat(values, _edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
     )
@@ -137,7 +139,7 @@ def gain_of(before: HeldOut, after: HeldOut, floor_n: float) -> Gain:
     )
 
 
-def _edges(held: HeldOut) -> NDArray[np.intp]:
+def _edges(held: HeldOutErrors) -> NDArray[np.intp]:
     """Where parts begin that are drawn anew for an interval: finer than the blocks that are left out, for an effect may show
     in one of these only, and then a fifth of all ways to draw blocks would not have it."""
     counted = np.cumsum(held.squares > 0.0)

@@ -58,7 +58,7 @@ def why_blind(diagnosis: Diagnosis) -> str:
     found = (
         diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
     )
-    return "" if found else notes.blind([trace.measurement for trace in diagnosis.traces])
+    return "" if found else notes.uninformative_force([trace.measurement for trace in diagnosis.traces])
 
 
 def _missing_evidence(diagnosis: Diagnosis) -> int:

@@ -10,40 +10,40 @@ from typing import Final
 from gateway.twin.effects.term import Term
 from gateway.twin.elementwise import Real, clip, exponential, quantised, sine
 from gateway.twin.sections import LoadCell
-from gateway.twin.surroundings import Moment
+from gateway.twin.surroundings import TwinConditions
 
 
-def bent(cell: LoadCell, force_n: Real, moment: Moment) -> Real:
+def bent(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
     """sensor-quadratic and sensor-cubic: F + q F^2 + c F^3."""
     return force_n + (cell.quadratic_per_n + cell.cubic_per_n2 * force_n) * (force_n * force_n)
 
 
-def warmer_span(cell: LoadCell, force_n: Real, moment: Moment) -> Real:
+def warmer_span(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
     """thermal-span-drift."""
     return force_n * (1.0 + cell.span_per_k * (moment.temperature_c - cell.reference_c))
 
 
-def warmer_zero(cell: LoadCell, force_n: Real, moment: Moment) -> Real:
+def warmer_zero(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
     """thermal-zero-drift."""
     return force_n + cell.zero_n_per_k * (moment.temperature_c - cell.reference_c)
 
 
-def warming_up(cell: LoadCell, force_n: Real, moment: Moment) -> Real:
+def warming_up(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
     """warm-up: an error that dies away after switching on."""
     return force_n + cell.warm_up_n * exponential(-moment.time_s / cell.warm_up_s)
 
 
-def drifting(cell: LoadCell, force_n: Real, moment: Moment) -> Real:
+def drifting(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
     """linear-drift."""
     return force_n + cell.drift_n_per_s * moment.time_s
 
 
-def humming(cell: LoadCell, force_n: Real, moment: Moment) -> Real:
+def humming(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
     """mains-hum."""
     return force_n + cell.hum_n * sine((2.0 * math.pi) * cell.hum_hz * moment.time_s + cell.hum_phase_rad)
 
 
-def disturbed(cell: LoadCell, force_n: Real, moment: Moment) -> Real:
+def disturbed(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
     """valve-crosstalk: the command voltage of this moment, before a new one acts."""
     return force_n + cell.crosstalk_n_per_v * moment.command_v
 

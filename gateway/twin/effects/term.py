@@ -11,9 +11,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from gateway.twin.elementwise import Real
-from gateway.twin.surroundings import Moment
+from gateway.twin.surroundings import TwinConditions
 
-Formula: TypeAlias = Callable[[Any, Real, Moment], Real]
+Formula: TypeAlias = Callable[[Any, Real, TwinConditions], Real]
 """(section of the plant, force or pressure, moment) -> force or pressure with the effect."""
 
 
@@ -35,7 +35,7 @@ def switched_on(section: Any, names: Sequence[str]) -> bool:
     return False
 
 
-def active(terms: Sequence[Term], section: Any, moment: Moment) -> tuple[Formula, ...]:
+def active(terms: Sequence[Term], section: Any, moment: TwinConditions) -> tuple[Formula, ...]:
     """The formulas that are on for this section, in order."""
     return tuple(
         term.formula

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gateway.twin.elementwise import Real
 from gateway.twin.replay.drive import Drive, Floats
-from gateway.twin.surroundings import COLUMNS, Moment
+from gateway.twin.surroundings import COLUMNS, TwinConditions
 
 COARSEST_S: Final = 5.0e-3
 MOST_STEPS: Final = 80_000  # where many plants share the memory
@@ -89,9 +89,9 @@ def _even(last_s: float, step_s: float) -> Floats:
     return found
 
 
-def _moment(drive: Drive, time_s: Floats, grid: Grid) -> Moment:
+def _moment(drive: Drive, time_s: Floats, grid: Grid) -> TwinConditions:
     """The recording's surroundings at the rows or on the grid."""
-    moment, around = Moment(time_s=time_s), drive.surroundings
+    moment, around = TwinConditions(time_s=time_s), drive.surroundings
     for name in COLUMNS:
         column = getattr(around, name)
         if column is not None:

@@ -10,7 +10,7 @@ from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import Floats, Strains
 from gateway.twin.sections import Friction
 from gateway.twin.slide import weight_n
-from gateway.twin.surroundings import Moment
+from gateway.twin.surroundings import TwinConditions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,13 +61,13 @@ class Load:
         return contact.gap_m == 0.0 and bounded and float(self.drive_n.min()) >= 0.0
 
 
-def sideways_n(friction: Friction, thrust_n: Floats, moment: Moment) -> Real:
+def sideways_n(friction: Friction, thrust_n: Floats, moment: TwinConditions) -> Real:
     """The side load on the grid, N; a float where there is none."""
     side: Real = side_load_n(friction, moment)
     return side + side_share(friction, moment) * thrust_n if friction.side_load_n_per_n else side
 
 
-def loaded(plant: Plant, pressure_pa: Floats, moment: Moment, start: Strains | None = None) -> Load:
+def loaded(plant: Plant, pressure_pa: Floats, moment: TwinConditions, start: Strains | None = None) -> Load:
     """Thrust and friction limit of a plant under a pressure."""
     friction, contact = plant.friction, plant.contact
     thrust = plant.cylinder.area_m2 * pressure_pa

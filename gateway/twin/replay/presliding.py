@@ -29,7 +29,7 @@ _SLIDING: Final = np.arange(ELEMENTS, -1.0, -1.0)[:, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lanes:
+class PreslidingLanes:
     """What the steps need of every lane; shapes (lanes,) and, by rows of the state, (4, lanes)."""
 
     stiffness: Floats  # pad and drag, N/m; (steps, lanes) where the drag differs from step to step
@@ -37,7 +37,7 @@ class Lanes:
     gain: Floats  # change of the state per travel: pad stiffness, 1/d3, 1/d2, 1/d1
 
     @classmethod
-    def of(cls, loads: list[Load], steps_s: Real) -> "Lanes":
+    def of(cls, loads: list[Load], steps_s: Real) -> "PreslidingLanes":
         pad = np.array([load.plant.contact.pad_stiffness_n_per_m for load in loads])
         drag = np.array([load.plant.friction.viscous_n_s_per_m for load in loads])
         if np.any(drag):
@@ -47,19 +47,19 @@ class Lanes:
         sticking = np.concatenate([np.zeros((1, pad.size)), np.cumsum(inverse, axis=0)])
         return cls(pad + drag, sticking, np.concatenate([pad[None], inverse]))
 
-    def taken(self, lanes: NDArray[np.intp], *stiffness: Floats) -> "Lanes":
+    def taken(self, lanes: NDArray[np.intp], *stiffness: Floats) -> "PreslidingLanes":
         """Some lanes. stiffness: in the steps that are taken, where it is not that of all."""
         (own,) = stiffness or (self.stiffness[lanes],)
-        return Lanes(own, self.sticking[:, lanes], self.gain[:, lanes])
+        return PreslidingLanes(own, self.sticking[:, lanes], self.gain[:, lanes])
 
-    def at_rest(self) -> "Lanes":
+    def at_rest(self) -> "PreslidingLanes":
         """Without drag."""
-        return Lanes(self.gain[0], self.sticking, self.gain)
+        return PreslidingLanes(self.gain[0], self.sticking, self.gain)
 
 
 def elastic(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
-    lanes = Lanes.of(loads, grid.steps_s)
+    lanes = PreslidingLanes.of(loads, grid.steps_s)
     drive = together([load.drive_n for load in loads])
     share = together([load.limit_n for load in loads]) * (1.0 / ELEMENTS)
     state, found = np.zeros((ELEMENTS + 1, len(loads))), np.empty_like(drive)
@@ -95,7 +95,7 @@ def _listed(stiffness: Floats, drive: Floats, share: Floats, lane: int) -> Itera
     return zip(*(column[:, lane].tolist() for column in (stiffness, drive, share)), strict=True)
 
 
-def _single(lanes: Lanes, lane: int, loads: Iterable[tuple[float, ...]], start: Floats) -> list[float]:
+def _single(lanes: PreslidingLanes, lane: int, loads: Iterable[tuple[float, ...]], start: Floats) -> list[float]:
     """One lane in floats; the elements slide one after another, and most steps end before the first does."""
     force, z3, z2, z1 = start[:, lane].tolist()
     _, stick3, stick2, stick1 = lanes.sticking[:, lane].tolist()
@@ -127,7 +127,7 @@ def _single(lanes: Lanes, lane: int, loads: Iterable[tuple[float, ...]], start: 
     return found
 
 
-def _march(lanes: Lanes, drive: Floats, share: Floats, state: Floats, found: Floats) -> None:
+def _march(lanes: PreslidingLanes, drive: Floats, share: Floats, state: Floats, found: Floats) -> None:
     """Step through (steps, lanes) of drive and share, N; advances the state (4, lanes) and fills the forces."""
     buffers = [np.empty((_CHUNK, *state.shape)) for _ in range(4)]
     for first in range(0, drive.shape[0], _CHUNK):

@@ -19,7 +19,7 @@ from gateway.twin.replay.drive import Drive, Flags, Floats
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.lags import followed
 from gateway.twin.sections import UNLIMITED, Contact, LoadCell
-from gateway.twin.surroundings import Moment
+from gateway.twin.surroundings import TwinConditions
 
 _RADIAN_PER_TURN = 2.0 * math.pi
 
@@ -59,15 +59,15 @@ class Readings:
         shown_s = earlier_s(cell, grid.row_s)
         return self._vibrating(plant, grid.at(filtered, shown_s), self._spindle_at(plant.contact, shown_s))
 
-    def _spindle_at(self, contact: Contact, time_s: Floats) -> Moment:
+    def _spindle_at(self, contact: Contact, time_s: Floats) -> TwinConditions:
         """The spindle at other times; nothing else is looked at there."""
         known = self._grid.row_moment
         if known.spindle_rpm is None or not active((SPINDLE,), contact, known):
-            return Moment()
+            return TwinConditions()
         rpm, angle = (np.interp(time_s, self._grid.row_s, column) for column in (known.spindle_rpm, known.spindle_rad))
-        return Moment(spindle_rpm=rpm, spindle_rad=angle)
+        return TwinConditions(spindle_rpm=rpm, spindle_rad=angle)
 
-    def _vibrating(self, plant: Plant, filtered_n: Floats, moment: Moment) -> Floats:
+    def _vibrating(self, plant: Plant, filtered_n: Floats, moment: TwinConditions) -> Floats:
         """Add the spindle's vibration as the filter lets it through."""
         contact, cell = plant.contact, plant.cell
         if not active((SPINDLE,), contact, moment):

@@ -25,7 +25,7 @@ from gateway.twin.replay.reading import Readings
 from gateway.twin.replay.regulator import Pressures
 from gateway.twin.replay.slide import Slides
 
-__all__ = ["Drive", "Replay", "Response"]
+__all__ = ["Drive", "Replay", "ReplayResult"]
 
 _SECTIONS: Final = tuple(entry.name for entry in fields(Plant))
 
@@ -45,7 +45,7 @@ def single(plant: Plant) -> Plant:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Response:
+class ReplayResult:
     """What each plant gives at the rows' times, shape (plants, rows). force_n: true contact force; reading_n: recorded."""
 
     reading_n: Floats
@@ -81,7 +81,7 @@ class Replay:
     def notes(self) -> tuple[str, ...]:
         return self.grid.notes
 
-    def run(self, plants: Sequence[Plant], starts: Sequence[Strains | None] | None = None) -> Response:
+    def run(self, plants: Sequence[Plant], starts: Sequence[Strains | None] | None = None) -> ReplayResult:
         """Replay the recording with each plant. ValueError when there is none, or one is stacked.
 
         starts: what each plant's friction remembers when the slide begins (`Drive.settled_s`); None: rest without pressure.
@@ -98,4 +98,4 @@ class Replay:
             self._forces.at_rows(plant.contact, contact_n, force[lane])
             self._readings.fill(plant, contact_n, force[lane], reading[lane])
         at_rows = np.stack([self.grid.at_rows(pressure) for pressure in pressures])
-        return Response(reading, force, at_rows[which])
+        return ReplayResult(reading, force, at_rows[which])

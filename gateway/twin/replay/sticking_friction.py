@@ -20,7 +20,7 @@ _LENGTH_M: Final = 1.0e-4  # unit of travels where states are compared
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lanes:
+class StickingLanes:
     """What the steps need of every lane, (lanes,)."""
 
     pad_n_per_m: Floats
@@ -32,7 +32,7 @@ class Lanes:
     stiction_s: Floats
 
     @classmethod
-    def of(cls, loads: list[Load]) -> "Lanes":
+    def of(cls, loads: list[Load]) -> "StickingLanes":
         frictions = [load.plant.friction for load in loads]
         both = np.array([drags(friction) for friction in frictions])
         return cls(
@@ -45,13 +45,13 @@ class Lanes:
             np.array([friction.dwell_stiction_s for friction in frictions]),
         )
 
-    def taken(self, lanes: NDArray[np.intp]) -> "Lanes":
-        return Lanes(*(getattr(self, name)[lanes] for name in self.__slots__))
+    def taken(self, lanes: NDArray[np.intp]) -> "StickingLanes":
+        return StickingLanes(*(getattr(self, name)[lanes] for name in self.__slots__))
 
 
 def sticking(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
-    lanes = Lanes.of(loads)
+    lanes = StickingLanes.of(loads)
     drive, limit = together([load.drive_n for load in loads]), together([load.limit_n for load in loads])
     state = np.zeros((3, len(loads)))
     begins = [0.0 if load.start is None else load.begins_n for load in loads]
@@ -69,7 +69,7 @@ def sticking(loads: list[Load], grid: Grid) -> list[Floats]:
     return apart(np.concatenate([first[None], force]))
 
 
-def _march(lanes: Lanes, series: list[Floats], state: Floats, forces: Floats) -> None:
+def _march(lanes: StickingLanes, series: list[Floats], state: Floats, forces: Floats) -> None:
     """Step through (steps, lanes) of drive, limit and lengths; advances the state (3, lanes) and fills the forces."""
     drives, limits, steps, lasts = series
     grows = 1.0 - np.exp(-steps / lanes.stiction_s)
