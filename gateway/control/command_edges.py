@@ -1,4 +1,4 @@
-"""Follows the command block: which bits rose and fell, what is demanded, and whether the heartbeat moved."""
+"""The command block from write to write: which bits rose and fell, what is demanded, whether the heartbeat moved."""
 
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -34,7 +34,7 @@ class CommandTracker:
         self.demand: Demand = demand_of(self.command, settings)
         self.not_finite = ""
         self._word = 0
-        self.lease = Lease(settings.supervision.lease_s)
+        self._lease = Lease(settings.supervision.lease_s)
         self._settings = self._rig_settings = settings
         self._adopt_heartbeat = False
 
@@ -42,7 +42,7 @@ class CommandTracker:
         """Hold to the force limits of this calibration, too: the demand of the last command may become a smaller one."""
         limits = narrow_limits(self._rig_settings.limits, model.limits_n)
         self._settings = replace(self._rig_settings, limits=limits)
-        self._demand()
+        self._update_demand()
 
     def expect_clearing(self) -> None:
         """The bank is asked to zero the command: no bit stands any more, and the next heartbeat value is its doing and not a
@@ -68,20 +68,40 @@ class CommandTracker:
         if self._adopt_heartbeat:
             self._adopt_heartbeat = False
             if not command.control_word:
-                self.lease.adopt(command.heartbeat)
-        self.lease.observe(now_s, command.heartbeat)
-        self._demand()
+                self._lease.adopt(command.heartbeat)
+        self._lease.observe(now_s, command.heartbeat)
+        self._update_demand()
         return edges
 
-    def demanded(self, command: Command) -> Demand:
-        """What this command would demand. NotFiniteError as `demand_of`."""
+    def demand_by(self, command: Command) -> Demand:
+        """Return what this command would demand. NotFiniteError as `demand_of`."""
         return demand_of(command, self._settings)
 
-    def _demand(self) -> None:
+    def _update_demand(self) -> None:
         try:
             self.demand, self.not_finite = demand_of(self.command, self._settings), ""
         except NotFiniteError as error:
             self.not_finite = str(error)
+
+    @property
+    def gravity_n(self) -> float:
+        """Contact force that the payload's weight gives under the present command."""
+        return self.demand.gravity_n
+
+    def start_lease(self, now_s: float) -> None:
+        """At enable: the master has one length of the lease to beat."""
+        self._lease.start(now_s)
+
+    def is_lease_lost(self, now_s: float, owner_connected: bool) -> bool:
+        return self._lease.is_lost(now_s, owner_connected)
+
+    def lease_age_s(self, now_s: float) -> float:
+        """Time since the lease was renewed."""
+        return self._lease.age_s(now_s)
+
+    def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
+        """Whether the heartbeat has changed since then and within one length of the lease, were this command taken now."""
+        return self._lease.would_be_fresh_since(since_s, now_s, command.heartbeat)
 
     @property
     def who(self) -> str:

@@ -19,12 +19,16 @@ _FAULT, _WARNING, _LIMITED, _UNREACHABLE = 16, 32, 64, 128
 
 
 @dataclass(slots=True)
-class Outcome:
+class StepOutcome:
     """What a step wants from its caller besides the voltage."""
 
     events: list[str] = field(default_factory=list)
     clear_command: bool = False
     release_owner: bool = False
+
+    def tell(self, *sentences: str) -> None:
+        """Sentences for the log; empty ones are none."""
+        self.events.extend(filter(None, sentences))
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,59 +61,59 @@ def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
     )
 
 
-def status_bits(standing: ControllerStatus, pursuit: ForceLoop) -> int:
-    enabled = standing.state in ENABLED_STATES
+def status_bits(status: ControllerStatus, loop: ForceLoop) -> int:
+    enabled = status.state in ENABLED_STATES
     return (
         (_ENABLED if enabled else 0)
-        | (_READY if not standing.block else 0)
-        | (_CONTACT if standing.touching else 0)
-        | (_IN_BAND if pursuit.in_band else 0)
-        | (_FAULT if standing.state is State.FAULT else 0)
-        | (_WARNING if standing.warnings else 0)
-        | (_LIMITED if pursuit.limited_by is not LimitedBy.NONE else 0)
-        | (_UNREACHABLE if pursuit.unreachable else 0)
+        | (_READY if not status.block else 0)
+        | (_CONTACT if status.touching else 0)
+        | (_IN_BAND if loop.in_band else 0)
+        | (_FAULT if status.state is State.FAULT else 0)
+        | (_WARNING if status.warnings else 0)
+        | (_LIMITED if loop.limited_by is not LimitedBy.NONE else 0)
+        | (_UNREACHABLE if loop.unreachable else 0)
     )
 
 
-def warning_bits(word: int, pursuit: ForceLoop, restarted: bool, master_lost: bool) -> int:
+def warning_bits(word: int, loop: ForceLoop, restarted: bool, master_lost: bool) -> int:
     """word: what the line and the process warn of."""
     return (
         word
         | (WarningBit.RESTARTED.value if restarted else 0)
-        | (WarningBit.TARGET_UNREACHABLE.value if pursuit.unreachable else 0)
-        | (WarningBit.TRIM_SATURATED.value if pursuit.trim.limited_by else 0)
+        | (WarningBit.TARGET_UNREACHABLE.value if loop.unreachable else 0)
+        | (WarningBit.TRIM_SATURATED.value if loop.is_trim_at_limit else 0)
         | (WarningBit.MASTER_LOST.value if master_lost else 0)
     )
 
 
 def output_of(
-    command: Command, standing: ControllerStatus, pursuit: ForceLoop, reading: Reading, outcome: Outcome
+    command: Command, status: ControllerStatus, loop: ForceLoop, reading: Reading, outcome: StepOutcome
 ) -> Output:
     """The frozen answer. The measured force is nan unless fresh and usable: a stale number with an age is still a lie
     to most readers."""
-    is_force = command.mode is Mode.FORCE or standing.state is State.CALIBRATING
+    is_force = command.mode is Mode.FORCE or status.state is State.CALIBRATING
     believed = reading.is_fresh and reading.is_usable
     return Output(
-        pursuit.stage.voltage_v,
-        pursuit.feedforward_v,
-        pursuit.trim.value_v,
-        pursuit.limited_by,
-        standing.state,
-        StatusBit(status_bits(standing, pursuit)),
-        standing.fault,
-        WarningBit(standing.warnings),
+        loop.voltage_v,
+        loop.feedforward_v,
+        loop.trim_v,
+        loop.limited_by,
+        status.state,
+        StatusBit(status_bits(status, loop)),
+        status.fault,
+        WarningBit(status.warnings),
         force_measured_n=reading.contact_n if believed else nan,
         force_requested_n=command.force_requested_n,
-        force_accepted_n=standing.accepted_n if is_force else 0.0,
-        force_applied_n=pursuit.law.applied_n if is_force else 0.0,
-        model_residual_n=reading.cell_n - standing.expected_cell_n if believed else nan,
+        force_accepted_n=status.accepted_n if is_force else 0.0,
+        force_applied_n=loop.applied_n if is_force else 0.0,
+        model_residual_n=reading.cell_n - status.expected_cell_n if believed else nan,
         sample_age_s=reading.age_s,
         heartbeat_echo=command.heartbeat,
         sequence_echo=command.command_sequence,
-        calibration_phase=standing.calibration_phase,
-        calibration_progress=standing.calibration_progress,
-        calibration_time_left_s=standing.calibration_time_left_s,
-        enable_block=standing.block,
+        calibration_phase=status.calibration_phase,
+        calibration_progress=status.calibration_progress,
+        calibration_time_left_s=status.calibration_time_left_s,
+        enable_block=status.block,
         clear_command=outcome.clear_command,
         release_owner=outcome.release_owner,
         events=tuple(outcome.events),

@@ -14,9 +14,8 @@ from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.control.sample_conditioning import Reading
+from gateway.control.sample_conditioning import Reading, SampleConditioner
 from gateway.control.state_table import ENABLED_STATES
-from gateway.control.tare import Zero
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
@@ -56,14 +55,14 @@ class Situation:
 class EdgeCheck:
     """Reads what it is given, changes nothing of it."""
 
-    def __init__(self, follower: CommandTracker, zero: Zero, calibrating: ActiveRun) -> None:
-        self._follower = follower
-        self._zero = zero
-        self._calibrating = calibrating
+    def __init__(self, commands: CommandTracker, conditioner: SampleConditioner, active_run: ActiveRun) -> None:
+        self._commands = commands
+        self._conditioner = conditioner
+        self._active_run = active_run
 
     def refusal(self, asked: ProposedWrite, at: Situation) -> EdgeRefusal | None:
         """Why this write cannot be taken now; None takes it."""
-        edges = self._follower.edges_of(asked.command)
+        edges = self._commands.edges_of(asked.command)
         if not edges.stops and (busy := self._busy(asked, edges, at)):
             return busy
         return next(self._refusals(asked.command, edges, at), None)
@@ -72,14 +71,14 @@ class EdgeCheck:
         """Why a run cannot begin now, for whoever asks; None begins it."""
         if at.state is State.CALIBRATING:
             return _no_run(RefusalReason.CALIBRATING, self._running())
-        if self._calibrating.is_busy:
+        if self._active_run.is_busy:
             why = "the last ladder is being fitted: wait until calibration_phase is stored or refused"
             return _no_run(RefusalReason.FITTING, why)
         if why := self._forbids_run(plan, at):
             return _no_run(RefusalReason.CALIBRATION_REFUSED, why)
-        if at.state is State.OFF and (blocked := _blocked(at, ControlBit.START_CALIBRATION)):
+        if at.state is State.OFF and (blocked := _refuse_blocked(at, ControlBit.START_CALIBRATION)):
             return blocked
-        return self._tare(self._follower.command, at.state, at) if plan.tare else None
+        return self._tare(self._commands.command, at.state, at) if plan.tare else None
 
     # -- the whole write
 
@@ -98,15 +97,11 @@ class EdgeCheck:
 
     def _running(self) -> str:
         """What has the output, how long still, and how it is ended."""
-        calibrating = self._calibrating
-        if not calibrating.running:
+        run = self._active_run
+        if not run.running:
             return "a run has just ended and its force goes to 0: try again when state is off"
-        what, left_s = calibrating.what, calibrating.eta_s
-        cure = (
-            "control_word 0 alone, or Ctrl-C at its terminal, ends it"
-            if calibrating.is_local
-            else "control_word 0 ends it"
-        )
+        what, left_s = run.what, run.eta_s
+        cure = "control_word 0 alone, or Ctrl-C at its terminal, ends it" if run.is_local else "control_word 0 ends it"
         return f"{what} has the output, {left_s:.0f} s left; {cure}"
 
     # -- edge by edge
@@ -119,7 +114,7 @@ class EdgeCheck:
         if edges.rises & _TARE:
             yield from _some(self._tare(command, state, at))
         if edges.rises & _ENABLE and state not in ENABLED_STATES:
-            yield from _some(_blocked(_in(state, at), ControlBit.ENABLE))
+            yield from _some(_refuse_blocked(_in(state, at), ControlBit.ENABLE))
         if edges.rises & _CALIBRATE:
             yield from _some(self.of_run(CalibrationPlan(), _in(state, at)))
             if held := _setpoints(command):
@@ -130,12 +125,12 @@ class EdgeCheck:
         if at.state in ENABLED_STATES:
             text = f"reset refused: no fault is latched, state {at.state.name}"
             return EdgeRefusal(RefusalReason.NOTHING_TO_RESET, ControlBit.RESET_FAULT, text)
-        if held := _held(command):
+        if held := _list_held(command):
             text = f"reset_fault needs enable 0 and setpoint 0: {' and '.join(held)}"
             return EdgeRefusal(RefusalReason.RESET_NEEDS_ZERO, ControlBit.RESET_FAULT, text)
         if at.state is State.OFF:
             return None  # as many programs begin: there is no fault latched, and that is what was asked for
-        if not self._follower.lease.would_be_fresh_since(at.faulted_s, at.now_s, command.heartbeat):
+        if not self._commands.would_beat_since(at.faulted_s, at.now_s, command):
             text = f"reset refused: heartbeat = {command.heartbeat} as at the fault: write another value with the reset"
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
         return None
@@ -151,9 +146,9 @@ class EdgeCheck:
             return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
         if not at.reading.is_fresh:
             return "no fresh load-cell sample"
-        if at.expected_n > self._zero.largest_spread_n:
+        if at.expected_n > self._conditioner.zero_spread_n:
             return f"about {at.expected_n:.1f} N are still on their way to 0: wait a moment"
-        return self._zero.unsteady(self._follower.demanded(command).gravity_n)
+        return self._conditioner.why_no_zero(self._commands.demand_by(command).gravity_n)
 
     def _forbids_run(self, plan: AnyPlan, at: Situation) -> str:
         begins = "it begins from OFF, or from READY with force 0"
@@ -162,7 +157,7 @@ class EdgeCheck:
         if at.state is State.READY and at.applied_n > 0.0:
             return f"state READY with {at.applied_n:.1f} N applied, {begins}"
         try:
-            self._calibrating.tried(plan)
+            self._active_run.build(plan)
         except ValueError as error:
             return str(error)
         return ""
@@ -173,7 +168,7 @@ def _in(state: State, at: Situation) -> Situation:
     return at if state is at.state else replace(at, state=state)
 
 
-def _blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
+def _refuse_blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
     reason = RefusalReason.FAULT_LATCHED if at.state is State.FAULT else at.block
     if not reason:
         return None
@@ -186,7 +181,7 @@ def _no_run(reason: RefusalReason, why: str) -> EdgeRefusal:
     return EdgeRefusal(reason, ControlBit.START_CALIBRATION, f"calibration refused: {why}")
 
 
-def _held(command: Command) -> list[str]:
+def _list_held(command: Command) -> list[str]:
     """What a reset would let loose."""
     bits = ((ControlBit.ENABLE, "enable is 1"), (ControlBit.START_CALIBRATION, "start_calibration is 1"))
     return [words for bit, words in bits if command.control_word & bit] + _setpoints(command)

@@ -42,7 +42,7 @@ class SampleConditioner:
 
     def __init__(self, supervision: Supervision, cell: CellMap | None = None) -> None:
         """cell: its known defects; None: the reading is the force."""
-        self.zero = Zero(supervision)
+        self._zero = Zero(supervision)
         self._cell = cell
         self._saturation_n = supervision.saturation_n
         self._timeout_s = supervision.sample_timeout_s
@@ -61,13 +61,31 @@ class SampleConditioner:
             force_n = self._cell.force_n(force_n, *around)
         interval_s = self._interval_s(sample.time_s)
         if interval_s > 0.0 and usable:
-            self.zero.observe(force_n)
+            self._zero.observe(force_n)
         age_s = max(0.0, now_s - sample.time_s)
-        cell_n = force_n - self.zero.zero_n if usable else nan
+        cell_n = force_n - self._zero.zero_n if usable else nan
         fresh = age_s <= self._timeout_s
         return Reading(
             cell_n, cell_n + gravity_n, age_s, interval_s, interval_s > 0.0, fresh, usable, overload, sample.force_n
         )
+
+    @property
+    def zero_n(self) -> float:
+        """What the last tare has taken as zero, N of the cell."""
+        return self._zero.zero_n
+
+    @property
+    def zero_spread_n(self) -> float:
+        """How far recent samples may lie apart to be taken as zero, N."""
+        return self._zero.largest_spread_n
+
+    def take_zero(self, gravity_n: float) -> float:
+        """Tare: by how much the zero moved, N; gravity_n as in `demand`. Ask `why_no_zero` first."""
+        return self._zero.take(gravity_n)
+
+    def why_no_zero(self, gravity_n: float) -> str:
+        """Why the recent samples are no zero, in numbers; empty where they are one."""
+        return self._zero.unsteady(gravity_n)
 
     def _interval_s(self, time_s: float) -> float:
         """Time since the sample before, at most the time-out; 0 for the same one, or one from the past."""
@@ -77,5 +95,5 @@ class SampleConditioner:
         self._last_s = time_s
         if time_s - last_s <= self._timeout_s:
             return time_s - last_s
-        self.zero.forget()  # also for the first sample, where last_s is nan
+        self._zero.forget()  # also for the first sample, where last_s is nan
         return self._timeout_s

@@ -142,12 +142,12 @@ def test_stop_ramps_to_zero_within_the_time_and_ends_in_off():
     bench.run(9.0)
     assert bench.plant.force_n > 35.0
     bench.controller.stop()
-    assert not bench.controller.stopped
+    assert not bench.controller.has_stopped
     bench.run(0.05)
     assert bench.last.voltage_v > 0.0
     took_s = bench.seconds_until(lambda output: output.state is State.OFF, 4.5)
     assert took_s <= 4.0
-    assert bench.controller.stopped
+    assert bench.controller.has_stopped
     assert bench.last.voltage_v == 0.0
     assert bench.enable(12.0).enable_block is RefusalReason.NOT_READY
 
@@ -160,14 +160,14 @@ def test_stop_from_direct_voltage_ramps_too():
     bench.run(0.03)
     assert 1.0 < bench.last.voltage_v < 5.0
     bench.run(1.0)
-    assert bench.controller.stopped
+    assert bench.controller.has_stopped
 
 
 def test_stop_while_off_is_stopped_at_once():
     bench = Bench()
     bench.run(0.1)
     bench.controller.stop()
-    assert bench.controller.stopped
+    assert bench.controller.has_stopped
 
 
 def test_a_force_that_stays_at_the_safe_voltage_refuses_enable():

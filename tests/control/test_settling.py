@@ -106,7 +106,7 @@ def test_a_vented_tool_starts_on_the_rising_branch_again():
     def go(goal_n: float) -> float:
         for _ in range(100):
             law.advance(goal_n, 200.0, 0.01)
-        return law.feedforward(0.0)[0]
+        return law.compute_voltage(0.0)[0]
 
     first_v = go(3.0)  # half of the blend's span
     go(30.0)

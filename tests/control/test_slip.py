@@ -28,7 +28,7 @@ def go(law: Feedforward, *goals_n: float) -> float:
     for goal_n in goals_n:
         while law.applied_n != goal_n:
             law.advance(goal_n, 100.0, 0.01)
-    return law.feedforward(0.0)[0]
+    return law.compute_voltage(0.0)[0]
 
 
 @pytest.mark.parametrize("friction_n", [1.0, 2.0, 3.0])
@@ -60,7 +60,7 @@ def test_changing_the_reversal_makes_no_bump():
     force_law = law(bsfm())
     before_v = go(force_law, 30.0, 18.0)
     force_law.use(slip(), 0.0)
-    assert force_law.feedforward(0.0)[0] == pytest.approx(before_v, abs=1e-12)
+    assert force_law.compute_voltage(0.0)[0] == pytest.approx(before_v, abs=1e-12)
 
 
 def test_an_equal_model_swapped_in_leaves_the_memory_of_every_stop():
@@ -80,7 +80,7 @@ def test_tilting_the_payload_moves_no_stop():
     before = force_law.branch_share
     for gravity_n in (0.0, 2.0, 5.0, 0.0):
         force_law.advance(18.0, 100.0, 0.01, gravity_n)
-        force_law.feedforward(gravity_n)
+        force_law.compute_voltage(gravity_n)
     assert force_law.branch_share == before
 
 

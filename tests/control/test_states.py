@@ -205,7 +205,7 @@ def test_while_off_a_broken_line_is_no_fault_but_blocks_enable(change, reason):
 def test_an_unclean_restart_warns_until_somebody_enables():
     bench = ready()
     bench.controller = Controller(
-        settings(), bench.controller._pursuit.law.model, calibration_id=1, unclean_restart=True
+        settings(), bench.controller._loop.feedforward.model, calibration_id=1, unclean_restart=True
     )
     output = bench.run(0.1)
     assert output.warnings & WarningBit.RESTARTED

@@ -313,7 +313,7 @@ def test_an_enable_that_waited_for_a_stalled_loop_is_not_obeyed():
 
 def test_a_model_that_answers_nonsense_is_named():
     class Nonsense:
-        reversal = Bench().controller._pursuit.law.model.reversal
+        reversal = Bench().controller._loop.feedforward.model.reversal
 
         def voltage_v(self, force_n: float, state: float) -> tuple[float, InverseStatus]:
             return nan, InverseStatus.OK
@@ -322,7 +322,7 @@ def test_a_model_that_answers_nonsense_is_named():
             return 0.0
 
     bench = pressing()
-    bench.controller._pursuit.law.model = Nonsense()  # type: ignore[assignment]
+    bench.controller._loop.feedforward.model = Nonsense()  # type: ignore[assignment]
     assert_faulted(bench, FaultCode.MODEL_INVALID, TICK_S)
 
 

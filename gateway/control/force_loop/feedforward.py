@@ -93,10 +93,10 @@ class Feedforward:
         for no share says as much as the memory that it would replace."""
         if model == self.model:
             return
-        before_v, _ = self.feedforward(gravity_n)
+        before_v, _ = self.compute_voltage(gravity_n)
         self.model, self._memory = model, model.reversal.at(self.branch_share)
         self._limits = narrow_limits(self._rig_limits, model.limits_n)
-        after_v, _ = self.feedforward(gravity_n)
+        after_v, _ = self.compute_voltage(gravity_n)
         self._carry_over_v += before_v - after_v
 
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
@@ -139,8 +139,8 @@ class Feedforward:
         self._delayed.restart(self.applied_n)
         self._memory = self.model.reversal.at(branch_share)
 
-    def feedforward(self, gravity_n: float) -> tuple[float, LimitedBy]:
-        """Voltage for the applied contact force by the inverse model, and what limited it. ModelError if there is none."""
+    def compute_voltage(self, gravity_n: float) -> tuple[float, LimitedBy]:
+        """Return the voltage for the applied contact force by the inverse model and what limited it. ModelError without one."""
         if self.applied_n <= 0.0:
             return 0.0, LimitedBy.NONE
         if is_below_usable(self.applied_n, self._limits):

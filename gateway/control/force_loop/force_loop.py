@@ -1,32 +1,39 @@
-"""One step towards what is demanded, while enabled: force law plus trim through the lead, or the direct voltage,
-through the voltage stage.
+"""The force loop of an enabled output: feedforward plus trim through the lead, or the direct voltage, through the limiter.
 
-READY, RAMPING and HOLDING are decided here, as events of the state table. When the trim may learn: in contact, on a new
-usable sample, in force mode, with no other limit acting, and with the target less than QUIET_N ahead of where the plant
-can be (not ramping fast). With a measured response that is where the model of the lags is, and it must have been there for
-the dead time and the trim's patience.
+A step answers with an event of the state table (READY, RAMPING and HOLDING are decided here), or with the cause of a fault.
+A run of calibration drives the same limiter (`drive_run`), and the force that the model expects is kept here for all.
+
+When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting, and with the target
+less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured response that is where the model of the
+lags is, and it must have been there for the dead time and the trim's patience.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
-from typing import Final
+from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
+from gateway.codes.faults import FaultCode
 from gateway.control.compensation.compensation import TimingCompensation
 from gateway.control.demand import Demand
-from gateway.control.force_loop.feedforward import Approach, Feedforward
+from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
 from gateway.control.force_loop.lag_inverse import LagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.control.force_loop.voltage_limits import VoltageLimiter, strongest
 from gateway.control.inputs import LineStatus
-from gateway.control.limits import TICK_S
+from gateway.control.limits import TICK_S, NotFiniteError
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
+from gateway.control.supervision.fault_detection import StopCause, stop_cause
 from gateway.control.supervision.in_band import InBandTimer
+from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.registers.words import LimitedBy, Mode
+
+Moved: TypeAlias = StateEvent | StopCause
 
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
@@ -48,13 +55,14 @@ class LoopInputs:
 
 
 class ForceLoop:
-    """Owns the applied target, the trim, the band and the voltage on the output."""
+    """Owns the applied target, the trim, the band, the voltage on the output and the force that the model expects of it."""
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing = timing
         self._tune(settings)
-        self.law = Feedforward(model, settings.limits, *self._course(settings))
-        self.stage = VoltageLimiter(settings.limits)
+        self.feedforward = Feedforward(model, settings.limits, *self._course(settings))
+        self.expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
+        self._limiter = VoltageLimiter(settings.limits)
         self.feedforward_v = 0.0
         self.limited_by = LimitedBy.NONE
         self._approach = Approach()
@@ -63,28 +71,35 @@ class ForceLoop:
         self._was_touching = False
         self._wanted_v = 0.0
 
-    def retime(self, settings: ControlSettings) -> None:
+    def use(self, model: Bsfm, given_n: float, settings: ControlSettings) -> None:
+        """Swap the calibration and the timing that goes with it. given_n: contact force that the slide need not give."""
+        self.feedforward.use(model, given_n)
+        self._retime(settings)
+        self.expected.retime(settings.supervision.response_lag_s)
+        self.expected.use(model)
+
+    def _retime(self, settings: ControlSettings) -> None:
         """The timing of another calibration. The lags' model goes on from where it is, the trim keeps what it has learned."""
         if settings.timing == self._measured and settings.lead == self._lead_settings:
             return
-        lead, value_v, law = self.lead, self.trim.value_v, self.law
+        lead, value_v = self._lead, self._trim.value_v
         self._tune(settings)
-        self.lead.first_v, self.lead.second_v = lead.first_v, lead.second_v
-        self.trim.resume(value_v)
-        law.retime(*self._course(settings))
+        self._lead.first_v, self._lead.second_v = lead.first_v, lead.second_v
+        self._trim.resume(value_v)
+        self.feedforward.retime(*self._course(settings))
 
     def _tune(self, settings: ControlSettings) -> None:
         """LeadCompensator and trim by the measured response where there is one, else by the rig file."""
         self._measured, self._lead_settings, self._still_s = settings.timing, settings.lead, 0.0
-        self.lead: LeadCompensator | LagInverse
-        self.trim: TrimIntegral | MeasuredTrim
+        self._lead: LeadCompensator | LagInverse
+        self._trim: TrimIntegral | MeasuredTrim
         if self._measured:
-            self.lead, self.trim = (
+            self._lead, self._trim = (
                 LagInverse(settings.lead, settings.limits),
                 MeasuredTrim(settings.trim, self._measured),
             )
         else:
-            self.lead, self.trim = LeadCompensator(settings.lead, settings.limits), TrimIntegral(settings.trim)
+            self._lead, self._trim = LeadCompensator(settings.lead, settings.limits), TrimIntegral(settings.trim)
 
     def _course(self, settings: ControlSettings) -> tuple[float, float, float]:
         """How the force follows the target: lag, dead time before it, and how far the aim runs ahead on a ramp."""
@@ -93,8 +108,46 @@ class ForceLoop:
             return max(TICK_S, measured.landing_s), measured.dead_time_s, measured.landing_s
         delay_s, lags_s = (timing.delay_s, timing.lags_s) if timing else (0.0, settings.supervision.response_lag_s)
         # the trim compares with a force that comes as much sooner as the lead makes it: it must not learn the push
-        gained_s = self.lead.gained_s if isinstance(self.lead, LeadCompensator) else 0.0
+        gained_s = self._lead.gained_s if isinstance(self._lead, LeadCompensator) else 0.0
         return max(TICK_S, lags_s - gained_s), delay_s, 0.0
+
+    @property
+    def voltage_v(self) -> float:
+        """On the output since the last step."""
+        return self._limiter.voltage_v
+
+    @property
+    def applied_n(self) -> float:
+        """The ramped target of this instant, contact force."""
+        return self.feedforward.applied_n
+
+    @property
+    def branch_share(self) -> float:
+        """Where between the branches the plant is, -1 .. 1."""
+        return self.feedforward.branch_share
+
+    @property
+    def expected_n(self) -> float:
+        """Cell force that the model expects now."""
+        return self.expected.force_n(self.branch_share)
+
+    @property
+    def expected_rise_n(self) -> float:
+        """The same above the force at rest."""
+        return self.expected.rise_n(self.branch_share)
+
+    @property
+    def trim_v(self) -> float:
+        return self._trim.value_v
+
+    @property
+    def is_trim_at_limit(self) -> bool:
+        return self._trim.limited_by is not LimitedBy.NONE
+
+    @property
+    def is_hunting(self) -> bool:
+        """The trim stands still because its corrections kept changing sign."""
+        return isinstance(self._trim, MeasuredTrim) and self._trim.hunted
 
     @property
     def in_band(self) -> bool:
@@ -107,114 +160,149 @@ class ForceLoop:
     def elapse(self, dt_s: float, line: LineStatus) -> None:
         """dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags hears what the wire
         has really taken, where that is known: it carries one setting at a time."""
-        self.stage.earn(dt_s)
-        self.lead.advance(self.stage.voltage_v if line.sent_v is None else line.sent_v, dt_s)
-        if isinstance(self.lead, LagInverse):
-            self.lead.know_wire(line.wire_s)
+        self._limiter.earn(dt_s)
+        self._lead.advance(self._limiter.voltage_v if line.sent_v is None else line.sent_v, dt_s)
+        if isinstance(self._lead, LagInverse):
+            self._lead.know_wire(line.wire_s)
+        self.expected.advance(self.voltage_v, dt_s)
 
     def rest(self) -> None:
         """Disabled: the safe voltage at once, everything learned forgotten."""
-        self.stage.make_safe()
-        self.law.reset()
-        self.trim.reset()
+        self._limiter.make_safe()
+        self.feedforward.reset()
+        self._trim.reset()
         self._approach = Approach()
         self._band.restart()
         self._answer.restart()
         self.feedforward_v, self.limited_by = 0.0, LimitedBy.NONE
 
-    def step(self, demand: Demand, moment: LoopInputs) -> StateEvent:
-        """Moves the output. NotFiniteError and ModelError are the caller's to turn into faults."""
-        event = self._force(demand, moment) if demand.mode is Mode.FORCE else self._voltage(demand, moment)
-        self._was_touching = moment.touching
-        return event
+    def step(self, demand: Demand, inputs: LoopInputs) -> Moved:
+        """One step towards the demand."""
+        return _or_fault(lambda: self._step(demand, inputs))
 
-    def follow(self, voltage_v: float, expected_n: float, branch_share: float) -> None:
-        """A stair of the calibration ladder: this voltage within the limits, nothing learned, nothing judged."""
-        self.trim.reset()
+    def descend(self, demand: Demand, dt_s: float, given_n: float) -> Moved:
+        """One step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that is
+        being calibrated may not fit, and never up."""
+        return _or_fault(lambda: self._step_down(demand, dt_s, given_n))
+
+    def drive_run(self, voltage_v: float, branch_share: float) -> None:
+        """Put out the voltage of a calibration run, within the limits: nothing learned, nothing judged."""
+        self._drive_by_model(voltage_v, self.expected.force_n(branch_share), branch_share)
+
+    def leave_run(self, towards_n: float, branch_share: float, given_n: float) -> None:
+        """Go on from the force of a run that has ended, and no higher than where its voltage would lead (towards_n). given_n:
+        as in `use`."""
+        reached_n = min(towards_n, self.expected.force_n(branch_share))
+        self.feedforward.take_over(reached_n + given_n, branch_share)
+
+    def _step_down(self, demand: Demand, dt_s: float, given_n: float) -> StateEvent:
+        law = self.feedforward
+        law.advance(0.0, demand.ramp_n_per_s, dt_s, given_n)
+        voltage_v, _ = law.compute_voltage(given_n)
+        self._drive_by_model(min(voltage_v, self.voltage_v), law.applied_n, law.branch_share)
+        return StateEvent.MOVE
+
+    def _drive_by_model(self, voltage_v: float, expected_n: float, branch_share: float) -> None:
+        self._trim.reset()
         self._band.restart()
         self._answer.restart()
-        self.law.take_over(expected_n, branch_share)
+        self.feedforward.take_over(expected_n, branch_share)
         self.feedforward_v = voltage_v
-        self.limited_by = self.stage.drive(voltage_v)
+        self.limited_by = self._limiter.drive(voltage_v)
 
-    def _force(self, demand: Demand, moment: LoopInputs) -> StateEvent:
-        law = self.law
-        goal_n, rate_n_per_s = self._approach.goal(moment.now_s, demand, moment.touching, law)
-        if moment.held_back:
+    def _step(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
+        event = self._step_force(demand, inputs) if demand.mode is Mode.FORCE else self._step_voltage(demand, inputs)
+        self._was_touching = inputs.touching
+        return event
+
+    def _step_force(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
+        law = self.feedforward
+        goal_n, rate_n_per_s = self._approach.goal(inputs.now_s, demand, inputs.touching, law)
+        if inputs.held_back:
             goal_n = min(goal_n, law.approaching_n(demand.precontact_n))
-        if self._was_touching and not moment.touching:
+        if self._was_touching and not inputs.touching:
             law.fall_back(goal_n)
-        given_n = demand.gravity_n + moment.outside_n
-        moved_n = law.advance(goal_n, rate_n_per_s, moment.dt_s, given_n)
-        self._learn(moment, moved_n, given_n)
-        model_v, by_model = law.feedforward(given_n)
+        given_n = demand.gravity_n + inputs.outside_n
+        moved_n = law.advance(goal_n, rate_n_per_s, inputs.dt_s, given_n)
+        self._learn(inputs, moved_n, given_n)
+        model_v, by_model = law.compute_voltage(given_n)
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
-        wanted_v = model_v + self.trim.value_v
+        wanted_v = model_v + self._trim.value_v
         push_v = self._led_v(wanted_v) - wanted_v if has_model else 0.0
         self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
-        by_stage = self.stage.drive(wanted_v + push_v if has_model else 0.0)
-        self.limited_by = strongest(by_stage, self.trim.limited_by, by_model, demand.force_limited_by)
+        by_stage = self._limiter.drive(wanted_v + push_v if has_model else 0.0)
+        self.limited_by = strongest(by_stage, self._trim.limited_by, by_model, demand.force_limited_by)
         self._answer.restart()
-        return self._judge_force(demand, moment, goal_n)
+        return self._judge_force(demand, inputs, goal_n)
 
     def _led_v(self, wanted_v: float) -> float:
         self._wanted_v = wanted_v
-        if isinstance(self.lead, LagInverse):
-            return self.lead.led_v(wanted_v, self.stage.voltage_v)
-        return self.lead.led_v(wanted_v)
+        if isinstance(self._lead, LagInverse):
+            return self._lead.led_v(wanted_v, self._limiter.voltage_v)
+        return self._lead.led_v(wanted_v)
 
-    def _learn(self, moment: LoopInputs, moved_n: float, given_n: float) -> None:
-        law, trim = self.law, self.trim
+    def _learn(self, inputs: LoopInputs, moved_n: float, given_n: float) -> None:
+        law, trim = self.feedforward, self._trim
         trim.travel(moved_n)
         if law.applied_n <= 0.0:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):
-            self._learn_measured(trim, moment, given_n)
-        elif self._may_learn(moment) and abs(law.applied_n - law.reference_n) < QUIET_N:
-            trim.integrate(law.reference_n - moment.reading.contact_n, moment.reading.interval_s)
+            self._learn_measured(trim, inputs, given_n)
+        elif self._may_learn(inputs) and abs(law.applied_n - law.reference_n) < QUIET_N:
+            trim.integrate(law.reference_n - inputs.reading.contact_n, inputs.reading.interval_s)
 
-    def _learn_measured(self, trim: MeasuredTrim, moment: LoopInputs, given_n: float) -> None:
-        law, measured = self.law, self._measured
+    def _learn_measured(self, trim: MeasuredTrim, inputs: LoopInputs, given_n: float) -> None:
+        law, measured = self.feedforward, self._measured
         assert measured
-        slope_n_per_v = law.slope_n_per_v(given_n) if moment.reading.is_new else 1.0
-        if moment.reading.is_new:
-            away_n = abs(self._wanted_v - self.lead.second_v) * slope_n_per_v
+        slope_n_per_v = law.slope_n_per_v(given_n) if inputs.reading.is_new else 1.0
+        if inputs.reading.is_new:
+            away_n = abs(self._wanted_v - self._lead.second_v) * slope_n_per_v
             still = away_n < STILL_N and abs(law.applied_n - law.reference_n) < STILL_N
-            self._still_s = self._still_s + moment.reading.interval_s if still else 0.0
+            self._still_s = self._still_s + inputs.reading.interval_s if still else 0.0
         if self._still_s < measured.dead_time_s + measured.patience_s:
             trim.rest()
-        elif self._may_learn(moment):
-            trim.integrate(law.reference_n - moment.reading.contact_n, slope_n_per_v, moment.reading.interval_s)
+        elif self._may_learn(inputs):
+            trim.integrate(law.reference_n - inputs.reading.contact_n, slope_n_per_v, inputs.reading.interval_s)
 
-    def _may_learn(self, moment: LoopInputs) -> bool:
+    def _may_learn(self, inputs: LoopInputs) -> bool:
         free = self.limited_by is LimitedBy.NONE or self.limited_by is LimitedBy.TRIM_RANGE  # of the step before
-        return moment.touching and moment.reading.is_new and moment.reading.is_usable and free
+        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free
 
-    def _judge_force(self, demand: Demand, moment: LoopInputs, goal_n: float) -> StateEvent:
-        applied_n, tolerance_n = self.law.applied_n, demand.tolerance_n
+    def _judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float) -> StateEvent:
+        applied_n, tolerance_n = self.feedforward.applied_n, demand.tolerance_n
         if demand.force_n <= 0.0:
             self._band.restart()
             return StateEvent.WAIT if applied_n <= 0.0 else StateEvent.MOVE
         if abs(goal_n - applied_n) > tolerance_n:
             self._band.restart()
             return StateEvent.MOVE
-        inside = moment.touching and abs(demand.force_n - applied_n) <= tolerance_n
-        inside = inside and abs(moment.reading.contact_n - demand.force_n) <= tolerance_n
-        self._band.update(moment.now_s, inside, demand.in_band_time_s)
+        inside = inputs.touching and abs(demand.force_n - applied_n) <= tolerance_n
+        inside = inside and abs(inputs.reading.contact_n - demand.force_n) <= tolerance_n
+        self._band.update(inputs.now_s, inside, demand.in_band_time_s)
         if self._band.in_band:
             return StateEvent.SETTLE
-        return StateEvent.MOVE if moment.touching or applied_n != goal_n else StateEvent.WAIT
+        return StateEvent.MOVE if inputs.touching or applied_n != goal_n else StateEvent.WAIT
 
-    def _voltage(self, demand: Demand, moment: LoopInputs) -> StateEvent:
-        self.trim.reset()
-        self.law.take_over(moment.expected_n)
+    def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
+        self._trim.reset()
+        self.feedforward.take_over(inputs.expected_n)
         self.feedforward_v = demand.voltage_v
-        self.limited_by = self.stage.drive(demand.voltage_v)
+        self.limited_by = self._limiter.drive(demand.voltage_v)
         moving = self.limited_by is LimitedBy.VOLTAGE_SLEW
-        answered = moving or moment.touching or moment.expected_n < _ANSWER_N
-        self._answer.update(moment.now_s, answered, inf)
+        answered = moving or inputs.touching or inputs.expected_n < _ANSWER_N
+        self._answer.update(inputs.now_s, answered, inf)
         if moving or demand.voltage_v <= 0.0:
             self._band.restart()
             return StateEvent.MOVE if moving else StateEvent.WAIT
-        self._band.update(moment.now_s, True, demand.in_band_time_s)
+        self._band.update(inputs.now_s, True, demand.in_band_time_s)
         return StateEvent.SETTLE if self._band.in_band else StateEvent.MOVE
+
+
+def _or_fault(move: Callable[[], StateEvent]) -> Moved:
+    """What a movement answers, or the fault that it could not be computed."""
+    try:
+        return move()
+    except ModelError as error:
+        return stop_cause(FaultCode.MODEL_INVALID, str(error))
+    except NotFiniteError as error:
+        return stop_cause(FaultCode.NOT_FINITE, str(error))

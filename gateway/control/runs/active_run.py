@@ -19,7 +19,6 @@ from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.supervision.force_ceiling import ForceCeiling
-from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.registers.words import CalibrationPhase
 
 AnyPlan: TypeAlias = CalibrationPlan | ExperimentPlan
@@ -70,13 +69,13 @@ class ActiveRun:
 
     def ask(self, plan: AnyPlan) -> AnyRun:
         """A local run for the next step to begin. ValueError with a sentence for a plan that the rig does not allow."""
-        run = self.tried(plan)
+        run = self.build(plan)
         self._asked, self.refused = plan, ""
         self.phase = CalibrationPhase.IDLE
         return run
 
-    def tried(self, plan: AnyPlan) -> AnyRun:
-        """What a plan would do. ValueError with a sentence for one that the rig does not allow."""
+    def build(self, plan: AnyPlan) -> AnyRun:
+        """Return the run that a plan makes. ValueError with a sentence for one that the rig does not allow."""
         if isinstance(plan, ExperimentPlan):
             return ExperimentRun(plan, self._settings, self.model)
         return LadderRun(plan, self._settings, self.model)
@@ -90,14 +89,15 @@ class ActiveRun:
         return asked
 
     def begin(self, plan: AnyPlan, *, is_local: bool) -> None:
-        self.run = self.tried(plan)
+        self.run = self.build(plan)
         self.is_local, self._stop_asked = is_local, ""
         self.phase, self.progress, self.last_row = CalibrationPhase.ZERO, 0.0, None
         self.eta_s, self.target_n = self.run.eta_s, 0.0
         self._ceiling = self._new_ceiling()
 
-    def climb(self, now_s: float, reading: Reading, pursuit: ForceLoop, response: ExpectedForce) -> StopCause | None:
-        """One step of the run, through the voltage stage; what ended it (a fault, or a sentence), None while it goes on."""
+    def step(self, now_s: float, reading: Reading, loop: ForceLoop) -> StopCause | None:
+        """One step of the run, through the limits of the force loop; what ended it (a fault, or a sentence), None while it goes
+        on."""
         run = self.run
         assert run
         self.cell_n = reading.cell_n
@@ -110,12 +110,18 @@ class ActiveRun:
             return run.found
         if run.is_done:
             return StopCause(FaultCode.NONE, run.ended)
-        voltage_v = self._below_ceiling(now_s, reading, step, pursuit.stage.voltage_v)
+        voltage_v = self._below_ceiling(now_s, reading, step, loop.voltage_v)
         if voltage_v is None:
             return StopCause(FaultCode.NONE, self._too_high(step.voltage_v, "the run is stopped"))
         self.target_n = max(0.0, run.model.force_n(voltage_v, run.branch_share))
-        pursuit.follow(voltage_v, response.force_n(run.branch_share), run.branch_share)
+        loop.drive_run(voltage_v, run.branch_share)
         return None
+
+    def leave(self, loop: ForceLoop, given_n: float) -> None:
+        """End, and let the force loop go on from the run's force. given_n: contact force that the slide need not give."""
+        if run := self.run:
+            loop.leave_run(run.model.force_n(loop.voltage_v, run.branch_share), run.branch_share, given_n)
+        self.end()
 
     def end(self) -> None:
         """Whatever ends it; complete or not is told by the run itself."""

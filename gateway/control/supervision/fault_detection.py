@@ -38,6 +38,7 @@ _LINE_WORDS: Final = {
 
 
 def stop_cause(fault: FaultCode, detail: str) -> StopCause:
+    """Return a fault with its code before the sentence."""
     return StopCause(fault, fault_sentence(fault, detail))
 
 
@@ -60,7 +61,7 @@ class FaultDetector:
     def __init__(self, settings: ControlSettings) -> None:
         self._limits = settings.limits
         self._bounds = settings.supervision
-        self.rise = RiseCheck(settings.defaults.contact_threshold_n)
+        self._rise = RiseCheck(settings.defaults.contact_threshold_n)
         self._frozen = StuckSensorCheck(settings.supervision)
         self._over = 0
         self._response_fault = FaultCode.NONE
@@ -68,18 +69,18 @@ class FaultDetector:
 
     def start(self) -> None:
         """At enable."""
-        self.rise.start()
+        self._rise.start()
         self._frozen.start()
         self._response_fault = FaultCode.NONE
         self._over = 0
 
     def observe(self, reading: Reading, response: ExpectedForce, branch_share: float, touching: bool) -> None:
         """Every new sample, enabled or not."""
-        self.rise.smooth(reading)
+        self._rise.smooth(reading)
         self._frozen.observe(reading, response, touching)
         is_over = reading.overload or abs(reading.contact_n) >= self._limits.over_force_n
         self._over = self._over + 1 if is_over else 0
-        self._response_fault = self.rise.judge(response, branch_share, touching, reading.interval_s)
+        self._response_fault = self._rise.judge(response, branch_share, touching, reading.interval_s)
 
     def observe_rest(self, reading: Reading) -> None:
         """While disabled: a force that stays at the safe voltage."""
@@ -95,6 +96,20 @@ class FaultDetector:
     def slow_words(self) -> str:
         """W234, empty where a frozen load cell is found soon."""
         return self._frozen.slow_words
+
+    @property
+    def measured_n(self) -> float:
+        """Cell force behind a low-pass, for judgement and sentences."""
+        return self._rise.smooth_n
+
+    @property
+    def is_first_rise_too_high(self) -> bool:
+        """The first rise since the enable is far above what the model expects: the target waits."""
+        return self._rise.is_too_high
+
+    def shift_zero(self, moved_n: float) -> None:
+        """The zero moved: what was measured before reads that much less now."""
+        self._rise.shift(moved_n)
 
     @property
     def is_stuck(self) -> bool:
@@ -164,9 +179,9 @@ class FaultDetector:
             said = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
             return stop_cause(FaultCode.SAMPLE_FROZEN, said)
         if self._response_fault is FaultCode.SIGN_INVERTED:
-            return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self.rise.measured_rise_n, expected_n))
+            return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self._rise.measured_rise_n, expected_n))
         if self._response_fault is FaultCode.GAIN_WRONG:
-            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self.rise.measured_rise_n, expected_n))
+            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.measured_rise_n, expected_n))
         return None
 
     def _over_words(self, reading: Reading, expected_n: float) -> str:

@@ -1,10 +1,13 @@
-"""Sentences that are told once, when something begins to be so: target unreachable, trim hunting, force stuck at rest."""
+"""Sentences for the log that are told once, when something begins: target unreachable, trim hunting, force stuck at rest.
+
+Each `..._event` answers with its sentence the first time, and with nothing as long as it goes on.
+"""
 
 from math import isfinite, nan
 from typing import Final
 
 from gateway.control.force_loop.force_loop import ForceLoop, LoopInputs
-from gateway.control.force_loop.measured_trim import MOST_TURNS, MeasuredTrim
+from gateway.control.force_loop.measured_trim import MOST_TURNS
 from gateway.control.inputs import LineStatus
 from gateway.control.messages import hunting_sentence, stuck_sentence, unreachable_sentence
 from gateway.control.sample_conditioning import Reading
@@ -18,7 +21,7 @@ class OneShotEvents:
     """stuck_n: measured at the safe voltage, from which a force counts as stuck."""
 
     def __init__(self, stuck_n: float) -> None:
-        self.said_unreachable = False
+        self._said_unreachable = False
         self._said_stuck = self._said_hunting = False
         self._stuck_n = stuck_n
         self._was_right = False
@@ -28,17 +31,22 @@ class OneShotEvents:
         """At enable."""
         self._was_right = False
 
-    def hear(self, line: LineStatus) -> None:
+    def disable(self) -> None:
+        """The output went off: an unreachable target may be told anew."""
+        self._said_unreachable = False
+
+    def observe_line(self, line: LineStatus) -> None:
         """What the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
 
-    def unreachable(self, pursuit: ForceLoop, measured_n: float, moment: LoopInputs, events: list[str]) -> None:
-        """After each step in force or voltage mode."""
-        if pursuit.unreachable and not self.said_unreachable:
-            events.append(unreachable_sentence(self._evidence(pursuit.stage.voltage_v, measured_n, moment.expected_n)))
-        self.said_unreachable = pursuit.unreachable
-        if pursuit.in_band and moment.touching:
-            self._learn(pursuit.stage.voltage_v)
+    def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
+        """Ask after each step in force or voltage mode. measured_n: contact force, smoothed."""
+        is_first = loop.unreachable and not self._said_unreachable
+        evidence = self._evidence(loop.voltage_v, measured_n, inputs.expected_n)
+        self._said_unreachable = loop.unreachable
+        if loop.in_band and inputs.touching:
+            self._learn(loop.voltage_v)
+        return unreachable_sentence(evidence) if is_first else ""
 
     def _learn(self, voltage_v: float) -> None:
         """The force is right, so the pressure at this voltage is, too."""
@@ -59,14 +67,12 @@ class OneShotEvents:
             was_right=self._was_right,
         )
 
-    def hunting(self, pursuit: ForceLoop, events: list[str]) -> None:
-        trim = pursuit.trim
-        hunted = isinstance(trim, MeasuredTrim) and trim.hunted
-        if hunted and not self._said_hunting:
-            events.append(hunting_sentence(pursuit.law.applied_n, MOST_TURNS))
-        self._said_hunting = hunted
+    def hunting_event(self, loop: ForceLoop) -> str:
+        """Ask after each step in force or voltage mode."""
+        is_first, self._said_hunting = loop.is_hunting and not self._said_hunting, loop.is_hunting
+        return hunting_sentence(loop.applied_n, MOST_TURNS) if is_first else ""
 
-    def stuck(self, is_stuck: bool, reading: Reading, events: list[str]) -> None:
-        if is_stuck and not self._said_stuck:
-            events.append(stuck_sentence(reading.contact_n, self._stuck_n))
-        self._said_stuck = is_stuck
+    def stuck_event(self, is_stuck: bool, reading: Reading) -> str:
+        """Ask on each sample while the output is off."""
+        is_first, self._said_stuck = is_stuck and not self._said_stuck, is_stuck
+        return stuck_sentence(reading.contact_n, self._stuck_n) if is_first else ""

@@ -78,7 +78,7 @@ class CalibrationRuns:
 
     def _tried(self, plan: AnyPlan) -> Answer:
         """What a plan would do; ValueError where the rig does not allow it."""
-        run = self._calibrating.tried(plan)
+        run = self._calibrating.build(plan)
         top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)
         top_n = self._calibrating.model.force_n(top_v, 1.0)
         return {

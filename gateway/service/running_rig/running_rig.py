@@ -284,7 +284,7 @@ class RunningRig:
         """Force to 0 along the ramp, then the safe voltage (at most 4.5 s)."""
         self.controller.stop()
         deadline_s = time.monotonic() + _STOP_BOUND_S
-        while not self.controller.stopped and time.monotonic() < deadline_s:
+        while not self.controller.has_stopped and time.monotonic() < deadline_s:
             await asyncio.sleep(self._tick.period_s)
 
     async def close(self) -> None:

@@ -220,7 +220,7 @@ def test_a_stop_of_the_service_ends_it() -> None:
     bench.run(3.0)
     bench.controller.stop()
     bench.run(0.4)
-    assert bench.controller.stopped
+    assert bench.controller.has_stopped
     assert bench.last.voltage_v == 0.0
 
 

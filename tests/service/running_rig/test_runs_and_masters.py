@@ -312,7 +312,7 @@ def test_a_force_that_is_still_leaving_cannot_become_the_zero() -> None:
     assert refused is not None
     assert "on their way to 0" in refused.sentence
     rack.run(1.5).write(0, TARE)
-    assert abs(rack.controller._reader.zero.zero_n) < 1.0
+    assert abs(rack.controller.zero_n) < 1.0
 
 
 def test_control_answers_for_this_moment_and_not_for_the_last_step() -> None:

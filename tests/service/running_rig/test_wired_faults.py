@@ -227,7 +227,7 @@ def test_a_defect_of_ours_is_the_safe_voltage_a_latched_fault_and_a_sentence(mon
         raise ZeroDivisionError("a defect planted by a test")
 
     with monkeypatch.context() as patched:
-        patched.setattr(wired.controller._pursuit, "step", defect)
+        patched.setattr(wired.controller._loop, "step", defect)
         assert wired.voltage_reaches_safe(TICK_S + WIRE_S) <= TICK_S + WIRE_S
     assert wired.fault_code is FaultCode.INTERNAL
     assert "ZeroDivisionError" in wired.said("A499")[0]
