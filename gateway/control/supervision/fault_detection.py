@@ -88,11 +88,6 @@ class FaultDetector:
         self._stuck_s = self._stuck_s + reading.interval_s if stuck else 0.0
 
     @property
-    def frozen_found_s(self) -> float:
-        """How long a frozen load cell would go unnoticed while the force stands still, by its noise so far; inf: for ever."""
-        return self._frozen.found_s
-
-    @property
     def slow_words(self) -> str:
         """W234, empty where a frozen load cell is found soon."""
         return self._frozen.slow_words
