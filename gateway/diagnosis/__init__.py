@@ -4,7 +4,7 @@ In the order of the work: measurement (what came in), excerpt, input_checks (wro
 (recordings beside the twin), base_fit, initial_friction (what friction remembers at the first row), direct_evidence (what
 the readings tell by themselves), hints, candidates, model_comparison and search (naming one of the effects of
 gateway/catalogue), normal_equations and levenberg_marquardt (the mathematics of it), significance (what is a finding);
-noise, residual_tests and residual_questions (what is left), noise_floor, experiments/ (what the recording cannot show, and
+noise, residual_tests and residual_regressors (what is left), noise_floor, experiments/ (what the recording cannot show, and
 what to record next), verdict and notes, diagnose (the whole), result (the answer). Pure: time and chance are arguments.
 """
 

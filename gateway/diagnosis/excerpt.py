@@ -14,7 +14,7 @@ import numpy as np
 from gateway.diagnosis.measurement import Floats, Measurement
 
 MOST_ROWS: Final = 40_000  # of all recordings together
-_UNJUDGED: Final = 0.05  # of a stretch, at its beginning: a rest there is none that a machine begins with
+_UNJUDGED_SHARE: Final = 0.05  # of a stretch, at its beginning: a rest there is none that a machine begins with
 _CLOSEST_S: Final = 2.0e-3  # rows closer than this may be taken together: a regulator's lag is tens of milliseconds
 
 
@@ -25,11 +25,11 @@ def take_excerpt(measurement: Measurement, most_rows: int) -> Measurement:
         return measurement
     row_s = float(np.median(np.diff(measurement.time_s)))
     together = min(-(-measurement.rows // most_rows), max(int(_CLOSEST_S / row_s), 1))
-    thin = _thinned(measurement, together) if together > 1 else measurement
-    return thin if thin.rows <= most_rows else _stretch(thin, most_rows)
+    thin = _thin_out(measurement, together) if together > 1 else measurement
+    return thin if thin.rows <= most_rows else _cut_stretch(thin, most_rows)
 
 
-def _thinned(measurement: Measurement, together: int) -> Measurement:
+def _thin_out(measurement: Measurement, together: int) -> Measurement:
     """So many rows become one: means of the readings, and the command as it stood in their middle."""
     rows = measurement.rows // together
     note = f"{measurement.name}: {together} rows each were taken together to one, {rows} in all"
@@ -48,7 +48,7 @@ def _thinned(measurement: Measurement, together: int) -> Measurement:
         force_n=mean(measurement.force_n),
         usable=usable,
         repeated=repeated,
-        command_v=_cut(measurement.command_v, middle),
+        command_v=_cut_column(measurement.command_v, middle),
         pressure_pa=None if measurement.pressure_pa is None else mean(measurement.pressure_pa),
         position_m=None if measurement.position_m is None else mean(measurement.position_m),
         covariates={name: mean(column) for name, column in measurement.covariates.items()},
@@ -56,9 +56,9 @@ def _thinned(measurement: Measurement, together: int) -> Measurement:
     )
 
 
-def _stretch(measurement: Measurement, most_rows: int) -> Measurement:
+def _cut_stretch(measurement: Measurement, most_rows: int) -> Measurement:
     """The liveliest stretch."""
-    first = _liveliest(measurement, most_rows)
+    first = _liveliest_row(measurement, most_rows)
     rows = slice(first, first + most_rows)
     start_s, end_s = float(measurement.time_s[first]), float(measurement.time_s[rows.stop - 1])
     note = (
@@ -66,26 +66,26 @@ def _stretch(measurement: Measurement, most_rows: int) -> Measurement:
         f"{start_s:.0f} to {end_s:.0f} s; for slow effects record fewer rows a second"
     )
     usable = measurement.usable[rows].copy()
-    usable[: int(_UNJUDGED * most_rows)] = False
+    usable[: int(_UNJUDGED_SHARE * most_rows)] = False
     return replace(
         measurement,
         time_s=measurement.time_s[rows] - start_s,
         force_n=measurement.force_n[rows],
         usable=usable,
         repeated=measurement.repeated[rows],
-        command_v=_cut(measurement.command_v, rows),
-        pressure_pa=_cut(measurement.pressure_pa, rows),
-        position_m=_cut(measurement.position_m, rows),
+        command_v=_cut_column(measurement.command_v, rows),
+        pressure_pa=_cut_column(measurement.pressure_pa, rows),
+        position_m=_cut_column(measurement.position_m, rows),
         covariates={name: column[rows] for name, column in measurement.covariates.items()},
         notes=(*measurement.notes, note),
     )
 
 
-def _cut(column: Floats | None, rows: slice) -> Floats | None:
+def _cut_column(column: Floats | None, rows: slice) -> Floats | None:
     return None if column is None else column[rows]
 
 
-def _liveliest(measurement: Measurement, most_rows: int) -> int:
+def _liveliest_row(measurement: Measurement, most_rows: int) -> int:
     """First row of the stretch with the longest way of the drive over rows that count."""
     drive = measurement.command_v if measurement.command_v is not None else measurement.pressure_pa
     way = np.zeros(measurement.rows) if drive is None else np.abs(np.diff(drive, prepend=drive[:1]))

@@ -107,17 +107,17 @@ def coloured_whitener(bench: Bench, remainder_n: Floats, basis: Floats, weights:
     for channel in bench.channels:
         part, usable = remainder_n[channel.rows] * weights[channel.rows], bench.usable[channel.rows]
         taken = np.sum(np.abs(np.fft.rfft(basis[:, channel.rows])) ** 2, axis=0) / part.size
-        noises.append(_fit(part, np.clip(1.0 - taken, _LEAST_LEFT, 1.0) * max(float(np.mean(usable)), 0.05)))
+        noises.append(_fit_spectrum(part, np.clip(1.0 - taken, _LEAST_LEFT, 1.0) * max(float(np.mean(usable)), 0.05)))
     return Whitener(bench.channels, tuple(noises), weights)
 
 
-def _fit(part: Floats, left: Floats) -> Noise:
+def _fit_spectrum(part: Floats, left: Floats) -> Noise:
     """left: share of the power that is left at each line, for rows that do not count and columns that were fitted."""
     rows = part.size
     power = np.abs(np.fft.rfft(part)) ** 2 / (rows * left)
     lines = np.arange(1, power.size)
-    centres, levels, weights = _binned(lines, power[1:], left[1:])
-    spectrum = _whittle(centres, np.maximum(levels, 1.0e-300), weights, rows)
+    centres, levels, weights = _bin_spectrum(lines, power[1:], left[1:])
+    spectrum = _fit_by_likelihood(centres, np.maximum(levels, 1.0e-300), weights, rows)
     model = spectrum(np.maximum(np.arange(power.size), 0.5))
     one_sided = np.ones(power.size)
     one_sided[1 : (rows + 1) // 2] = 2.0
@@ -125,7 +125,7 @@ def _fit(part: Floats, left: Floats) -> Noise:
     return Noise(float(np.sqrt(model[-1])), total, 1.0 / np.sqrt(model))
 
 
-def _binned(lines: NDArray[np.int64], power: Floats, left: Floats) -> tuple[Floats, Floats, Floats]:
+def _bin_spectrum(lines: NDArray[np.int64], power: Floats, left: Floats) -> tuple[Floats, Floats, Floats]:
     """Centre line, level and weight of logarithmic bins."""
     edges = np.unique(np.round(np.geomspace(1, lines.size + 1, _BINS)).astype(int))
     centres, levels, weights = [], [], []
@@ -138,32 +138,32 @@ def _binned(lines: NDArray[np.int64], power: Floats, left: Floats) -> tuple[Floa
     return np.array(centres), np.array(levels), np.array(weights, dtype=float)
 
 
-def _whittle(centres: Floats, levels: Floats, weights: Floats, rows: int) -> "Spectrum":
+def _fit_by_likelihood(centres: Floats, levels: Floats, weights: Floats, rows: int) -> "Spectrum":
     """The spectrum of greatest likelihood; one Lorentzian fewer where the second does not pay."""
     floor = float(np.median(levels[-8:]))
     slow = max(float(np.mean(levels[: max(4, levels.size // 4)])) - floor, 0.1 * floor)
-    peaks = [(max(levels[k] - floor, 0.1 * floor), 0.15 * centres[k], centres[k]) for k in _highest(levels)]
+    peaks = [(max(levels[k] - floor, 0.1 * floor), 0.15 * centres[k], centres[k]) for k in _highest_bins(levels)]
     lows = [(slow, rows * share, _NOWHERE) for share in (0.001, 0.01, 0.08)]
-    best = _minimised([floor], centres, levels, weights)
+    best = _minimise_misfit([floor], centres, levels, weights)
     for humps in (
         [[low] for low in lows] + [[peak] for peak in peaks],
         [[lows[0], lows[2]], [lows[0], lows[1]]] + [[lows[1], peak] for peak in peaks],
     ):
         starts = [[floor, *(number for hump in each for number in hump)] for each in humps]
-        found = min((_minimised(start, centres, levels, weights) for start in starts), key=lambda each: each[0])
+        found = min((_minimise_misfit(start, centres, levels, weights) for start in starts), key=lambda each: each[0])
         if found[0] < best[0] - 6.0:  # more numbers must pay for themselves
             best = found
     return Spectrum(best[1])
 
 
-def _highest(levels: Floats) -> list[int]:
+def _highest_bins(levels: Floats) -> list[int]:
     """The two bins that rise most above their surroundings, where a frame may ring."""
     around = np.array([np.median(levels[max(k - 6, 0) : k + 7]) for k in range(levels.size)])
     inner = slice(levels.size // 4, levels.size - 2)
     return [int(k) + levels.size // 4 for k in np.argsort(-(levels / around)[inner])[:2]]
 
 
-def _minimised(start: list[float], centres: Floats, levels: Floats, weights: Floats) -> tuple[float, Floats]:
+def _minimise_misfit(start: list[float], centres: Floats, levels: Floats, weights: Floats) -> tuple[float, Floats]:
     def misfit(logs: Floats) -> tuple[float, Floats]:
         numbers = np.exp(np.clip(logs, -200.0, 200.0))
         value, gradient = Spectrum(numbers).with_gradient(centres)

@@ -8,18 +8,18 @@ import numpy as np
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import fast_noise_n
 
-_MOVES: Final = 30.0  # times the noise, from which a force moves
-_STANDS: Final = 8.0  # times the noise, below which nearly all readings of a force lie that stands
-_STRANGE: Final = 30.0  # times larger or smaller than the start: a unit, more likely than a machine
-_APART: Final = 10.0  # times the floor, from which offsets are told
+_MOVING_RATIO: Final = 30.0  # times the noise, from which a force moves
+_RESTING_RATIO: Final = 8.0  # times the noise, below which nearly all readings of a force lie that stands
+_IMPLAUSIBLE_RATIO: Final = 30.0  # times larger or smaller than the start: a unit, more likely than a machine
+_OFFSETS_APART_RATIO: Final = 10.0  # times the floor, from which offsets are told
 
 
 def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[float], floor_n: float) -> Iterator[str]:
     """Each recording's own notes, then what only all of them together show."""
     for each in measurements:
         yield from each.notes
-        yield from _of_a_dead_drive(each)
-    if max(offsets_n) - min(offsets_n) > _APART * floor_n:
+        yield from _dead_drive_notes(each)
+    if max(offsets_n) - min(offsets_n) > _OFFSETS_APART_RATIO * floor_n:
         told = ", ".join(
             f"{each.name} {offset_n:.3g} N" for each, offset_n in zip(measurements, offsets_n, strict=True)
         )
@@ -31,13 +31,13 @@ def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[flo
 
 def uninformative_force(measurements: Sequence[Measurement]) -> str:
     """Why these recordings say nothing of the machine, as a sentence; empty where one of them does: its force moves."""
-    whys = [_blind(each) for each in measurements]
+    whys = [_why_uninformative(each) for each in measurements]
     return whys[0] if all(whys) else ""
 
 
-def _blind(measurement: Measurement) -> str:
+def _why_uninformative(measurement: Measurement) -> str:
     moved = _movement(measurement)
-    if not moved or _moves(measurement):
+    if not moved or _is_moving(measurement):
         return ""
     return (
         f"{measurement.name}: the force stands at {np.mean(measurement.force_n[measurement.usable]):.3g} N while {moved}: a "
@@ -45,11 +45,11 @@ def _blind(measurement: Measurement) -> str:
     )
 
 
-def _moves(measurement: Measurement) -> bool:
+def _is_moving(measurement: Measurement) -> bool:
     """Does the force move beyond its noise?"""
     force_n = measurement.force_n[measurement.usable]
     low_n, high_n = np.quantile(force_n, (0.01, 0.99))
-    return bool(high_n - low_n > _STANDS * fast_noise_n(force_n))
+    return bool(high_n - low_n > _RESTING_RATIO * fast_noise_n(force_n))
 
 
 def _movement(measurement: Measurement) -> str:
@@ -57,7 +57,7 @@ def _movement(measurement: Measurement) -> str:
     volts, pressure_pa = measurement.command_v, measurement.pressure_pa
     if volts is not None and np.ptp(volts) > 0.0:
         return f"command_v moves by {np.ptp(volts):.3g} V"
-    if volts is None and pressure_pa is not None and np.ptp(pressure_pa) > _STANDS * fast_noise_n(pressure_pa):
+    if volts is None and pressure_pa is not None and np.ptp(pressure_pa) > _RESTING_RATIO * fast_noise_n(pressure_pa):
         return f"pressure_kpa moves by {np.ptp(pressure_pa) / 1.0e3:.3g} kPa"
     return ""
 
@@ -65,7 +65,7 @@ def _movement(measurement: Measurement) -> str:
 def implausible_area(area_m2: float, start_m2: float) -> str:
     """A sentence where the force is of another size than the piston can give; empty else."""
     times = area_m2 / start_m2
-    if 1.0 / _STRANGE < times < _STRANGE:
+    if 1.0 / _IMPLAUSIBLE_RATIO < times < _IMPLAUSIBLE_RATIO:
         return ""
     return (
         f"the force is {times:.3g} times what the start plant's piston of {start_m2 * 1.0e4:.3g} cm2 gives: if that is no "
@@ -87,17 +87,17 @@ def too_high_a_floor(given_n: float, rms_n: float) -> str:
     )
 
 
-def _of_a_dead_drive(measurement: Measurement) -> Iterator[str]:
+def _dead_drive_notes(measurement: Measurement) -> Iterator[str]:
     volts = measurement.command_v
     if volts is None or measurement.pressure_pa is not None or np.ptp(volts) > 0.0:
         return
     force_n = measurement.force_n[measurement.usable]
-    if not _moves(measurement):
+    if not _is_moving(measurement):
         yield (
             f"{measurement.name}: command_v stands at {volts[0]:g} V throughout: the model's area and offset cannot be "
             "told apart"
         )
-    elif np.ptp(force_n) > _MOVES * fast_noise_n(force_n):
+    elif np.ptp(force_n) > _MOVING_RATIO * fast_noise_n(force_n):
         yield (
             f"{measurement.name}: command_v stands at {volts[0]:g} V throughout while the force moves by "
             f"{np.ptp(force_n):.3g} N: is it the right column? Without a command that moves, no cause can be told"

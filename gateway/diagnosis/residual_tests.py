@@ -14,18 +14,18 @@ import numpy as np
 
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.residual_questions import Regressors, list_regressors
+from gateway.diagnosis.residual_regressors import Regressors, list_regressors
 from gateway.diagnosis.result import Leftover
 from gateway.diagnosis.search.bench import BLOCKS, Bench
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.normal_equations import NormalEquations
 
-_LEVEL: Final = 1.0e-3  # of a false answer over all questions
+_SIGNIFICANCE: Final = 1.0e-3  # of a false answer over all questions
 _LEAST_SHARE: Final = 0.01  # of the whitened squared residual
-_AT_ONCE: Final = 60  # questions
-_MOST: Final = 6
-_AROUND: Final = 14  # lines to either side that a wandering line stands out of
-_STANDS_OUT: Final = 16.0  # times their mean
+_REGRESSORS_AT_ONCE: Final = 60  # questions
+_MOST_DEPENDENCES: Final = 6
+_SURROUNDING_LINES: Final = 14  # lines to either side that a wandering line stands out of
+_LEAST_PEAK_RATIO: Final = 16.0  # times their mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,25 +53,27 @@ def strongest_dependence(
         for each in list_regressors(bench, fitted.residual_n, white)
         if (each.outside or not outside) and (each.depends_on, each.shape) not in known
     )
-    return _best(bench, fitted, whiten, asked)
+    return _strongest(bench, fitted, whiten, asked)
 
 
-def _best(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Iterator[Regressors]) -> Dependence | None:
+def _strongest(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Iterator[Regressors]) -> Dependence | None:
     """Some at a time: a thousand columns would be gigabytes at once."""
     model, white = whiten(fitted.jacobian), whiten(fitted.residual_n)
     total = max(float(white @ white), 1.0)
     tried, best = 0, None
-    while some := list(islice(asked, _AT_ONCE)):
+    while some := list(islice(asked, _REGRESSORS_AT_ONCE)):
         tried += sum(each.among for each in some)
         columns = whiten(bench.reduced(np.vstack([each.columns for each in some])))
         found = [
-            each for each in _answers(NormalEquations(model, columns, white), some, total) if each.share >= _LEAST_SHARE
+            each
+            for each in _dependences(NormalEquations(model, columns, white), some, total)
+            if each.share >= _LEAST_SHARE
         ]
         best = min([*found, *([best] if best else [])], key=lambda each: each.log_chance, default=None)
-    return best if best and best.log_chance < np.log(_LEVEL / tried) else None
+    return best if best and best.log_chance < np.log(_SIGNIFICANCE / tried) else None
 
 
-def _answers(normal: NormalEquations, asked: Sequence[Regressors], total: float) -> Iterator[Dependence]:
+def _dependences(normal: NormalEquations, asked: Sequence[Regressors], total: float) -> Iterator[Dependence]:
     """Each question's gain beside the model; `normal` holds the columns of all of them in order."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
@@ -93,17 +95,17 @@ def find_dependences(
     Each answer is taken out before the next question.
     """
     leftovers = list(given)
-    while len(leftovers) < _MOST:
+    while len(leftovers) < _MOST_DEPENDENCES:
         dependence = strongest_dependence(bench, fitted, whiten, leftovers, outside=False)
         if dependence is None:
             break
         leftovers.append(dependence.leftover)
         taken = np.vstack([fitted.jacobian, bench.reduced(dependence.regressors.columns)])
         fitted = FittedModel(fitted.parameters, fitted.free, fitted.residual_n, fitted.chi2, taken)
-    return (*leftovers, *_unsteady(bench, fitted, whiten))
+    return (*leftovers, *_find_unsteadiness(bench, fitted, whiten))
 
 
-def _unsteady(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Iterator[Leftover]:
+def _find_unsteadiness(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Iterator[Leftover]:
     """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
@@ -118,10 +120,10 @@ def _unsteady(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Iterator[L
             levels = np.array([np.mean(block**2) for block in np.array_split(counted, BLOCKS)])
             usual = float(np.median(levels))
             apart = np.sum((levels / levels.mean() - 1.0) ** 2) * counted.size / BLOCKS / 2.0
-            if chi2_law.sf(apart, BLOCKS - 1) < _LEVEL and times_are_sure:
+            if chi2_law.sf(apart, BLOCKS - 1) < _SIGNIFICANCE and times_are_sure:
                 share = float(np.sum(np.maximum(levels - usual, 0.0)) / np.sum(levels))
                 yield Leftover("time", "louder at some times than at others", share)
-            if (share := _wandering(part)) > _LEAST_SHARE:
+            if (share := _wandering_share(part)) > _LEAST_SHARE:
                 yield Leftover("time", "a line that wanders, or comes and goes", share)
 
 
@@ -131,7 +133,7 @@ def _evenly_sampled(measurement: Measurement) -> bool:
     return float(np.mean(rows_s > 1.9 * np.median(rows_s))) < 0.02
 
 
-def _wandering(part: Floats) -> float:
+def _wandering_share(part: Floats) -> float:
     """Share of the power in lines that stand out of their surroundings in single blocks."""
     standing, total = 0.0, 0.0
     for block in np.array_split(part, BLOCKS):
@@ -140,7 +142,7 @@ def _wandering(part: Floats) -> float:
         if power.size < 7:
             continue
         best = int(np.argmax(power[3:-3])) + 3
-        around = np.r_[power[max(best - _AROUND, 1) : best - 2], power[best + 3 : best + _AROUND]]
-        if around.size and power[best] > _STANDS_OUT * float(around.mean()):
+        around = np.r_[power[max(best - _SURROUNDING_LINES, 1) : best - 2], power[best + 3 : best + _SURROUNDING_LINES]]
+        if around.size and power[best] > _LEAST_PEAK_RATIO * float(around.mean()):
             standing += float(power[best - 2 : best + 3].sum())
     return standing / max(total, 1.0e-300)

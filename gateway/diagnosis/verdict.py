@@ -44,8 +44,8 @@ from gateway.diagnosis.search.significance import (
 )
 from gateway.twin.plant import Plant, with_value
 
-_REACHED: Final = 1.05  # residual over floor that counts as reached
-_ABOVE: Final = 1.1  # residual over a known floor that asks for a cause
+_REACHED_RATIO: Final = 1.05  # residual over floor that counts as reached
+_ABOVE_FLOOR_RATIO: Final = 1.1  # residual over a known floor that asks for a cause
 _LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
 _DEVIATIONS: Final = 2.1  # of a 95 % interval, for some twenty blocks
 _LEAST_REJECTED: Final = 5.0e-3  # of the RMS
@@ -81,24 +81,24 @@ def compose_diagnosis(findings: Findings, given_floor_n: float | None) -> Diagno
     bench, left = findings.bench, findings.left
     found, reported, dropped = drop_doubtful_effects(bench, findings.found)
     noise = _noise_floor(bench, found, reported, given_floor_n)
-    reaches = reported.held_out.rms_n <= _REACHED * noise.floor_n
+    reaches = reported.held_out.rms_n <= _REACHED_RATIO * noise.floor_n
     causes = _causes(bench, found, reported, noise.floor_n)
     causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
     causes.sort(key=lambda cause: -cause.gain.share_of_excess)
     unseen = _unseen(findings, found, causes)
     told = {*_grouped(causes), *(each.name for each in causes), *(each.name for each in unseen)}
-    unexplained = noise.known_n is not None and noise.rms_n > _ABOVE * noise.known_n
+    unexplained = noise.known_n is not None and noise.rms_n > _ABOVE_FLOOR_RATIO * noise.known_n
     duration_s = sum(each.duration_s for each in bench.measurements)
     return Diagnosis(
-        verdict=_verdict(causes, left, reached=noise.known_n is not None and reaches, unexplained=unexplained),
+        verdict=_decide_verdict(causes, left, reached=noise.known_n is not None and reaches, unexplained=unexplained),
         baseline=Baseline(noise.rms_n, noise.floor_n, int(bench.judged.sum()), duration_s),
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
         rejected=_rejected(bench, found, noise.rms_n, told, dropped),
         extended=Extended(reported.held_out.rms_n, reaches),
-        base=_plant(reported.base),
-        plant=_extended(reported, causes),
+        base=_plant_of(reported.base),
+        plant=_extended_plant(reported, causes),
         base_parameters=_base_estimates(bench, reported),
         traces=_traces(bench, reported),
         experiments=_experiments(causes),
@@ -111,7 +111,7 @@ def _noise_floor(
 ) -> _NoiseFloor:
     rms_n = bench.rms_n(reported.base.residual_n)
     too_high_n = given_floor_n if given_floor_n is not None and given_floor_n > rms_n else None
-    known_n = _replicates(bench) if given_floor_n is None or too_high_n is not None else given_floor_n
+    known_n = _replicate_floor_n(bench) if given_floor_n is None or too_high_n is not None else given_floor_n
     floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n, reported.held_out.rms_n)
     return _NoiseFloor(rms_n, known_n, floor_n, too_high_n)
 
@@ -137,13 +137,13 @@ def _base_estimates(bench: Bench, reported: ReportedModels) -> dict[str, Estimat
     return _estimates(bench, reported.base, of_plant, reported.whiten)
 
 
-def _verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
+def _decide_verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
     if not causes:
         return Verdict.UNKNOWN if left or unexplained else Verdict.NOTHING_FOUND
     return Verdict.CONFIRMED if reached and not left else Verdict.PARTIAL
 
 
-def _replicates(bench: Bench) -> float | None:
+def _replicate_floor_n(bench: Bench) -> float | None:
     floors = [floor for each in bench.measurements if (floor := replicate_floor_n(each)) is not None]
     return max(floors) if len(floors) == len(bench.measurements) else None
 
@@ -210,13 +210,13 @@ def _estimates(
     return estimates
 
 
-def _plant(fitted: FittedModel) -> Plant:
+def _plant_of(fitted: FittedModel) -> Plant:
     return with_value(fitted.parameters.plant, "cell", "zero_n", float(np.mean(fitted.parameters.offsets_n)))
 
 
-def _extended(reported: ReportedModels, causes: Sequence[Cause]) -> Plant:
+def _extended_plant(reported: ReportedModels, causes: Sequence[Cause]) -> Plant:
     """The extended plant, with what the readings told by themselves."""
-    plant = _plant(reported.fitted)
+    plant = _plant_of(reported.fitted)
     for cause in causes:
         if BY_NAME[cause.name].direct:
             for name, estimate in cause.parameters.items():

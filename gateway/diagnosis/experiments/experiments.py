@@ -88,12 +88,12 @@ def plan_for(names: Iterable[str], *, besides: Iterable[str] = (), longest_s: fl
         each for each in asked if each.meanwhile == asked[0].meanwhile
     ]
     left_out = [(each.name, f"needs a run of its own: {each.meanwhile}") for each in asked if each not in together]
-    chosen, parts = _fitting(together, first, longest_s)
+    chosen, parts = _choose_within_time(together, first, longest_s)
     left_out += [
         (each.name, f"would take {_extra_s(each, parts):.0f} s more") for each in together if each not in chosen
     ]
     return Plan(
-        experiment=_merged(chosen, parts),
+        experiment=_merge_experiments(chosen, parts),
         left_out=tuple(left_out),
         apart=tuple(dict.fromkeys(each.apart for each in chosen if each.apart)),
     )
@@ -112,17 +112,17 @@ def plan_next(diagnosis: Diagnosis, *, longest_s: float = USUAL_LONGEST_S) -> Pl
     if not names:
         return None
     plan = plan_for(groups or (alone or unseen)[:1], besides=names, longest_s=longest_s)
-    left = [(name, _help(EXPERIMENTS[name])) for name in unseen if name not in names]
+    left = [(name, _describe_needs(EXPERIMENTS[name])) for name in unseen if name not in names]
     return Plan(experiment=plan.experiment, left_out=(*plan.left_out, *left), apart=plan.apart)
 
 
-def _help(experiment: Experiment) -> str:
+def _describe_needs(experiment: Experiment) -> str:
     wanted = [name for name in experiment.columns if name not in RECORDED]
     said = [f"record {' and '.join(wanted)}"] if wanted else []
     return "; ".join([*said, *(text for text in (experiment.meanwhile, experiment.apart) if text)])
 
 
-def _fitting(
+def _choose_within_time(
     experiments: Sequence[Experiment], must: Sequence[str], longest_s: float
 ) -> tuple[list[Experiment], list[Part]]:
     """What must be, then greedily what adds least; of equals the first one asked for."""
@@ -143,7 +143,7 @@ def _extra_s(experiment: Experiment, parts: Sequence[Part]) -> float:
     return sum(part.duration_s for part in experiment.parts if part not in parts)
 
 
-def _merged(experiments: Sequence[Experiment], parts: Sequence[Part]) -> ExperimentPlan:
+def _merge_experiments(experiments: Sequence[Experiment], parts: Sequence[Part]) -> ExperimentPlan:
     names = tuple(each.name for each in experiments)
     return ExperimentPlan(
         name=f"{names[0]} and {len(names) - 1} more" if len(names) > 2 else " and ".join(names),

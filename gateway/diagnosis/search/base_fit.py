@@ -60,7 +60,7 @@ def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -
 def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Whitener) -> FittedModel:
     """The refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
     start = ModelParameters(plant, tuple(0.0 for _ in bench.measurements))
-    coarse, strains = _coarse(bench, start, free, whiten), start_parameters(bench, plant)
+    coarse, strains = _grid_search(bench, start, free, whiten), start_parameters(bench, plant)
     coarse_ones = try_initial_strains(bench, coarse, whiten) if strains else [coarse]
     problems = [FitProblem(parameters, (*free, *strains)) for parameters in coarse_ones]
     return min(refine(bench, problems, whiten, waves=16 if strains else 8), key=lambda each: each.chi2)
@@ -71,9 +71,11 @@ def refit(bench: Bench, fitted: FittedModel, whiten: Whitener, waves: int = 3) -
     return refine(bench, [FitProblem(fitted.parameters, fitted.free)], whiten, waves)[0]
 
 
-def _coarse(bench: Bench, start: ModelParameters, free: tuple[Parameter, ...], whiten: Whitener) -> ModelParameters:
+def _grid_search(
+    bench: Bench, start: ModelParameters, free: tuple[Parameter, ...], whiten: Whitener
+) -> ModelParameters:
     """The best of a grid, gain and offset by linear regression."""
-    start = _scaled(bench, start, bench.simulate([start])[0])
+    start = _scale_by_regression(bench, start, bench.simulate([start])[0])
     lags = {start.value(LAG), *_LAGS_S} if LAG in free else {start.value(LAG)}
     frictions = {start.value(COULOMB), *_COULOMBS_N} if COULOMB in free else {start.value(COULOMB)}
     parameter_sets = [
@@ -82,10 +84,10 @@ def _coarse(bench: Bench, start: ModelParameters, free: tuple[Parameter, ...], w
     simulated = bench.simulate(parameter_sets)
     costs = [_regression(bench, simulated[k], whiten)[2] for k in range(len(parameter_sets))]
     best = int(np.argmin(costs))
-    return _scaled(bench, parameter_sets[best], simulated[best])
+    return _scale_by_regression(bench, parameter_sets[best], simulated[best])
 
 
-def _scaled(bench: Bench, parameters: ModelParameters, simulated_n: Floats) -> ModelParameters:
+def _scale_by_regression(bench: Bench, parameters: ModelParameters, simulated_n: Floats) -> ModelParameters:
     """The point with area and offsets that regression finds; unchanged where the force does not answer."""
     gain, offset, _ = _regression(bench, simulated_n, None)
     if not 0.02 < gain < 50.0:

@@ -89,7 +89,9 @@ class CandidateScore:
 def score_candidates(found: CandidateColumns, fitted: FittedModel, whiten: Whiten) -> list[CandidateScore]:
     """Every candidate's promise beside the present model."""
     normal = NormalEquations(whiten(fitted.jacobian), whiten(found.columns), whiten(fitted.residual_n))
-    return [_with_power(_score(candidate, normal, fitted.parameters), normal) for candidate in found.candidates]
+    return [
+        _with_power(_score_candidate(candidate, normal, fitted.parameters), normal) for candidate in found.candidates
+    ]
 
 
 def _with_power(score: CandidateScore, normal: NormalEquations) -> CandidateScore:
@@ -98,18 +100,18 @@ def _with_power(score: CandidateScore, normal: NormalEquations) -> CandidateScor
     return replace(score, power=float(np.max(power)), alone=float(np.max(power / raw_power)))
 
 
-def _score(candidate: Candidate, normal: NormalEquations, parameters: ModelParameters) -> CandidateScore:
+def _score_candidate(candidate: Candidate, normal: NormalEquations, parameters: ModelParameters) -> CandidateScore:
     screened = normal.add(list(candidate.columns))
     if candidate.form.quadrature:
-        start = _turned(candidate, screened)
+        start = _turn_phase(candidate, screened)
         return CandidateScore(candidate, screened.gain, apply_start(parameters, candidate.form, start))
     size = float(screened.sizes[0])
     if candidate.form.proportional:
-        return CandidateScore(candidate, screened.gain, _sized(candidate, parameters, size))
-    return _bounded(candidate, normal, parameters, size)
+        return CandidateScore(candidate, screened.gain, _apply_sizes(candidate, parameters, size))
+    return _score_bounded(candidate, normal, parameters, size)
 
 
-def _turned(candidate: Candidate, screened: ColumnGain) -> Start:
+def _turn_phase(candidate: Candidate, screened: ColumnGain) -> Start:
     along, across = (float(size) for size in screened.sizes)
     unit = candidate.form.parameters[-1].unit
     angle = math.atan2(across, along)
@@ -118,29 +120,31 @@ def _turned(candidate: Candidate, screened: ColumnGain) -> Start:
     return (start[0] * math.hypot(along, across), *start[1:-1], start[-1] + turn)
 
 
-def _bounded(candidate: Candidate, normal: NormalEquations, parameters: ModelParameters, size: float) -> CandidateScore:
+def _score_bounded(
+    candidate: Candidate, normal: NormalEquations, parameters: ModelParameters, size: float
+) -> CandidateScore:
     """A response that is no straight line: the size counts as far as it is believed."""
     column = candidate.columns[0]
     limit = candidate.form.exact or candidate.form.parameters[0].null >= ANY  # a fall from UNLIMITED has one size
-    kept = min(max(size, 0.0 if _at_low(candidate, parameters) else -1.0), 1.0 if limit else _LARGEST_STRETCH)
+    kept = min(max(size, 0.0 if _is_at_limit(candidate, parameters) else -1.0), 1.0 if limit else _LARGEST_STRETCH)
     kept = 1.0 if candidate.form.exact else kept
     gain = float(2.0 * kept * normal.slope[column] - kept**2 * normal.power[column])
     begin = (
         apply_start(parameters, candidate.form, candidate.start)
         if limit
-        else _sized(candidate, parameters, kept if kept < 0.0 else max(kept, 0.2))
+        else _apply_sizes(candidate, parameters, kept if kept < 0.0 else max(kept, 0.2))
     )
     return CandidateScore(candidate, max(gain, 0.0) if kept != 0.0 else 0.0, begin)
 
 
-def _at_low(candidate: Candidate, parameters: ModelParameters) -> bool:
+def _is_at_limit(candidate: Candidate, parameters: ModelParameters) -> bool:
     """Would a smaller size than now leave the bounds? Asked in the direction of the start."""
     parameter, way = candidate.form.parameters[0], candidate.start[0]
     value = parameters.value(parameter)
     return value <= parameter.low if way > 0.0 else value >= parameter.high
 
 
-def _sized(candidate: Candidate, parameters: ModelParameters, size: float) -> ModelParameters:
+def _apply_sizes(candidate: Candidate, parameters: ModelParameters, size: float) -> ModelParameters:
     sizes = tuple(
         number if parameter.shape else number * size
         for parameter, number in zip(candidate.form.parameters, candidate.start, strict=True)

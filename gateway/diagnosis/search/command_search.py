@@ -29,18 +29,18 @@ _SMALLEST_STEP_V: Final = 0.0125
 _USUAL_STEPS_V: Final = (10.0 / 1023.0, 10.0 / 511.0, 10.0 / 255.0, 5.0 / 1023.0, 5.0 / 255.0)
 _LARGEST_SPAN_V: Final = 20.0  # a command beyond it is no voltage
 _BANDS_V: Final = np.geomspace(0.004, 0.8, 160)
-_FINER: Final = np.linspace(-1.0, 1.0, 41)  # between the neighbours of a step that was found
-_LOOKED_AT: Final = 12
-_BEST: Final = 3
-_WHOLE: Final = 0.35  # a step that explains best when shrunk below this share of itself is not the step
+_FINER_OFFSETS: Final = np.linspace(-1.0, 1.0, 41)  # between the neighbours of a step that was found
+_MOST_STEPS_REFINED: Final = 12
+_MOST_ANSWERS: Final = 3
+_LEAST_WHOLE_STEP: Final = 0.35  # a step that explains best when shrunk below this share of itself is not the step
 _FINE_POINTS: Final = ("presliding_m", "stribeck_n", "dwell_stiction_n", "viscous_n_s_per_m", "asymmetry_n_s_per_m")
-_BUNCH: Final = 0.25  # of the lag
-_AT_ONCE: Final = 3_000_000  # numbers of one kind in memory
+_BUNCH_SHARE_OF_LAG: Final = 0.25  # of the lag
+_MOST_NUMBERS_AT_ONCE: Final = 3_000_000  # numbers of one kind in memory
 
 
 def likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:
     """Steps of the command whose saw tooth is most like the residual, the best first."""
-    return _likely(bench, fitted, whiten, _steps_v(_span_v(bench))) if _span_v(bench) > 0.0 else ()
+    return _most_likely_steps_v(bench, fitted, whiten, _steps_v(_span_v(bench))) if _span_v(bench) > 0.0 else ()
 
 
 def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:
@@ -49,19 +49,19 @@ def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) ->
         return ()
     regulator = fitted.parameters.plant.regulator
     bands_pa = _BANDS_V * regulator.full_scale_pa / regulator.full_scale_v
-    rigid = replace(fitted.parameters, plant=_rigid(fitted.parameters.plant))
+    rigid = replace(fitted.parameters, plant=_with_rigid_friction(fitted.parameters.plant))
     without = bench.simulate([rigid])
     cost = np.zeros(bands_pa.size)
-    for part in _parts(bands_pa.size, bench.rows):
+    for part in _column_parts(bands_pa.size, bench.rows):
         columns = bench.reduced(
             bench.simulate([rigid.with_value(DEAD_BAND, band_pa) for band_pa in bands_pa[part]]) - without
         )
         normal = NormalEquations(whiten(fitted.jacobian), whiten(columns), whiten(fitted.residual_n))
         cost[part] = normal.power - 2.0 * normal.slope
-    return tuple(bands_pa[np.argsort(cost)[:_BEST]].tolist())
+    return tuple(bands_pa[np.argsort(cost)[:_MOST_ANSWERS]].tolist())
 
 
-def _rigid(plant: Plant) -> Plant:
+def _with_rigid_friction(plant: Plant) -> Plant:
     """The same plant with friction that costs little to replay."""
     return replace(plant, friction=replace(plant.friction, **dict.fromkeys(_FINE_POINTS, 0.0)))
 
@@ -84,42 +84,44 @@ def _spacing(step_v: Real, span_v: float) -> Real:
     return smaller(step_v / (3.0 * span_v), 0.05)
 
 
-def _likely(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> tuple[float, ...]:
+def _most_likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> tuple[float, ...]:
     span_v, best = _span_v(bench), list[float]()
-    for size in tried[np.argsort(-_promises(bench, fitted, whiten, tried))]:
+    for size in tried[np.argsort(-_first_wave_scores(bench, fitted, whiten, tried))]:
         if all(abs(size / other - 1.0) > 1.5 * _spacing(size, span_v) for other in best):
             best.append(float(size))
-        if len(best) == _LOOKED_AT:
+        if len(best) == _MOST_STEPS_REFINED:
             break
-    finer = np.array([size * (1.0 + _spacing(size, span_v) * _FINER) for size in best])
-    gains = _gains(bench, fitted, whiten, finer.ravel()).reshape(finer.shape)
+    finer = np.array([size * (1.0 + _spacing(size, span_v) * _FINER_OFFSETS) for size in best])
+    gains = _chi2_gains(bench, fitted, whiten, finer.ravel()).reshape(finer.shape)
     sharpest = finer[np.arange(len(best)), np.argmax(gains, axis=1)]
-    return tuple(sharpest[np.argsort(-np.max(gains, axis=1))[:_BEST]].tolist())
+    return tuple(sharpest[np.argsort(-np.max(gains, axis=1))[:_MOST_ANSWERS]].tolist())
 
 
-def _promises(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
+def _first_wave_scores(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
     """How much the first wave of each step's teeth is like the residual, in no unit; rows in bunches: a lag is slow."""
     told = whiten(whiten(fitted.residual_n)) * bench.usable
     slope, power = np.zeros(tried.size), np.full(tried.size, 1.0e-300)
-    for channel, command_v, row_s in _driven(bench):
-        bunch = max(int(_BUNCH * fitted.parameters.value(LAG) / row_s), 1)
+    for channel, command_v, row_s in _commanded_channels(bench):
+        bunch = max(int(_BUNCH_SHARE_OF_LAG * fitted.parameters.value(LAG) / row_s), 1)
         rows = np.arange(0, command_v.size, bunch)
         sums, some_v = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0)), command_v[rows]
-        for part in _parts(tried.size, rows.size):
-            waves = _error(_waved(some_v[:, None], tried[part]), some_v, bunch * row_s, fitted.parameters)
+        for part in _column_parts(tried.size, rows.size):
+            waves = _rounding_error_v(
+                _first_wave_of_teeth(some_v[:, None], tried[part]), some_v, bunch * row_s, fitted.parameters
+            )
             waves -= waves.mean(axis=0)
             slope[part] += sums @ waves
             power[part] += bunch * np.einsum("ij,ij->j", waves, waves)
     return np.asarray(np.maximum(slope, 0.0) ** 2 / power)
 
 
-def _parts(columns: int, rows: int) -> Iterator[slice]:
+def _column_parts(columns: int, rows: int) -> Iterator[slice]:
     """Some columns at a time: a long recording has many rows."""
-    many = max(_AT_ONCE // rows, 1)
+    many = max(_MOST_NUMBERS_AT_ONCE // rows, 1)
     yield from (slice(first, first + many) for first in range(0, columns, many))
 
 
-def _driven(bench: Bench) -> Iterator[tuple[Channel, Floats, float]]:
+def _commanded_channels(bench: Bench) -> Iterator[tuple[Channel, Floats, float]]:
     """Forces that a command drives: where they stand, the command of each row, V, and the usual distance of rows, s."""
     for channel in bench.channels:
         measurement = bench.measurements[channel.recording]
@@ -127,34 +129,34 @@ def _driven(bench: Bench) -> Iterator[tuple[Channel, Floats, float]]:
             yield channel, measurement.command_v, float(np.median(np.diff(measurement.time_s)))
 
 
-def _waved(command_v: Floats, steps_v: Floats) -> Floats:
+def _first_wave_of_teeth(command_v: Floats, steps_v: Floats) -> Floats:
     """The command, rounded to steps whose teeth are their first wave only."""
     return np.asarray(command_v - steps_v / math.pi * np.sin(2.0 * math.pi / steps_v * command_v))
 
 
-def _gains(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
+def _chi2_gains(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
     """Chi-square that each step explains of the whitened residual."""
     found = np.zeros(tried.size)
-    for part in _parts(tried.size, bench.rows):
+    for part in _column_parts(tried.size, bench.rows):
         vectors = np.zeros((tried[part].size, bench.rows))
-        for channel, command_v, row_s in _driven(bench):
+        for channel, command_v, row_s in _commanded_channels(bench):
             rounded = np.round(command_v[:, None] / tried[part]) * tried[part]
-            vectors[:, channel.rows] = _error(rounded, command_v, row_s, fitted.parameters).T
+            vectors[:, channel.rows] = _rounding_error_v(rounded, command_v, row_s, fitted.parameters).T
         normal = NormalEquations(whiten(fitted.jacobian), whiten(bench.reduced(vectors)), whiten(fitted.residual_n))
         power = np.maximum(normal.power, 1.0e-300)
-        found[part] = np.where(normal.slope > _WHOLE * power, normal.slope**2 / power, 0.0)
+        found[part] = np.where(normal.slope > _LEAST_WHOLE_STEP * power, normal.slope**2 / power, 0.0)
     return found
 
 
-def _error(given_v: Floats, command_v: Floats, row_s: float, parameters: ModelParameters) -> Floats:
+def _rounding_error_v(given_v: Floats, command_v: Floats, row_s: float, parameters: ModelParameters) -> Floats:
     """What it makes of the force, in volts, that these were given (rows, steps) and not the command (rows,)."""
-    both = _lagged(np.concatenate([given_v, command_v[:, None]], axis=1), parameters.value(LAG), row_s)
+    both = _apply_lag(np.concatenate([given_v, command_v[:, None]], axis=1), parameters.value(LAG), row_s)
     regulator, friction_pa = parameters.plant.regulator, parameters.value(COULOMB) / parameters.value(AREA)
-    played = _dragged(both, friction_pa * regulator.full_scale_v / regulator.full_scale_pa)
+    played = _apply_friction_play(both, friction_pa * regulator.full_scale_v / regulator.full_scale_pa)
     return np.asarray(played[:, :-1] - played[:, -1:])
 
 
-def _lagged(command_v: Floats, lag_s: float, row_s: float) -> Floats:
+def _apply_lag(command_v: Floats, lag_s: float, row_s: float) -> Floats:
     """Behind the regulator's lag; a row sees the command of the row before."""
     from scipy.signal import lfilter
 
@@ -162,7 +164,7 @@ def _lagged(command_v: Floats, lag_s: float, row_s: float) -> Floats:
     return np.asarray(lfilter([0.0, share], [1.0, share - 1.0], command_v, axis=0))
 
 
-def _dragged(values: Floats, half_width: float) -> Floats:
+def _apply_friction_play(values: Floats, half_width: float) -> Floats:
     """Play operator along the rows: what rigid friction lets through."""
     low, high, found = values - half_width, values + half_width, np.empty_like(values)
     state = np.maximum(low[0], 0.0)

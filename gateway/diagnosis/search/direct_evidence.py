@@ -39,7 +39,9 @@ def find_outliers(bench: Bench, residual_n: Floats, quantum_n: float) -> DirectE
     for channel in bench.channels:
         if channel.is_force:
             simulated_n = (bench.measured_n - residual_n)[channel.rows]
-            flagged[channel.rows] = _apart(residual_n[channel.rows], simulated_n, bench.usable[channel.rows], quantum_n)
+            flagged[channel.rows] = _stands_out(
+                residual_n[channel.rows], simulated_n, bench.usable[channel.rows], quantum_n
+            )
     count = int(flagged.sum())
     if count < _FEWEST_SPIKES:
         return None
@@ -50,10 +52,10 @@ def find_outliers(bench: Bench, residual_n: Floats, quantum_n: float) -> DirectE
         (OUTLIER_SHARE, share, float(np.sqrt(share / judged.sum()))),
         (OUTLIER, size, size / float(np.sqrt(2.0 * count))),
     )
-    return DirectEvidence("outliers", values, flagged, bench.rms_n(residual_n), _rms(residual_n[judged & ~flagged]))
+    return DirectEvidence("outliers", values, flagged, bench.rms_n(residual_n), _rms_of(residual_n[judged & ~flagged]))
 
 
-def _apart(residual_n: Floats, simulated_n: Floats, usable: Flags, quantum_n: float) -> Flags:
+def _stands_out(residual_n: Floats, simulated_n: Floats, usable: Flags, quantum_n: float) -> Flags:
     """Rows that differ from the median of five around them far beyond chance, and beyond a row's error in time."""
     padded = np.pad(residual_n, 2, mode="edge")
     around = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
@@ -75,7 +77,7 @@ def find_repeats(bench: Bench, residual_n: Floats) -> DirectEvidence | None:
         return None
     values = ((REPEATED, share, float(np.sqrt(share / bench.judged.sum()))),)
     return DirectEvidence(
-        "repeated-samples", values, flagged, bench.rms_n(residual_n), _rms(residual_n[bench.judged & ~flagged])
+        "repeated-samples", values, flagged, bench.rms_n(residual_n), _rms_of(residual_n[bench.judged & ~flagged])
     )
 
 
@@ -114,5 +116,5 @@ def _lattice_n(force_n: Floats) -> float:
     return quantum if float(np.mean(off < 0.02)) > 0.98 else 0.0
 
 
-def _rms(values: Floats) -> float:
+def _rms_of(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

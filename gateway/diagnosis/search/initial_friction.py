@@ -23,15 +23,15 @@ from gateway.diagnosis.search.recording_drive import begins_at_rest
 from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import Strains
 
-_TRIED: Final[tuple[Strains, ...]] = (
+_TRIED_STRAINS: Final[tuple[Strains, ...]] = (
     (0.0, 0.0, 0.0),
     *((one, two, three) for one in (1.0, -1.0) for two in (1.0, -1.0) for three in (1.0, -1.0)),
 )
 """The middle, both branches, and what reversals of different sizes within the loop leave."""
 _WAVES: Final = 4
-_FELT: Final = 2.0  # chi-square that the whole way of a strain must make for it to be fitted
-_FAINT: Final = 0.1  # of the noise: what is less of the start is forgotten
-_YOUNGEST: Final = 0.25  # of a recording may count as its beginning
+_LEAST_CHI2: Final = 2.0  # chi-square that the whole way of a strain must make for it to be fitted
+_FORGOTTEN_SHARE: Final = 0.1  # of the noise: what is less of the start is forgotten
+_LONGEST_START_SHARE: Final = 0.25  # of a recording may count as its beginning
 
 
 def start_parameters(bench: Bench, plant: Plant) -> tuple[Parameter, ...]:
@@ -50,12 +50,13 @@ def try_initial_strains(
     bench: Bench, parameters: ModelParameters, whiten: Whitener, most: int = 3
 ) -> list[ModelParameters]:
     """The point with the best few starts for each recording, the best first: a fit may end in the wrong one."""
-    parameter_sets = [replace(parameters, starts=(strains,) * len(bench.measurements)) for strains in _TRIED]
+    parameter_sets = [replace(parameters, starts=(strains,) * len(bench.measurements)) for strains in _TRIED_STRAINS]
     costs = [
-        _costs(bench, residual) for residual in whiten(_centred(bench, bench.residuals(bench.simulate(parameter_sets))))
+        _squares_per_recording(bench, residual)
+        for residual in whiten(_subtract_offsets(bench, bench.residuals(bench.simulate(parameter_sets))))
     ]
     ranked = np.argsort(np.array(costs), axis=0)[:most]
-    return [replace(parameters, starts=tuple(_TRIED[int(index)] for index in best)) for best in ranked]
+    return [replace(parameters, starts=tuple(_TRIED_STRAINS[int(index)] for index in best)) for best in ranked]
 
 
 def fit_initial_strains(bench: Bench, plant: Plant) -> FittedModel:
@@ -67,7 +68,7 @@ def fit_initial_strains(bench: Bench, plant: Plant) -> FittedModel:
     return refine(bench, [FitProblem(parameters, start_parameters(bench, plant))], whiten, waves=_WAVES)[0]
 
 
-def _centred(bench: Bench, residuals: Floats) -> Floats:
+def _subtract_offsets(bench: Bench, residuals: Floats) -> Floats:
     """Without the offset of each recording."""
     found = residuals.copy()
     for channel in bench.channels:
@@ -76,7 +77,7 @@ def _centred(bench: Bench, residuals: Floats) -> Floats:
     return found
 
 
-def _costs(bench: Bench, residual: Floats) -> list[float]:
+def _squares_per_recording(bench: Bench, residual: Floats) -> list[float]:
     """Squared residual of each recording."""
     costs = [0.0] * len(bench.measurements)
     for channel in bench.channels:
@@ -89,16 +90,16 @@ def drop_unfelt_strains(bench: Bench, fitted: FittedModel, whiten: Whitener) -> 
     offsets = len(fitted.parameters.offsets_n)
     columns = whiten(fitted.jacobian)
     kept = [
-        not isinstance(parameter, InitialStrain) or float(np.sum(column**2)) > _FELT
+        not isinstance(parameter, InitialStrain) or float(np.sum(column**2)) > _LEAST_CHI2
         for parameter, column in zip(fitted.free, columns[offsets:], strict=True)
     ]
     free = tuple(parameter for parameter, keep in zip(fitted.free, kept, strict=True) if keep)
     rows = [True] * offsets + kept
-    young = replace(bench, young=_young(bench, fitted, whiten))
+    young = replace(bench, young=_rows_that_feel_the_start(bench, fitted, whiten))
     return young, replace(fitted, free=free, jacobian=fitted.jacobian[np.array(rows)])
 
 
-def _young(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Flags:
+def _rows_that_feel_the_start(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Flags:
     """Rows until the last one that feels the start of its recording, at most the first quarter of it."""
     young = np.zeros(bench.rows, dtype=bool)
     offsets = len(fitted.parameters.offsets_n)
@@ -108,8 +109,8 @@ def _young(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Flags:
                 if channel.recording == parameter.recording and not begins_at_rest(
                     bench.measurements[channel.recording]
                 ):
-                    part = np.flatnonzero(np.abs(column[channel.rows]) > _FAINT * whiten.floor_n)
-                    most = int(_YOUNGEST * (channel.rows.stop - channel.rows.start))
+                    part = np.flatnonzero(np.abs(column[channel.rows]) > _FORGOTTEN_SHARE * whiten.floor_n)
+                    most = int(_LONGEST_START_SHARE * (channel.rows.stop - channel.rows.start))
                     last = min(int(part[-1]) + 1, most) if part.size else 0
                     young[channel.rows.start : channel.rows.start + last] = True
     return young

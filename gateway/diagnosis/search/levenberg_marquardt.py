@@ -18,7 +18,7 @@ from gateway.diagnosis.search.parameters import ModelParameters
 Whiten = Callable[[Floats], Floats]
 
 _DAMPINGS: Final = (0.0, 1.0, 30.0)
-_ENOUGH: Final = 0.02  # a gain in chi-square below this share of one row's is no progress
+_LEAST_PROGRESS: Final = 0.02  # a gain in chi-square below this share of one row's is no progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +53,13 @@ def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten, waves: 
     for _ in range(waves):
         if not active:
             break
-        better = _one_wave(bench, [fitted[index] for index in active], whiten)
+        better = _try_steps(bench, [fitted[index] for index in active], whiten)
         moving = []
         for index, found in zip(active, better, strict=True):
             if found is not None:
                 gain = fitted[index].chi2 - found.chi2
                 fitted[index] = found
-                if gain > max(_ENOUGH, 1.0e-5 * found.chi2):
+                if gain > max(_LEAST_PROGRESS, 1.0e-5 * found.chi2):
                     moving.append(index)
         active = moving
         for index, found in zip(
@@ -113,9 +113,9 @@ def _offset_column(bench: Bench, recording: int) -> Floats:
     return column
 
 
-def _one_wave(bench: Bench, fitted: Sequence[FittedModel], whiten: Whiten) -> list[FittedModel | None]:
+def _try_steps(bench: Bench, fitted: Sequence[FittedModel], whiten: Whiten) -> list[FittedModel | None]:
     """The best of a few damped steps of each problem; None where no step is better."""
-    trials = [[_stepped(each, whiten, damping) for damping in _DAMPINGS] for each in fitted]
+    trials = [[_damped_step(each, whiten, damping) for damping in _DAMPINGS] for each in fitted]
     simulated = bench.simulate([parameters for parameter_sets in trials for parameters in parameter_sets])
     residuals = bench.residuals(simulated).reshape(len(fitted), len(_DAMPINGS), -1)
     chi2 = np.sum(whiten(residuals) ** 2, axis=-1)
@@ -131,7 +131,7 @@ def _one_wave(bench: Bench, fitted: Sequence[FittedModel], whiten: Whiten) -> li
     return result
 
 
-def _stepped(fitted: FittedModel, whiten: Whiten, damping: float) -> ModelParameters:
+def _damped_step(fitted: FittedModel, whiten: Whiten, damping: float) -> ModelParameters:
     """Where a damped Gauss-Newton step leads; a parameter that would leave its bounds stays, the others step again."""
     columns, residual = whiten(fitted.jacobian), whiten(fitted.residual_n)
     normal_matrix, slope = columns @ columns.T, columns @ residual
@@ -152,10 +152,10 @@ def _stepped(fitted: FittedModel, whiten: Whiten, damping: float) -> ModelParame
         if not beyond.any():
             break
         held |= beyond
-    return _at(fitted, np.clip(values + step, low, high))
+    return _apply_values(fitted, np.clip(values + step, low, high))
 
 
-def _at(fitted: FittedModel, values: Floats) -> ModelParameters:
+def _apply_values(fitted: FittedModel, values: Floats) -> ModelParameters:
     count = len(fitted.parameters.offsets_n)
     parameters = fitted.parameters.with_offsets(values[:count].tolist())
     for parameter, value in zip(fitted.free, values[count:], strict=True):

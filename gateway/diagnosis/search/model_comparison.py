@@ -27,9 +27,9 @@ from gateway.diagnosis.search.normal_equations import block_sums
 
 MOST_REFINED: Final = 6
 _RESAMPLES: Final = 500
-_SHARE: Final = 0.95  # a name that wins this often stands alone
+_SURE_SHARE: Final = 0.95  # a name that wins this often stands alone
 _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
-_ALIKE: Final = 0.75  # share of the gain that a relative must explain to stay in the group
+_SIMILAR_GAIN_SHARE: Final = 0.75  # share of the gain that a relative must explain to stay in the group
 _WAVES: Final = 6
 _INCUMBENT_SHARE: Final = 0.04
 _SEED: Final = 20
@@ -86,8 +86,12 @@ class ModelComparison:
         """
         own = max((each.gain for each in self.ranked if each.effect.name == name), default=0.0)
         relatives = BY_NAME[name].group
-        alike = {each.effect.name for each in self.ranked if each.effect.name in relatives and each.gain > _ALIKE * own}
-        if self.shares.get(name, 0.0) < _SHARE:
+        alike = {
+            each.effect.name
+            for each in self.ranked
+            if each.effect.name in relatives and each.gain > _SIMILAR_GAIN_SHARE * own
+        }
+        if self.shares.get(name, 0.0) < _SURE_SHARE:
             alike |= {each for each, share in self.shares.items() if share >= _SMALL_SHARE}
         names = dict.fromkeys(each.effect.name for each in self.ranked if each.effect.name in alike - {name})
         return (name, *sorted(names, key=lambda each: -self.shares.get(each, 0.0)))
@@ -125,7 +129,9 @@ def compare_effects(
     ]
     ranked += [replace(incumbent, incumbent_bonus=_incumbent_bonus(bench, incumbent))] if incumbent else []
     ranked.sort(key=lambda each: -each.penalised_gain)
-    return ModelComparison(fitted, tuple(ranked), _shares(ranked), hints, _starts(found, hints), tuple(promised))
+    return ModelComparison(
+        fitted, tuple(ranked), _winning_shares(ranked), hints, _count_starts(found, hints), tuple(promised)
+    )
 
 
 def _incumbent_bonus(bench: Bench, incumbent: RefinedEffect) -> float:
@@ -148,7 +154,7 @@ def refined_effect(
     return RefinedEffect(effect, form, refined, beside.chi2 - refined.chi2, dof, block_chi2)
 
 
-def _shares(ranked: Sequence[RefinedEffect]) -> dict[str, float]:
+def _winning_shares(ranked: Sequence[RefinedEffect]) -> dict[str, float]:
     """How often each name has the least chi-square, two per parameter added, over resampled blocks."""
     if not ranked:
         return {}
@@ -162,7 +168,7 @@ def _shares(ranked: Sequence[RefinedEffect]) -> dict[str, float]:
     return shares
 
 
-def _starts(found: CandidateColumns, hints: SearchHints) -> int:
+def _count_starts(found: CandidateColumns, hints: SearchHints) -> int:
     """Starts tried; a line or a pitch was chosen among as many as the rows can tell apart."""
     rows = hints.duration_s / max(hints.row_s, 1.0e-6)
     searched = sum(each.form.quadrature and len(each.start) == 3 for each in found.candidates)

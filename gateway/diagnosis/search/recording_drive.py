@@ -11,11 +11,13 @@ from gateway.twin.surroundings import COLUMNS, Surroundings
 
 MOTIONS: Final[tuple[Motion, ...]] = ("inferred", "measured", "measured-reversed")  # how the slide's may be known
 SETTLING_S: Final = 1.0  # of a recording's start are not judged, unless it begins at rest at its lowest:
-_LOWEST: Final = 0.02  # of the drive's range
-_FORGOTTEN: Final = 0.15  # of the drive's range: a drive that went so far has wiped out what friction remembered ...
-_LATEST: Final = 0.25  # ... and this share of a recording may go by until it has
+_LOWEST_SHARE: Final = 0.02  # of the drive's range
+_FORGOTTEN_SHARE: Final = (
+    0.15  # of the drive's range: a drive that went so far has wiped out what friction remembered ...
+)
+_LATEST_SHARE: Final = 0.25  # ... and this share of a recording may go by until it has
 REST_S: Final = 0.2  # command and force stand still for so long
-_SLACK: Final = 5.0e-3  # of the forces' range that a force at rest may wander
+_REST_SLACK_SHARE: Final = 5.0e-3  # of the forces' range that a force at rest may wander
 
 
 def settled_s(measurement: Measurement) -> float:
@@ -25,8 +27,8 @@ def settled_s(measurement: Measurement) -> float:
     if drive is None:
         return settled_s
     gone = np.maximum.accumulate(drive) - np.minimum.accumulate(drive)
-    forgotten_s = float(measurement.time_s[int(np.argmax(gone >= _FORGOTTEN * gone[-1]))])
-    return min(settled_s + forgotten_s, max(settled_s, _LATEST * measurement.duration_s))
+    forgotten_s = float(measurement.time_s[int(np.argmax(gone >= _FORGOTTEN_SHARE * gone[-1]))])
+    return min(settled_s + forgotten_s, max(settled_s, _LATEST_SHARE * measurement.duration_s))
 
 
 def begins_at_rest(measurement: Measurement) -> bool:
@@ -35,13 +37,13 @@ def begins_at_rest(measurement: Measurement) -> bool:
     rows = measurement.time_s < REST_S
     if measurement.command_v is None or rows.sum() < 8 or np.ptp(measurement.command_v[rows]) > 0.0:
         return False
-    if measurement.command_v[0] > np.min(measurement.command_v) + _LOWEST * np.ptp(measurement.command_v):
+    if measurement.command_v[0] > np.min(measurement.command_v) + _LOWEST_SHARE * np.ptp(measurement.command_v):
         return False
     first, second = np.array_split(measurement.force_n[rows & measurement.usable], 2)
     if min(first.size, second.size) < 4:
         return False
     error_n = float(np.sqrt(np.var(first) / first.size + np.var(second) / second.size))
-    slack_n = _SLACK * float(np.ptp(measurement.force_n[measurement.usable]))  # slow noise wanders, too
+    slack_n = _REST_SLACK_SHARE * float(np.ptp(measurement.force_n[measurement.usable]))  # slow noise wanders, too
     return abs(float(np.mean(first) - np.mean(second))) < max(4.0 * error_n, slack_n) + 1.0e-9
 
 

@@ -40,22 +40,22 @@ from gateway.diagnosis.search.normal_equations import block_sums, held_out_error
 from gateway.diagnosis.search.parameters import reset_parameters
 
 MOST_EFFECTS: Final = 5
-_DISCREPANT: Final = 3.0  # chi-square per row of the winner
-_CLEARLY: Final = 1.15  # a nameless dependence must explain this much more than the best effect ...
-_CLEARLY_ALIKE: Final = 1.3  # ... or this much more, where both look at one column ...
-_MARGIN: Final = 10.0  # ... and this much more in chi-square
-_DOUBT: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
-_MOMENTS: Final = 2  # best and worst blocks without which an effect that acts everywhere ...
-_ELSEWHERE: Final = 0.3  # ... must save this much of what it saves with them
-_OVERWHELMING: Final = 80.0
-_RIVALS: Final = 2
+_DISCREPANT_CHI2_PER_ROW: Final = 3.0  # chi-square per row of the winner
+_CLEARLY_STRONGER: Final = 1.15  # a nameless dependence must explain this much more than the best effect ...
+_CLEARLY_STRONGER_ON_ITS_COLUMN: Final = 1.3  # ... or this much more, where both look at one column ...
+_CHI2_MARGIN: Final = 10.0  # ... and this much more in chi-square
+_SAVING_QUANTILE: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
+_EXTREME_BLOCKS: Final = 2  # best and worst blocks without which an effect that acts everywhere ...
+_LEAST_SHARE_ELSEWHERE: Final = 0.3  # ... must save this much of what it saves with them
+_OVERWHELMING_CHI2: Final = 80.0
+_MOST_RIVALS: Final = 2
 _COMPANIONS: Final = 2  # looked at closely for each
-_WINS: Final = 0.05  # share from which a rival is looked at
+_LEAST_RIVAL_SHARE: Final = 0.05  # share from which a rival is looked at
 _SEED: Final = 21
 _LEAST_GAIN: Final = 0.04  # of the held-out squared error; less is a trifle ...
 _LEAST_SURE_GAIN: Final = 0.02  # ... unless chi-square overwhelms
 _LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain ...
-_MUCH: Final = 0.15  # ... unless it saves this much of the held-out squared error
+_MUCH_SAVED: Final = 0.15  # ... unless it saves this much of the held-out squared error
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,41 +84,41 @@ class SearchResult:
 
 def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], whiten: Whitener) -> SearchResult:
     """All effects that the recording shows, one after the other. `base` is the refitted base model."""
-    base, whiten, comparison = _opened(bench, base, effects, whiten)
+    base, whiten, comparison = _compare_under_noise(bench, base, effects, whiten)
     first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
     unnamed: list[Dependence] = []
     while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
-        explained = _explained(base, fitted, accepted)
+        explained = _explained_chi2(base, fitted, accepted)
         winner, saved = None, 0.0
         if comparison.ranked and is_significant(comparison.winner, comparison.starts):
-            winner, saved = comparison.winner, _saved(bench, fitted, comparison.winner, whiten, explained)
-            if _matters(winner, saved):  # the name of a trifle is not worth foresight
-                winner = _foreseen(bench, comparison, _others(effects, accepted), whiten)
-                saved = saved if winner is comparison.winner else _saved(bench, fitted, winner, whiten, explained)
-            saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH
+            winner, saved = comparison.winner, _saved_share(bench, fitted, comparison.winner, whiten, explained)
+            if _saves_enough(winner, saved):  # the name of a trifle is not worth foresight
+                winner = _pick_with_companions(bench, comparison, _not_accepted(effects, accepted), whiten)
+                saved = saved if winner is comparison.winner else _saved_share(bench, fitted, winner, whiten, explained)
+            saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH_SAVED
         dependence = strongest_dependence(bench, fitted, whiten, [each.leftover for each in unnamed], outside=True)
         strongest = comparison.winner if saved > 0.0 else None
-        if dependence is not None and _stands_beside(dependence, strongest, explained):
+        if dependence is not None and _is_clearly_stronger(dependence, strongest, explained):
             unnamed.append(dependence)
             bench = bench.without_columns(dependence.regressors.columns)
             fitted = refit(bench, fitted, whiten)
         elif winner is None or saved == 0.0:
             break
-        elif _matters(winner, saved) and _noticeable(winner, fitted):
+        elif _saves_enough(winner, saved) and _is_noticeable(winner, fitted):
             accepted.append(AcceptedEffect(winner.effect, winner.form, comparison))
             fitted = winner.fitted
         else:
             usual.append(winner.effect)
-            base, fitted = _widened(bench, base, winner, whiten), winner.fitted
+            base, fitted = _widen_base(bench, base, winner, whiten), winner.fitted
         effects = [effect for effect in effects if effect not in usual]
-        fitted, whiten, comparison = _opened(bench, fitted, _others(effects, accepted), whiten)
-        base = _revalued(bench, base, whiten)
+        fitted, whiten, comparison = _compare_under_noise(bench, fitted, _not_accepted(effects, accepted), whiten)
+        base = _refit_base(bench, base, whiten)
     if len(accepted) > 1:
-        fitted, accepted = _exchanged(bench, fitted, base, accepted, effects, whiten)
+        fitted, accepted = _exchange_effects(bench, fitted, base, accepted, effects, whiten)
     return SearchResult(bench, base, fitted, tuple(accepted), tuple(unnamed), whiten, first, comparison)
 
 
-def _opened(
+def _compare_under_noise(
     bench: Bench, fitted: FittedModel, effects: Sequence[Effect], whiten: Whitener
 ) -> tuple[FittedModel, Whitener, ModelComparison]:
     """Noise as the remainder shows it, the model at its optimum under that noise, and the effects compared beside it.
@@ -131,7 +131,7 @@ def _opened(
     whiten = coloured_whitener(bench, *unexplained_residual(found, fitted), whiten.weights)
     fitted = refit(bench, fitted, whiten)
     comparison = compare_effects(bench, fitted, effects, hints, whiten)
-    if comparison.ranked and comparison.winner.fitted.chi2 > _DISCREPANT * int(bench.usable.sum()):
+    if comparison.ranked and comparison.winner.fitted.chi2 > _DISCREPANT_CHI2_PER_ROW * int(bench.usable.sum()):
         best = min((each.fitted for each in comparison.ranked), key=lambda each: bench.rms_n(each.residual_n))
         whiten = coloured_whitener(bench, best.residual_n, orthonormal(best.jacobian), whiten.weights)
         fitted = refit(bench, fitted, whiten, waves=5)
@@ -139,28 +139,32 @@ def _opened(
     return fitted, whiten, comparison
 
 
-def _revalued(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedModel:
+def _refit_base(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedModel:
     """The same model at its optimum under another noise."""
     return refit(bench, fitted, whiten, waves=2)
 
 
-def _others(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect]) -> list[Effect]:
+def _not_accepted(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect]) -> list[Effect]:
     taken = {each.effect.name for each in accepted}
     return [effect for effect in effects if effect.name not in taken]
 
 
-def _stands_beside(dependence: Dependence, strongest: RefinedEffect | None, explained: float) -> bool:
+def _is_clearly_stronger(dependence: Dependence, strongest: RefinedEffect | None, explained: float) -> bool:
     """Is a nameless dependence more than what the effects before it have left, and clearly more than the strongest effect?
 
     One on the effect's own column may be no more than the effect's form, which is never exact.
     """
     if strongest is None:
         return dependence.gain > _LEAST_BESIDE * explained
-    times = _CLEARLY_ALIKE if dependence.regressors.depends_on in strongest.form.needs else _CLEARLY
-    return dependence.gain > times * strongest.gain + _MARGIN
+    times = (
+        _CLEARLY_STRONGER_ON_ITS_COLUMN
+        if dependence.regressors.depends_on in strongest.form.needs
+        else _CLEARLY_STRONGER
+    )
+    return dependence.gain > times * strongest.gain + _CHI2_MARGIN
 
 
-def _explained(base: FittedModel, fitted: FittedModel, accepted: Sequence[AcceptedEffect]) -> float:
+def _explained_chi2(base: FittedModel, fitted: FittedModel, accepted: Sequence[AcceptedEffect]) -> float:
     """Chi-square that the model explains by causes whose wrong form could look like another one: not by oscillations."""
     gains = [(each.comparison.winner.gain, each.form.quadrature) for each in accepted]
     total = sum(gain for gain, _oscillates in gains)
@@ -168,28 +172,32 @@ def _explained(base: FittedModel, fitted: FittedModel, accepted: Sequence[Accept
     return max(base.chi2 - fitted.chi2, 0.0) * (shapes / total if total > 0.0 else 1.0)
 
 
-def _foreseen(bench: Bench, comparison: ModelComparison, effects: Sequence[Effect], whiten: Whitener) -> RefinedEffect:
+def _pick_with_companions(
+    bench: Bench, comparison: ModelComparison, effects: Sequence[Effect], whiten: Whitener
+) -> RefinedEffect:
     """The winner; or a rival of another kind that, together with its best companion, explains clearly more.
 
     Two causes together may look like a third one. Looked at only where resampling does not decide.
     """
     winner = comparison.winner
-    rivals = [each for each in comparison.ranked[1:] if _rivals(each, winner, comparison)][:_RIVALS]
+    rivals = [each for each in comparison.ranked[1:] if _is_rival(each, winner, comparison)][:_MOST_RIVALS]
     if not rivals:
         return winner
-    costs = [_with_companion(bench, each, effects, comparison.hints, whiten) for each in (winner, *rivals)]
+    costs = [_cost_with_companion(bench, each, effects, comparison.hints, whiten) for each in (winner, *rivals)]
     best = int(np.argmin(costs))
-    return (winner, *rivals)[best] if costs[best] < costs[0] - _MARGIN else winner
+    return (winner, *rivals)[best] if costs[best] < costs[0] - _CHI2_MARGIN else winner
 
 
-def _rivals(other: RefinedEffect, winner: RefinedEffect, comparison: ModelComparison) -> bool:
+def _is_rival(other: RefinedEffect, winner: RefinedEffect, comparison: ModelComparison) -> bool:
     """Does resampling let this one win now and then, and is it neither the same effect nor a relative?"""
     name = other.effect.name
     is_other = name != winner.effect.name and name not in winner.effect.group
-    return is_other and comparison.shares.get(name, 0.0) >= _WINS and is_significant(other, comparison.starts)
+    return (
+        is_other and comparison.shares.get(name, 0.0) >= _LEAST_RIVAL_SHARE and is_significant(other, comparison.starts)
+    )
 
 
-def _with_companion(
+def _cost_with_companion(
     bench: Bench, first: RefinedEffect, effects: Sequence[Effect], hints: SearchHints, whiten: Whitener
 ) -> float:
     """Return chi-square and penalty of an effect and of the best one beside it; starts by the same hints as without it."""
@@ -199,12 +207,12 @@ def _with_companion(
     return first.penalty + min([first.fitted.chi2, *found])
 
 
-def _matters(refined: RefinedEffect, saved: float) -> bool:
+def _saves_enough(refined: RefinedEffect, saved: float) -> bool:
     """Is what it saves of the held-out squared error no trifle?"""
-    return saved > (_LEAST_SURE_GAIN if refined.gain > _OVERWHELMING else _LEAST_GAIN)
+    return saved > (_LEAST_SURE_GAIN if refined.gain > _OVERWHELMING_CHI2 else _LEAST_GAIN)
 
 
-def _noticeable(refined: RefinedEffect, before: FittedModel) -> bool:
+def _is_noticeable(refined: RefinedEffect, before: FittedModel) -> bool:
     """Is its size, or the change of a size that the plant had already, more than every machine has?"""
     size = refined.form.parameters[0]
     return abs(refined.fitted.parameters.value(size) - before.parameters.value(size)) >= max(
@@ -212,39 +220,41 @@ def _noticeable(refined: RefinedEffect, before: FittedModel) -> bool:
     )
 
 
-def _widened(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whiten) -> FittedModel:
+def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whiten) -> FittedModel:
     """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
     parameters = reset_parameters(base.parameters, usual.fitted.parameters, usual.form.parameters)
     return refine(bench, [FitProblem(parameters, joined_parameters(base, usual.form))], whiten, waves=3)[0]
 
 
-def _saved(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten: Whitener, explained: float) -> float:
+def _saved_share(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten: Whitener, explained: float) -> float:
     """Share of the held-out squared error that it saves; 0 unless it saves in nearly all ways to resample the blocks.
 
     An effect that shows in one block only (a slide that rests once, a force that is negative once) cannot be resampled;
     an overwhelming chi-square stands for it, also beside what the effects before it have `explained`. Not so for a saw
     tooth: it is there all the time, and among so many teeth some meet the few moments that another form got wrong.
     """
-    old = _old_blocks(bench)
+    old = _blocks_past_the_start(bench)
     error_before = held_out_errors(bench, before, whiten).errors[old]
     saved = error_before - held_out_errors(bench, winner.fitted, whiten).errors[old]
     weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
     if winner.form.everywhere:
-        sure = float(np.sum(np.sort(saved)[_MOMENTS:-_MOMENTS])) > _ELSEWHERE * float(np.sum(saved))
+        sure = float(np.sum(np.sort(saved)[_EXTREME_BLOCKS:-_EXTREME_BLOCKS])) > _LEAST_SHARE_ELSEWHERE * float(
+            np.sum(saved)
+        )
     else:
-        overwhelming = winner.gain > max(_OVERWHELMING, 0.5 * explained)
-        sure = overwhelming or float(np.quantile(weights @ saved, _DOUBT)) > 0.0
+        overwhelming = winner.gain > max(_OVERWHELMING_CHI2, 0.5 * explained)
+        sure = overwhelming or float(np.quantile(weights @ saved, _SAVING_QUANTILE)) > 0.0
     return max(float(np.sum(saved)), 0.0) / float(np.sum(error_before)) if sure else 0.0
 
 
-def _old_blocks(bench: Bench) -> NDArray[np.intp]:
+def _blocks_past_the_start(bench: Bench) -> NDArray[np.intp]:
     """Blocks that do not feel any more how their recording began: a cause must show without the first seconds, too."""
     counted = block_sums(bench, bench.judged.astype(np.float64))
     young = block_sums(bench, (bench.judged & bench.young).astype(np.float64))
     return np.flatnonzero(young <= 0.5 * counted)
 
 
-def _exchanged(
+def _exchange_effects(
     bench: Bench,
     fitted: FittedModel,
     base: FittedModel,
@@ -263,7 +273,7 @@ def _exchanged(
         lone = refit_without(bench, fitted, base, incumbent, beside, whiten)
         hints = search_hints(bench, lone, whiten)
         held = refined_effect(bench, incumbent.effect, incumbent.form, fitted, lone, whiten)
-        comparison = compare_effects(bench, lone, _others(effects, beside), hints, whiten, incumbent=held)
+        comparison = compare_effects(bench, lone, _not_accepted(effects, beside), hints, whiten, incumbent=held)
         winner = comparison.winner
         if not is_significant(winner, comparison.starts):
             fitted, accepted = lone, beside

@@ -60,7 +60,7 @@ def drop_doubtful_effects(
     bench: Bench, found: SearchResult
 ) -> tuple[SearchResult, ReportedModels, tuple[DoubtfulEffect, ...]]:
     """What is reported once everything counts again, without effects that are no finding then, the worst of them first."""
-    reported, dropped = _reported(bench, found), list[DoubtfulEffect]()
+    reported, dropped = _refit_for_report(bench, found), list[DoubtfulEffect]()
     while found.accepted:
         gains = [
             gain_of(held_out_errors(bench, without_it, reported.whiten), reported.held_out, 0.0)
@@ -78,7 +78,7 @@ def drop_doubtful_effects(
         dropped.append(DoubtfulEffect(taken.effect.name, won_n, doubts[worst]))
         fitted = refit_without(bench, found.fitted, found.base, taken, kept, found.whiten) if kept else found.base
         found = replace(found, fitted=fitted, accepted=kept)
-        reported = _reported(bench, found)
+        reported = _refit_for_report(bench, found)
     return found, reported, tuple(dropped)
 
 
@@ -94,22 +94,25 @@ def reason_for_doubt(accepted: AcceptedEffect, gain: Gain) -> str:
     return f"it wins in {100.0 * wins:.0f} % of the ways to resample the recording only" if wins < _LEAST_SURE else ""
 
 
-def _reported(bench: Bench, found: SearchResult) -> ReportedModels:
+def _refit_for_report(bench: Bench, found: SearchResult) -> ReportedModels:
     """Every model twice, whitened and plain; the kind whose extended model predicts better.
 
     Dependences without a name count here: the reported errors are those of the simulation, and of nothing beside it.
     """
     plain = white_whitener(bench, found.fitted.residual_n, found.whiten.weights)
-    models = [found.base, found.fitted, *(_without(each, found) for each in found.accepted)]
+    models = [found.base, found.fitted, *(_model_without(each, found) for each in found.accepted)]
     problems = [FitProblem(each.parameters, each.free) for each in models]
-    kinds = [(found.whiten, refine(bench, problems, found.whiten, waves=3)), (plain, _plainly(bench, problems, plain))]
+    kinds = [
+        (found.whiten, refine(bench, problems, found.whiten, waves=3)),
+        (plain, _refit_plainly(bench, problems, plain)),
+    ]
     errors = [held_out_errors(bench, fits[1], whiten) for whiten, fits in kinds]
     best = 1 if errors[1].rms_n < _BETTER * errors[0].rms_n else 0
     whiten, fits = kinds[best]
     return ReportedModels(fits[0], fits[1], tuple(fits[2:]), whiten, errors[best])
 
 
-def _plainly(bench: Bench, problems: Sequence[FitProblem], plain: Whitener) -> list[FittedModel]:
+def _refit_plainly(bench: Bench, problems: Sequence[FitProblem], plain: Whitener) -> list[FittedModel]:
     """Each model at its plain optimum. The whitened one may be far from it in the area, which slow changes tell best:
     then it is looked for from the base model's plain area, too."""
     fits = refine(bench, problems, plain, waves=3)
@@ -121,13 +124,13 @@ def _plainly(bench: Bench, problems: Sequence[FitProblem], plain: Whitener) -> l
     return [min(pair, key=lambda each: each.chi2) for pair in zip(fits, others, strict=True)]
 
 
-def _without(accepted: AcceptedEffect, found: SearchResult) -> FittedModel:
+def _model_without(accepted: AcceptedEffect, found: SearchResult) -> FittedModel:
     return found.base if len(found.accepted) == 1 else accepted.comparison.beside
 
 
 def gain_of(before: HeldOutErrors, after: HeldOutErrors, floor_n: float) -> Gain:
     errors_before, errors_after, counts = (
-        np.add.reduceat(values, _edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
+        np.add.reduceat(values, _part_edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
     )
     blocks = counts.size
     weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=400)
@@ -139,7 +142,7 @@ def gain_of(before: HeldOutErrors, after: HeldOutErrors, floor_n: float) -> Gain
     )
 
 
-def _edges(held: HeldOutErrors) -> NDArray[np.intp]:
+def _part_edges(held: HeldOutErrors) -> NDArray[np.intp]:
     """Where parts begin that are drawn anew for an interval: finer than the blocks that are left out, for an effect may show
     in one of these only, and then a fifth of all ways to draw blocks would not have it."""
     counted = np.cumsum(held.squares > 0.0)

@@ -46,7 +46,7 @@ def title(diagnosis: Diagnosis) -> str:
 def sentence(diagnosis: Diagnosis) -> str:
     """The verdict, and for `partial` what it lacks."""
     if any(suspect.is_sure for suspect in diagnosis.suspects):
-        return "The columns are not what their names say: no cause was looked for. First mend this, then ask again."
+        return "The columns are not what their names say: no cause was looked for. Fix this first, then run it again."
     if why := why_blind(diagnosis):
         return f"{why}."
     told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_missing_evidence(diagnosis)]

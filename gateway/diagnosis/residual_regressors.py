@@ -18,8 +18,8 @@ from gateway.diagnosis.noise import fast_noise_n
 from gateway.diagnosis.search.bench import BLOCKS, SURROUNDINGS, Bench
 from gateway.diagnosis.search.hints import lines_hz
 
-_STEPS: Final = 40  # places where a jump in time is looked for
-_LATE_S: Final = (1.0, 4.0, 16.0)
+_JUMPS_TRIED: Final = 40  # places where a jump in time is looked for
+_LAGS_S: Final = (1.0, 4.0, 16.0)
 _MOST_PAIRED: Final = 8  # covariates whose products are asked
 
 
@@ -38,11 +38,11 @@ def list_regressors(bench: Bench, residual_n: Floats, white: Floats) -> Iterator
     """All of them, for the raw and the whitened residual of the present model."""
     simulated = bench.measured_n - residual_n
     force = standardise(simulated, bench)
-    yield from _of_columns(bench, force)
-    yield from _of_time(bench, force)
-    yield from _of_lines(bench, white)
+    yield from _column_regressors(bench, force)
+    yield from _time_regressors(bench, force)
+    yield from _line_regressors(bench, white)
     if float(np.std(simulated[bench.judged])) > fast_noise_n(residual_n[bench.judged]):  # else a trim follows the noise
-        yield from _of_motion(bench, simulated, force)
+        yield from _motion_regressors(bench, simulated, force)
 
 
 def standardise(column: Floats, bench: Bench) -> Floats:
@@ -55,7 +55,7 @@ def standardise(column: Floats, bench: Bench) -> Floats:
     return centred / spread if spread > 1.0e-12 else np.zeros(bench.rows)
 
 
-def _of_columns(bench: Bench, force: Floats) -> Iterator[Regressors]:
+def _column_regressors(bench: Bench, force: Floats) -> Iterator[Regressors]:
     columns = {}
     for name in sorted(bench.columns() - {"command_v", "pressure_kpa"}):
         column = standardise(bench.covariate(name), bench)
@@ -66,28 +66,28 @@ def _of_columns(bench: Bench, force: Floats) -> Iterator[Regressors]:
         yield Regressors(name, "in proportion", column[None], foreign)
         yield Regressors(name, "in proportion to it times the force", (column * force)[None], foreign)
         yield Regressors(name, "curved", np.vstack([column, column**2]), name != "position_mm")
-        yield Regressors(name, "follows it late, by seconds", _late(bench, column), True)
+        yield Regressors(name, "follows it late, by seconds", _lagged_columns(bench, column), True)
     for first, second in combinations(list(columns)[:_MOST_PAIRED], 2):
         product = standardise(columns[first] * columns[second], bench)
         yield Regressors(f"{first} x {second}", "in proportion to their product", product[None], True)
 
 
-def _late(bench: Bench, column: Floats) -> Floats:
+def _lagged_columns(bench: Bench, column: Floats) -> Floats:
     """The column behind first-order lags of 1, 4 and 16 s."""
     from scipy.signal import lfilter
 
-    found = np.zeros((len(_LATE_S), bench.rows))
+    found = np.zeros((len(_LAGS_S), bench.rows))
     for channel in bench.channels:
         if channel.is_force:
             row_s = float(np.median(np.diff(bench.measurements[channel.recording].time_s)))
-            for k, late_s in enumerate(_LATE_S):
+            for k, late_s in enumerate(_LAGS_S):
                 share = 1.0 - np.exp(-row_s / late_s)
                 start = column[channel.rows][0]
                 found[k, channel.rows] = start + lfilter([share], [1.0, share - 1.0], column[channel.rows] - start)
     return np.asarray(found * bench.force_rows)
 
 
-def _waves(bench: Bench) -> Floats:
+def _slow_waves(bench: Bench) -> Floats:
     """Sines and cosines of one to three periods over each recording, (6, rows)."""
     phase = np.zeros(bench.rows)
     for channel in bench.channels:
@@ -96,26 +96,26 @@ def _waves(bench: Bench) -> Floats:
     return np.vstack([turn(count * phase) for count in (1, 2, 3) for turn in (np.sin, np.cos)])
 
 
-def _of_time(bench: Bench, force: Floats) -> Iterator[Regressors]:
+def _time_regressors(bench: Bench, force: Floats) -> Iterator[Regressors]:
     seconds = bench.time_s()
     time = standardise(seconds, bench)
     yield Regressors("time", "a slow trend", np.vstack([time, time**2, time**3]), False)
     yield Regressors(
         "time", "the gain drifts: a trend times the force", np.vstack([time * force, time**2 * force]), True
     )
-    yield Regressors("time", "the gain wanders", _waves(bench) * force, True)
-    for place in range(1, _STEPS):
+    yield Regressors("time", "the gain wanders", _slow_waves(bench) * force, True)
+    for place in range(1, _JUMPS_TRIED):
         part = np.zeros(bench.rows)
         for channel in bench.channels:
             if channel.is_force:
                 rows = channel.rows.stop - channel.rows.start
-                part[channel.rows] = np.arange(rows) * _STEPS >= place * rows
+                part[channel.rows] = np.arange(rows) * _JUMPS_TRIED >= place * rows
         at_s = float(np.min(seconds[part > 0.0])) if np.any(part) else 0.0
         yield Regressors("time", f"a jump at {at_s:.0f} s", (part * bench.force_rows)[None], True)
         yield Regressors("time", f"the gain jumps at {at_s:.0f} s", np.vstack([part * force, part]), True)
 
 
-def _of_lines(bench: Bench, white: Floats) -> Iterator[Regressors]:
+def _line_regressors(bench: Bench, white: Floats) -> Iterator[Regressors]:
     seconds = bench.time_s()
     for line_hz in lines_hz(bench, white):
         angle = 2.0 * np.pi * line_hz * seconds
@@ -127,7 +127,7 @@ def _of_lines(bench: Bench, white: Floats) -> Iterator[Regressors]:
             yield Regressors("time", shape, waves * inside, True, max(bench.rows // 2, 1))
 
 
-def _of_motion(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Regressors]:
+def _motion_regressors(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Regressors]:
     slope = bench.slope_n_per_s(simulated_n)
     moving = np.sign(slope) * bench.force_rows
     time = standardise(bench.time_s(), bench)
@@ -135,7 +135,7 @@ def _of_motion(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Reg
     yield Regressors("force", "curved", np.vstack([force**2, force**3, force**4]), False)
     yield Regressors("direction", "differs between rising and falling", moving[None], False)
     yield Regressors("direction", "differs between rising and falling, with the force", (moving * force)[None], False)
-    drifting = np.vstack([time, time**2, _waves(bench)]) * moving
+    drifting = np.vstack([time, time**2, _slow_waves(bench)]) * moving
     yield Regressors("direction", "the difference between rising and falling changes in time", drifting, True)
     yield Regressors("speed", "in proportion to the rate of the force", standardise(slope, bench)[None], False)
     yield Regressors("command", "curved", np.vstack([command, command**2, command**3]), False)
