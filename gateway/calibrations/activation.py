@@ -42,19 +42,19 @@ class Activation:
         self.store = store
         self.limits = limits
 
-    def why_not(self, calibration: Calibration) -> str:
+    def why_unusable(self, calibration: Calibration) -> str:
         """A sentence for a calibration that this rig cannot take, empty for one that it can."""
         fault = self._fault(calibration)
         return f"E401 calibration {calibration.number}: {fault.text}" if fault else ""
 
-    def take_offered(self, number: int, *, force: bool = False) -> ActiveCalibration:
+    def use_offered(self, number: int, *, force: bool = False) -> ActiveCalibration:
         """Select a calibration that a person asks for. force: one that its fit's verdict has rejected, too."""
         rejected = self.store.load(number).rejected
         if rejected and not force:
             raise StoreError("E436", f"calibration {number} was rejected: {rejected}; --force uses it all the same")
-        return self.take(number)
+        return self.use(number)
 
-    def take(self, number: int | None, slot: int | None = None) -> ActiveCalibration:
+    def use(self, number: int | None, slot: int | None = None) -> ActiveCalibration:
         """Select a calibration that is there, None: the built-in one."""
         calibration = self.store.built_in if number is None else self.store.load(number)
         if calibration is None:
@@ -64,20 +64,20 @@ class Activation:
         model = calibration.model()
         return ActiveCalibration(calibration, model, self.store.use(number, slot))
 
-    def take_back(self) -> ActiveCalibration:
+    def roll_back(self) -> ActiveCalibration:
         """Select what was in use before."""
         previous = self.store.previous()
-        return self.take(previous.number, previous.slot)
+        return self.use(previous.number, previous.slot)
 
-    def take_uploaded(self, fresh: Calibration, slot: int, known: SelectionState) -> ActiveCalibration:
+    def use_uploaded(self, fresh: Calibration, slot: int, known: SelectionState) -> ActiveCalibration:
         """Store an uploaded set, fill its slot and select it. One that is known already, word for word, keeps its number, its
         name and all that the words do not carry: what is in use before all, then what is in the slot."""
-        for number in dict.fromkeys((known.active.number, known.slots[slot] or None, None, *self._like(fresh))):
-            if self._holds(number, fresh):
-                return replace(self.take(number, slot), notice=CommitNotice.KNOWN_SET)
-        return self.take(self.store.add(fresh), slot)
+        for number in dict.fromkeys((known.active.number, known.slots[slot] or None, None, *self._candidates(fresh))):
+            if self._is_same_set(number, fresh):
+                return replace(self.use(number, slot), notice=CommitNotice.KNOWN_SET)
+        return self.use(self.store.add(fresh), slot)
 
-    def _like(self, fresh: Calibration) -> Iterator[int]:
+    def _candidates(self, fresh: Calibration) -> Iterator[int]:
         """Numbers of the store that seem to be this set, the last one first."""
         words = _words(fresh)
         for number, stored in self.store.glances():
@@ -85,7 +85,7 @@ class Activation:
                 if _words(stored) == words:
                     yield number
 
-    def _holds(self, number: int | None, fresh: Calibration) -> bool:
+    def _is_same_set(self, number: int | None, fresh: Calibration) -> bool:
         """Whether a stored set, None: the built-in one, is whole and the very same."""
         try:
             stored = self.store.built_in if number is None else self.store.load(number)

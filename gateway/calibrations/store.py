@@ -48,7 +48,7 @@ class CalibrationEntry:
 
 
 @dataclass(frozen=True, slots=True)
-class StartingSelection:
+class SelectedCalibration:
     """What is in use. calibration None: the built-in one, of a rig that the store was not told. notes: what was passed over."""
 
     calibration: Calibration | None
@@ -108,22 +108,22 @@ class CalibrationStore:
         """The calibration that was made of these very data, None where there is none."""
         return next((e.number for e in self.list() if e.calibration and e.calibration.data_sha256 == data_sha256), None)
 
-    def standing(self, why_not: Callable[[Calibration], str] = lambda calibration: "") -> StartingSelection:
-        """What is in use: the active one, else the previous, else the built-in. why_not: a sentence for one that is not
+    def find_selected(self, why_unusable: Callable[[Calibration], str] = lambda calibration: "") -> SelectedCalibration:
+        """What is in use: the active one, else the previous, else the built-in. why_unusable: a sentence for one that is not
         fit for this rig, empty for one that is."""
         pointer, notes = self._pointer()
         for selection in (pointer.active, pointer.previous):
             if selection.number is None:
-                return StartingSelection(self.built_in, selection, pointer, notes)
+                return SelectedCalibration(self.built_in, selection, pointer, notes)
             try:
                 calibration = self.load(selection.number)
-                fault = why_not(calibration)
+                fault = why_unusable(calibration)
             except StoreError as error:
                 fault = str(error)
             if not fault:
-                return StartingSelection(calibration, selection, pointer, notes)
+                return SelectedCalibration(calibration, selection, pointer, notes)
             notes = (*notes, f"{fault}; the one before it is used instead of calibration {selection.number}")
-        return StartingSelection(self.built_in, BUILT_IN, pointer, notes)
+        return SelectedCalibration(self.built_in, BUILT_IN, pointer, notes)
 
     def use(self, number: int | None, slot: int | None = None) -> SelectionState:
         """From now on this calibration is in use, None: the built-in one; a slot given is filled with it. StoreError, and

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from gateway.calibrations.activation import Activation, ActiveCalibration, UnusableCalibration, make_uploaded
-from gateway.calibrations.store import StartingSelection, StoreError
+from gateway.calibrations.store import SelectedCalibration, StoreError
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.processes.disk_worker import DiskWorker, Done, Work
@@ -51,27 +51,27 @@ class UploadRules:
 
 
 class UploadService:
-    """on_use: called in the loop with what is in use from now on. apart: runs work elsewhere and comes back."""
+    """on_use: called in the loop with what is in use from now on. run_in_background: runs work elsewhere and comes back."""
 
     def __init__(
         self,
         staging: StagingBlock,
         activation: Activation,
-        standing: StartingSelection,
+        selected: SelectedCalibration,
         rules: UploadRules,
         log: Callable[[str, str], None],
     ) -> None:
-        if standing.calibration is None:
+        if selected.calibration is None:
             raise ValueError("a gateway has a calibration, at least the rig's own")
         self.on_use: Callable[[ActiveCalibration], None] = lambda in_use: None
         self._thread = DiskWorker()
-        self.apart: Callable[[Work, Done], None] = self._thread
+        self.run_in_background: Callable[[Work, Done], None] = self._thread
         self._staging = staging
         self._activation = activation
         self._rules = rules
         self._log = log
-        self._calibration = standing.calibration
-        self._pointer = replace(standing.pointer, active=standing.selection)
+        self._calibration = selected.calibration
+        self._pointer = replace(selected.pointer, active=selected.selection)
         self._doing = ""
         self._shows = False  # whether commit_status tells of what is being done
         self._notice = NO_NOTICE
@@ -90,11 +90,11 @@ class UploadService:
         self._check_free(self._rules.commit_address)
         if action is CommitAction.ROLLBACK:
             self._begin(f"rollback by {peer}", CommitStatus.WRITING)
-            self.apart(self._activation.take_back, self._on_taken)
+            self.run_in_background(self._activation.roll_back, self._on_taken)
             return
         self._begin(f"{'dry run' if action is CommitAction.DRY_RUN else 'upload'} by {peer}", CommitStatus.CHECKING)
         limits = self._activation.limits
-        self.apart(lambda: check_staged(words, limits), lambda found: self._on_checked(found, action, peer))
+        self.run_in_background(lambda: check_staged(words, limits), lambda found: self._on_checked(found, action, peer))
 
     def _on_checked(self, found: Any, action: CommitAction, peer: Peer) -> None:
         if isinstance(found, Exception):
@@ -118,7 +118,7 @@ class UploadService:
         )
         known = self._pointer
         self._staging.show_commit(CommitStatus.WRITING)
-        self.apart(lambda: self._activation.take_uploaded(fresh, found.slot, known), self._on_taken)
+        self.run_in_background(lambda: self._activation.use_uploaded(fresh, found.slot, known), self._on_taken)
 
     def _on_select(self, slot: int, peer: Peer) -> None:
         self._check_free(self._rules.select_address)
@@ -128,7 +128,7 @@ class UploadService:
             text = f"slot {slot} is empty, filled: {filled}; active set {self._calibration.number} unchanged"
             raise Refusal(RefusalReason.EMPTY_SLOT, self._rules.select_address, text, value=slot)
         self._begin(f"slot {slot} selected by {peer}", CommitStatus.WRITING)
-        self.apart(lambda: self._activation.take(chosen.number, slot), self._on_taken)
+        self.run_in_background(lambda: self._activation.use(chosen.number, slot), self._on_taken)
 
     def _check_free(self, address: int) -> None:
         if self._doing:
@@ -139,11 +139,11 @@ class UploadService:
     def use(self, number: int, *, force: bool = False) -> dict[str, Any]:
         """Begin to take a calibration by its number; `status` tells how it goes. force: a rejected one, too. ValueError while
         another is under way."""
-        return self._ask(f"calibration use {number}", lambda: self._activation.take_offered(number, force=force))
+        return self._ask(f"calibration use {number}", lambda: self._activation.use_offered(number, force=force))
 
     def rollback(self) -> dict[str, Any]:
         """Begin to go back to what was in use before."""
-        return self._ask("calibration rollback", self._activation.take_back)
+        return self._ask("calibration rollback", self._activation.roll_back)
 
     def status(self) -> dict[str, Any]:
         """What is in use, and how the last job went; job is its number, for whoever began it; reason as failing_reason."""
@@ -163,7 +163,7 @@ class UploadService:
         if self._doing:
             raise ValueError(f"{self._doing} is under way: try again when it has ended")
         self._begin(what, None)
-        self.apart(work, self._on_taken)
+        self.run_in_background(work, self._on_taken)
         return self.status()
 
     # -- how it goes

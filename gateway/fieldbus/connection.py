@@ -120,11 +120,11 @@ class Connection(asyncio.BufferedProtocol):
         if self._closing_since_s is not None:
             return
         self._framer.push(self._view[:size])
-        self._answer_what_is_whole()
+        self._answer_complete_requests()
         if size == BUFFER_BYTES and self._resume is None and self._closing_since_s is None:
             self._pause(0.0)
 
-    def _answer_what_is_whole(self) -> None:
+    def _answer_complete_requests(self) -> None:
         """Execute the framer's whole requests until they end, the rate is used up, or the stream is no Modbus."""
         answers: list[bytes] = []
         lost: FramingLost | None = None
@@ -172,11 +172,11 @@ class Connection(asyncio.BufferedProtocol):
 
     def _pause(self, delay_s: float) -> None:
         self._transport.pause_reading()
-        self._resume = self._shared.clock.call_later(delay_s, self._go_on)
+        self._resume = self._shared.clock.call_later(delay_s, self._resume_reading)
 
-    def _go_on(self) -> None:
+    def _resume_reading(self) -> None:
         self._resume = None
-        self._answer_what_is_whole()
+        self._answer_complete_requests()
         if self._resume is None:
             self._transport.resume_reading()
 

@@ -30,7 +30,7 @@ class RequestRate:
         """One request runs."""
         self._tokens -= 1.0
 
-    def rested(self, now_s: float) -> bool:
+    def is_full(self, now_s: float) -> bool:
         """Whether a new bucket would be no different."""
         self.wait_s(now_s)
         return self._tokens >= self._most

@@ -70,6 +70,6 @@ class Peers:
 
     def forget(self, now_s: float) -> None:
         """Drop the buckets of those who left, once full: leaving and coming back is no way to a new one."""
-        gone = [host for host, rate in self._rates.items() if host not in self._open and rate.rested(now_s)]
+        gone = [host for host, rate in self._rates.items() if host not in self._open and rate.is_full(now_s)]
         for host in gone:
             del self._rates[host]

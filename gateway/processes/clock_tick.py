@@ -47,11 +47,11 @@ class ClockTick:
         loop = asyncio.get_running_loop()
         if self.is_fallback:
             self._due_s = time.monotonic() + self.period_s
-            self._timer = loop.call_later(self.period_s, self._fallback)
+            self._timer = loop.call_later(self.period_s, self._on_fallback)
             return
         self._due_s = time.monotonic()
         self._fd = _create_timerfd(self.period_s)
-        loop.add_reader(self._fd, self._expired)
+        loop.add_reader(self._fd, self._on_expired)
 
     def close(self) -> None:
         if self._timer:
@@ -61,7 +61,7 @@ class ClockTick:
             os.close(self._fd)
             self._fd = -1
 
-    def _expired(self) -> None:
+    def _on_expired(self) -> None:
         try:
             (expirations,) = _EXPIRATIONS.unpack(os.read(self._fd, 8))
         except BlockingIOError:
@@ -69,9 +69,9 @@ class ClockTick:
         self._due_s += expirations * self.period_s
         self._on_tick(expirations, time.monotonic() - self._due_s)
 
-    def _fallback(self) -> None:
+    def _on_fallback(self) -> None:
         now_s = time.monotonic()
         expirations = 1 + int(max(0.0, now_s - self._due_s) / self.period_s)
         self._due_s += expirations * self.period_s
-        self._timer = asyncio.get_running_loop().call_later(max(0.0, self._due_s - now_s), self._fallback)
+        self._timer = asyncio.get_running_loop().call_later(max(0.0, self._due_s - now_s), self._on_fallback)
         self._on_tick(expirations, max(0.0, now_s - self._due_s + self.period_s))

@@ -74,7 +74,7 @@ class EventFile:
 
 
 class EventReader:
-    """What is kept, oldest first (`kept`), then what has come since (`more`, as often as wanted). Torn lines are passed over.
+    """Reads what is stored, oldest first, then what has come since, as often as wanted. Torn lines are passed over.
 
     A rotation meanwhile neither hides a line nor shows one twice.
     """
@@ -84,7 +84,7 @@ class EventReader:
         self._stream: IO[bytes] | None = None
         self._rest = b""
 
-    def kept(self) -> Iterator[EventRecord]:
+    def read_stored(self) -> Iterator[EventRecord]:
         old = _open_files(self._path)
         self._stream = old.pop() if old else None
         with contextlib.ExitStack() as stack:
@@ -92,9 +92,9 @@ class EventReader:
                 stack.enter_context(stream)
             for stream in old:
                 yield from _events(stream)
-        yield from self.more()
+        yield from self.read_new()
 
-    def more(self) -> Iterator[EventRecord]:
+    def read_new(self) -> Iterator[EventRecord]:
         """What has been written since, also to a file that has been begun anew since."""
         while True:
             fresh = self._fresh()  # looked for first: what comes into the old file after its new name is read below

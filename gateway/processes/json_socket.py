@@ -111,7 +111,7 @@ class JsonLineServer:
 
     # -- one thing at a time
 
-    def wait_for(self, turn: Callable[[], None]) -> None:
+    def enqueue(self, turn: Callable[[], None]) -> None:
         """Put something to do at the end of the queue. It must not raise."""
         self._queue.append(turn)
         if self._turn is None:
@@ -135,7 +135,7 @@ class JsonLineServer:
     def _on_connection(self) -> None:
         assert self._listener
         self.loop.remove_reader(self._listener)
-        self.wait_for(self._accept)
+        self.enqueue(self._accept)
 
     def _accept(self) -> None:
         assert self._listener
@@ -153,7 +153,7 @@ class JsonLineServer:
             _say_and_close(peer, f"{self.limits.callers} connections are open, the most allowed: try again")
             return
         caller = _Client(self, peer)
-        self.spoke(caller)
+        self.note_activity(caller)
         caller.listen()
 
     def _make_room(self) -> bool:
@@ -164,12 +164,12 @@ class JsonLineServer:
         silent.dismiss("others are waiting, and nothing was asked here for longest")
         return True
 
-    def spoke(self, caller: "_Client") -> None:
+    def note_activity(self, caller: "_Client") -> None:
         caller.spoke_s = self.loop.time()
         self._callers.pop(caller, None)
         self._callers[caller] = None
 
-    def left(self, caller: "_Client") -> None:
+    def forget_client(self, caller: "_Client") -> None:
         self._callers.pop(caller, None)
 
     def _sweep(self) -> None:
@@ -183,7 +183,7 @@ class JsonLineServer:
     def answer(self, line: bytes) -> bytes:
         """The answer to one line, whatever it is."""
         try:
-            answer = self._answered(line)
+            answer = self._handle_line(line)
             text = _as_json(answer)
             if len(text) > _LONGEST_ANSWER:
                 text = _as_json(_error(f"the answer would have {len(text)} bytes"))
@@ -196,13 +196,13 @@ class JsonLineServer:
             text = _as_json(_error(told))
         return text.encode() + b"\n"
 
-    def _answered(self, line: bytes) -> Answer:
+    def _handle_line(self, line: bytes) -> Answer:
         try:
             request = json.loads(line, parse_constant=_no_number)
             handler = self._handlers[request["do"]]
         except (ValueError, KeyError, TypeError, RecursionError):
             return _error(f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}')
-        if too_much := _too_much(request):
+        if too_much := _why_too_large(request):
             return _error(too_much)
         try:
             return {"ok": True} | handler(request)
@@ -227,9 +227,9 @@ class _Client:
 
     def _on_readable(self) -> None:
         self._server.loop.remove_reader(self._peer)
-        self._server.wait_for(self._hear)
+        self._server.enqueue(self._receive)
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         if self._is_closed:
             return
         try:
@@ -256,7 +256,7 @@ class _Client:
         longest = self._server.limits.longest_line
         end = self._said.find(b"\n") + 1 or (len(self._said) if self._is_last else 0)
         if (end or len(self._said)) > longest:
-            self._turn_deaf(f"a line of more than {longest} bytes")
+            self._stop_listening(f"a line of more than {longest} bytes")
         elif end:
             line = bytes(self._said[:end])
             del self._said[:end]
@@ -278,21 +278,21 @@ class _Client:
             self._unsent = data[sent:]
             self._server.loop.add_writer(self._peer, self._on_writable)
         else:
-            self._server.spoke(self)
-            self._go_on()
+            self._server.note_activity(self)
+            self._continue()
 
     def _on_writable(self) -> None:
         self._server.loop.remove_writer(self._peer)
-        self._server.wait_for(self._send_rest)
+        self._server.enqueue(self._send_rest)
 
     def _send_rest(self) -> None:
         if not self._is_closed:
             data, self._unsent = self._unsent, b""
             self._send(data)
 
-    def _go_on(self) -> None:
+    def _continue(self) -> None:
         if self._said:
-            self._server.wait_for(self._answer_next)
+            self._server.enqueue(self._answer_next)
         elif self._is_last:
             self.close()
         else:
@@ -305,7 +305,7 @@ class _Client:
                 self._peer.send(_as_json(_error(f"{why}: closed")).encode() + b"\n")
         self.close()
 
-    def _turn_deaf(self, why: str) -> None:
+    def _stop_listening(self, why: str) -> None:
         """Say why and end our direction. A close now would take the sentence away from a caller that is still writing."""
         self._said.clear()
         self._is_deaf = True
@@ -323,7 +323,7 @@ class _Client:
             self._server.loop.remove_reader(self._peer)
             self._server.loop.remove_writer(self._peer)
             self._peer.close()
-        self._server.left(self)
+        self._server.forget_client(self)
 
 
 def _error(sentence: str) -> Answer:
@@ -332,7 +332,7 @@ def _error(sentence: str) -> Answer:
     return {"ok": False, "error": sentence}
 
 
-def _too_much(request: Any) -> str:
+def _why_too_large(request: Any) -> str:
     """Why a request is larger than any that means something; empty for one that is not.
 
     Checking a shape and telling what is wrong with it takes its time for each key: what could take longer than a tick or

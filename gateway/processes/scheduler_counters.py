@@ -32,7 +32,7 @@ class Silence:
 
     silent_s: float
     bound_s: float
-    turns: ProcessorTime | None
+    used: ProcessorTime | None
     state: str
     was_late: bool
 
@@ -82,10 +82,10 @@ def explain_silence(silence: Silence, load: str) -> Ending:
     seen = f"control process stalled: {_ms(silence.silent_s)} without a tick, allowed {_ms(silence.bound_s)} (stall_s)"
     if silence.state and silence.state in STOPPED_STATES:
         return Ending(EndCause.STOPPED, f"{seen}; it was stopped by a signal or a debugger")
-    if silence.turns is None:
+    if silence.used is None:
         cause = EndCause.MACHINE_BUSY if silence.was_late else EndCause.STALLED
         return Ending(cause, f"{seen}; this kernel does not count why; {load}{_CURE if silence.was_late else ''}")
-    ran_s, waited_s = silence.turns.on_cpu_s, silence.turns.waited_s
+    ran_s, waited_s = silence.used.on_cpu_s, silence.used.waited_s
     slept_s = max(0.0, silence.silent_s - ran_s - waited_s)
     parts = f"it waited {_ms(waited_s)} for a processor, ran {_ms(ran_s)} and slept {_ms(slept_s)}; {load}"
     if waited_s >= max(ran_s, slept_s):

@@ -7,11 +7,11 @@ class CleanShutdownMarker:
     def __init__(self, state: Path) -> None:
         self._path = state / "running"
 
-    def raise_flag(self) -> bool:
+    def mark_running(self) -> bool:
         """Mark this run as begun; True when the one before never lowered its flag."""
         was_unclean = self._path.exists()
         self._path.touch(mode=0o600)
         return was_unclean
 
-    def lower(self) -> None:
+    def clear(self) -> None:
         self._path.unlink(missing_ok=True)

@@ -99,11 +99,11 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
     if ports is None:
         return EXIT_DEVICE
-    cell = RunningRig(rig, ports, Path(options["state"]), guardian, log)
-    cell.ring = sample_ring(options["ring"])
-    guardian.on_ports = cell.move_ports
+    running = RunningRig(rig, ports, Path(options["state"]), guardian, log)
+    running.ring = sample_ring(options["ring"])
+    guardian.on_ports = running.move_ports
     try:
-        ready = await cell.start(
+        ready = await running.start(
             options["bind"], record=options["record"], restarted=Ending.from_json(options["restarted"])
         )
         ready = replace(ready, notes=ready.notes + notes)
@@ -112,16 +112,16 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         announcement = {
             "banner": banner.format_banner(ready),
             "info": banner.ready_fields(ready),
-            "watch": watch_arguments(rig, cell.ring),
+            "watch": watch_arguments(rig, running.ring),
         }
         guardian.ready(announcement, rig.control.supervision.stall_s)
-        await _wait_first(guardian.told_to_stop, cell.failed)
-        if cell.failed.is_set():
+        await _wait_first(guardian.told_to_stop, running.failed)
+        if running.failed.is_set():
             return EXIT_DEFECT
         if not guardian.is_gone:
-            await cell.ramp_down()
+            await running.ramp_down()
     finally:
-        await cell.close()
+        await running.close()
         guardian.close()
     return 0
 

@@ -29,7 +29,7 @@ class RunningParts:
     recordings: Recordings
     health: LoopHealth
     upload: UploadService
-    ladder: CalibrationRuns
+    calibration_runs: CalibrationRuns
     watch: WatchReports
     running: dict[str, Any] = field(default_factory=dict)
     """What does not change while it runs: rig, port of Modbus TCP, lease_s (null: none), lease_action."""
@@ -40,7 +40,7 @@ class ControlSocket(JsonLineServer):
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,
-            "calibrate": asked.ladder.answer,
+            "calibrate": asked.calibration_runs.answer,
             "last-writer": self._last_writer,
             "last-refusal": self._last_refusal,
             "health": self._health_figures,

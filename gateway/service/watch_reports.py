@@ -22,8 +22,8 @@ _LARGEST_COUNT: Final = 1.0e15
 class WatchReports:
     """Called from the loop only. clock: monotonic seconds."""
 
-    def __init__(self, gateway: ControlLoop, clock: Callable[[], float], log: Log) -> None:
-        self._gateway = gateway
+    def __init__(self, loop: ControlLoop, clock: Callable[[], float], log: Log) -> None:
+        self._loop = loop
         self._clock = clock
         self._log = log
         self._sentence = ""
@@ -40,7 +40,7 @@ class WatchReports:
 
     def figures(self) -> Answer:
         """Cause by number and name, how often a warning rose, the watch's own counters, and how old all of it is."""
-        cause = self._gateway.residual_cause
+        cause = self._loop.residual_cause
         age_s = None if self._heard_s is None else round(self._clock() - self._heard_s, 3)
         return {"cause": int(cause), "name": cause.effect, "warnings": self._warnings, "age_s": age_s} | self._counters
 
@@ -49,22 +49,22 @@ class WatchReports:
             raise ValueError(f"cause = {number}: a number of residual_cause is expected")
         self._counters = _numbers(told.counters)
         self._heard_s = self._clock()
-        cause, before = ResidualCause(number), self._gateway.residual_cause
+        cause, before = ResidualCause(number), self._loop.residual_cause
         self._sentence = told.sentence[:_LONGEST_SENTENCE]
         if cause is not before:
             self._change(cause)
 
     def _change(self, cause: ResidualCause) -> None:
-        gateway = self._gateway
-        was_none, gateway.residual_cause = gateway.residual_cause is ResidualCause.NONE, cause
+        loop = self._loop
+        was_none, loop.residual_cause = loop.residual_cause is ResidualCause.NONE, cause
         if cause is ResidualCause.NONE:
-            gateway.warnings &= ~WarningBit.MODEL_DIFFERS
+            loop.warnings &= ~WarningBit.MODEL_DIFFERS
             self._log("residual", self._sentence or "the model agrees with the measurements again")
         else:
-            gateway.warnings |= WarningBit.MODEL_DIFFERS
+            loop.warnings |= WarningBit.MODEL_DIFFERS
             self._warnings += was_none
             self._log("residual", f"A345 {self._sentence or cause.effect}")
-        gateway.refresh()
+        loop.refresh()
 
 
 def _numbers(told: dict[str, Any]) -> dict[str, float]:

@@ -56,12 +56,12 @@ class WatchReference:
         floor_n = self.floor_n(window)
         return floor_n is None or rms_n > _EXCESS * floor_n
 
-    def learn(self, window: Window, rms_n: float) -> None:
+    def raise_floor(self, window: Window, rms_n: float) -> None:
         """This window was acquitted."""
         octave = _octave(window.excitation_v)
         self.floors_n[octave] = max(rms_n, self.floors_n.get(octave, 0.0))
 
-    def settle(self, found: Diagnosis) -> None:
+    def take_line_delays(self, found: Diagnosis) -> None:
         """Take what the lines add out of the first judged window, as far as it is of their size."""
         self.is_settled = True
         for path, most in LINES.items():

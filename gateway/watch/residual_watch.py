@@ -55,29 +55,29 @@ class Watch:
         self._setup = setup
         self._diagnose = diagnose
         self._clock = clock
-        self._opinion = WarningFilter()
+        self._filter = WarningFilter()
         self._search_s = 0.0
         self._healthy_s = -inf
         self.why_skipped = ""
         self.counters: dict[str, float] = {"looks": 0, "judged": 0, "skipped": 0}
 
     @property
-    def standing(self) -> WindowVerdict:
+    def published(self) -> WindowVerdict:
         """What is to be published."""
-        return self._opinion.standing
+        return self._filter.published
 
-    def look(self) -> None:
-        """Look once; `standing` and `counters` tell."""
+    def check_newest_window(self) -> None:
+        """Look once; `published` and `counters` tell."""
         self.counters["looks"] += 1
         window = self._window(self._setup.window_s)
-        self.why_skipped = window if isinstance(window, str) else self._unfit(window)
+        self.why_skipped = window if isinstance(window, str) else self._why_unsuitable(window)
         if self.why_skipped or isinstance(window, str):
             self.counters["skipped"] += 1
             return
         rms_n = self._reference.rms_n(window)
         self.counters["rms_n"] = rms_n
         if not self._reference.is_exceeded(window, rms_n):
-            self._healthy(window)
+            self._note_healthy(window)
         elif self._clock() >= self._search_s:
             self._search(window)
         if (floor_n := self._reference.floor_n(window)) is not None:
@@ -86,9 +86,9 @@ class Watch:
     def _window(self, window_s: float) -> Window | str:
         return window_of(self._ring.newest(_ALL), self._ring.columns, window_s)
 
-    def _healthy(self, window: Window) -> None:
+    def _note_healthy(self, window: Window) -> None:
         self._healthy_s = window.end_s
-        self._opinion.hear(WindowVerdict(excitation_v=window.excitation_v))
+        self._filter.add(WindowVerdict(excitation_v=window.excitation_v))
 
     def _search(self, window: Window) -> None:
         """In what is younger than the last healthy window, once that is half a window."""
@@ -99,7 +99,7 @@ class Watch:
         if not isinstance(fresh, str):
             self._judge(fresh)
 
-    def _unfit(self, window: Window) -> str:
+    def _why_unsuitable(self, window: Window) -> str:
         """Why this window may not be the first; empty when it may, or when it is not."""
         enough = window.excitation_v >= _LEAST_EXCITATION_V and window.moves >= _LEAST_MOVES
         return "" if self._reference.is_settled or enough else "too little was commanded to begin with"
@@ -108,12 +108,12 @@ class Watch:
         self.counters["judged"] += 1
         found = self._diagnose([window.measurement], self._reference.plant)
         if not self._reference.is_settled:
-            self._reference.settle(found)
+            self._reference.take_line_delays(found)
         finding = judge_window(window, found, self._reference, _OF_TOLERANCE * self._setup.tolerance_n)
         if finding.cause is ResidualCause.NONE:
-            self._reference.learn(window, self._reference.rms_n(window))
+            self._reference.raise_floor(window, self._reference.rms_n(window))
             self._healthy_s = window.end_s
-        self._opinion.hear(finding)
-        if self._opinion.convictions > _CERTAIN:
-            pause_s = self._setup.every_s * 2.0 ** (self._opinion.convictions - _CERTAIN)
+        self._filter.add(finding)
+        if self._filter.agreeing_windows > _CERTAIN:
+            pause_s = self._setup.every_s * 2.0 ** (self._filter.agreeing_windows - _CERTAIN)
             self._search_s = self._clock() + min(_LONGEST_PAUSE_S, pause_s)

@@ -26,34 +26,34 @@ class WindowVerdict:
         return self.cause is other.cause or (self.cause.effect in other.others and other.cause.effect in self.others)
 
 
-AGREEMENT: Final = WindowVerdict()
+NO_CHANGE: Final = WindowVerdict()
 
 
 @dataclass(slots=True)
 class WarningFilter:
-    """standing: what is published. convictions: how many windows in a row have said the same."""
+    """published: what is published. agreeing_windows: how many windows in a row have said the same."""
 
-    standing: WindowVerdict = AGREEMENT
-    convictions: int = 0
-    _last: WindowVerdict = AGREEMENT
+    published: WindowVerdict = NO_CHANGE
+    agreeing_windows: int = 0
+    _last: WindowVerdict = NO_CHANGE
 
-    def hear(self, finding: WindowVerdict) -> None:
+    def add(self, finding: WindowVerdict) -> None:
         """One judged window."""
         if finding.cause is ResidualCause.NONE:
-            self._acquit(finding)
+            self._clear_if_visible(finding)
             return
         last, self._last = self._last, finding
         if last.cause is ResidualCause.NONE:
-            self.convictions = 1
+            self.agreeing_windows = 1
         elif finding.agrees_with(last):
-            self.convictions += 1
-            keeps = self.standing.agrees_with(finding) and self.standing.cause is not ResidualCause.UNKNOWN
-            self.standing = self.standing if keeps else finding
+            self.agreeing_windows += 1
+            keeps = self.published.agrees_with(finding) and self.published.cause is not ResidualCause.UNKNOWN
+            self.published = self.published if keeps else finding
         else:
-            self.convictions = 1
-            if self.standing.cause is ResidualCause.NONE:
-                self.standing = WindowVerdict(ResidualCause.UNKNOWN, finding.sentence, finding.excitation_v)
+            self.agreeing_windows = 1
+            if self.published.cause is ResidualCause.NONE:
+                self.published = WindowVerdict(ResidualCause.UNKNOWN, finding.sentence, finding.excitation_v)
 
-    def _acquit(self, finding: WindowVerdict) -> None:
+    def _clear_if_visible(self, finding: WindowVerdict) -> None:
         if finding.excitation_v >= _AS_GOOD * self._last.excitation_v:
-            self.standing, self._last, self.convictions = AGREEMENT, AGREEMENT, 0
+            self.published, self._last, self.agreeing_windows = NO_CHANGE, NO_CHANGE, 0

@@ -94,13 +94,13 @@ def run(options: dict[str, Any]) -> None:
     watch = make_watch(ring, options)
     while True:
         began_s = time.process_time()
-        watch.look()
+        watch.check_newest_window()
         spent_s = time.process_time() - began_s
         rest_s = pause_s(every_s, spent_s)
         counters = watch.counters | {"cpu_s": time.process_time(), "pause_s": rest_s}
         counters = {name: value for name, value in counters.items() if isfinite(value)}  # JSON has no NaN
-        standing = watch.standing
-        report_to_control(state, {"cause": int(standing.cause), "sentence": standing.sentence, "counters": counters})
+        published = watch.published
+        report_to_control(state, {"cause": int(published.cause), "sentence": published.sentence, "counters": counters})
         time.sleep(rest_s)
 
 

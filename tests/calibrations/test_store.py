@@ -84,7 +84,7 @@ def test_an_unknown_number_is_told_with_those_that_there_are(used):
 
 
 def test_nothing_stored_is_the_built_in_calibration(store):
-    standing = store.standing()
+    standing = store.find_selected()
     assert (standing.calibration, standing.selection, standing.notes) == (OWN, BUILT_IN, ())
     assert store.slot(0) is None
     with pytest.raises(StoreError, match="nothing to go back to"):
@@ -173,8 +173,8 @@ def test_whatever_call_fails_the_set_is_the_old_one_or_the_new_one(tmp_path, err
                 refused += 1
                 assert str(failure).startswith(f"E431 calibration not stored: {os.strerror(error)}")
         assert active_mark(store) == (4 if acknowledged else old), (n, there.calls[-1])
-        assert store.slot(2) == (store.standing().selection.number if acknowledged else None)
-        assert not any(entry.fault for entry in store.list()) and not store.standing().notes
+        assert store.slot(2) == (store.find_selected().selection.number if acknowledged else None)
+        assert not any(entry.fault for entry in store.list()) and not store.find_selected().notes
         commit(store, 5)
         assert active_mark(store) == 5
         assert not [name for name in files(store) if name.endswith(".new")]
@@ -236,6 +236,6 @@ def test_a_directory_that_may_not_be_read_is_said(used, monkeypatch):
 
     with disk() as there:
         monkeypatch.setattr(there, "_counted", lambda what: refuse)
-        standing = used.standing()
+        standing = used.find_selected()
     assert standing.calibration == OWN
     assert "cannot be read: Permission denied" in standing.notes[0]

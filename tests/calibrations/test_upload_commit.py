@@ -153,7 +153,7 @@ def test_a_set_that_fails_a_check_changes_nothing_and_says_where_and_why(bench, 
     before = bench.active_words
     assert bench.commit(words, action) == (FAILED, index, reason)
     assert bench.active_words == before
-    assert (bench.used, bench.store.list(), bench.store.standing().calibration) == ([], [], OWN)
+    assert (bench.used, bench.store.list(), bench.store.find_selected().calibration) == ([], [], OWN)
     (sentence,) = bench.log
     assert sentence.startswith("E401 ")
     assert reason.name.lower() in sentence

@@ -24,7 +24,7 @@ def test_the_loop_goes_on_while_the_disk_takes_its_time(bench: Bench):
         assert go.wait(10)
 
     async def upload() -> list[CommitStatus]:
-        bench.upload.apart = apart = DiskWorker()
+        bench.upload.run_in_background = apart = DiskWorker()
         seen: list[CommitStatus] = []
         with disk() as there:
             there.before_fsync = slow
@@ -54,7 +54,7 @@ def test_a_loop_that_ends_before_the_disk_is_ready_leaves_the_old_set_or_the_new
     go = threading.Event()
 
     async def begin() -> None:
-        bench.upload.apart = apart = DiskWorker()
+        bench.upload.run_in_background = apart = DiskWorker()
         bench.upload.use(2)
         apart.close()
 

@@ -22,7 +22,7 @@ def state(tmp_path: Path) -> Path:
 
 
 def active(state: Path) -> int | None:
-    return CalibrationStore(state, load_calibration("demo")).standing().selection.number
+    return CalibrationStore(state, load_calibration("demo")).find_selected().selection.number
 
 
 def test_list_shows_all_and_which_one_is_used(state, call):

@@ -37,7 +37,7 @@ class Gateway:
         self.upload = UploadService(
             self.bank.staging,
             activation,
-            self.store.standing(),
+            self.store.find_selected(),
             UploadRules.of("demo", register_map, lambda: "2026-11-22"),
             lambda cause, sentence: self.log.append(sentence),
         )
@@ -103,7 +103,7 @@ def test_a_shipped_calibration_has_a_name_only(gateway, address, call):
 
 def test_a_calibration_that_the_gateway_knows_keeps_its_number_and_its_name(gateway, address, call, tmp_path):
     number = gateway.store.add(load_calibration("demo"))
-    gateway.upload.apart = lambda work, done: done(work())
+    gateway.upload.run_in_background = lambda work, done: done(work())
     gateway.upload.use(number)
     for options in ((), ("--fc06",)):
         done = call("upload", "demo", "--slot", 3, *options, "--gateway", address)
@@ -174,7 +174,7 @@ def test_a_gateway_that_is_busy_says_so(gateway, address, call, file):
 
 def test_a_commit_that_never_ends_is_waited_for_with_a_bound(gateway, address, call, file, monkeypatch):
     monkeypatch.setattr("gateway.cli.master.upload._PATIENCE_S", 0.05)
-    gateway.upload.apart = lambda work, done: None
+    gateway.upload.run_in_background = lambda work, done: None
     done = call("upload", file, "--gateway", address)
     assert done.exit_code == 1
     assert done.stderr == "E431 after 0.05 s the gateway is still checking: a disk that hangs?\n"
@@ -199,7 +199,7 @@ def frames_of(call, *options: object) -> list[dict]:
 @pytest.mark.parametrize("fc06", [[], ["--fc06"]])
 def test_printed_frames_played_by_anybody_make_the_upload(gateway, call, file, fc06):
     """What is printed is enough: the bytes go through the server's own framing into a bank that has seen no client."""
-    gateway.upload.apart = lambda work, done: done(work())
+    gateway.upload.run_in_background = lambda work, done: done(work())
     frames = frames_of(call, file, "--slot", 6, *fc06)
     framer = MbapFramer()
     answers = []

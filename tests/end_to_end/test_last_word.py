@@ -82,7 +82,7 @@ def test_a_killed_control_process_has_the_safe_voltage_on_the_wire_in_time(real,
     print(f"SIGKILL to the safe voltage: {took_s * 1e3:.1f} ms")
     assert took_s <= 0.025 or took_s <= STALL_S, "25 ms; a machine that is busy may take as long as for a stall"
     with EventReader(real.state) as reader:
-        events = list(reader.kept())
+        events = list(reader.read_stored())
     pressed = max(n for n, event in enumerate(events) if event.source == "control" and "enabled by" in event.text)
     deaths = [event.source for event in events[pressed:] if event.code == "A401"]
     assert deaths == ["guardian"], "one file, in the order in which it happened"

@@ -70,7 +70,7 @@ def active_mark(state: Path) -> int:
     """The mark in use; everything in the store is whole, and every part of a calibration is of one mark."""
     store = CalibrationStore(state)
     assert not [entry.fault for entry in store.list() if entry.fault]
-    standing = store.standing()
+    standing = store.find_selected()
     assert standing.notes == ()
     assert standing.calibration is not None
     mark = mark_of(standing.calibration)

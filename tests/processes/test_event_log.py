@@ -188,7 +188,7 @@ def test_alarms_that_are_only_warnings_are_those_of_the_catalogue() -> None:
 
 def kept(directory: Path) -> list[EventRecord]:
     with EventReader(directory) as reader:
-        return list(reader.kept())
+        return list(reader.read_stored())
 
 
 def event(text: str, source: str = "control") -> EventRecord:
@@ -289,17 +289,17 @@ def test_two_processes_that_write_and_rotate_at_once_lose_and_tear_nothing(tmp_p
 def test_a_reader_that_follows_sees_each_line_once_through_rotations(tmp_path: Path) -> None:
     file, reader = EventFile(tmp_path, longest_bytes=1500), EventReader(tmp_path)
     file.append(encode_event(event("0")))
-    found = list(reader.kept())
+    found = list(reader.read_stored())
     for number in range(1, 60):
         file.append(encode_event(event(str(number))))
-        found += reader.more()
+        found += reader.read_new()
     with (tmp_path / "events.jsonl").open("ab") as stream:
         line = encode_event(event("late"))
         stream.write(line[:40])
         stream.flush()
-        found += reader.more()
+        found += reader.read_new()
         stream.write(line[40:])
-    found += reader.more()
+    found += reader.read_new()
     assert [each.text for each in found] == [*map(str, range(60)), "late"]
     reader.close()
     file.close()
@@ -307,10 +307,10 @@ def test_a_reader_that_follows_sees_each_line_once_through_rotations(tmp_path: P
 
 def test_following_begins_before_there_is_a_file(tmp_path: Path) -> None:
     reader = EventReader(tmp_path)
-    assert list(reader.kept()) == []
+    assert list(reader.read_stored()) == []
     file = EventFile(tmp_path)
     file.append(encode_event(event("first")))
-    assert [each.text for each in reader.more()] == ["first"]
+    assert [each.text for each in reader.read_new()] == ["first"]
     reader.close()
     file.close()
 

@@ -65,7 +65,7 @@ def test_an_output_follows_a_moving_setpoint_for_five_seconds_at_its_own_speed(n
             line.on_bytes(heard, now_s)
         if round(now_s * 1000) % 10 == 0:
             line.tick(now_s)
-            line.want(low_v + (high_v - low_v) * 0.9 * abs((now_s / 2.0) % 2.0 - 1.0), now_s)
+            line.set_voltage(low_v + (high_v - low_v) * 0.9 * abs((now_s / 2.0) % 2.0 - 1.0), now_s)
         assert line.fault is FaultCode.NONE
     assert line.garbage_bytes == device.garbage == 0
     assert line.acknowledged_v == pytest.approx(device.setting_v, abs=line._host.resolution_v)

@@ -69,18 +69,18 @@ class Stage:
         self.said: list[str] = []
         log = lambda cause, sentence: self.said.append(sentence)  # noqa: E731
         self.recordings = Recordings(self.state / "recordings", wired.rig, log)  # type: ignore[arg-type]
-        wired.gateway.recordings = self.recordings
-        self.ladder = CalibrationRuns(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
-        wired.gateway.ladder = self.ladder
+        wired.loop.recordings = self.recordings
+        self.calibration_runs = CalibrationRuns(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
+        wired.loop.calibration_runs = self.calibration_runs
         self.upload = RigCalibrations(wired.rig, self.state).serve(wired.bank, lambda taken: None, log)
-        self.upload.apart = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers
+        self.upload.run_in_background = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers
         asked = RunningParts(
             bank=wired.bank,
             recordings=self.recordings,
-            health=wired.gateway.health,
+            health=wired.loop.health,
             upload=self.upload,
-            ladder=self.ladder,
-            watch=WatchReports(wired.gateway, lambda: wired.now_s, log),
+            calibration_runs=self.calibration_runs,
+            watch=WatchReports(wired.loop, lambda: wired.now_s, log),
             running={"rig": "demo", "port": 5020, "lease_s": None, "lease_action": "fault"},
         )
         self.server = ControlSocket(self.state, asked, log)
@@ -91,7 +91,7 @@ class Stage:
 
     def close(self) -> None:
         self.recordings.stop()
-        self.ladder.close()
+        self.calibration_runs.close()
         self.upload.close()
 
 

@@ -105,12 +105,12 @@ def test_the_json_line_is_json_and_tells_the_ports() -> None:
 
 def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
     flag = CleanShutdownMarker(tmp_path)
-    assert not flag.raise_flag()
-    assert CleanShutdownMarker(tmp_path).raise_flag(), "the one before was killed"
-    flag.lower()
-    assert not CleanShutdownMarker(tmp_path).raise_flag()
-    flag.lower()
-    flag.lower()  # twice is no trouble
+    assert not flag.mark_running()
+    assert CleanShutdownMarker(tmp_path).mark_running(), "the one before was killed"
+    flag.clear()
+    assert not CleanShutdownMarker(tmp_path).mark_running()
+    flag.clear()
+    flag.clear()  # twice is no trouble
 
 
 @pytest.mark.parametrize(

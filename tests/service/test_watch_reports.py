@@ -17,7 +17,7 @@ def wired() -> Wired:
 @pytest.fixture
 def desk(wired: Wired) -> WatchReports:
     return WatchReports(
-        wired.gateway, lambda: wired.now_s, lambda cause, sentence: wired.log.append((wired.now_s, sentence))
+        wired.loop, lambda: wired.now_s, lambda cause, sentence: wired.log.append((wired.now_s, sentence))
     )
 
 

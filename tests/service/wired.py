@@ -118,7 +118,7 @@ class Wired:
             unclean_restart=unclean,
             response=rig.response_of(rig.calibration),
         )
-        self.gateway = ControlLoop(
+        self.loop = ControlLoop(
             self.bank,
             self.controller,
             self.exchange,
@@ -130,7 +130,7 @@ class Wired:
             clock=clock,
             log=lambda cause, sentence: self.log.append((self.now_s, sentence)),
         )
-        self.gateway.pressure_pa_per_v = rig.output.device.pressure_pa_per_v
+        self.loop.pressure_pa_per_v = rig.output.device.pressure_pa_per_v
 
     # -- time
 
@@ -163,11 +163,11 @@ class Wired:
         if self._frame_steps and self._steps % self._frame_steps == 3 % self._frame_steps and self._wire_has_time():
             self.world.stream(self.now_s)
         if (heard := self._down.bytes_through(self.now_s)) and self.is_plugged:
-            self.gateway.on_output_bytes(heard, self.now_s)
+            self.loop.on_output_bytes(heard, self.now_s)
         if (frame := self._stream.bytes_through(self.now_s)) and self.is_cell_plugged:
-            self.gateway.on_cell_bytes(frame, self.now_s)
+            self.loop.on_cell_bytes(frame, self.now_s)
         if self._steps % 10 == 0:
-            self.gateway.on_tick(1, 0.0)
+            self.loop.on_tick(1, 0.0)
 
     def _wire_has_time(self) -> bool:
         """An amplifier leaves out the readings that its wire cannot carry."""
@@ -176,13 +176,13 @@ class Wired:
 
     def stall(self, duration_s: float, then: Callable[[], None] = lambda: None) -> None:
         """The loop does not come by; the world and the wires go on, and bytes wait for it. `then` is served first."""
-        gateway, waiting = self.gateway, _Absent()
-        self.gateway = waiting  # type: ignore[assignment]
+        loop, waiting = self.loop, _Absent()
+        self.loop = waiting  # type: ignore[assignment]
         self.run(duration_s)
-        self.gateway = gateway
+        self.loop = loop
         then()
-        gateway.on_output_bytes(waiting.output, self.now_s)
-        gateway.on_cell_bytes(waiting.cell, self.now_s)
+        loop.on_output_bytes(waiting.output, self.now_s)
+        loop.on_cell_bytes(waiting.cell, self.now_s)
 
     # -- faults
 
@@ -193,11 +193,11 @@ class Wired:
         self.is_plugged = False
         self.observer.cut()
         self._up, self._down = wire_of(self.rig.output), wire_of(self.rig.output)
-        self.gateway.output_closed()
+        self.loop.on_output_closed()
 
     def replug(self) -> None:
         self.is_plugged = True
-        self.gateway.output_opened()
+        self.loop.on_output_opened()
 
     def _write(self, data: bytes) -> None:
         if self.is_plugged:

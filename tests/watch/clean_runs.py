@@ -42,7 +42,7 @@ class Busy(Wired):
         self._awake_s = 0.0
         super().__init__(rig, seed=seed)
         self.rows = Rows()
-        self.gateway.ring = self.rows  # type: ignore[assignment]
+        self.loop.ring = self.rows  # type: ignore[assignment]
 
     def _step(self) -> None:
         if self._steps % 10 == 0:
@@ -52,14 +52,14 @@ class Busy(Wired):
         if self.now_s >= self._awake_s:
             super()._step()
             return
-        gateway, waiting = self.gateway, _Absent()
-        self.gateway = waiting  # type: ignore[assignment]
+        loop, waiting = self.loop, _Absent()
+        self.loop = waiting  # type: ignore[assignment]
         while self.now_s < self._awake_s:
             super()._step()
-        self.gateway = gateway
-        gateway.on_output_bytes(waiting.output, self.now_s)
-        gateway.on_cell_bytes(waiting.cell, self.now_s)
-        gateway.on_tick(1, 0.0)
+        self.loop = loop
+        loop.on_output_bytes(waiting.output, self.now_s)
+        loop.on_cell_bytes(waiting.cell, self.now_s)
+        loop.on_tick(1, 0.0)
 
 
 class Run:

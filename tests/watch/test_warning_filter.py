@@ -7,8 +7,8 @@ from gateway.watch.warning_filter import WarningFilter, WindowVerdict
 def after(*findings: WindowVerdict) -> C:
     opinion = WarningFilter()
     for finding in findings:
-        opinion.hear(finding)
-    return opinion.standing.cause
+        opinion.add(finding)
+    return opinion.published.cause
 
 
 def convicts(cause: C, *others: str, excitation_v: float = 1.0) -> WindowVerdict:

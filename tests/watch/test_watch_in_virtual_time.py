@@ -61,7 +61,7 @@ class Scene:
     def __init__(self, descriptor: int) -> None:
         self.wired = Wired(seed=3)
         self.ring, self.reader = SampleRing(descriptor, COLUMNS), RingReader(descriptor)
-        self.wired.gateway.ring = self.ring
+        self.wired.loop.ring = self.ring
         plant = self.wired.rig.plant
         assert plant is not None
         self.plant = with_value(plant, "regulator", "delay_s", plant.regulator.delay_s + WIRE_S)
@@ -95,8 +95,8 @@ class Scene:
         causes = []
         for _ in range(count):
             self.work(5)
-            self.watch.look()
-            causes.append(self.watch.standing.cause)
+            self.watch.check_newest_window()
+            causes.append(self.watch.published.cause)
         return causes
 
 
@@ -134,7 +134,7 @@ def test_a_hose_that_is_longer_than_a_wire_can_be_is_a_finding_from_the_start(sc
     )
     scene.work(25)
     assert scene.looks(2)[-1] is ResidualCause.TRANSPORT_DELAY
-    assert "cannot tell it from clock-offset" in scene.watch.standing.sentence
+    assert "cannot tell it from clock-offset" in scene.watch.published.sentence
 
 
 def test_more_friction_raises_the_warning_by_its_name_and_its_end_clears_it(scene):
@@ -144,7 +144,7 @@ def test_more_friction_raises_the_warning_by_its_name_and_its_end_clears_it(scen
     found = scene.looks(6)
     assert found[0] is ResidualCause.NONE, "one window is not enough"
     assert found[-1] is ResidualCause.COULOMB_FRICTION
-    assert "coulomb_n 1 -> 3 N" in scene.watch.standing.sentence
+    assert "coulomb_n 1 -> 3 N" in scene.watch.published.sentence
     scene.wired.fault("plant", on=False)
     scene.search.plant = scene.plant
     scene.work(30)
@@ -189,12 +189,12 @@ def test_what_no_effect_explains_is_an_unknown_cause(scene):
     scene.search.plant = scene.plant
     scene.search.leftover = (Leftover("time", "jumps", 0.8),)
     assert scene.looks(5)[-1] is ResidualCause.UNKNOWN
-    assert "jumps, depending on time" in scene.watch.standing.sentence
+    assert "jumps, depending on time" in scene.watch.published.sentence
 
 
 def test_an_idle_gateway_is_never_searched(scene):
     scene.wired.run(40.0)
-    scene.watch.look()
+    scene.watch.check_newest_window()
     assert scene.watch.why_skipped == "nothing was commanded"
     assert scene.search.asked == 0
 
@@ -202,7 +202,7 @@ def test_an_idle_gateway_is_never_searched(scene):
 def test_the_first_window_must_have_seen_something(scene):
     scene.wired.write(0, ENABLE, 1200)
     scene.wired.run(40.0)
-    scene.watch.look()
+    scene.watch.check_newest_window()
     assert "too little" in scene.watch.why_skipped
     assert scene.search.asked == 0
 
@@ -213,7 +213,7 @@ def test_a_gain_has_no_name_in_the_catalogue_but_is_told(scene):
     area_m2 = scene.plant.cylinder.area_m2
     scene.change(cylinder__area_m2=1.15 * area_m2)
     assert scene.looks(6)[-1] is ResidualCause.UNKNOWN
-    assert "gain, area_m2 9.5e-05 -> 0.0001092 m2" in scene.watch.standing.sentence
+    assert "gain, area_m2 9.5e-05 -> 0.0001092 m2" in scene.watch.published.sentence
 
 
 def test_a_cell_whose_sign_turned_is_told_as_such(scene):

@@ -44,7 +44,7 @@ def find_calibration(store: "CalibrationStore", which: str) -> "Calibration":
 
 def in_use(store: "CalibrationStore") -> "Calibration":
     """The calibration in use, or the one that a gateway would start with."""
-    calibration = store.standing().calibration
+    calibration = store.find_selected().calibration
     if calibration is None:
         raise CliError(f"E433 nothing is stored in {store.directory}; --rig names the rig's own", exit_codes.DATA)
     return calibration
@@ -74,12 +74,10 @@ def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, A
 
     rig, store = _rig(rig_name), open_store(directory, rig_name)
     activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n if rig else _ANY_CELL_N))
-    before = store.standing().calibration
+    before = store.find_selected().calibration
     try:
         force = bool(request.get("force"))
-        taken = (
-            activation.take_back() if "rollback" in request else activation.take_offered(request["use"], force=force)
-        )
+        taken = activation.roll_back() if "rollback" in request else activation.use_offered(request["use"], force=force)
     except UnusableCalibration as error:
         sentence = error.fault.sentence(before.number if before else 0)
         raise CliError(sentence, exit_codes.DATA) from None

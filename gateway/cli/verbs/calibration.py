@@ -17,7 +17,7 @@ from gateway.cli.options import json_option, state_directory, state_options
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration
-    from gateway.calibrations.store import CalibrationEntry, StartingSelection
+    from gateway.calibrations.store import CalibrationEntry, SelectedCalibration
 
 
 @click.group(name="calibration")
@@ -34,7 +34,7 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
     from gateway.cli.calibration.stored import open_store
 
     store = open_store(state_directory(state, rig), rig)
-    standing, entries = store.standing(), store.list()
+    standing, entries = store.find_selected(), store.list()
     if as_json:
         facts = {
             "active": _number(standing),
@@ -169,11 +169,11 @@ def _write(texts: dict[Path, str], *, force: bool) -> None:
         click.echo(f"wrote {path}", err=True)
 
 
-def _number(standing: "StartingSelection") -> int | None:
+def _number(standing: "SelectedCalibration") -> int | None:
     return standing.calibration.number if standing.calibration else None
 
 
-def _built_in(own: "Calibration | None", standing: "StartingSelection") -> dict[str, Any] | None:
+def _built_in(own: "Calibration | None", standing: "SelectedCalibration") -> dict[str, Any] | None:
     """The rig's own calibration, which is no file of the store."""
     from gateway.calibrations.selection import OWN
     from gateway.registers.upload.coefficients import model_hash
@@ -184,7 +184,7 @@ def _built_in(own: "Calibration | None", standing: "StartingSelection") -> dict[
     return {"number": own.number, "name": own.name, "active": active, "slots": slots, "model_hash": model_hash(own)}
 
 
-def _facts(entry: "CalibrationEntry", standing: "StartingSelection") -> dict[str, Any]:
+def _facts(entry: "CalibrationEntry", standing: "SelectedCalibration") -> dict[str, Any]:
     from gateway.registers.upload.coefficients import model_hash
 
     return {
@@ -197,7 +197,7 @@ def _facts(entry: "CalibrationEntry", standing: "StartingSelection") -> dict[str
     }
 
 
-def _slots(standing: "StartingSelection", number: int) -> list[int]:
+def _slots(standing: "SelectedCalibration", number: int) -> list[int]:
     """Those that hold this calibration."""
     return [slot for slot, held in enumerate(standing.pointer.slots) if held == number]
 

@@ -74,7 +74,7 @@ def _event_filter(after: str, severity: str, codes: set[str]) -> Callable[[Event
 
 
 def _show(reader: EventReader, wanted: Callable[[EventRecord], bool], follow: bool, as_json: bool) -> None:
-    events = reader.kept()
+    events = reader.read_stored()
     try:
         while True:
             for event in filter(wanted, events):
@@ -82,6 +82,6 @@ def _show(reader: EventReader, wanted: Callable[[EventRecord], bool], follow: bo
             if not follow:
                 return
             time.sleep(_LOOK_S)
-            events = reader.more()
+            events = reader.read_new()
     except KeyboardInterrupt:
         return

@@ -129,5 +129,5 @@ def _reference(rig: Rig | None, state: Path | None) -> Calibration | None:
     """The calibration in use, else the rig's built-in one."""
     if rig is None:
         return None
-    standing = CalibrationStore(state, rig.calibration).standing() if state else None
+    standing = CalibrationStore(state, rig.calibration).find_selected() if state else None
     return (standing.calibration if standing else None) or rig.calibration

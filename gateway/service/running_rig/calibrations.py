@@ -19,20 +19,20 @@ class RigCalibrations:
     def __init__(self, rig: Rig, state: Path) -> None:
         store = CalibrationStore(state, rig.calibration)
         self._activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n))
-        self._standing = standing = store.standing(self._activation.why_not)
-        calibration = standing.calibration or rig.calibration
+        self._selected = selected = store.find_selected(self._activation.why_unusable)
+        calibration = selected.calibration or rig.calibration
         self.rig = replace(rig, calibration=calibration)
-        number = standing.selection.number
+        number = selected.selection.number
         chosen = () if number is None else (f"calibration {number} of {calibration.date_utc} from {store.directory}",)
-        self.notes = (*standing.notes, *chosen)
+        self.notes = (*selected.notes, *chosen)
 
     def serve(
         self, bank: RegisterBank, on_use: Callable[[ActiveCalibration], None], log: Callable[[str, str], None]
     ) -> UploadService:
         """Show the calibration in use in the bank, and take uploads from now on."""
-        bank.set_active_model(self.rig.calibration, self._standing.selection.slot_word)
+        bank.set_active_model(self.rig.calibration, self._selected.selection.slot_word)
         rules = UploadRules.of(self.rig.name, self.rig.register_map, _today)
-        upload = UploadService(bank.staging, self._activation, self._standing, rules, log)
+        upload = UploadService(bank.staging, self._activation, self._selected, rules, log)
         upload.on_use = on_use
         return upload
 

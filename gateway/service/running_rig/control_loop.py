@@ -56,7 +56,7 @@ class ControlLoop:
         self.controller = controller
         self.output = output
         self.recordings: Recordings | None = None
-        self.ladder: CalibrationRuns | None = None
+        self.calibration_runs: CalibrationRuns | None = None
         self.ring: SampleRing | None = None
         self.health = LoopHealth()
         self.decision: Output | None = None
@@ -116,13 +116,13 @@ class ControlLoop:
         if self.lateness:
             self.lateness.tick(now_s, self._last_waited_s)
 
-    def output_opened(self) -> None:
-        self.output.opened()
+    def on_output_opened(self) -> None:
+        self.output.reset()
         self.output_lost = FaultCode.NONE
 
-    def output_closed(self) -> None:
+    def on_output_closed(self) -> None:
         """Decided at once: it may be open again before the next tick, and another device may be behind it then."""
-        self.output.opened()
+        self.output.reset()
         self.output_lost = FaultCode.OUTPUT_LOST
         self._step(self._clock())
 
@@ -130,8 +130,8 @@ class ControlLoop:
         """Decide and publish now: something besides command and sample has changed."""
         self._step(self._clock())
 
-    def cell_opened(self) -> None:
-        self._cell.opened()
+    def on_cell_opened(self) -> None:
+        self._cell.reset()
         self.cell_lost = False
 
     def _late_s(self, now_s: float) -> float:
@@ -179,16 +179,16 @@ class ControlLoop:
 
     def _step(self, now_s: float) -> None:
         decision = self._decide(now_s)
-        self.output.want(decision.voltage_v, now_s)
+        self.output.set_voltage(decision.voltage_v, now_s)
         self.decision = decision
-        if self.ladder:
-            self.ladder.follow(decision)
+        if self.calibration_runs:
+            self.calibration_runs.follow(decision)
         if decision.clear_command:
             self.bank.clear_command()
         if decision.release_owner:
             self.bank.release_owner()
         self.health.loop_time_s = self._clock() - now_s
-        stored = self.ladder.stored if self.ladder else 0
+        stored = self.calibration_runs.stored if self.calibration_runs else 0
         known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause)
         status = status_of(decision, self.health, self.output.pressure_pa, known)
         if decision.warnings & WarningBit.RESTARTED and not decision.fault:
@@ -200,7 +200,7 @@ class ControlLoop:
     def _record(self) -> None:
         if self.recordings and self.sample and self.decision:
             self.recordings.append(self.sample, self.decision, self.output.line)
-        if self.ladder and self.sample and self.decision:
-            self.ladder.append(self.sample, self.decision, self.output.line)
+        if self.calibration_runs and self.sample and self.decision:
+            self.calibration_runs.append(self.sample, self.decision, self.output.line)
         if self.ring and self.sample and self.decision:
             self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.line))

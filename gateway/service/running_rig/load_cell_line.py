@@ -27,9 +27,9 @@ class CellExchange:
         self._reply_timeout_s = profile.reply_timeout_s
         self._period_s = 1.0 / min(profile.reading.rate_hz or inf, _FASTEST_HZ)
         self.overdue = 0
-        self.opened()
+        self.reset()
 
-    def opened(self) -> None:
+    def reset(self) -> None:
         """The port is (again) open: nothing said before counts any more."""
         self._host.forget()
         self._sent_s: float | None = None
@@ -44,7 +44,7 @@ class CellExchange:
                 self._is_overdue = False  # of the question before, perhaps: the one that is out has its time
             else:
                 self._sent_s = None
-        self._pump(now_s)
+        self._send_next(now_s)
         return found
 
     def tick(self, now_s: float) -> None:
@@ -53,9 +53,9 @@ class CellExchange:
             self._host.forget()
             self.overdue += 1
             self._sent_s, self._is_overdue, self._next_s = None, True, now_s
-        self._pump(now_s)
+        self._send_next(now_s)
 
-    def _pump(self, now_s: float) -> None:
+    def _send_next(self, now_s: float) -> None:
         if self._question and self._sent_s is None and now_s >= self._next_s:
             self._sent_s, self._next_s = now_s, now_s + self._period_s
             self._write(self._question)

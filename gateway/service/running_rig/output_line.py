@@ -56,9 +56,9 @@ class OutputExchange:
         self.garbage_bytes = 0
         self.round_trip_s = nan
         self.on_pressure: Callable[[float], None] = lambda pressure_pa: None
-        self.opened()
+        self.reset()
 
-    def opened(self) -> None:
+    def reset(self) -> None:
         """The port is (again) open: nothing said before counts any more."""
         self._host.forget()
         self._wanted_v: float | None = None
@@ -84,15 +84,15 @@ class OutputExchange:
     def line(self) -> LineState:
         return LineState(self.pressure_pa, self._sent_v, self._setting_s)
 
-    def want(self, voltage_v: float, now_s: float) -> None:
+    def set_voltage(self, voltage_v: float, now_s: float) -> None:
         """This voltage shall stand on the device, V; sent at once if the wire is free, else as soon as it is."""
         self._wanted_v = voltage_v
-        self._pump(now_s)
+        self._send_next(now_s)
 
     def on_bytes(self, chunk: bytes, now_s: float) -> None:
         for reply in self._host.receive(chunk, now_s):
             self._on_reply(reply, now_s)
-        self._pump(now_s)
+        self._send_next(now_s)
 
     def tick(self, now_s: float) -> None:
         """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""
@@ -100,15 +100,15 @@ class OutputExchange:
             self._host.forget()
             self._in_flight, self._is_overdue = None, True
             self._next_poll_s = now_s  # ask again at once: three tries fit into the bound on silence
-        self._pump(now_s)
+        self._send_next(now_s)
 
-    def _pump(self, now_s: float) -> None:
+    def _send_next(self, now_s: float) -> None:
         wanted_v = self._wanted_v
         if wanted_v is None or self._in_flight is not None:
             return
         if now_s < self._quiet_until_s and wanted_v >= self._asked_v:
             return
-        if not self._stands(wanted_v):
+        if not self._is_confirmed(wanted_v):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             self._asked_v, self._standing_v = wanted_v, None
             if self._host.idle_question is None:  # this is what a poll would say
@@ -119,7 +119,7 @@ class OutputExchange:
             self._next_poll_s = now_s + _POLL_PERIOD_S
             self._send(self._host.idle_question or SetVoltage(self._asked_v), now_s)
 
-    def _stands(self, voltage_v: float) -> bool:
+    def _is_confirmed(self, voltage_v: float) -> bool:
         """Within half a step of what surely stands there is nothing to send. After a question without an answer nothing
         surely stands: a device whose answer was lost may have obeyed, and must hear the safe voltage."""
         standing_v = self._standing_v
@@ -138,7 +138,7 @@ class OutputExchange:
             return
         asked, self._in_flight = self._in_flight, None
         self.unanswered_since_s = None
-        if self._is_overdue and not self._echoes(asked, reply):
+        if self._is_overdue and not self._is_echo(asked, reply):
             self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
         self.round_trip_s = now_s - self._sent_s
@@ -147,11 +147,11 @@ class OutputExchange:
             self.pressure_pa = reply.pressure_pa
             self.on_pressure(reply.pressure_pa)
         elif isinstance(reply, Refused):
-            self._failed(type(asked), FaultCode.OUTPUT_REFUSED)
+            self._count_failure(type(asked), FaultCode.OUTPUT_REFUSED)
         elif asked is not None and isinstance(reply, Accepted):
             self._check_setting(asked, reply)
 
-    def _echoes(self, asked: OutputRequest | None, reply: OutputReply) -> bool:
+    def _is_echo(self, asked: OutputRequest | None, reply: OutputReply) -> bool:
         return (
             isinstance(asked, SetVoltage)
             and isinstance(reply, Accepted)
@@ -162,7 +162,7 @@ class OutputExchange:
         """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted."""
         self.acknowledged_v = self._standing_v = reply.voltage_v
         if not self._host.confirms(self._asked_v, reply, asked):
-            self._failed(type(asked), FaultCode.OUTPUT_ALTERED)
+            self._count_failure(type(asked), FaultCode.OUTPUT_ALTERED)
             return
         if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:
             self._standing_v = self._asked_v  # the answer only counts in coarser steps
@@ -170,7 +170,7 @@ class OutputExchange:
         if max(self._failures.values()) < _FAILURES_BEFORE_FAULT:
             self.fault = FaultCode.NONE
 
-    def _failed(self, question: type, fault: FaultCode) -> None:
+    def _count_failure(self, question: type, fault: FaultCode) -> None:
         """Counted by question: an echo that agrees makes no reading good that does not."""
         self._failures[question] = self._failures.get(question, 0) + 1
         if self._failures[question] >= _FAILURES_BEFORE_FAULT:

@@ -78,7 +78,7 @@ class RunningRig:
         self._state = state
         self._guardian = guardian
         self._log = log
-        self._flag = CleanShutdownMarker(state)
+        self._shutdown_marker = CleanShutdownMarker(state)
         self._closing = False
         self._not_opened: dict[str, PortError] = {}  # after a restart, by path
         self._spoke = asyncio.Event()
@@ -90,7 +90,7 @@ class RunningRig:
         }
         self.ring: SampleRing | None = None
         self.failed = asyncio.Event()
-        asyncio.get_running_loop().set_exception_handler(self._on_defect)
+        asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
         host = output_host(rig.output.device)
         self._safe_frame = host.safe_frame(rig.control.limits.safe_voltage_v)
         self._safe_reply = host.safe_reply
@@ -111,7 +111,7 @@ class RunningRig:
             is_simulated=rig.simulated,
         )
         self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
-        self._turns = SchedulerCounters(os.getpid())
+        self._counters = SchedulerCounters(os.getpid())
         self._lateness = Lateness(1.0 / rig.loop_hz)
         self._follow_rig()
         cell = rig.load_cell
@@ -123,22 +123,22 @@ class RunningRig:
         """Bank and controller, the gateway between them, and who serves both."""
         self._wire_gateway(cause)
         rig = self._rig
-        self._ladder = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
-        self.gateway.ladder = self._ladder
+        self._calibration_runs = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
+        self.loop.calibration_runs = self._calibration_runs
         self._server = ModbusTcpServer(
             self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
         )
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
-        self.watch_desk = WatchReports(self.gateway, time.monotonic, self._log.speaking_for("watch"))
+        self.watch_reports = WatchReports(self.loop, time.monotonic, self._log.speaking_for("watch"))
         self._control_socket = ControlSocket(
             self._state,
             RunningParts(
                 bank=self.bank,
                 recordings=self._recordings,
-                health=self.gateway.health,
+                health=self.loop.health,
                 upload=self._upload,
-                ladder=self._ladder,
-                watch=self.watch_desk,
+                calibration_runs=self._calibration_runs,
+                watch=self.watch_reports,
                 running=self._running,
             ),
             self._log,
@@ -159,7 +159,7 @@ class RunningRig:
             compensation=rig.compensation,
             response=rig.response_of(rig.calibration),
         )
-        self.gateway = ControlLoop(
+        self.loop = ControlLoop(
             self.bank,
             self.controller,
             self._line,
@@ -167,18 +167,18 @@ class RunningRig:
             clock=time.monotonic,
             log=self._log,
         )
-        self.gateway.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
-        self.gateway.recordings = self._recordings
-        self.gateway.ring = self.ring
-        self.gateway.restart_cause = cause
-        self.gateway.waited_s = self._turns.waited_s
-        self.gateway.lateness = self._lateness
+        self.loop.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
+        self.loop.recordings = self._recordings
+        self.loop.ring = self.ring
+        self.loop.restart_cause = cause
+        self.loop.waited_s = self._counters.waited_s
+        self.loop.lateness = self._lateness
         if self._tick.is_fallback:
-            self.gateway.warnings |= WarningBit.CLOCK_FALLBACK
+            self.loop.warnings |= WarningBit.CLOCK_FALLBACK
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
-        self._wire(_cause_of_restart(restarted, was_unclean=self._flag.raise_flag()))
+        self._wire(_cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
         for port in (self._output_port, self._cell_port):
             await (self._open_again(port) if restarted else port.open())
         self._tick.start()
@@ -199,7 +199,7 @@ class RunningRig:
             output_port=self._output_port.path,
             cell_port=self._cell_port.path,
             voltage_v=self._line.acknowledged_v,
-            force_n=self.gateway.sample.force_n if self.gateway.sample else None,
+            force_n=self.loop.sample.force_n if self.loop.sample else None,
             notes=notes,
         )
 
@@ -242,7 +242,7 @@ class RunningRig:
             notes.append(f"restarted in OFF after: {restarted.sentence}")
         if self._line.acknowledged_v is None:
             notes.append(await self._why_silent(self._output_port, self._rig.output, restarted))
-        if self.gateway.sample is None:
+        if self.loop.sample is None:
             notes.append(await self._why_silent(self._cell_port, self._rig.load_cell, restarted))
         return tuple(notes)
 
@@ -255,7 +255,7 @@ class RunningRig:
         if restarted and port.path in self._not_opened:
             return str(self._not_opened[port.path])
         waited_s, now_s = _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S, time.monotonic()
-        held = self._lateness.since(now_s - waited_s, now_s, self._turns.waited_s())
+        held = self._lateness.since(now_s - waited_s, now_s, self._counters.waited_s())
         _, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, waited_s, held, "")
         if restarted or blamed:
             start = "restart" if restarted else "start"
@@ -296,15 +296,15 @@ class RunningRig:
         await self._server.close()
         await self._control_socket.close()
         self._recordings.stop()
-        self._ladder.close()
+        self._calibration_runs.close()
         self._output_port.close()
         self._cell_port.close()
         self._upload.close()
-        self._turns.close()
+        self._counters.close()
         self._lateness.close()
-        self._flag.lower()
+        self._shutdown_marker.clear()
 
-    def _on_defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    def _on_internal_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """An exception that nobody expected: the process ends with the safe voltage, the guardian starts it again in OFF."""
         error = context.get("exception")
         trace = "".join(traceback.format_exception(error)) if isinstance(error, BaseException) else ""
@@ -313,11 +313,11 @@ class RunningRig:
         self.failed.set()
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
-        self.gateway.on_tick(expirations, late_s)
+        self.loop.on_tick(expirations, late_s)
         self._guardian.heartbeat()
         self._recordings.flush(time.monotonic())
-        self._ladder.flush(time.monotonic())
-        if self._line.acknowledged_v is not None and self.gateway.sample is not None:
+        self._calibration_runs.flush(time.monotonic())
+        if self._line.acknowledged_v is not None and self.loop.sample is not None:
             self._spoke.set()
 
     def _on_calibration(self, taken: ActiveCalibration) -> None:
@@ -329,7 +329,7 @@ class RunningRig:
         lowered = self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
         if lowered:
             self._log("calibration", lowered)
-        self.gateway.refresh()
+        self.loop.refresh()
 
     def _write_output(self, data: bytes) -> None:
         if not self._closing:
@@ -342,22 +342,22 @@ class RunningRig:
             self._cell_port.write(data)
 
     def _on_output_bytes(self, chunk: bytes, now_s: float) -> None:
-        self.gateway.on_output_bytes(chunk, now_s)
+        self.loop.on_output_bytes(chunk, now_s)
 
     def _on_output_open(self, descriptor: int) -> None:
         self._guardian.hand_over(descriptor, self._safe_frame, self._safe_reply)
-        self.gateway.output_opened()
+        self.loop.on_output_opened()
         self._warn_of_latency(self._output_port)
 
     def _on_output_lost(self, error: PortError) -> None:
         self._log("port", str(error))
-        self.gateway.output_closed()
+        self.loop.on_output_closed()
 
     def _on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
-        self.gateway.on_cell_bytes(chunk, now_s)
+        self.loop.on_cell_bytes(chunk, now_s)
 
     def _on_cell_open(self, descriptor: int) -> None:
-        self.gateway.cell_opened()
+        self.loop.on_cell_opened()
         self._warn_of_latency(self._cell_port)
 
     def _warn_of_latency(self, port: SerialPort) -> None:
@@ -366,8 +366,8 @@ class RunningRig:
 
     def _on_cell_lost(self, error: PortError) -> None:
         self._log("port", str(error))
-        self.gateway.cell_lost = True
+        self.loop.cell_lost = True
 
     def _on_peer_closed(self, peer: Peer) -> None:
         if peer.host == self.bank.owner:
-            self.gateway.owner_connected = False
+            self.loop.owner_connected = False

@@ -25,23 +25,23 @@ LOST: Final = -1000
 
 @dataclass
 class Child:
-    """A child process. link: our end of its line; pid 0: asked for and not born yet; died: its pidfd, readable once it
+    """A child process. link: our end of its line; pid 0: asked for and not attach yet; died: its pidfd, readable once it
     is gone, -1 before its birth; turns: what the kernel gives it."""
 
     link: socket.socket
     pid: int = 0
     died: int = -1
-    turns: SchedulerCounters | None = None
+    counters: SchedulerCounters | None = None
     _code: int | None = field(default=None, repr=False)
 
-    def born(self, pid: int) -> None:
+    def attach(self, pid: int) -> None:
         """Follow this process from now on; OSError when it has died already."""
         self.died = os.pidfd_open(pid)
-        self.pid, self.turns = pid, SchedulerCounters(pid)
+        self.pid, self.counters = pid, SchedulerCounters(pid)
 
     def adopt(self, pid: int) -> None:
         """Follow a forked process that has told of its birth, and let it begin; OSError when it has died already."""
-        self.born(pid)
+        self.attach(pid)
         guardian_link.send(self.link, guardian_link.ADOPTED)
 
     def kill(self) -> None:
@@ -69,8 +69,8 @@ class Child:
 
     def close(self) -> None:
         self.link.close()
-        if self.turns:
-            self.turns.close()
+        if self.counters:
+            self.counters.close()
         if self.died >= 0:
             os.close(self.died)
             self.died = -1
@@ -103,7 +103,7 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
         ours.close()
         raise
     try:
-        child.born(pid)
+        child.attach(pid)
     except OSError:
         child.end()
         raise

@@ -47,7 +47,7 @@ class ChildStarter:
 
     @property
     def birth_bound_s(self) -> float:
-        """How long a child that was asked for may take to be born."""
+        """How long a child that was asked for may take to be attach."""
         return _BIRTH_S if self._is_proven else _FIRST_BIRTH_S
 
     def open(self) -> None:
@@ -76,10 +76,10 @@ class ChildStarter:
         """The residual watch: what it finds it tells control, through the control socket."""
         return spawn_child(WATCH, arguments, arguments["ring"])
 
-    def was_born(self) -> None:
+    def on_born(self) -> None:
         self._is_proven = True
 
-    def was_not_born(self) -> None:
+    def on_not_born(self) -> None:
         """A child that was asked for ended before its first word."""
         self._is_doubted = True
 

@@ -57,8 +57,8 @@ def run(options: RunOptions) -> int:
             return EXIT_DEVICE
         priority.set_nice(priority.LOOP_NICE)
         with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
-            nursery = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
-            return Guardian(options, state, nursery, signals, log).watch()
+            starter = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
+            return Guardian(options, state, starter, signals, log).watch()
 
 
 @dataclass
@@ -68,7 +68,7 @@ class Guardian:
 
     options: RunOptions
     state: Path
-    nursery: ChildStarter
+    starter: ChildStarter
     signals: SignalPipe
     log: EventLog
     clock: Callable[[], float] = time.monotonic
@@ -79,7 +79,7 @@ class Guardian:
     others: OtherChildren = field(init=False)
     ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
     line: SafeLine | None = None
-    pulse: Heartbeat = field(default_factory=Heartbeat)
+    heartbeat: Heartbeat = field(default_factory=Heartbeat)
     bound: tuple[str, int] | None = None
     said_cause: Ending | None = None  # what control gave as its own first cause
     next_start: Ending | None = None  # why control is started again, once it is
@@ -91,13 +91,13 @@ class Guardian:
     restarts: RestartPolicy = field(default_factory=RestartPolicy)
 
     def __post_init__(self) -> None:
-        self.others = OtherChildren(self.nursery, self.log, lambda answer: self._tell_control(message_link.RIG, answer))
+        self.others = OtherChildren(self.starter, self.log, lambda answer: self._tell_control(message_link.RIG, answer))
 
     def watch(self) -> int:
         """Until the end; the exit code."""
         self.ring = create_shared_memory()
         try:
-            self.nursery.open()
+            self.starter.open()
             code = self._start_control()
             while code is None:
                 code = self._step()
@@ -113,7 +113,7 @@ class Guardian:
         if control and not self.link_ended and control.link.fileno() in readable:
             self._on_messages(control)
             if self.link_ended and not control.pid:
-                self.nursery.was_not_born()
+                self.starter.on_not_born()
                 return self._on_death(Ending(EndCause.NOT_STARTED, "control process ended before its first word"))
         if control and control.died >= 0 and control.died in readable:
             return self._on_death(Ending(EndCause.DIED, "control process died"))
@@ -138,9 +138,9 @@ class Guardian:
         """When control is overdue: its heartbeat, READY, its birth; or when it is to be started."""
         if self.control is None:
             return inf if self.leaving else self.asked_s
-        if self.pulse.is_up:
-            return self.pulse.due_s
-        return self.asked_s + (_START_GRACE_S if self.control.pid else self.nursery.birth_bound_s)
+        if self.heartbeat.is_up:
+            return self.heartbeat.due_s
+        return self.asked_s + (_START_GRACE_S if self.control.pid else self.starter.birth_bound_s)
 
     def _follow_others(self, readable: set[int]) -> None:
         if self.leaving and self.leaving.died in readable:
@@ -152,7 +152,7 @@ class Guardian:
     def _on_signal(self, count: int) -> None:
         """The first one asks control to ramp down, where there is a line to ramp on; a second one waits for nothing."""
         self.stops += count
-        is_up = self.line is not None or self.pulse.is_up
+        is_up = self.line is not None or self.heartbeat.is_up
         self.stop_deadline_s = self.clock() + (_STOP_BOUND_S if self.stops == 1 and is_up else 0.0)
         if self.stops == 1:
             self._tell_control(message_link.STOP)
@@ -182,12 +182,12 @@ class Guardian:
 
     def _handle(self, control: Child, message: message_link.Message) -> None:
         if message.tag == message_link.HEARTBEAT:
-            if self.pulse.is_up:  # before READY the start has its own, longer patience
-                self.pulse.heard(control, self.clock())
+            if self.heartbeat.is_up:  # before READY the start has its own, longer patience
+                self.heartbeat.record_beat(control, self.clock())
         elif message.tag == message_link.BORN:
             with contextlib.suppress(OSError):  # it has died since: the end of its line is behind this message
                 control.adopt(int(message.body["pid"]))
-                self.nursery.was_born()
+                self.starter.on_born()
         elif message.tag == message_link.LINE:
             self._take_line(message)
         elif message.tag == message_link.NEED_RIG:
@@ -214,10 +214,10 @@ class Guardian:
 
     def _announce(self, control: Child, message: message_link.Message) -> None:
         info, banner = message.body["info"], message.body["banner"]
-        self.pulse.stall_s = float(message.body["stall_s"])
+        self.heartbeat.stall_s = float(message.body["stall_s"])
         host, port = info["modbus"]
         self.bound = (host, port)  # a restart keeps the port that masters already know
-        self.pulse.heard(control, self.clock())
+        self.heartbeat.record_beat(control, self.clock())
         self._provide_watch(message.body["watch"])
         if self.options.json:
             words.print_ready(info | {"pids": self._pids()})
@@ -248,17 +248,17 @@ class Guardian:
             return None
         if self.control is None:
             return self._start_control()
-        if not self.pulse.is_up:
+        if not self.heartbeat.is_up:
             return self._on_no_start(self.control, now_s)
-        if self.pulse.is_overdue(now_s):
-            return self._on_death(self.pulse.why_silent(self.control, now_s))
+        if self.heartbeat.is_overdue(now_s):
+            return self._on_death(self.heartbeat.why_silent(self.control, now_s))
         return None
 
     def _on_no_start(self, control: Child, now_s: float) -> int | None:
         if not control.pid:  # nothing has been risked: the long way, at once, and it counts as no restart
             control.close()
             self.control = None
-            self.nursery.drop_server("does not answer", now_s)
+            self.starter.drop_server("does not answer", now_s)
             return self._start_control()
         return self._on_death(Ending(EndCause.NOT_STARTED, f"control process not ready within {_START_GRACE_S:g} s"))
 
@@ -270,7 +270,7 @@ class Guardian:
             return EXIT_OK  # told to stop while there was none
         is_gone = control.died < 0 or bool(self.wait([control.died], _DEATH_BOUND_S))
         ending = self.said_cause or (cause if isinstance(cause, Ending) else cause())
-        self.pulse.forget()
+        self.heartbeat.reset()
         code = control.wait(0.0)
         if is_gone:
             control.close()
@@ -316,7 +316,7 @@ class Guardian:
     def _start_control(self) -> int | None:
         self.said_cause, self.link_ended, self.asked_s = None, False, self.clock()
         try:
-            self.control = self.nursery.control(
+            self.control = self.starter.control(
                 {
                     "rig": self.options.rig,
                     "simulate": self.options.simulate,

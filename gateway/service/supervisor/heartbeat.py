@@ -17,7 +17,7 @@ class Heartbeat:
         self.stall_s = 0.1
         self._beat_s: float | None = None  # later than it was where we were late ourselves
         self._heard_s = 0.0
-        self._turns: ProcessorTime | None = None  # at the last heartbeat
+        self._used: ProcessorTime | None = None  # at the last heartbeat
         self._was_late = False
 
     @property
@@ -29,13 +29,13 @@ class Heartbeat:
     def due_s(self) -> float:
         return (self._beat_s or 0.0) + self.stall_s
 
-    def forget(self) -> None:
-        self._beat_s, self._turns, self._was_late = None, None, False
+    def reset(self) -> None:
+        self._beat_s, self._used, self._was_late = None, None, False
 
-    def heard(self, control: Child, now_s: float) -> None:
+    def record_beat(self, control: Child, now_s: float) -> None:
         self._beat_s = self._heard_s = now_s
         self._was_late = False
-        self._turns = control.turns.read() if control.turns else None
+        self._used = control.counters.read() if control.counters else None
 
     def is_overdue(self, now_s: float) -> bool:
         """True after stall_s of silence. Where we woke late ourselves the machine stood still: one more chance."""
@@ -48,11 +48,11 @@ class Heartbeat:
     def why_silent(self, control: Child, now_s: float) -> Callable[[], Ending]:
         """How to find the cause of the silence until now; to be asked behind the kill, when the kernel's counters are
         complete and nothing waits for them any more."""
-        state = control.turns.state() if control.turns else ""
-        silent_s, before, was_late = now_s - self._heard_s, self._turns, self._was_late
+        state = control.counters.state() if control.counters else ""
+        silent_s, before, was_late = now_s - self._heard_s, self._used, self._was_late
 
         def why() -> Ending:
-            turns = time_between(before, control.turns.read() if control.turns else None)
+            turns = time_between(before, control.counters.read() if control.counters else None)
             return explain_silence(Silence(silent_s, self.stall_s, turns, state, was_late), load_of_machine())
 
         return why

@@ -1,6 +1,6 @@
 """What the guardian keeps besides control: the prepared process, the simulated rig and the residual watch.
 
-Each looks after itself (see its keeper); together they say what to wait for and until when, and who is there. Standard
+Each looks after itself (see its supervisor); together they say what to wait for and until when, and who is there. Standard
 library only.
 """
 
@@ -17,8 +17,8 @@ from gateway.service.supervisor.watch_child import WatchSupervisor
 class OtherChildren:
     """tell: an answer for control about the simulated rig. Times are monotonic seconds."""
 
-    def __init__(self, nursery: ChildStarter, log: EventLog, tell: Callable[[Answer], None]) -> None:
-        self._nursery, self._log, self._tell = nursery, log, tell
+    def __init__(self, starter: ChildStarter, log: EventLog, tell: Callable[[Answer], None]) -> None:
+        self._starter, self._log, self._tell = starter, log, tell
         self._rig: RigSupervisor | None = None
         self._watch: WatchSupervisor | None = None
 
@@ -38,7 +38,7 @@ class OtherChildren:
         return {
             "rig": self._rig.pid if self._rig else None,
             "watch": self._watch.pid if self._watch else None,
-            "fork_server": self._nursery.server_pid,
+            "fork_server": self._starter.server_pid,
         }
 
     def follow(self, readable: set[int], now_s: float) -> None:
@@ -49,23 +49,23 @@ class OtherChildren:
     def provide_rig(self, now_s: float) -> None:
         """Control asks for the simulated rig's ports."""
         if self._rig is None:
-            nursery = self._nursery
-            self._rig = RigSupervisor(lambda first: nursery.rig(prepared=first), self._tell, partial(self._log, "rig"))
+            starter = self._starter
+            self._rig = RigSupervisor(lambda first: starter.rig(prepared=first), self._tell, partial(self._log, "rig"))
         self._rig.ask(now_s)
 
     def provide_watch(self, arguments: dict[str, Any], now_s: float) -> None:
         """Control is ready, and its rig is one that is watched. The first arguments count."""
         if self._watch is None:
-            nursery = self._nursery
-            self._watch = WatchSupervisor(lambda: nursery.watch(arguments), partial(self._log, "watch"))
+            starter = self._starter
+            self._watch = WatchSupervisor(lambda: starter.watch(arguments), partial(self._log, "watch"))
         self._watch.start(now_s)
 
     def end(self) -> None:
         """Ask each, then insist."""
-        for one in (self._rig, self._watch, self._nursery):
+        for one in (self._rig, self._watch, self._starter):
             if one:
                 one.end()
 
     @property
     def _all(self) -> list[ChildStarter | RigSupervisor | WatchSupervisor]:
-        return [one for one in (self._nursery, self._rig, self._watch) if one]
+        return [one for one in (self._starter, self._rig, self._watch) if one]

@@ -34,13 +34,13 @@ class SafeLine:
             for _ in range(_REPEATS):
                 _drop_input(self.descriptor)
                 _write_all(self.descriptor, self.frame, reply_timeout_s)
-                if not self.reply or self._acknowledged(reply_timeout_s):
+                if not self.reply or self._wait_for_acknowledgement(reply_timeout_s):
                     return True
         except OSError:
             return False
         return False
 
-    def _acknowledged(self, timeout_s: float) -> bool:
+    def _wait_for_acknowledgement(self, timeout_s: float) -> bool:
         """A reply counts only as a whole line: the 0 at the end of 510 acknowledges nothing."""
         deadline_s = time.monotonic() + timeout_s
         seen = b""

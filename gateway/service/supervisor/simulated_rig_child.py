@@ -63,7 +63,7 @@ class RigSupervisor:
         if child and not self._link_ended and child.link.fileno() in readable:
             self._hear(child, now_s)
         if child and child is self._child and child.died >= 0 and child.died in readable:
-            self._died(describe_exit(child.wait()), now_s)
+            self._on_death_of_child(describe_exit(child.wait()), now_s)
         elif now_s >= self._due_s:
             self._overdue(now_s)
 
@@ -77,7 +77,7 @@ class RigSupervisor:
         try:
             self._child = self._spawn(self._deaths == 0)
         except OSError as error:
-            self._died(error.strerror or str(error), now_s)
+            self._on_death_of_child(error.strerror or str(error), now_s)
 
     def _overdue(self, now_s: float) -> None:
         if self._child is None:
@@ -85,7 +85,7 @@ class RigSupervisor:
             return
         self._child.kill()
         self._child.wait()
-        self._died(f"no ports within {_START_BOUND_S:g} s", now_s)
+        self._on_death_of_child(f"no ports within {_START_BOUND_S:g} s", now_s)
 
     def _hear(self, child: Child, now_s: float) -> None:
         try:
@@ -97,7 +97,7 @@ class RigSupervisor:
                 self._due_s, self._answer = inf, {"ptys": dict(message.body["ptys"]), **told}
         except (OSError, ValueError, KeyError, TypeError):
             child.kill()
-            self._died("its first words made no sense", now_s)
+            self._on_death_of_child("its first words made no sense", now_s)
             return
         if message is None:
             self._on_end_of_link(child, now_s)
@@ -108,9 +108,9 @@ class RigSupervisor:
         """Its death follows, which has the exit code; without a birth there is nothing to wait for."""
         self._link_ended = True
         if not child.pid:
-            self._died("it could not be started", now_s)
+            self._on_death_of_child("it could not be started", now_s)
 
-    def _died(self, how: str, now_s: float) -> None:
+    def _on_death_of_child(self, how: str, now_s: float) -> None:
         if self._child:
             self._child.close()
             self._child = None

@@ -52,7 +52,7 @@ class WatchSupervisor:
             code = self._child.wait()
             self._child.close()
             self._child = None
-            self._died(f"ended ({f'signal {-code}' if LOST < code < 0 else describe_exit(code)})", now_s)
+            self._on_death_of_child(f"ended ({f'signal {-code}' if LOST < code < 0 else describe_exit(code)})", now_s)
         elif now_s >= self._due_s:
             self._begin(now_s)
 
@@ -66,9 +66,9 @@ class WatchSupervisor:
         try:
             self._child = self._spawn()
         except OSError as error:
-            self._died(f"did not start ({error.strerror or error})", now_s)
+            self._on_death_of_child(f"did not start ({error.strerror or error})", now_s)
 
-    def _died(self, how: str, now_s: float) -> None:
+    def _on_death_of_child(self, how: str, now_s: float) -> None:
         if now_s - self._began_s >= _LONG_LIFE_S:
             self._deaths = 0
         self._deaths += 1

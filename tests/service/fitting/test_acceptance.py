@@ -69,17 +69,17 @@ def test_what_is_out_of_band_or_worse_than_what_is_in_use_is_kept_and_not_offere
         )
     assert "stored" not in result
     assert result["refused"].startswith(f"E435 calibration {result['rejected']} is stored as rejected")
-    before = store_of(tmp_path).standing().selection
+    before = store_of(tmp_path).find_selected().selection
     store = store_of(tmp_path)
     rejected = store.load(result["rejected"])
     assert words in rejected.rejected
     assert "Rejected, not offered" in Path(result["report"]).read_text(encoding="utf-8")
     activation = Activation(store, CoefficientLimits(cell_range_n=98.0))
     with pytest.raises(StoreError, match=f"E436 calibration {rejected.number} was rejected: .*--force"):
-        activation.take_offered(rejected.number)
-    assert store.standing().selection == before
-    assert activation.take_offered(rejected.number, force=True).calibration == rejected
-    assert store_of(tmp_path).standing().calibration == rejected
+        activation.use_offered(rejected.number)
+    assert store.find_selected().selection == before
+    assert activation.use_offered(rejected.number, force=True).calibration == rejected
+    assert store_of(tmp_path).find_selected().calibration == rejected
 
 
 def test_without_a_reversal_part_the_branches_are_judged_and_it_is_said(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Bank, gateway and controller around a small plant, in virtual time and without wires: a thousand times faster than real.
 
 Masters write through the bank's own faces (FC05, FC06, FC16, FC22, floats), so that an answer is what a master would get.
-Two racks with the same past live the same next seconds: what a refused write changes all the same shows.
+Two rigs with the same past live the same next seconds: what a refused write changes all the same shows.
 """
 
 from dataclasses import replace
@@ -39,7 +39,7 @@ class Wire:
     def sent_v(self) -> float:
         return self.voltage_v
 
-    def want(self, voltage_v: float, now_s: float) -> None:
+    def set_voltage(self, voltage_v: float, now_s: float) -> None:
         self.voltage_v = self.acknowledged_v = voltage_v
 
     def tick(self, now_s: float) -> None: ...
@@ -58,7 +58,7 @@ class Samples:
         """A stream is not asked."""
 
 
-class Rack:
+class SmallRig:
     """Times are virtual seconds. beats: the owner's heartbeat changes every tenth of a second, where there is a lease."""
 
     def __init__(self, control: ControlSettings | None = None, *, seed: int = 1, **plant: float) -> None:
@@ -72,13 +72,13 @@ class Rack:
         self.plant = SmallPlant(Random(seed), **plant)  # type: ignore[arg-type]
         self.wire, self.samples = Wire(), Samples()
         rules = BankRules(
-            rig_name="rack",
+            rig_name="rig",
             force_max_n=self.settings.limits.force_max_n,
             supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION,
         )
         self.bank = RegisterBank(MAP, rules, now=self.now)
         self.controller = Controller(self.settings, bsfm(), calibration_id=1)
-        self.gateway = ControlLoop(
+        self.loop = ControlLoop(
             self.bank,
             self.controller,
             self.wire,
@@ -96,12 +96,12 @@ class Rack:
 
     # -- time
 
-    def run(self, seconds: float) -> "Rack":
+    def run(self, seconds: float) -> "SmallRig":
         for _ in range(round(seconds / TICK_S)):
             self._tick()
         return self
 
-    def until(self, state: State, within_s: float = 5.0) -> "Rack":
+    def until(self, state: State, within_s: float = 5.0) -> "SmallRig":
         for _ in range(round(within_s / TICK_S)):
             if self.state is state:
                 return self
@@ -115,11 +115,11 @@ class Rack:
         if not self.is_cell_silent:
             force_n = self.plant.reading_n()
             self.samples.next = ForceSample(force_n, force_n, Quality.OK, self.now())
-            self.gateway.on_cell_bytes(b"", self.now())
+            self.loop.on_cell_bytes(b"", self.now())
         if self.beats and self.ticks % 10 == 0 and self.bank.owner == OWNER.host:
             self.beat += 1
             self.write(4, self.beat)
-        self.gateway.on_tick(1, 0.0)
+        self.loop.on_tick(1, 0.0)
         self.trace.append((self.state, self.wire.voltage_v, self.plant.force_n))
 
     # -- masters
@@ -156,17 +156,17 @@ class Rack:
 
     # -- where it may stand
 
-    def holding(self, force_n: float = 12.0) -> "Rack":
+    def holding(self, force_n: float = 12.0) -> "SmallRig":
         self.write(0, ENABLE, round(100 * force_n))
         return self.until(State.HOLDING)
 
-    def faulted(self) -> "Rack":
+    def faulted(self) -> "SmallRig":
         self.holding().is_cell_silent = True
         self.until(State.FAULT)
         self.is_cell_silent = False
         return self.run(1.5)
 
-    def calibrating(self, word: int = CALIBRATE) -> "Rack":
+    def calibrating(self, word: int = CALIBRATE) -> "SmallRig":
         self.write(0, word)
         return self.until(State.CALIBRATING).run(2.5)
 

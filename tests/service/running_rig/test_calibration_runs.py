@@ -22,7 +22,7 @@ def kept(wired: Wired, state: Path) -> CalibrationRuns:
         lambda: wired.now_s,
         lambda cause, sentence: wired.log.append((wired.now_s, sentence)),
     )
-    wired.gateway.ladder = keeper
+    wired.loop.calibration_runs = keeper
     wired.run(0.1)
     return keeper
 

@@ -1,7 +1,7 @@
 """Every edge in every state has an answer, and the force and the state of the next five seconds are what the answer says.
 
 Taken means done; an exception means that nothing of the write was taken: the seconds after it are, sample for sample, those
-of a rack that nobody has written to.
+of a rig that nobody has written to.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from tests.service.running_rig.simulated_rig import (
     TAKE,
     TARE,
     VALVE,
-    Rack,
+    SmallRig,
     with_limits,
 )
 
@@ -31,19 +31,19 @@ R = RefusalReason
 HELD, FAULTY, BUSY, GOING, FIT = R.CALIBRATION_REFUSED, R.FAULT_LATCHED, R.CALIBRATING, R.STOPPING, R.FITTING
 
 
-def rack(leased: bool) -> Rack:
-    return Rack(settings(lease_s=LEASE_S if leased else None))
+def rig(leased: bool) -> SmallRig:
+    return SmallRig(settings(lease_s=LEASE_S if leased else None))
 
 
-def local(leased: bool) -> Rack:
-    begun = rack(leased)
+def local(leased: bool) -> SmallRig:
+    begun = rig(leased)
     begun.controller.active_run.ask(CalibrationPlan())
     return begun.until(State.CALIBRATING).run(2.5)
 
 
-def slow(leased: bool) -> Rack:
+def slow(leased: bool) -> SmallRig:
     """A force that takes seconds to get anywhere."""
-    begun = Rack(
+    begun = SmallRig(
         replace(
             settings(lease_s=LEASE_S if leased else None), defaults=replace(settings().defaults, force_ramp_n_per_s=5.0)
         )
@@ -52,79 +52,79 @@ def slow(leased: bool) -> Rack:
     return begun.until(State.RAMPING).run(1.0)
 
 
-def ending(leased: bool) -> Rack:
+def ending(leased: bool) -> SmallRig:
     """Bit 5 has been cleared, and the ramp takes a while."""
     control = with_limits(settings(lease_s=LEASE_S if leased else None), force_max_n=50.0)
-    begun = Rack(replace(control, defaults=replace(control.defaults, force_ramp_n_per_s=1.0))).calibrating()
+    begun = SmallRig(replace(control, defaults=replace(control.defaults, force_ramp_n_per_s=1.0))).calibrating()
     begun.write(0, 0)
     assert begun.state is State.CALIBRATING
     return begun
 
 
-def stopping(leased: bool) -> Rack:
+def stopping(leased: bool) -> SmallRig:
     begun = slow(leased)
     begun.run(2.0)
     begun.controller.stop()
     return begun.run(0.1)
 
 
-def fitting(leased: bool) -> Rack:
-    begun = rack(leased)
+def fitting(leased: bool) -> SmallRig:
+    begun = rig(leased)
     begun.controller.active_run.phase = CalibrationPhase.FITTING
     return begun
 
 
-def ready(leased: bool) -> Rack:
-    begun = rack(leased)
+def ready(leased: bool) -> SmallRig:
+    begun = rig(leased)
     begun.write(0, ENABLE)
     return begun.run(0.3)
 
 
-STATES: dict[str, Callable[[bool], Rack]] = {
-    "off": rack,
+STATES: dict[str, Callable[[bool], SmallRig]] = {
+    "off": rig,
     "ready": ready,
     "ramping": slow,
-    "holding": lambda leased: rack(leased).holding(),
-    "fault": lambda leased: rack(leased).faulted(),
-    "calibrating": lambda leased: rack(leased).calibrating(),
-    "enabled and calibrating": lambda leased: rack(leased).calibrating(ENABLE | CALIBRATE),
+    "holding": lambda leased: rig(leased).holding(),
+    "fault": lambda leased: rig(leased).faulted(),
+    "calibrating": lambda leased: rig(leased).calibrating(),
+    "enabled and calibrating": lambda leased: rig(leased).calibrating(ENABLE | CALIBRATE),
     "calibrating here": local,
     "run ended": ending,
     "stopping": stopping,
     "fitting": fitting,
 }
 
-EDGES: dict[str, Callable[[Rack], tuple[int, ...]]] = {
+EDGES: dict[str, Callable[[SmallRig], tuple[int, ...]]] = {
     # address and words; `stands` is the control word as it reads
-    "enable": lambda rack: (0, stands(rack) | ENABLE),
-    "enable and force": lambda rack: (0, stands(rack) | ENABLE, 1500),
-    "reset": lambda rack: (0, RESET),
-    "reset too": lambda rack: (0, stands(rack) | RESET),
-    "reset and enable": lambda rack: (0, RESET | ENABLE),
-    "tare": lambda rack: (0, TARE),
-    "tare too": lambda rack: (0, stands(rack) | TARE),
-    "tare and force": lambda rack: (0, stands(rack) | TARE, 1400),
-    "enable and tare": lambda rack: (0, ENABLE | TARE),
-    "calibrate": lambda rack: (0, CALIBRATE),
-    "calibrate too": lambda rack: (0, stands(rack) | CALIBRATE),
-    "calibrate and enable": lambda rack: (0, ENABLE | CALIBRATE),
-    "calibrate and force": lambda rack: (0, ENABLE | CALIBRATE, 1100),
-    "valve": lambda rack: (0, stands(rack) | VALVE),
-    "self-test": lambda rack: (0, stands(rack) | SELF_TEST),
-    "take over": lambda rack: (0, stands(rack) | TAKE),
-    "heartbeat": lambda rack: (0, *rack.block(stands(rack), beat=4711)),
-    "force": lambda rack: (1, 1300),
-    "ramp": lambda rack: (2, 77),
-    "tilt": lambda rack: (6, 10),
+    "enable": lambda rig: (0, stands(rig) | ENABLE),
+    "enable and force": lambda rig: (0, stands(rig) | ENABLE, 1500),
+    "reset": lambda rig: (0, RESET),
+    "reset too": lambda rig: (0, stands(rig) | RESET),
+    "reset and enable": lambda rig: (0, RESET | ENABLE),
+    "tare": lambda rig: (0, TARE),
+    "tare too": lambda rig: (0, stands(rig) | TARE),
+    "tare and force": lambda rig: (0, stands(rig) | TARE, 1400),
+    "enable and tare": lambda rig: (0, ENABLE | TARE),
+    "calibrate": lambda rig: (0, CALIBRATE),
+    "calibrate too": lambda rig: (0, stands(rig) | CALIBRATE),
+    "calibrate and enable": lambda rig: (0, ENABLE | CALIBRATE),
+    "calibrate and force": lambda rig: (0, ENABLE | CALIBRATE, 1100),
+    "valve": lambda rig: (0, stands(rig) | VALVE),
+    "self-test": lambda rig: (0, stands(rig) | SELF_TEST),
+    "take over": lambda rig: (0, stands(rig) | TAKE),
+    "heartbeat": lambda rig: (0, *rig.block(stands(rig), beat=4711)),
+    "force": lambda rig: (1, 1300),
+    "ramp": lambda rig: (2, 77),
+    "tilt": lambda rig: (6, 10),
 }
 
 
-def stands(rack: Rack) -> int:
-    return rack.word("control_word")
+def stands(rig: SmallRig) -> int:
+    return rig.word("control_word")
 
 
 SAME = "same"
-"""Taken, and what the rack does stays what it was."""
+"""Taken, and what the rig does stays what it was."""
 
 ANYWHERE = {"valve": R.UNSUPPORTED_BIT, "self-test": R.UNSUPPORTED_BIT, "take over": SAME, "heartbeat": SAME}
 PRESSING = {
@@ -174,7 +174,7 @@ EXPECTED: dict[str, dict[str, object]] = {
 
 @dataclass(frozen=True)
 class Watched:
-    """What a rack does when nobody writes."""
+    """What a rig does when nobody writes."""
 
     trace: list[object]
     state: State

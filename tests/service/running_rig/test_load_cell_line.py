@@ -109,7 +109,7 @@ def test_after_a_lost_answer_the_line_is_back_at_its_rate(wire: Wire) -> None:
 def test_half_an_answer_from_before_a_reopening_is_no_part_of_the_next(wire: Wire) -> None:
     wire.tick()
     wire.exchange.receive(b"W +0001", wire.now_s)
-    wire.exchange.opened()
+    wire.exchange.reset()
     wire.tick()
     wire.answer(2.0)
     assert [sample.force_n for sample in wire.samples] == [2.0]

@@ -29,9 +29,9 @@ class Wire:
     def last(self) -> str:
         return self.written[-1].decode().strip()
 
-    def want(self, counts: float, after_s: float = 0.0) -> None:
+    def set_voltage(self, counts: float, after_s: float = 0.0) -> None:
         self.now_s += after_s
-        self.exchange.want(counts * 10 / 1023, self.now_s)
+        self.exchange.set_voltage(counts * 10 / 1023, self.now_s)
 
     def answer(self, text: str, after_s: float = ROUND_TRIP_S) -> None:
         self.now_s += after_s
@@ -43,7 +43,7 @@ class Wire:
 
     def settle(self, counts: int) -> None:
         """This setting acknowledged, the wire idle."""
-        self.want(counts)
+        self.set_voltage(counts)
         self.answer(str(counts))
         if self.last == "MON":
             self.answer("0")
@@ -55,7 +55,7 @@ def wire() -> Wire:
 
 
 def test_a_voltage_is_sent_at_once_when_the_wire_is_free(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     assert wire.written == [b"SET 512\r\n"]
     assert wire.exchange.acknowledged_v is None
     wire.answer("512")
@@ -64,9 +64,9 @@ def test_a_voltage_is_sent_at_once_when_the_wire_is_free(wire: Wire) -> None:
 
 
 def test_of_waiting_setpoints_only_the_last_is_sent(wire: Wire) -> None:
-    wire.want(100)
+    wire.set_voltage(100)
     for counts in (200, 300, 400, 900, 350):
-        wire.want(counts, after_s=0.001)
+        wire.set_voltage(counts, after_s=0.001)
     assert wire.written == [b"SET 100\r\n"]
     wire.answer("100")
     assert wire.written == [b"SET 100\r\n", b"SET 350\r\n"]
@@ -74,27 +74,27 @@ def test_of_waiting_setpoints_only_the_last_is_sent(wire: Wire) -> None:
 
 def test_a_thousand_setpoints_leave_no_queue_behind(wire: Wire) -> None:
     for counts in range(1000):
-        wire.want(counts, after_s=0.0001)
+        wire.set_voltage(counts, after_s=0.0001)
     wire.answer("0")
     wire.answer("999")
     assert [line for line in wire.written if line.startswith(b"SET")] == [b"SET 0\r\n", b"SET 999\r\n"]
 
 
 def test_there_is_never_a_second_question_on_the_wire(wire: Wire) -> None:
-    wire.want(100)
+    wire.set_voltage(100)
     for _ in range(5):
         wire.tick(0.01)
-        wire.want(500)
+        wire.set_voltage(500)
     assert len(wire.written) == 1
 
 
 def test_within_half_a_step_of_the_device_nothing_is_sent(wire: Wire) -> None:
     wire.settle(512)
     before = len(wire.written)
-    wire.want(512.4)
-    wire.want(511.6)
+    wire.set_voltage(512.4)
+    wire.set_voltage(511.6)
     assert len(wire.written) == before
-    wire.want(512.6)
+    wire.set_voltage(512.6)
     assert wire.last == "SET 513"
 
 
@@ -113,7 +113,7 @@ def test_a_setpoint_goes_before_a_pressure_poll(wire: Wire) -> None:
     wire.settle(512)
     wire.tick(0.2)
     assert wire.last == "MON"
-    wire.want(600)
+    wire.set_voltage(600)
     wire.answer("400", after_s=0.2)  # the next poll is due as well
     assert wire.last == "SET 600"
 
@@ -123,13 +123,13 @@ def test_before_the_first_wish_nothing_is_asked(wire: Wire) -> None:
     for _ in range(50):
         wire.tick()
     assert wire.written == []
-    wire.want(0)
+    wire.set_voltage(0)
     assert wire.written == [b"SET 0\r\n"]
 
 
 def test_after_a_lost_answer_the_newest_voltage_is_asked_again(wire: Wire) -> None:
-    wire.want(512)
-    wire.want(300)
+    wire.set_voltage(512)
+    wire.set_voltage(300)
     wire.tick(REPLY_TIMEOUT_S - 0.001)
     assert wire.written == [b"SET 512\r\n"]
     wire.tick(0.002)
@@ -139,7 +139,7 @@ def test_after_a_lost_answer_the_newest_voltage_is_asked_again(wire: Wire) -> No
 
 
 def test_silence_keeps_its_age_over_retries(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     began_s = wire.now_s
     for _ in range(30):
         wire.tick()
@@ -160,7 +160,7 @@ def test_silence_while_nothing_is_wanted_is_noticed_by_a_poll(wire: Wire) -> Non
 
 @pytest.mark.parametrize("failures", [1, 2])
 def test_one_or_two_bad_echoes_are_noise(wire: Wire, failures: int) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     for _ in range(failures):
         wire.answer("510")
     assert wire.exchange.fault is FaultCode.NONE
@@ -169,7 +169,7 @@ def test_one_or_two_bad_echoes_are_noise(wire: Wire, failures: int) -> None:
 
 
 def test_three_bad_echoes_in_a_row_are_an_altered_output(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     for _ in range(3):
         wire.answer("510")
     assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
@@ -178,7 +178,7 @@ def test_three_bad_echoes_in_a_row_are_an_altered_output(wire: Wire) -> None:
 
 def test_a_good_echo_between_bad_ones_starts_the_count_anew(wire: Wire) -> None:
     for counts in (512, 600, 512):
-        wire.want(counts)
+        wire.set_voltage(counts)
         wire.answer("510")
         wire.answer("510")
         wire.answer(str(counts))
@@ -186,7 +186,7 @@ def test_a_good_echo_between_bad_ones_starts_the_count_anew(wire: Wire) -> None:
 
 
 def test_three_refusals_in_a_row_are_a_refused_output(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     for _ in range(3):
         assert wire.exchange.fault is FaultCode.NONE
         wire.answer("OUT OF RANGE")
@@ -195,7 +195,7 @@ def test_three_refusals_in_a_row_are_a_refused_output(wire: Wire) -> None:
 
 
 def test_the_fault_is_gone_once_the_device_obeys_again(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     for _ in range(3):
         wire.answer("UNKNOWN COMMAND")
     wire.answer("512")
@@ -203,7 +203,7 @@ def test_the_fault_is_gone_once_the_device_obeys_again(wire: Wire) -> None:
 
 
 def test_garbage_is_counted_and_answers_nothing(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     wire.answer("5a2")
     assert wire.exchange.garbage_bytes == 5
     assert wire.exchange.unanswered_since_s is not None
@@ -212,7 +212,7 @@ def test_garbage_is_counted_and_answers_nothing(wire: Wire) -> None:
 
 
 def test_an_answer_in_pieces_is_an_answer(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     for piece in (b"5", b"1", b"2\r", b"\n"):
         wire.exchange.on_bytes(piece, wire.now_s)
     assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
@@ -253,7 +253,7 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
     device = SlowDevice(wire, every, slow_s)
     device.seen = len(wire.written)
     for index in range(200):  # a setpoint that moves all the time: the wire is never idle
-        wire.want(200 + (index * 7) % 500)
+        wire.set_voltage(200 + (index * 7) % 500)
         device.advance(wire.now_s + 0.01)
         assert wire.exchange.fault is FaultCode.NONE
     device.advance(wire.now_s + 0.4)
@@ -264,18 +264,18 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
 
 def test_a_late_answer_costs_one_reply_time_and_no_fall_waits_for_it(wire: Wire) -> None:
     wire.settle(200)
-    wire.want(210)
-    wire.want(220)
+    wire.set_voltage(210)
+    wire.set_voltage(220)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
     wire.answer("210")  # of the question that was given up
-    wire.want(230)
+    wire.set_voltage(230)
     assert wire.last == "SET 220", "a rise waits until the line is quiet"
-    wire.want(0)
+    wire.set_voltage(0)
     assert wire.last == "SET 0"
 
 
 def test_a_device_that_alters_its_settings_is_found_after_a_lost_answer_too(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
     wire.answer("510")
     wire.tick(REPLY_TIMEOUT_S + 0.001)
@@ -288,20 +288,20 @@ def test_a_device_that_alters_its_settings_is_found_after_a_lost_answer_too(wire
 def test_a_device_whose_answers_are_cut_still_hears_the_safe_voltage(wire: Wire) -> None:
     """It may have obeyed the question whose answer was lost: what it acknowledged before that does not stand for sure."""
     wire.settle(0)
-    wire.want(512)
+    wire.set_voltage(512)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
-    wire.want(0)
+    wire.set_voltage(0)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
     assert wire.last == "SET 0"
 
 
 def test_opened_again_nothing_said_before_counts(wire: Wire) -> None:
-    wire.want(512)
+    wire.set_voltage(512)
     wire.answer("510")
     wire.answer("510")
     wire.answer("510")
-    wire.want(900)
-    wire.exchange.opened()
+    wire.set_voltage(900)
+    wire.exchange.reset()
     exchange = wire.exchange
     assert (exchange.acknowledged_v, exchange.unanswered_since_s, exchange.fault) == (None, None, FaultCode.NONE)
     before = len(wire.written)
@@ -339,7 +339,7 @@ def test_a_device_without_a_pressure_is_asked_for_its_setting() -> None:
 def test_a_device_that_can_be_asked_nothing_is_told_its_setting_again() -> None:
     """So that it does not go unnoticed when it falls silent."""
     wire = with_words(read_pressure=None, read_voltage=None, set_voltage=OBEYED)
-    wire.want(512)
+    wire.set_voltage(512)
     wire.answer(">")
     wire.tick(0.2)
     assert wire.written == [b"SET 512\r\n"] * 2
@@ -362,11 +362,11 @@ def test_a_setting_that_somebody_else_has_changed_is_set_anew_and_at_last_a_faul
 
 def test_a_device_that_says_nothing_to_a_setting_is_read_back_in_the_same_breath() -> None:
     wire = with_words(read_pressure=None, set_voltage=TELLS_NOTHING)
-    wire.want(512)
+    wire.set_voltage(512)
     assert wire.written == [b"SET 512\r\nREQ\r\n"]
     wire.answer("512")
     assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
-    wire.want(600)
+    wire.set_voltage(600)
     for _ in range(4):  # the first is the answer to a poll
         wire.answer("512")
     assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
@@ -377,11 +377,11 @@ def test_an_answer_that_counts_in_coarser_steps_confirms_and_is_not_asked_for_ev
         OBEYED, ask="V {volts:.3f}", answer="{volts:.1f}", range=VoltageRange(device=(0, 10), voltage_v=(0, 10))
     )
     wire = with_words(read_pressure=None, read_voltage=None, set_voltage=fine)
-    wire.exchange.want(1.234, wire.now_s)
+    wire.exchange.set_voltage(1.234, wire.now_s)
     assert wire.last == "V 1.234"
     wire.answer("1.2")
     assert wire.exchange.fault is FaultCode.NONE
-    wire.exchange.want(1.234, wire.now_s + 0.01)
+    wire.exchange.set_voltage(1.234, wire.now_s + 0.01)
     assert len(wire.written) == 1
-    wire.exchange.want(1.240, wire.now_s + 0.02)
+    wire.exchange.set_voltage(1.240, wire.now_s + 0.02)
     assert wire.last == "V 1.240"

@@ -1,4 +1,4 @@
-"""One running cell in this process, on ptys whose devices the test serves: what an internal error leaves on the wire."""
+"""One running rig in this process, on ptys whose devices the test serves: what an internal error leaves on the wire."""
 
 import asyncio
 import os
@@ -34,8 +34,8 @@ def devices(tmp_path: Path) -> Iterator[OwnDevices]:
         yield devices
 
 
-def with_cell(devices: OwnDevices, scene: Scene, restarted: Ending | None = None) -> list[str]:
-    """Start a cell, play the scene, close it; what was logged."""
+def with_running_rig(devices: OwnDevices, scene: Scene, restarted: Ending | None = None) -> list[str]:
+    """Start a rig, play the scene, close it; return what was logged."""
     lines: list[str] = []
     state = devices.directory / "state"
     state.mkdir()
@@ -43,15 +43,15 @@ def with_cell(devices: OwnDevices, scene: Scene, restarted: Ending | None = None
     async def play(log: EventLog) -> None:
         ours, theirs = message_link.create_link()
         theirs.setblocking(False)
-        rig = load_rig(str(devices.rig))
+        profile = load_rig(str(devices.rig))
         guardian = GuardianLine(theirs)
-        cell = RunningRig(rig, rig.ports(), state, guardian, log)
+        rig = RunningRig(profile, profile.ports(), state, guardian, log)
         try:
-            await cell.start(["127.0.0.1", 0], record=False, restarted=restarted)
+            await rig.start(["127.0.0.1", 0], record=False, restarted=restarted)
             async with asyncio.timeout(10):
-                await scene(cell, ours)
+                await scene(rig, ours)
         finally:
-            await cell.close()
+            await rig.close()
             guardian.close()
             drop(ours)
 
@@ -68,8 +68,8 @@ def drop(guardian: socket.socket) -> None:
     guardian.close()
 
 
-async def pressing(cell: RunningRig, devices: OwnDevices, volts: float = 4.0) -> None:
-    cell.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, round(1000 * volts)), MASTER)
+async def pressing(rig: RunningRig, devices: OwnDevices, volts: float = 4.0) -> None:
+    rig.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, round(1000 * volts)), MASTER)
     while devices.setting_v < volts - 0.1:
         await asyncio.sleep(0.005)
 
@@ -78,11 +78,11 @@ def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices
     """3 s for the first words and 3 s of other speeds are for somebody who sets a rig up, not for a running line."""
     devices.is_silent = True
 
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
-        assert cell.gateway.restart_cause is FaultCode.MACHINE_BUSY
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        assert rig.loop.restart_cause is FaultCode.MACHINE_BUSY
 
     began_s = time.monotonic()
-    with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
+    with_running_rig(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
     assert time.monotonic() - began_s < 2.5
     assert devices.heard
 
@@ -102,12 +102,12 @@ def test_a_restart_waits_a_moment_for_a_port_whose_holder_is_about_to_end(device
     ending = threading.Timer(0.1, os.close, [holder])
     ending.start()
 
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
-        await until(lambda: cell.gateway.decision is not None)
-        assert cell.gateway.decision is not None
-        assert cell.gateway.decision.fault is FaultCode.NONE, "it was nobody's fault"
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await until(lambda: rig.loop.decision is not None)
+        assert rig.loop.decision is not None
+        assert rig.loop.decision.fault is FaultCode.NONE, "it was nobody's fault"
 
-    lines = with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
+    lines = with_running_rig(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
     ending.join()
     assert not [line for line in lines if "E103" in line]
 
@@ -119,15 +119,15 @@ def test_a_restart_whose_port_stays_held_comes_up_without_it_and_takes_it_when_i
     monkeypatch.setattr("gateway.service.running_rig.running_rig._HELD_BOUND_S", 0.0)
     holder = held(str(devices.output.link))
 
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
-        assert not cell._output_port.is_open
-        assert cell.gateway.output_lost is FaultCode.OUTPUT_LOST
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        assert not rig._output_port.is_open
+        assert rig.loop.output_lost is FaultCode.OUTPUT_LOST
         os.close(holder)
-        await until(lambda: cell._output_port.is_open)
+        await until(lambda: rig._output_port.is_open)
         heard = len(devices.heard)
         await until(lambda: len(devices.heard) > heard)
 
-    lines = with_cell(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
+    lines = with_running_rig(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
     assert [line for line in lines if "E103" in line and "is held by this very process" in line]
     assert {heard.voltage_v for heard in devices.settings_since(0.0)} <= {0.0}
 
@@ -136,21 +136,21 @@ def test_a_first_start_ends_over_a_port_that_is_held(devices: OwnDevices) -> Non
     """Somebody sits in front of it, who is told what to stop."""
     holder = held(str(devices.output.link))
 
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         raise AssertionError("it must not come up")
 
     with pytest.raises(PortError, match="E103"):
-        with_cell(devices, scene)
+        with_running_rig(devices, scene)
     os.close(holder)
 
 
 def test_a_defect_anywhere_in_the_loop_ends_with_the_safe_voltage(devices: OwnDevices) -> None:
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
-        await pressing(cell, devices)
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await pressing(rig, devices)
         asyncio.get_running_loop().call_soon(lambda: 1 // 0)
-        await cell.failed.wait()
+        await rig.failed.wait()
 
-    lines = with_cell(devices, scene)
+    lines = with_running_rig(devices, scene)
     deadline_s = time.monotonic() + 1.0
     while devices.heard[-1].voltage_v != 0.0:
         assert time.monotonic() < deadline_s
@@ -162,37 +162,37 @@ def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevic
     """Whatever hangs in closing the rest, the wire has its last word already."""
     seen_v: list[float] = []
 
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
-        await pressing(cell, devices)
-        close = cell._server.close
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await pressing(rig, devices)
+        close = rig._server.close
 
         async def look_and_close() -> None:
             await asyncio.sleep(0.02)
             seen_v.append(devices.setting_v)
             await close()
 
-        monkeypatch.setattr(cell._server, "close", look_and_close)
+        monkeypatch.setattr(rig._server, "close", look_and_close)
 
-    with_cell(devices, scene)
+    with_running_rig(devices, scene)
     assert seen_v == [0.0]
 
 
 def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
-        await pressing(cell, devices)
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await pressing(rig, devices)
         with monkeypatch.context() as patched:
-            patched.setattr(cell.controller, "_step", lambda *arguments: 1 // 0)
+            patched.setattr(rig.controller, "_step", lambda *arguments: 1 // 0)
             while devices.setting_v > 0.0:
                 await asyncio.sleep(0.005)
-        while cell.gateway.decision is None or cell.gateway.decision.fault is not FaultCode.INTERNAL:
+        while rig.loop.decision is None or rig.loop.decision.fault is not FaultCode.INTERNAL:
             await asyncio.sleep(0.005)
-        assert not cell.failed.is_set()
+        assert not rig.failed.is_set()
 
-    assert any("A499" in line for line in with_cell(devices, scene))
+    assert any("A499" in line for line in with_running_rig(devices, scene))
 
 
 def test_the_guardian_has_the_line_before_anything_but_safe_is_written(devices: OwnDevices) -> None:
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         assert {heard.voltage_v for heard in devices.settings_since(0.0)} <= {0.0}
         guardian.setblocking(False)
         messages = []
@@ -206,11 +206,11 @@ def test_the_guardian_has_the_line_before_anything_but_safe_is_written(devices: 
         assert len(handed.descriptors) == 1
         socket.close(handed.descriptors[0])
 
-    with_cell(devices, scene)
+    with_running_rig(devices, scene)
 
 
 def test_the_heartbeat_comes_from_the_loop_itself(devices: OwnDevices) -> None:
-    async def scene(cell: RunningRig, guardian: socket.socket) -> None:
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         def beats() -> int:
             count = 0
             while True:
@@ -225,13 +225,13 @@ def test_the_heartbeat_comes_from_the_loop_itself(devices: OwnDevices) -> None:
 
         guardian.setblocking(False)
         beats()
-        ticks = cell.gateway.health.ticks
+        ticks = rig.loop.health.ticks
         await asyncio.sleep(0.2)
-        heard, ticked = beats(), cell.gateway.health.ticks - ticks
+        heard, ticked = beats(), rig.loop.health.ticks - ticks
         assert heard >= 10
         assert heard <= ticked
         time.sleep(0.15)  # the loop does not come by
         assert beats() == 0
         guardian.setblocking(True)
 
-    with_cell(devices, scene)
+    with_running_rig(devices, scene)

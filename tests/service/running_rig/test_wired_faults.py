@@ -127,7 +127,7 @@ def test_what_takes_the_force_while_holding_is_told_by_pressure_and_factor(fault
     wired = Wired().pressing(12.0)
     wired.run(1.0)
     if fault == "cell-in-kgf":
-        wired.gateway._cell = InKilograms(wired.gateway._cell)  # type: ignore[assignment]
+        wired.loop._cell = InKilograms(wired.loop._cell)  # type: ignore[assignment]
     else:
         wired.fault(fault)
     wired.until(lambda: bool(wired.said("A301")), 6.0)
@@ -203,21 +203,21 @@ def test_while_the_output_is_unplugged_no_enable_is_accepted() -> None:
 def test_an_unplugged_cell_is_named_as_such() -> None:
     wired = at_twenty()
     wired.is_cell_plugged = False
-    wired.gateway.cell_lost = True
+    wired.loop.cell_lost = True
     fails_with(wired, FaultCode.CELL_LOST, 2 * TICK_S)
     wired.is_cell_plugged = True
-    wired.gateway.cell_opened()
+    wired.loop.on_cell_opened()
     heal_and_reset(wired)
 
 
 def test_a_cell_that_comes_back_within_half_a_frame_gives_no_wrong_force() -> None:
     wired = Wired().ready()
-    wired.gateway.on_cell_bytes(b"ST,GS,+0009.", wired.now_s)
-    wired.gateway.cell_opened()
-    before = wired.gateway.samples
-    wired.gateway.on_cell_bytes(b"99kg\r\n", wired.now_s)
-    assert wired.gateway.samples == before
-    assert wired.gateway.cell_garbage_bytes == len(b"99kg\r\n")
+    wired.loop.on_cell_bytes(b"ST,GS,+0009.", wired.now_s)
+    wired.loop.on_cell_opened()
+    before = wired.loop.samples
+    wired.loop.on_cell_bytes(b"99kg\r\n", wired.now_s)
+    assert wired.loop.samples == before
+    assert wired.loop.cell_garbage_bytes == len(b"99kg\r\n")
 
 
 def test_a_defect_of_ours_is_the_safe_voltage_a_latched_fault_and_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -289,7 +289,7 @@ def test_the_owners_last_connection_closed_is_a_fault_where_there_is_a_lease() -
     wired = Wired(with_supervision(strict(), lease_s=5.0)).ready()
     wired.write(0, ENABLE, 1500, 0, 0, 1)
     wired.run(0.5)
-    wired.gateway.owner_connected = False
+    wired.loop.owner_connected = False
     fails_with(wired, FaultCode.MASTER_LOST, 2 * TICK_S)
 
 
@@ -339,7 +339,7 @@ def test_a_fault_has_one_first_cause_and_latches() -> None:
 def test_after_an_unclean_end_the_cause_is_readable_until_somebody_enables() -> None:
     wired = at_twenty()
     wired.start(unclean=True)
-    wired.gateway.restart_cause = FaultCode.LOOP_STALLED
+    wired.loop.restart_cause = FaultCode.LOOP_STALLED
     restarted_s = wired.now_s
     wired.ready()
     wired.run(0.1)
@@ -400,7 +400,7 @@ def test_whatever_happens_the_wire_keeps_the_invariants(seed: int, budget: int) 
         for _ in range(25):
             misfortunes(wired, chance)
             for _ in wired.samples(round(chance.uniform(0.02, 0.4) / STEP_S) * STEP_S):
-                decision = wired.gateway.decision
+                decision = wired.loop.decision
                 assert decision is None or not non_safe_without_leave(wired, decision), "I4"
                 may_press = not wired.is_plugged or wired.state not in (State.OFF, State.FAULT)
                 disabled_s = 0.0 if may_press else disabled_s + STEP_S

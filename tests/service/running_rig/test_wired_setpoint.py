@@ -207,14 +207,14 @@ class Rows:
 def test_every_sample_is_a_row_of_what_was_read_and_what_was_decided(tmp_path: Path) -> None:
     wired = Wired().ready()
     rows = Rows(tmp_path)
-    wired.gateway.recordings = rows  # type: ignore[assignment]
-    before = wired.gateway.samples
+    wired.loop.recordings = rows  # type: ignore[assignment]
+    before = wired.loop.samples
     wired.write(0, ENABLE, 1500)
     wired.run(1.5)
     wired.fault("cell-cut")
     wired.run(0.5)
     recording = read_recording(rows.close())
-    samples = wired.gateway.samples - before
+    samples = wired.loop.samples - before
     assert recording.rows == samples == pytest.approx(150, abs=2), "no row without a sample"
     column = {name: values.tolist() for name, values in recording.columns.items()}
     assert tuple(column) == COLUMNS

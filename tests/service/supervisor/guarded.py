@@ -41,7 +41,7 @@ class FakeChild(Child):
         self.exit_code: int | None = None
         self.is_immortal = False
 
-    def born(self, pid: int) -> None:
+    def attach(self, pid: int) -> None:
         self.pid, self.died = self._next_pid, self._died_read
 
     def dies(self, code: int) -> None:
@@ -140,11 +140,11 @@ class FakeNursery:
     def end(self) -> None:
         self.calls.append("end")
 
-    def was_born(self) -> None:
-        self.calls.append("born")
+    def on_born(self) -> None:
+        self.calls.append("attach")
 
-    def was_not_born(self) -> None:
-        self.calls.append("not born")
+    def on_not_born(self) -> None:
+        self.calls.append("not attach")
 
     def drop_server(self, how: str, now_s: float) -> None:
         self.calls.append(f"drop {how}")
@@ -185,16 +185,16 @@ class FakeLog:
 class Scene:
     """step: until something has happened that `until` accepts, or the guardian ends (`code`)."""
 
-    def __init__(self, tmp_path: Path, nursery: FakeNursery) -> None:
+    def __init__(self, tmp_path: Path, starter: FakeNursery) -> None:
         self.now_s = 100.0
         self.said: list[str] = []
-        self.nursery = nursery
+        self.starter = starter
         self.signals = FakeSignals()
         self.code: int | None = None
         self.guardian = Guardian(
             RunOptions(json=True),
             tmp_path,
-            nursery,  # type: ignore[arg-type]
+            starter,  # type: ignore[arg-type]
             self.signals,  # type: ignore[arg-type]
             FakeLog(self.said),  # type: ignore[arg-type]
             clock=lambda: self.now_s,
@@ -209,7 +209,7 @@ class Scene:
         return ready
 
     def run(self, until: Callable[[], bool] = lambda: False, steps: int = 200) -> int | None:
-        if not self.nursery.arguments:
+        if not self.starter.arguments:
             self.code = self.guardian._start_control()
         while self.code is None and not until():
             self.code = self.guardian._step()
@@ -219,12 +219,12 @@ class Scene:
 
     @property
     def child(self) -> FakeChild:
-        return self.nursery.started[-1]
+        return self.starter.started[-1]
 
     def close(self) -> None:
         self.guardian._close()
         self.signals.close()
-        for child in (*self.nursery.started, *self.nursery.rigs_started):
+        for child in (*self.starter.started, *self.starter.rigs_started):
             child.dies(0)
             child.close()
 

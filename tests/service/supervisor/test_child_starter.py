@@ -21,7 +21,7 @@ def spawned(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[str, FakeChi
 
     def spawn(module: str, *_: object, **__: object) -> FakeChild:
         child = FakeChild(len(made))
-        child.born(0)
+        child.attach(0)
         made.append((module, child))
         return child
 
@@ -59,7 +59,7 @@ def test_control_is_asked_of_the_prepared_process(kept, spawned):
 
 def test_after_a_stillbirth_one_child_is_started_the_long_way(kept, spawned):
     one, said = kept
-    one.was_not_born()
+    one.on_not_born()
     one.control(ARGUMENTS)
     one.control(ARGUMENTS).close()
     assert modules(spawned) == ["fork_server", "control_process"]

@@ -83,9 +83,9 @@ def test_what_the_server_forked_and_nobody_follows_any_more_begins_nothing(tmp_p
     theirs.close()
     line = fork_server.request_child(ours, fork_server.CONTROL, {})
     assert wait_readable([line.fileno()], 10.0)
-    born = message_link.receive(line)
-    assert born and born.tag == message_link.BORN
-    died = os.pidfd_open(born.body["pid"])
+    attach = message_link.receive(line)
+    assert attach and attach.tag == message_link.BORN
+    died = os.pidfd_open(attach.body["pid"])
     line.close()
     assert wait_readable([died], 10.0)
     assert not began.exists()

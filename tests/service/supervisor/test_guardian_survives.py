@@ -85,7 +85,7 @@ def scene(tmp_path: Path) -> Iterator[Callable[..., Scene]]:
 
 
 def comes_up(one: Scene) -> None:
-    assert one.run(lambda: one.guardian.pulse.is_up) is None, one.said
+    assert one.run(lambda: one.guardian.heartbeat.is_up) is None, one.said
 
 
 @pytest.mark.parametrize("code", [-9, 1, 0, None])
@@ -93,14 +93,14 @@ def comes_up(one: Scene) -> None:
 def test_a_control_process_that_dies_at_the_nth_step_is_started_again(scene, port, steps, code):
     """n = 0, 1, ... until clean: with 8 steps it has lived. None: it hangs there instead, until it is overdue."""
     one = scene(dies_after(steps, port, code), lives(port))
-    assert one.run(lambda: len(one.nursery.started) == 2) is None
+    assert one.run(lambda: len(one.starter.started) == 2) is None
     had_line = steps >= 3
     assert port.wrote() == (SAFE_FRAME if had_line else b"")
     if not (steps == 0 and code is None):  # nobody has risked anything: the long way, which counts as no restart
         (line,) = [line for line in one.said if line.startswith("A401")]
         assert ("acknowledged" if had_line else "no line was open") in line
     comes_up(one)
-    restarted = Ending.from_json(one.nursery.arguments[1]["restarted"])
+    restarted = Ending.from_json(one.starter.arguments[1]["restarted"])
     assert (restarted is None) is (steps == 0 and code is None)
 
 
@@ -147,7 +147,7 @@ def test_the_nth_call_on_any_line_may_fail_until_none_does(scene, port, error):
             rig_lives(child)
 
         one = scene(script, lives(port), rigs=(rig, rig_lives))
-        assert one.run(lambda one=one: one.now_s > 160.0 or one.guardian.pulse.is_up, 400) is None, n
+        assert one.run(lambda one=one: one.now_s > 160.0 or one.guardian.heartbeat.is_up, 400) is None, n
         comes_up(one)
         one.signals.send()
         one.signals.send()
@@ -177,10 +177,10 @@ def test_a_dead_childs_last_words_still_count(scene, port):
         return {one.child.died} if one.child.died in ready else ready
 
     one.guardian.wait = death_first
-    one.run(lambda: len(one.nursery.started) == 2)
+    one.run(lambda: len(one.starter.started) == 2)
     assert port.wrote() == SAFE_FRAME
     assert "ZeroDivisionError" in one.said[0]
-    assert Ending.from_json(one.nursery.arguments[1]["restarted"]).cause is EndCause.DEFECT
+    assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is EndCause.DEFECT
 
 
 @pytest.mark.parametrize(
@@ -203,9 +203,9 @@ def test_a_control_process_that_talks_nonsense_is_replaced(scene, port, nonsense
         child.theirs.send(nonsense)
 
     one = scene(script, lives(port))
-    assert one.run(lambda: len(one.nursery.started) == 2) is None
+    assert one.run(lambda: len(one.starter.started) == 2) is None
     assert port.wrote() == SAFE_FRAME
-    assert Ending.from_json(one.nursery.arguments[1]["restarted"]).cause is EndCause.NONSENSE
+    assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is EndCause.NONSENSE
 
 
 def test_a_word_of_a_newer_version_is_passed_over(scene, port):
@@ -224,7 +224,7 @@ def test_a_machine_without_a_process_for_us_is_asked_again_later(scene, port):
     one = scene(no_process, no_process, no_process, lives(port))
     comes_up(one)
     assert one.now_s > 100.0, "not in a hurry"
-    assert Ending.from_json(one.nursery.arguments[3]["restarted"]).cause is EndCause.NOT_STARTED
+    assert Ending.from_json(one.starter.arguments[3]["restarted"]).cause is EndCause.NOT_STARTED
 
 
 def test_what_never_starts_ends_with_the_count_of_causes(scene, port):
@@ -249,7 +249,7 @@ def test_only_a_refusal_with_a_sentence_is_an_end(scene, port, code, comes_up_fi
     """A device that is away while control is started again (69) comes back; a configuration does not mend itself."""
     first = [dies_after(8, port)] if comes_up_first else []
     one = scene(*first, dies_after(3, port, code), lives(port))
-    assert one.run(lambda: len(one.nursery.started) == 2 + comes_up_first) == ends
+    assert one.run(lambda: len(one.starter.started) == 2 + comes_up_first) == ends
     assert port.wrote().startswith(SAFE_FRAME)
 
 
@@ -268,10 +268,10 @@ def test_there_are_never_two_control_processes(scene, port):
     assert one.guardian._patience_s() > 1e6
     one.now_s += 3600.0
     assert one.guardian._on_deadline() is None
-    assert len(one.nursery.started) == 1
+    assert len(one.starter.started) == 1
     one.child.dies(-9)
     comes_up(one)
-    assert len(one.nursery.started) == 2
+    assert len(one.starter.started) == 2
 
 
 def test_a_stop_does_not_wait_for_a_process_that_does_not_go(scene, port):
@@ -299,19 +299,19 @@ def test_a_stop_does_not_wait_for_a_process_that_does_not_go(scene, port):
 def test_a_silence_is_told_by_what_the_kernel_gave_the_loop(scene, port, turns, letter, cause):
     def script(child: FakeChild) -> None:
         dies_after(6, port, None)(child)
-        child.turns = FakeTurns(turns, letter)
+        child.counters = FakeTurns(turns, letter)
 
     one = scene(script, lives(port))
-    assert one.run(lambda: len(one.nursery.started) == 2) is None
+    assert one.run(lambda: len(one.starter.started) == 2) is None
     assert one.now_s == pytest.approx(100.1), "within the bound"
-    assert Ending.from_json(one.nursery.arguments[1]["restarted"]).cause is cause
+    assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is cause
     assert f"({ {'machine-busy': 'A403', 'stalled': 'A404', 'stopped': 'A405'}[cause.value] })" in one.said[0]
 
 
 def test_a_busy_machine_that_ends_the_gateway_is_named_as_the_cause(scene, port):
     def script(child: FakeChild) -> None:
         dies_after(6, port, None)(child)
-        child.turns = FakeTurns([ProcessorTime(0.0, 0.0), ProcessorTime(0.0, 0.1)], "R")
+        child.counters = FakeTurns([ProcessorTime(0.0, 0.0), ProcessorTime(0.0, 0.1)], "R")
 
     one = scene(script)
     assert one.run() == 1
@@ -339,11 +339,11 @@ def test_a_rig_that_dies_is_started_again_and_control_learns_where_it_is_now(sce
     one = scene(lives(port), rigs=(rig_lives, second))
     comes_up(one)
     assert beats_until_told(one) == [message_link.Message(message_link.RIG, {"ptys": PTYS})]
-    one.nursery.rigs_started[0].dies(-9)
+    one.starter.rigs_started[0].dies(-9)
     assert beats_until_told(one) == [message_link.Message(message_link.RIG, {"ptys": moved})]
     assert one.said[0].startswith("A408 the simulated rig ended (SIGKILL)")
-    assert one.nursery.calls[-1] == "rig prepared=False"
-    assert len(one.nursery.started) == 1, "control was left alone"
+    assert one.starter.calls[-1] == "rig prepared=False"
+    assert len(one.starter.started) == 1, "control was left alone"
 
 
 def test_a_rig_that_never_starts_is_told_to_control_in_the_end(scene, port):

@@ -43,65 +43,65 @@ class Nursery:
 
 
 @pytest.fixture
-def nursery() -> Nursery:
+def starter() -> Nursery:
     return Nursery()
 
 
 @pytest.fixture
-def keeper(nursery: Nursery) -> WatchSupervisor:
-    return WatchSupervisor(nursery.spawn, nursery.said.append)  # type: ignore[arg-type]
+def supervisor(starter: Nursery) -> WatchSupervisor:
+    return WatchSupervisor(starter.spawn, starter.said.append)  # type: ignore[arg-type]
 
 
-def dies(keeper: WatchSupervisor, now_s: float) -> None:
-    keeper.follow([*keeper.sources], now_s)
+def dies(supervisor: WatchSupervisor, now_s: float) -> None:
+    supervisor.follow([*supervisor.sources], now_s)
 
 
-def test_a_dead_watch_is_started_again_later_each_time_and_then_no_more(keeper, nursery):
+def test_a_dead_watch_is_started_again_later_each_time_and_then_no_more(supervisor, starter):
     now_s = 0.0
-    keeper.start(now_s)
+    supervisor.start(now_s)
     for number, pause_s in enumerate(PAUSES_S, 1):
         now_s += 1.0
-        dies(keeper, now_s)
-        assert keeper.due_s == now_s + pause_s
-        assert keeper.sources == []
-        keeper.follow([], now_s + pause_s - 0.01)
-        assert len(nursery.children) == number
+        dies(supervisor, now_s)
+        assert supervisor.due_s == now_s + pause_s
+        assert supervisor.sources == []
+        supervisor.follow([], now_s + pause_s - 0.01)
+        assert len(starter.children) == number
         now_s += pause_s
-        keeper.follow([], now_s)
-        assert len(nursery.children) == number + 1
-    dies(keeper, now_s + 1.0)
-    assert keeper.due_s == inf
-    assert all(child.closed for child in nursery.children)
-    assert [line[:4] for line in nursery.said] == ["A346"] * 4
-    assert "stays off" in nursery.said[-1]
-    keeper.start(now_s + 2.0)
-    assert len(nursery.children) == 4, "a restarted control does not wake it"
+        supervisor.follow([], now_s)
+        assert len(starter.children) == number + 1
+    dies(supervisor, now_s + 1.0)
+    assert supervisor.due_s == inf
+    assert all(child.closed for child in starter.children)
+    assert [line[:4] for line in starter.said] == ["A346"] * 4
+    assert "stays off" in starter.said[-1]
+    supervisor.start(now_s + 2.0)
+    assert len(starter.children) == 4, "a restarted control does not wake it"
 
 
-def test_a_long_life_forgives_earlier_deaths(keeper, nursery):
-    keeper.start(0.0)
+def test_a_long_life_forgives_earlier_deaths(supervisor, starter):
+    supervisor.start(0.0)
     for day in range(1, 9):
-        dies(keeper, day * 86400.0)
-        keeper.follow([], day * 86400.0 + PAUSES_S[0])
-    assert len(nursery.children) == 9
+        dies(supervisor, day * 86400.0)
+        supervisor.follow([], day * 86400.0 + PAUSES_S[0])
+    assert len(starter.children) == 9
 
 
-def test_a_start_that_fails_is_a_death_and_no_exception(keeper, nursery):
-    nursery.error = OSError(11, "Resource temporarily unavailable")
-    keeper.start(0.0)
-    assert keeper.pid is None
-    assert keeper.due_s == PAUSES_S[0]
-    nursery.error = None
-    keeper.follow([], PAUSES_S[0])
-    assert keeper.pid == 4711
+def test_a_start_that_fails_is_a_death_and_no_exception(supervisor, starter):
+    starter.error = OSError(11, "Resource temporarily unavailable")
+    supervisor.start(0.0)
+    assert supervisor.pid is None
+    assert supervisor.due_s == PAUSES_S[0]
+    starter.error = None
+    supervisor.follow([], PAUSES_S[0])
+    assert supervisor.pid == 4711
 
 
-def test_what_lives_is_left_alone_and_ended_once(keeper, nursery):
-    keeper.start(0.0)
-    keeper.start(1.0)
-    keeper.follow([os.getpid()], 2.0)
-    assert len(nursery.children) == 1
-    keeper.end()
-    keeper.end()
-    assert nursery.children[0].ended
-    assert keeper.sources == []
+def test_what_lives_is_left_alone_and_ended_once(supervisor, starter):
+    supervisor.start(0.0)
+    supervisor.start(1.0)
+    supervisor.follow([os.getpid()], 2.0)
+    assert len(starter.children) == 1
+    supervisor.end()
+    supervisor.end()
+    assert starter.children[0].ended
+    assert supervisor.sources == []
