@@ -30,7 +30,7 @@ VOLTAGE_MAX_V: Final = 10.0
 """End of the usual range of DACs and regulators, 0 .. 10 V."""
 CELL_RANGE_N: Final = 100.0
 LEASE_S: Final = 0.2
-"""Of a starter rig; and what `hold` keeps where nobody has told it the rig's."""
+"""Of a starter rig; and what `hold` keeps where the rig's is unknown."""
 
 LADDER_STEP_V: Final = 0.2
 LADDER_GROUPS: Final = 5

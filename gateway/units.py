@@ -1,4 +1,4 @@
-"""Unit conversions and constants, nothing else. Inside the house everything is SI; names end with the unit."""
+"""Unit conversions and constants, nothing else. Inside the program everything is SI; names end with the unit."""
 
 from typing import Final
 

@@ -7,6 +7,7 @@ exceptions: an exception can only have come from a module that is loaded already
 import errno
 import sys
 import traceback
+from pathlib import Path
 from typing import IO, Any
 
 import click
@@ -25,8 +26,28 @@ class CliError(click.ClickException):
         click.echo(self.format_message(), file=file or sys.stderr)
 
 
+def already_exists(target: Path, instead: str = "--force overwrites it") -> CliError:
+    """E405: a verb would overwrite something. instead: what to do."""
+    return CliError(f"E405 {target} exists and was left alone; {instead}")
+
+
+def no_state_directory(directory: Path) -> CliError:
+    """E106: the verb needs a state directory that is there."""
+    return CliError(f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA)
+
+
+def no_such_recording(path: Path) -> CliError:
+    """E403: neither a file nor a number of this state directory."""
+    return CliError(f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA)
+
+
+def disk_hangs(seen: str) -> CliError:
+    """E431: a store of the gateway's has not come to its end. seen: for how long, and what it was at."""
+    return CliError(f"E431 {seen}: its disk probably hangs; look at its log and at the kernel's (dmesg)")
+
+
 def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliError:
-    """The message for an exception that no verb has caught. Anything unknown is our defect, and says so."""
+    """Return the message for an exception that no verb has caught; anything unknown is an internal error, and says so."""
     if _is_a(error, "gateway.profiles.strict_yaml.faults", "ProfileError"):
         return CliError(str(error), exit_codes.CONFIGURATION)
     if _is_a(error, "gateway.recording.errors", "RecordingError"):
@@ -39,7 +60,7 @@ def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliE
         traceback.print_exception(error)
     first_line = (str(error).splitlines() or [""])[0]
     return CliError(
-        f"E500 a defect of force-gateway, not of yours: {type(error).__name__}: {first_line}\n"
+        f"E500 internal error: {type(error).__name__}: {first_line}\n"
         f"please report it with the output of: force-gateway --debug {command_line}"
     )
 

@@ -3,7 +3,7 @@
 from typing import Final
 
 OK: Final = 0
-FAILED: Final = 1  # asked for and not done: a refusal, a full disk, a defect of ours
+FAILED: Final = 1  # asked for and not done: a refusal, a full disk, an internal error
 USAGE: Final = 2  # the command line itself
 DATA: Final = 65  # an input file that is not what it should be
 DEVICE: Final = 69  # a port, a device or a gateway that is not there

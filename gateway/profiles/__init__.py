@@ -1,7 +1,6 @@
 """Profiles: YAML text + positions -> frozen typed objects; every fault at once, file:line:column, in the user's words.
 
-A package instead of the one file that the plan of the house shows, for strict YAML, sentences, cross-checks and schemas are
-four trades. In the order of the way of a text: scalars, syntax, text (strict YAML), typed, sentences (pydantic's findings),
+In the order of the way of a text: scalars, syntax, text (strict YAML), typed, sentences (pydantic's findings),
 models (form of a rig file), plants, calibrations, device_files, register_files, kinds, find, load, checks, line_checks,
 wire_checks, network_checks, edit_marks, rig, report, any_file; schema stands apart, for editors.
 

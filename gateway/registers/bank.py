@@ -1,7 +1,7 @@
 """The register bank: what a Modbus server asks for and writes to, and the one place where commands are accepted or
 refused.
 
-Checks run in FIELDBUS's order: address (02), whole values (03), values (03), owner (06), then what the state allows.
+Checks run in this order: address (02), whole values (03), values (03), owner (06), then what the state allows.
 Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal registers. One accepted
 write is one Command, handed on inside the write, so that a setpoint acts before its answer is sent. The Command carries
 the edge bits as written, each write with a new number; in the registers they read back as 0. Whether an edge can be taken

@@ -9,7 +9,7 @@ from gateway.registers.words import ControlBit, LimitedBy, Mode, State
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One accepted write of the command block, whole, SI units. 0 in the fields named in FIELDBUS means the rig's default.
+    """One accepted write of the command block, whole, SI units. 0 in a field that has a default of the rig means that one.
 
     number counts accepted writes (control sees a new one by it); received_s is monotonic; peer is the writer's address.
     stops: whatever the control word was, this write wants the output off. lowered_from_n: what the master wrote as setpoint

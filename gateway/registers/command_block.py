@@ -145,12 +145,12 @@ class CommandBlock:
         return candidate
 
     def check_known(self, values: Values, block: Block) -> None:
-        """Refuses bits that the rig has nothing behind and modes that do not exist (03)."""
+        """Refuse bits that the rig does not support, and modes that do not exist (03)."""
         word = int(values[CONTROL_WORD])
         if unsupported := word & ~int(self._rules.supported_bits):
             bit = unsupported.bit_length() - 1
             name = f" ({ControlBit(1 << bit).name})".lower() if 1 << bit < _KNOWN_BITS else ""
-            text = f"control_word bit {bit}{name}: rig {self._rules.rig_name} has nothing behind it"
+            text = f"control_word bit {bit}{name}: not supported by rig {self._rules.rig_name}"
             raise Refusal(RefusalReason.UNSUPPORTED_BIT, self.address(block, CONTROL_WORD), text, value=float(word))
         if values[MODE] not in _MODES:
             known = ", ".join(f"{mode.value} {mode.name.lower()}" for mode in Mode)

@@ -110,5 +110,5 @@ class UploadReason(IntEnum):
     FORCE_LIMITS = 24
     STORAGE = 25  # E431: the set is good, the disk took it not
     NOT_STORED = 26  # E432, E433: what slot or rollback name is damaged, or is not there
-    DEFECT = 27  # A499: of ours
+    DEFECT = 27  # A499: an internal error
     STOPS_CUT = 28  # the read-back of a model with more slip stops than the registers carry

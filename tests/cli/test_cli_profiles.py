@@ -208,4 +208,4 @@ def test_ports_lists_by_id_names_first(call, monkeypatch: pytest.MonkeyPatch) ->
     assert "in use by minicom (4711)" in answer.output
     assert json.loads(call("ports", "--json").output)[0]["path"] == by_id
     monkeypatch.setattr("gateway.ports.list_ports", list)
-    assert "is the adapter plugged in?" in call("ports").output
+    assert "plug the adapter in" in call("ports").output

@@ -111,7 +111,7 @@ def test_a_defect_says_so_without_a_traceback(call, monkeypatch) -> None:
     monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: {}["missing"])
     answer = call("run")
     assert answer.exit_code == 1
-    assert answer.stderr.startswith("E500 a defect of force-gateway, not of yours: KeyError")
+    assert answer.stderr.startswith("E500 internal error: KeyError")
     assert "Traceback" not in answer.stderr
     assert "Traceback" in call("--debug", "run").stderr
 

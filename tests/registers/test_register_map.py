@@ -1,4 +1,4 @@
-"""The shipped map against FIELDBUS's list, and what a wrong map is told."""
+"""The shipped map against the list that masters rely on, and what a wrong map is told."""
 
 import json
 from copy import deepcopy

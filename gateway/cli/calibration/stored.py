@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.cli import exit_codes
 from gateway.cli.control_socket import ask
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, disk_hangs
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration
@@ -59,7 +59,7 @@ def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str,
     answer, deadline_s = job, time.monotonic() + _PATIENCE_S
     while answer["busy"] and answer["job"] == job["job"]:
         if time.monotonic() > deadline_s:
-            raise CliError(f"E431 the gateway has not answered for {_PATIENCE_S:g} s: a disk that hangs?")
+            raise disk_hangs(f"the gateway has not answered for {_PATIENCE_S:g} s")
         time.sleep(_POLL_S)
         answer = ask(directory, {"do": "calibration"})
     if answer["failed"]:
@@ -94,7 +94,7 @@ def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, A
 
 
 def _exit_code(reason: int) -> int:
-    """A disk that refuses, or a defect of ours, is a failure; all else is a wrong calibration or number."""
+    """A disk that refuses, or an internal error, is a failure; all else is a wrong calibration or number."""
     from gateway.registers.words import UploadReason
 
     return exit_codes.FAILED if reason in (UploadReason.STORAGE, UploadReason.DEFECT) else exit_codes.DATA

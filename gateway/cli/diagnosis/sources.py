@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway import defaults
-from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import no_such_recording
 from gateway.cli.options import state_directory
 from gateway.devices import cell_host
 from gateway.diagnosis.measurement import Measurement
@@ -86,9 +85,7 @@ def _path(name: str, rig: str | None, state: Path | None) -> Path:
     if name.isdecimal() and not path.exists():
         return find_recording(state_directory(state, rig or _ANY_STATE), int(name))
     if not path.exists():
-        raise CliError(
-            f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA
-        )
+        raise no_such_recording(path)
     return path
 
 

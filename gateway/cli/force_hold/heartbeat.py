@@ -22,7 +22,7 @@ _ACTIONS: Final = {
     "ramp": "it ramps to 0 N",
 }
 _BEATS_PER_LEASE: Final = 4.0
-DEFAULT_PERIOD_S: Final = defaults.LEASE_S / _BEATS_PER_LEASE  # of a lease that nobody has told us
+DEFAULT_PERIOD_S: Final = defaults.LEASE_S / _BEATS_PER_LEASE  # where the rig's lease is unknown
 _SHORTEST_PERIOD_S: Final = 0.005
 _LOOK_S: Final = 0.1
 _LOOKS_AFTER_A_LOSS_S: Final = 2.0  # without a lease, or one that we do not know

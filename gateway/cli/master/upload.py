@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, disk_hangs
 from gateway.cli.master.client import Frame, GatewayClient
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.upload_frames import Request, UploadFrames
@@ -52,7 +52,7 @@ class Master(GatewayClient):
                 return CommitStatus(status)
             if time.monotonic() > deadline_s:
                 name = CommitStatus(status).name.lower()
-                raise CliError(f"E431 after {_PATIENCE_S:g} s the gateway is still {name}: a disk that hangs?")
+                raise disk_hangs(f"after {_PATIENCE_S:g} s the gateway is still {name}")
             time.sleep(_POLL_S)
 
     def is_known_set(self) -> bool:
@@ -74,7 +74,9 @@ class Master(GatewayClient):
         different = [at for at, own, found in zip(places, sent, words, strict=True) if own != found]
         if different or seen != slot:
             where = f"{len(different)} words differ, the first at {different[0]}" if different else f"slot {seen}"
-            raise CliError(f"E434 committed, but another set is in use now ({where}): another master was quicker?")
+            raise CliError(
+                f"E434 committed, but another set is in use now ({where}): probably another master's; agree on one"
+            )
 
     def _failed(self, index: int, reason: int) -> CliError:
         unchanged = f"active set {self.calibration_id()} unchanged"

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import click
 
-from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import already_exists, no_state_directory
 from gateway.cli.options import count_of, state_directory, state_options
 
 
@@ -22,10 +21,8 @@ def command(*, file: Path, force: bool, state: Path | None, rig: str) -> None:
 
     directory = state_directory(state, rig)
     if not directory.is_dir():
-        raise CliError(
-            f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA
-        )
+        raise no_state_directory(directory)
     if file.exists() and not force:
-        raise CliError(f"E405 {file} exists and was left alone; --force overwrites it")
+        raise already_exists(file)
     names = pack(directory, file)
     click.echo(f"packed {count_of(names, 'file')} of {directory} into {file}, {file.stat().st_size / 1e3:.1f} kB")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import json_option, state_directory, state_options
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def _write(texts: dict[Path, str], *, force: bool) -> None:
     """All or, where one is there already, none."""
     for path in texts:
         if path.exists() and not force:
-            raise CliError(f"E405 {path} exists and was left alone; --force overwrites it")
+            raise already_exists(path)
     for path, text in texts.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

@@ -10,8 +10,7 @@ from typing import Final
 
 import click
 
-from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import no_state_directory
 from gateway.cli.options import json_option, state_directory, state_options
 from gateway.processes.event import SEVERITIES, EventRecord, format_event, utc_text
 from gateway.processes.event_file import EventReader
@@ -57,9 +56,7 @@ def command(
     """
     directory = state_directory(state, rig)
     if not directory.is_dir():
-        raise CliError(
-            f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA
-        )
+        raise no_state_directory(directory)
     with EventReader(directory) as reader:
         _show(reader, _event_filter(after, severity, {code.upper() for code in codes}), follow, as_json)
 

@@ -8,7 +8,7 @@ import click
 
 from gateway import defaults
 from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import json_option, name_option, state_directory
 
 if TYPE_CHECKING:
@@ -101,9 +101,7 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
 
     path = find_source(name, state_directory(options["state"], options["rig"] or defaults.RIG))
     if not path.exists():
-        raise CliError(
-            f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA
-        )
+        raise no_such_recording(path)
     mapping = column_mapping(options["columns"])
     models = tuple(ModelName(model) for model in options["models"])
     question = FitRequest(

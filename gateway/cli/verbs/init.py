@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from gateway.cli.errors import CliError
+from gateway.cli.errors import already_exists
 
 
 @click.command()
@@ -29,7 +29,7 @@ def command(*, name: str) -> None:
         with target.open("x", encoding="utf-8") as file:
             file.write(starter_rig(target.stem))
     except FileExistsError:
-        raise CliError(f"E405 {target} exists and was left alone; choose another name") from None
+        raise already_exists(target, "choose another name") from None
     click.echo(f"wrote {target}; next:")
     for line, why in (
         (f"run {target} --sim", "tries it without hardware"),

@@ -25,7 +25,7 @@ def command(*, as_json: bool) -> None:
         click.echo(json.dumps([{"path": port.path} | asdict(port) for port in found], indent=2))
         return
     if not found:
-        click.echo("no serial port with hardware behind it; is the adapter plugged in? (dmesg | tail tells)")
+        click.echo("no serial port of a device found; plug the adapter in (dmesg | tail shows whether it is seen)")
     for port in found:
         click.echo(port.path)
         click.echo(f"  {_line(port)}")

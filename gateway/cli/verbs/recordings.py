@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import already_exists
 from gateway.cli.options import json_option, state_directory, state_options
 
 if TYPE_CHECKING:
@@ -88,6 +87,6 @@ def export_command(*, number: int, form: str, output: Path | None, force: bool, 
         return
     target = output or Path(f"{recording.header.get('rig', 'recording')}-{number:04d}.{form}")
     if target.exists() and not force:
-        raise CliError(f"E405 {target} exists and was left alone; --force overwrites it", exit_codes.FAILED)
+        raise already_exists(target)
     (room.export_csv if form == "csv" else room.export_parquet)(recording, target)
     click.echo(f"wrote {recording.rows} rows to {target}", err=True)

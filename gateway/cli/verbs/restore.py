@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from gateway.cli import exit_codes
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import count_of, state_directory, state_options
 
 
@@ -28,9 +28,7 @@ def command(*, file: Path, force: bool, dry_run: bool, state: Path | None, rig: 
     try:
         names = names_in(file)
         if directory.is_dir() and any(directory.iterdir()) and not force:
-            raise CliError(
-                f"E405 {directory} is not empty and was left alone; --force replaces it and keeps the old one"
-            )
+            raise already_exists(directory, "--force replaces it and keeps the old one")
         if dry_run:
             click.echo("\n".join([*names, f"{count_of(names, 'file')} would be restored to {directory}"]))
             return

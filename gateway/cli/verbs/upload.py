@@ -51,7 +51,7 @@ def command(*, file: str, map_name: str, as_json: bool, **options: Any) -> None:
 
 
 def _load(file: str) -> "Calibration":
-    """The file to upload, with METHOD's checks: what can be said here need not go to the gateway."""
+    """Return the calibration to upload, checked: what can be said here need not go to the gateway."""
     from gateway.profiles import ProfileError, load_calibration
 
     try:

@@ -34,7 +34,7 @@ def read_calibration(document: Document) -> tuple[Calibration | None, list[Fault
 
 
 def coefficient_faults(calibration: Calibration, document: Document, cell_range_n: float) -> list[Fault]:
-    """What METHOD demands of coefficients that drive a plant with this load cell."""
+    """Return what is wrong with coefficients that are to drive a plant with this load cell."""
     limits = CoefficientLimits(cell_range_n=cell_range_n)
     coefficients = Coefficients.of_calibration(calibration)
     return [document.fault(_place(found), found.text) for found in validate_coefficients(coefficients, limits)]

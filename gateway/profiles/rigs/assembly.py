@@ -38,7 +38,7 @@ WARNINGS: Final = (*checks.WARNINGS, *line_checks.WARNINGS, *wire_checks.WARNING
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """faults: what must be mended before the rig starts; warnings: what may be meant so; rig: None while there are faults.
+    """faults: what must be fixed before the rig starts; warnings: what may be meant so; rig: None while there are faults.
     With `simulated` the faults are those that keep even a simulated run from starting."""
 
     faults: tuple[Fault, ...]

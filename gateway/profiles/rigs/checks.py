@@ -1,7 +1,7 @@
 """What no single field can know: whether the parts of a rig fit together.
 
 Each check is a generator of (path, sentence) and looks at the parts that were read; a part with a fault of its own is None,
-and its checks wait until it is mended. FAULTS keep a rig from starting, WARNINGS do not. The checks of the two serial
+and its checks wait until it is fixed. FAULTS keep a rig from starting, WARNINGS do not. The checks of the two serial
 lines are in line_checks, those of the Modbus face in network_checks.
 """
 
@@ -108,7 +108,7 @@ def defaults_fit(parts: Parts) -> Found:
 
 
 def calibration_reaches(parts: Parts) -> Found:
-    """METHOD: a rig whose maximum force exceeds its calibration fails, and the trim needs room above it."""
+    """A rig whose maximum force exceeds its calibration fails, and the trim needs room above it."""
     if (limits := parts.limits) is None or (calibration := parts.calibration) is None:
         return
     model, most = calibration.model(), limits.force_max_n

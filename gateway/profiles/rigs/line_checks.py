@@ -81,7 +81,7 @@ def the_output_reaches(parts: Parts) -> Found:
 
 
 def silence_is_accepted(parts: Parts) -> Found:
-    """DESIGN: without a watchdog in the device, nothing but the rig's own word lets it be enabled."""
+    """Without a watchdog in the device, nothing but the rig's own word lets it be enabled."""
     device = of_role(parts.output_device, Role.OUTPUT)
     if device and device.watchdog == "none" and not parts.accept_no_device_watchdog:
         risk = f"{device.name} has no watchdog and keeps its last output when this machine loses power"

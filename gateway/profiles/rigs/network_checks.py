@@ -8,7 +8,7 @@ from gateway.profiles.rigs.checks import Check, Found, Parts
 
 
 def others_are_named(parts: Parts) -> Found:
-    """FIELDBUS: default bind 127.0.0.1; another address needs an allow-list of networks."""
+    """Another address than loopback needs an allow-list of networks."""
     if (network := parts.network) is None:
         return
     if not is_loopback(network.bind) and not network.allow:

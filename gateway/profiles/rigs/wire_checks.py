@@ -26,7 +26,7 @@ from gateway.profiles.rigs.line_checks import of_role
 from gateway.profiles.strict_yaml.sentences import newton, number, second
 
 _COUNTS_OF_NOISE: Final = 0.7  # a rate that needs more than this to tell is worth a word
-_SLOWEST_HZ: Final = 20.0  # DEVICES: the pneumatics settle in 0.27-0.49 s and need 20-50 Hz
+_SLOWEST_HZ: Final = 20.0  # the pneumatics of the paper's rig settle in 0.27-0.49 s and need 20-50 Hz
 
 
 def _output_talks_s(device: DeviceProfile, character_s: float) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """What is wrong in a profile, where, and in the user's words.
 
 A fault is one line, `file:line:column path: message`, as compilers print theirs, so that editors jump to it. Faults are
-collected and told together: a file with five typos takes one run to mend, not five.
+collected and told together: a file with five typos takes one run to fix, not five.
 """
 
 from collections.abc import Iterable
@@ -36,7 +36,7 @@ class FaultKind(Enum):
 
 @dataclass(frozen=True, slots=True, order=True)
 class Fault:
-    """One thing to mend. line and column count from 1; line 0: the file as a whole (it could not be found or read). meant:
+    """One thing to fix. line and column count from 1; line 0: the file as a whole (it could not be found or read). meant:
     the key that a STRANGER probably is, empty where nobody knows."""
 
     file: str

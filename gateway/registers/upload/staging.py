@@ -1,7 +1,7 @@
 """Is a staged set of coefficients whole and fit to be used? Pure: words in, a trusted set or the first fault out.
 
 In the order in which a fault explains those after it: length, stops that a read-back has cut off, CRC-32, unused words and
-places, order and number of stops, target slot, then METHOD's checks of every number, of the curves and of the stops
+places, order and number of stops, target slot, then the checks of every number, of the curves and of the stops
 (gateway.bsfm.validate), then the force limits against what the curves reach.
 """
 

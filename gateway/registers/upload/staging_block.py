@@ -112,7 +112,7 @@ class StagingBlock:
             text = f"commit = {word}, known are 0 none, 1 commit, 2 dry_run, 3 rollback"
             raise Refusal(RefusalReason.OUT_OF_RANGE, self._commit, text, value=word)
         if word and self.on_commit is None:
-            text = "nobody takes coefficients here: the active set is unchanged"
+            text = "this gateway takes no coefficients; the active set is unchanged"
             raise Refusal(RefusalReason.COEFFICIENTS, self._commit, text, value=word)
         self._image.write(self._commit, b"\0\0")
         if word and self.on_commit is not None:
@@ -124,6 +124,6 @@ class StagingBlock:
         if slot > 7:
             raise Refusal(RefusalReason.OUT_OF_RANGE, self._select, f"slot_select = {slot}, allowed 0 .. 7", value=slot)
         if self.on_select is None:
-            text = "nobody keeps slots here: the active set is unchanged"
+            text = "this gateway has no slots; the active set is unchanged"
             raise Refusal(RefusalReason.COEFFICIENTS, self._select, text, value=slot)
         self.on_select(slot, peer)
