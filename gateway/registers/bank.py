@@ -91,12 +91,12 @@ class RegisterBank:
 
     def refused(self, refusal: RequestError, peer: Peer) -> None:
         """What the framing has refused leaves its reason as all others do."""
-        self._noted(request_refusal(refusal), peer)
+        self._note_refusal(request_refusal(refusal), peer)
 
     def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Big-endian words of one block. Refusal (02) for a range that no block holds."""
         if not 0 < count <= self._room[address]:
-            raise self._noted(no_such_address(self._blocks, address, count), peer)
+            raise self._note_refusal(no_such_address(self._blocks, address, count), peer)
         return bytes(self._data[2 * address : 2 * (address + count)])
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
@@ -107,7 +107,7 @@ class RegisterBank:
         try:
             first = self._bit_word(address, count)
         except Refusal as refusal:
-            raise self._noted(refusal, peer) from None
+            raise self._note_refusal(refusal, peer) from None
         word = self._image.word(first)
         return pack_bits([bool(word >> (address - first + k) & 1) for k in range(count)])
 
@@ -116,7 +116,7 @@ class RegisterBank:
         try:
             self._write(address, data, peer)
         except Refusal as refusal:
-            raise self._noted(refusal, peer) from None
+            raise self._note_refusal(refusal, peer) from None
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
         """Coils 0-15: the control word is read, changed and written under the same checks as by register."""
@@ -130,7 +130,7 @@ class RegisterBank:
             bits = sum(bool(value) << (address - first + k) for k, value in enumerate(values))
             self._write(first, (self._image.word(first) & ~mask | bits).to_bytes(2, "big"), peer, mask)
         except Refusal as refusal:
-            raise self._noted(refusal, peer) from None
+            raise self._note_refusal(refusal, peer) from None
 
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
         """One word, under the same checks as any write."""
@@ -138,7 +138,7 @@ class RegisterBank:
         try:
             self._write(address, (word & and_mask | or_mask & touched).to_bytes(2, "big"), peer, touched)
         except Refusal as refusal:
-            raise self._noted(refusal, peer) from None
+            raise self._note_refusal(refusal, peer) from None
 
     @property
     def on_asked(self) -> Decide:
@@ -190,7 +190,7 @@ class RegisterBank:
         word = ControlBit(int(self._commands.values[CONTROL_WORD]))
         self.command = replace(self.command, control_word=word, stops=False, **changes)  # type: ignore[arg-type]
 
-    def _noted(self, refusal: Refusal, peer: Peer) -> Refusal:
+    def _note_refusal(self, refusal: Refusal, peer: Peer) -> Refusal:
         self.last_refusal = refusal
         self._status.show_refusal(refusal)
         self.on_refusal(refusal, peer)

@@ -197,7 +197,7 @@ class CommandBlock:
     def differences(self, before: Values, after: Values) -> str:
         """`force_setpoint 0.00 N -> 12.00 N`: what a write changed, heartbeat and sequence apart (they always change)."""
         return ", ".join(
-            f"{field.name} {field.shown(old)} -> {field.shown(new)}"
+            f"{field.name} {field.format(old)} -> {field.format(new)}"
             for k, (field, old, new) in enumerate(zip(self.fields, before, after, strict=True))
             if field is not None and old != new and k not in (HEARTBEAT, SEQUENCE)
         )

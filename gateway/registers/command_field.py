@@ -58,7 +58,7 @@ class CommandField:
             )
         raise self._not_a_value(value, address, order)
 
-    def shown(self, value: float) -> str:
+    def format(self, value: float) -> str:
         """`12.00 N`, or `1 (voltage)` for an enumeration."""
         name = self.values.get(int(value)) if self.values and isfinite(value) else None
         return quantity(value, self.decimals, self.unit) + (f" ({name})" if name else "")
@@ -66,7 +66,7 @@ class CommandField:
     def _not_a_value(self, value: float, address: int, order: WordOrder) -> Refusal:
         if self._is_plausible(swapped := _swap_words_of_float(value)):
             sends, cure = _CURES[order]
-            seen = f"{self.shown(value)}; with the words swapped {self.shown(swapped)}"
+            seen = f"{self.format(value)}; with the words swapped {self.format(swapped)}"
             text = f"{seen}: your client sends {sends}, {cure} ({self.name} at {address})"
             return Refusal(RefusalReason.WORDS_SWAPPED, address, text, value=value)
         if not isfinite(value):
@@ -74,7 +74,7 @@ class CommandField:
                 RefusalReason.NOT_FINITE, address, f"{self.name} = {value} is not a number to command", value=value
             )
         if self.float_low <= value <= self.float_high:
-            text = f"{self.name} = {self.shown(value)} is too small to be meant: swapped words, or an integer sent as a float?"
+            text = f"{self.name} = {self.format(value)} is too small to be meant: swapped words, or an integer sent as a float?"
             return Refusal(RefusalReason.TOO_SMALL, address, text, value=value)
         return self._out_of_range(value, address)
 
@@ -83,7 +83,7 @@ class CommandField:
 
     def _out_of_range(self, value: float, address: int) -> Refusal:
         allowed = ("0 and " if self.low > 0.0 else "") + allowed_range(self.low, self.high, self.unit)
-        text = f"{self.name} = {self.shown(value)}, allowed {allowed} ({self.limit_source})"
+        text = f"{self.name} = {self.format(value)}, allowed {allowed} ({self.limit_source})"
         return Refusal(RefusalReason.OUT_OF_RANGE, address, text, value=value)
 
 

@@ -179,8 +179,7 @@ def test_a_commit_that_never_ends_is_waited_for_with_a_bound(gateway, address, c
     assert done.exit_code == 1
     seen, advice = done.stderr.split(": ")
     assert seen == "E431 after 0.05 s the gateway is still checking"
-    assert advice == "its disk probably hangs; look at its log and at the kernel's (dmesg)
-"
+    assert advice == "its disk probably hangs; look at its log and at the kernel's (dmesg)\n"
 
 
 def test_another_set_than_the_one_sent_is_noticed(gateway, address, call, file):

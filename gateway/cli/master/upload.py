@@ -47,7 +47,7 @@ class Master(GatewayClient):
                 words = self.read_words(upload.poll.address, upload.poll.count)
             status, index, reason = struct.unpack(">HhH", struct.pack(">3H", *words))
             if status == CommitStatus.FAILED:
-                raise self._failed(index, reason)
+                raise self._failure(index, reason)
             if status in (CommitStatus.IDLE, CommitStatus.COMMITTED):
                 return CommitStatus(status)
             if time.monotonic() > deadline_s:
@@ -78,7 +78,7 @@ class Master(GatewayClient):
                 f"E434 committed, but another set is in use now ({where}): probably another master's; agree on one"
             )
 
-    def _failed(self, index: int, reason: int) -> CliError:
+    def _failure(self, index: int, reason: int) -> CliError:
         unchanged = f"active set {self.calibration_id()} unchanged"
         if reason in _OURS:
             return CliError(f"E431 the gateway could not store the set, its log says why; {unchanged}")

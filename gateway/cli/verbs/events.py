@@ -64,10 +64,10 @@ def command(
 def _event_filter(after: str, severity: str, codes: set[str]) -> Callable[[EventRecord], bool]:
     severities = SEVERITIES[SEVERITIES.index(severity) :]
 
-    def wanted(event: EventRecord) -> bool:
+    def is_wanted(event: EventRecord) -> bool:
         return event.time >= after and event.severity in severities and (not codes or event.code in codes)
 
-    return wanted
+    return is_wanted
 
 
 def _show(reader: EventReader, wanted: Callable[[EventRecord], bool], follow: bool, as_json: bool) -> None:

@@ -130,11 +130,11 @@ def _steps(path: str) -> tuple[str | int, ...]:
 def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     """What can be checked together: every part that has no fault of its own."""
 
-    def named(kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]) -> T | None:
+    def read_part(kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]) -> T | None:
         return read_named(kind, refer_at(document, path, folder), read, findings)
 
-    plant = named("plant", ("plant",), read_plant)
-    extended = named("plant", ("compensation",), read_plant)
+    plant = read_part("plant", ("plant",), read_plant)
+    extended = read_part("plant", ("compensation",), read_plant)
     loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else 100.0
     return Parts(
         name=str(document.at("name")),
@@ -149,9 +149,9 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         trim=_part(document, "trim", Trim),
         supervision=_part(document, "supervision", Supervision),
         network=_part(document, "network", Network),
-        calibration=named("calibration", ("calibration",), read_calibration),
-        output_device=named("device", ("output", "device"), read_device),
-        cell_device=named("device", ("load_cell", "device"), read_device),
+        calibration=read_part("calibration", ("calibration",), read_calibration),
+        output_device=read_part("device", ("output", "device"), read_device),
+        cell_device=read_part("device", ("load_cell", "device"), read_device),
         plant=plant,
         extended=extended,
         compensation=_compensation(plant, extended),

@@ -142,9 +142,9 @@ class RegisterMap:
         if matches:
             choices = " or ".join(f"{bare}@{register.block}" for register in matches)
             raise UnknownRegister(f"{name} is not a register; did you mean {choices}?")
-        raise UnknownRegister(f"{name} is not a register{self._meant(name)}")
+        raise UnknownRegister(f"{name} is not a register{self._suggest_register(name)}")
 
-    def _meant(self, name: str) -> str:
+    def _suggest_register(self, name: str) -> str:
         near = get_close_matches(
             name.lower(), [*self._by_name, *(register.name for register in self.registers)], 1, 0.6
         )
