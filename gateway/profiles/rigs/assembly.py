@@ -130,7 +130,9 @@ def _steps(path: str) -> tuple[str | int, ...]:
 def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     """What can be checked together: every part that has no fault of its own."""
 
-    def read_part(kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]) -> T | None:
+    def read_part(
+        kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]
+    ) -> T | None:
         return read_named(kind, refer_at(document, path, folder), read, findings)
 
     plant = read_part("plant", ("plant",), read_plant)
