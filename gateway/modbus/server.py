@@ -49,7 +49,7 @@ class DataBank(Protocol):
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
         """One word: (word & and_mask) | (or_mask & ~and_mask)."""
 
-    def refused(self, refusal: RequestError, peer: Peer) -> None:
+    def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Told of each request that the protocol's own rules have refused. Must not raise."""
 
 
@@ -59,7 +59,7 @@ def answer(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     try:
         return _HANDLERS.get(function, _not_served)(pdu, bank, peer)
     except RequestError as refusal:
-        bank.refused(refusal, peer)
+        bank.note_refusal(refusal, peer)
         return P.exception_pdu(function, refusal.code)
     except ModbusError as refusal:
         return P.exception_pdu(function, refusal.code)
@@ -70,7 +70,7 @@ def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBan
     unit, pdu = request
     known = ", ".join(map(str, served))
     refusal = RequestError(RequestFault.UNIT, f"unit id {unit}, served here: {known}", unit, P.address_in(pdu))
-    bank.refused(refusal, peer)
+    bank.note_refusal(refusal, peer)
     return P.exception_pdu(pdu[0], refusal.code)
 
 

@@ -89,7 +89,7 @@ class RegisterBank:
         is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
         return ServerId(SERVER_ID, not is_fault, b" ".join(self.identity[number] for number in (0, 2, 6)))
 
-    def refused(self, refusal: RequestError, peer: Peer) -> None:
+    def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """What the framing has refused leaves its reason as all others do."""
         self._note_refusal(request_refusal(refusal), peer)
 

@@ -43,7 +43,7 @@ class PlainBank:
     def read(self, address: int, count: int) -> bytes:
         return b"".join(self.words.get(at, 0).to_bytes(2, "big") for at in range(address, address + count))
 
-    def refused(self, refusal: RequestError, peer: Peer) -> None:
+    def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """The protocol's own refusals: nothing here keeps them."""
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:

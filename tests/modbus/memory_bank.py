@@ -45,7 +45,7 @@ class MemoryBank:
         self._check_bits(address, len(values))
         self.bits[address : address + len(values)] = map(bool, values)
 
-    def refused(self, refusal: RequestError, peer: Peer) -> None:
+    def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Nobody asks a bank without meaning for its reasons."""
 
     def _check_bits(self, address: int, count: int) -> None:

@@ -34,7 +34,7 @@ class ListeningBank(FussyBank):
         super().__init__()
         self.heard: list[tuple[RequestFault, int, int | None, Peer]] = []
 
-    def refused(self, refusal: RequestError, peer: Peer) -> None:
+    def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         self.heard.append((refusal.fault, refusal.value, refusal.address, peer))
 
 

@@ -140,11 +140,11 @@ class HoldRun:
         return self._beat()
 
     def _beat(self) -> HoldWrite:
-        return HoldWrite(self._changed())
+        return HoldWrite(self._next_heartbeat())
 
     def _write(self, control_word: int, setpoint_n: float = 0.0) -> HoldWrite:
-        return HoldWrite(self._changed(), control_word, setpoint_n)
+        return HoldWrite(self._next_heartbeat(), control_word, setpoint_n)
 
-    def _changed(self) -> int:
+    def _next_heartbeat(self) -> int:
         self._heartbeat = (self._heartbeat + 1) & 0xFFFF
         return self._heartbeat
