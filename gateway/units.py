@@ -62,6 +62,6 @@ LINEAR: Final[dict[str, dict[str, tuple[float, float]]]] = {
 
 
 def linear_conversion(quantity: str, given: str, wanted: str) -> tuple[float, float]:
-    """(factor, offset) with wanted = factor x given + offset; (1, 0) exactly when both are one. KeyError if unknown."""
+    """Return (factor, offset) with wanted = factor x given + offset; (1, 0) exactly when both are one. KeyError if unknown."""
     (factor, offset), (factor_to, offset_to) = LINEAR[quantity][given], LINEAR[quantity][wanted]
     return factor / factor_to, (offset - offset_to) / factor_to

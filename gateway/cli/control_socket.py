@@ -13,7 +13,7 @@ _LONGEST_ANSWER: Final = 1 << 20
 
 
 def ask(state: Path, request: dict[str, Any]) -> dict[str, Any]:
-    """The answer of the gateway that runs on this state directory; CliError when there is none or it refuses."""
+    """Return the answer of the gateway that runs on this state directory; CliError when there is none or it refuses."""
     path = state / "control.sock"
     try:
         answer = _exchange(path, json.dumps(request).encode() + b"\n")

@@ -66,7 +66,7 @@ def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliE
 
 
 def _from_system(error: OSError) -> CliError:
-    """What the operating system refused: permission, disk, a missing directory."""
+    """Return what the operating system refused: permission, disk, a missing directory."""
     place = f"{error.filename}: " if error.filename else ""
     if error.errno in (errno.EACCES, errno.EPERM):
         return CliError(f"E105 {place}{error.strerror}: this user may not", exit_codes.PERMISSION)

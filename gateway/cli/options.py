@@ -26,7 +26,7 @@ def endpoint(context: click.Context, parameter: click.Parameter, value: str | No
 
 
 def _split(text: str) -> tuple[str, str]:
-    """Host and port, either may be empty; brackets hold an IPv6 address, and one without brackets has no port."""
+    """Return host and port, either may be empty; brackets hold an IPv6 address, and one without brackets has no port."""
     if text.startswith("["):
         host, _, rest = text[1:].partition("]")
         return host, rest.removeprefix(":")
@@ -74,7 +74,7 @@ def state_options(function: Function) -> Function:
 
 
 def calibration_name(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    """A name that stands on one line and is no number, for an option's callback."""
+    """Return a name that stands on one line and is no number, for an option's callback."""
     if value is None:
         return None
     name = " ".join(value.split())
@@ -93,12 +93,12 @@ def json_option(function: Function) -> Function:
 
 
 def count_of(things: Sized, noun: str) -> str:
-    """`1 file`, `3 files`."""
+    """Return `1 file`, `3 files`."""
     return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
 
 
 def state_directory(state: Path | None, rig: str) -> Path:
-    """The directory that `run` would use."""
+    """Return the directory that `run` would use."""
     from gateway.service.supervisor.run_options import RunOptions
 
     return RunOptions(rig=rig, state=state).state_directory

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def facts(checked: "Checked", *, whole: bool = False) -> dict[str, str]:
-    """Name -> words. whole: the fingerprint in full."""
+    """Return name -> words. whole: the fingerprint in full."""
     if checked.kind == "rig":
         return _rig(checked.value) | ({"fingerprint": checked.value.fingerprint} if whole else {})
     return {checked.kind: _SAID[checked.kind](checked.value)}

@@ -52,7 +52,7 @@ def pack(state: Path, target: Path) -> list[str]:
 
 
 def names_in(source: Path) -> list[str]:
-    """The files of an archive, after every check that `unpack` makes; ArchiveError with the reason."""
+    """Return the files of an archive, after every check that `unpack` makes; ArchiveError with the reason."""
     try:
         _read_to_the_end(source)
         with tarfile.open(source, "r:gz") as archive:

@@ -20,20 +20,21 @@ _SUFFIXES: Final = (".yaml", ".yml")
 
 
 def root() -> Path:
-    """The shipped profiles: gateway/_profiles in an installed wheel, else the checkout's profiles/."""
+    """Return the shipped profiles: gateway/_profiles in an installed wheel, else the checkout's profiles/."""
     package = Path(gateway.__file__).parent
     installed = package / "_profiles"
     return installed if installed.is_dir() else package.parent / "profiles"
 
 
 def list_shipped(kind: str) -> list[str]:
-    """Names of the shipped profiles of a kind (rig, device, plant, calibration, registers, plan)."""
+    """Return names of the shipped profiles of a kind (rig, device, plant, calibration, registers, plan)."""
     return sorted(path.stem for path in (root() / FOLDERS[kind]).glob("*.yaml"))
 
 
 def locate(kind: str, name: str, beside: Path | None = None) -> Path:
-    """The file of a profile: a shipped name, else a path (relative to the folder `beside`, or to the working directory), else
-    the name of a file there or in its folder of that kind: `device: my-dac` is my-dac.yaml or devices/my-dac.yaml.
+    """Return the file of a profile: a shipped name, else a path (relative to the folder `beside`, or to the working
+    directory), else the name of a file there or in its folder of that kind: `device: my-dac` is my-dac.yaml or
+    devices/my-dac.yaml.
 
     FileNotFoundError with a sentence that follows the name: what is there, and what was probably meant.
     """
@@ -69,7 +70,7 @@ def _near(path: Path) -> str:
 
 
 def display(path: Path) -> str:
-    """A path as messages show it: short below the working directory, whole elsewhere."""
+    """Return a path as messages show it: short below the working directory, whole elsewhere."""
     try:
         return str(path.absolute().relative_to(Path.cwd()))
     except (OSError, ValueError):

@@ -35,14 +35,15 @@ class ProfileReference:
 
 
 def refer_to(name: str | Path) -> ProfileReference:
-    """A profile that was named on the command line or by a program."""
+    """Return a profile that was named on the command line or by a program."""
     return ProfileReference(str(name), lambda sentence: Fault(str(name), 0, 0, "", sentence))
 
 
 def refer_at(
     document: Document, path: tuple[str, ...], folder: Path, default: str | None = None
 ) -> ProfileReference | None:
-    """The profile named at a path of a document; None where no name stands (which the types tell) and none is the default."""
+    """Return the profile named at a path of a document; None where no name stands (which the types tell) and none is
+    the default."""
     name = document.at(*path) if path in document.marks else default
     if not isinstance(name, str) or not name:
         return None
@@ -61,7 +62,7 @@ def open_profile(kind: str, reference: ProfileReference, findings: Findings) -> 
 
 
 def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
-    """The same, whatever the file turns out to be."""
+    """Return the same, whatever the file turns out to be."""
     try:
         path = locate(kind, reference.name, reference.beside)
         data = path.read_bytes()
@@ -80,7 +81,7 @@ def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tup
 
 
 def read_named(kind: str, reference: ProfileReference | None, read: Read[T], findings: Findings) -> T | None:
-    """One profile, or None with the faults noted."""
+    """Return one profile, or None with the faults noted."""
     opened = open_profile(kind, reference, findings) if reference else None
     if opened is None:
         return None
@@ -98,7 +99,7 @@ def _load(kind: str, name: str | Path, read: Read[T]) -> T:
 
 
 def load_device(name: str | Path) -> DeviceProfile:
-    """A device profile by shipped name or path; ProfileError with every fault. So the three below."""
+    """Return a device profile by shipped name or path; ProfileError with every fault. So the three below."""
     return _load("device", name, read_device)
 
 

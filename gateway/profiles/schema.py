@@ -58,13 +58,14 @@ def field_comments(kind: type) -> dict[str, str]:
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """The JSON schema of a kind of profile: rig, device, plant, calibration, registers or plan. KeyError for any other."""
+    """Return the JSON schema of a kind of profile: rig, device, plant, calibration, registers or plan. KeyError for any
+    other."""
     head = {"$schema": DIALECT, "title": f"force-gateway {kind}"}
     return head | _MAKERS[kind]() | {"title": head["title"]}
 
 
 def dataclass_schema(kind: type) -> dict[str, Any]:
-    """The schema of one tree of dataclasses, with its help texts."""
+    """Return the schema of one tree of dataclasses, with its help texts."""
     schema: dict[str, Any] = adapter(kind).json_schema()
     definitions: dict[str, Any] = schema.get("$defs", {})
     _describe(schema, kind)
@@ -75,7 +76,7 @@ def dataclass_schema(kind: type) -> dict[str, Any]:
 
 
 def _tree(kind: type) -> list[type]:
-    """Every dataclass below one, each once."""
+    """Return every dataclass below one, each once."""
     found: list[type] = []
     for _, inner in groups(kind):
         if inner not in found:
@@ -97,13 +98,13 @@ def _describe(schema: dict[str, Any], kind: type) -> None:
 
 
 def _title(key: str) -> str:
-    """`force_ramp_n_per_s` -> `force ramp, N/s`."""
+    """Return `force_ramp_n_per_s` -> `force ramp, N/s`."""
     unit = unit_of(key)
     return f"{without_unit(key).replace('_', ' ')},{unit}" if unit else key.replace("_", " ")
 
 
 def plant_schema() -> dict[str, Any]:
-    """The schema of a plant file: the twin's fields, each number with its origin."""
+    """Return the schema of a plant file: the twin's fields, each number with its origin."""
     schema = dataclass_schema(Plant)
     sections = schema.setdefault("$defs", {})
     for section in list(sections.values()):
@@ -115,7 +116,7 @@ def plant_schema() -> dict[str, Any]:
 
 
 def _with_origin(leaf: dict[str, Any]) -> dict[str, Any]:
-    """`4.1e4` -> `{value: 4.1e4, source: ..., range: [..]}`; x-null-value: what it is when the plant leaves it out."""
+    """Return `4.1e4` -> `{value: 4.1e4, source: ..., range: [..]}`; x-null-value: what it is when the plant leaves it out."""
     number = {key: leaf[key] for key in leaf if key not in ("title", "description", "default")}
     about = {key: leaf[key] for key in ("title", "description") if key in leaf}
     null = {"x-null-value": leaf["default"]} if "default" in leaf else {}
@@ -125,7 +126,7 @@ def _with_origin(leaf: dict[str, Any]) -> dict[str, Any]:
 
 
 def plan_schema() -> dict[str, Any]:
-    """The schema of a plan file: an experiment, or a ladder."""
+    """Return the schema of a plan file: an experiment, or a ladder."""
     experiment, ladder = dataclass_schema(ExperimentPlan), dataclass_schema(CalibrationPlan)
     definitions = experiment.pop("$defs", {}) | ladder.pop("$defs", {})
     return {"anyOf": [experiment, ladder], "$defs": definitions}
@@ -142,7 +143,7 @@ _MAKERS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
 
 
 def schema_text(kind: str) -> str:
-    """The schema as a file holds it."""
+    """Return the schema as a file holds it."""
     return json.dumps(schema(kind), indent=2, ensure_ascii=False) + "\n"
 
 

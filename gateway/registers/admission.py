@@ -85,7 +85,7 @@ class Admission:
         self._is_held = False
 
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
-        """What a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
+        """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
         commands, before = self._commands, self._commands.values
         wish = self._wish(write)
         if wish is None:
@@ -141,11 +141,11 @@ class Admission:
         return is_idle and tuple(self._offsets(write)) == (CONTROL_WORD,)
 
     def _offsets(self, write: Write) -> range:
-        """Which words of the command block are written whole."""
+        """Return which words of the command block are written whole."""
         return self._commands.offsets(write.block, write.address, len(write.data) // 2)
 
     def _held_by(self, write: Write, written: int) -> bool:
-        """Whether a master that writes in cycles holds start_calibration at 1: only its own 0 lets the next 1 count."""
+        """Return whether a master that writes in cycles holds start_calibration at 1: only its own 0 lets the next 1 count."""
         if not self._is_held and not written & CALIBRATE:
             return False
         is_told = CONTROL_WORD in self._offsets(write) and bool(write.touched & CALIBRATE)

@@ -94,7 +94,7 @@ class RegisterBank:
         self._note_refusal(request_refusal(refusal), peer)
 
     def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
-        """Big-endian words of one block. Refusal (02) for a range that no block holds."""
+        """Return big-endian words of one block. Refusal (02) for a range that no block holds."""
         if not 0 < count <= self._room[address]:
             raise self._note_refusal(no_such_address(self._blocks, address, count), peer)
         return bytes(self._data[2 * address : 2 * (address + count)])
@@ -103,7 +103,7 @@ class RegisterBank:
         self.read_registers(address, count, peer)
 
     def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
-        """Bits of control_word (0-15) or status_word (100-115), packed."""
+        """Return bits of control_word (0-15) or status_word (100-115), packed."""
         try:
             first = self._bit_word(address, count)
         except Refusal as refusal:
@@ -197,7 +197,7 @@ class RegisterBank:
         return refusal
 
     def _bit_word(self, address: int, count: int) -> int:
-        """First address of the word that holds all of these bits."""
+        """Return the first address of the word that holds all of these bits."""
         for first in self._bits:
             if count > 0 and first <= address and address + count <= first + BITS:
                 return first
@@ -272,7 +272,7 @@ class RegisterBank:
             self._status.show_owner(ip_number(self._shown_owner))
 
     def _sentence(self, before: list[float], owner: str | None, admitted: AdmittedWrite) -> str:
-        """What an accepted write changed; empty when nothing that people want to know."""
+        """Return what an accepted write changed; empty when nothing that people want to know."""
         changes = self._commands.differences(before, admitted.values)
         edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE
         asked = ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)

@@ -84,28 +84,28 @@ class CommandBlock:
         return (*named, *(None,) * (count - len(registers)))
 
     def holds(self, block: Block, address: int) -> bool:
-        """Whether this address is in a face of the command block, named or reserved."""
+        """Return whether this address is in a face of the command block, named or reserved."""
         base = block.repeats.get("command")
         return block.first == self._first if base is None else base <= address < base + 2 * len(self.values)
 
     def address(self, block: Block, offset: int) -> int:
-        """Where a word of the command block is in this face."""
+        """Return where a word of the command block is in this face."""
         return self._first + offset if not block.repeats else block.repeats["command"] + 2 * offset
 
     def offsets(self, block: Block, address: int, count: int) -> range:
-        """Which words of the command block a write of these words sets, reserved ones among them."""
+        """Return which words of the command block a write of these words sets, reserved ones among them."""
         if not block.repeats:
             return range(address - self._first, address - self._first + count)
         start = (address - block.repeats["command"] + 1) // 2
         return range(start, start + count // 2)
 
     def names(self, block: Block, address: int, count: int) -> Sequence[str]:
-        """The registers that a write of these words sets."""
+        """Return the registers that a write of these words sets."""
         offsets = self.offsets(block, address, count)
         return NAMES[offsets.start : offsets.stop]
 
     def decode(self, block: Block, address: int, data: bytes) -> Values:
-        """A candidate: the accepted values with those of this write put over them. Refusal (03) for a bad one."""
+        """Return a candidate: the accepted values with those of this write put over them. Refusal (03) for a bad one."""
         if not block.repeats:
             return self._decode_words(address, data)
         return self._decode_floats(block, address, data)
@@ -173,7 +173,7 @@ class CommandBlock:
                 self._image.write(base, words_swapped_from_little_endian(self._low_first.pack(*candidate)))
 
     def command(self, values: Values, control_word: int, number: int, received_s: float, peer: str) -> Command:
-        """These values in SI units. control_word: as written, edge bits included."""
+        """Return these values in SI units. control_word: as written, edge bits included."""
         v = values
         return Command(
             control_word=_CONTROL_WORDS[control_word],
@@ -195,7 +195,8 @@ class CommandBlock:
         )
 
     def differences(self, before: Values, after: Values) -> str:
-        """`force_setpoint 0.00 N -> 12.00 N`: what a write changed, heartbeat and sequence apart (they always change)."""
+        """Return `force_setpoint 0.00 N -> 12.00 N`: what a write changed, heartbeat and sequence apart (they always
+        change)."""
         return ", ".join(
             f"{field.name} {field.format(old)} -> {field.format(new)}"
             for k, (field, old, new) in enumerate(zip(self.fields, before, after, strict=True))

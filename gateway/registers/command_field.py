@@ -38,7 +38,7 @@ class CommandField:
     values: Mapping[int, str]
 
     def of_word(self, word: int, address: int) -> float:
-        """The value of one int16 or uint16 register."""
+        """Return the value of one int16 or uint16 register."""
         if self.is_signed and word >= 0x8000:
             word -= 0x10000
         value = word / self.counts_per_unit
@@ -47,7 +47,7 @@ class CommandField:
         raise self._out_of_range(value, address)
 
     def of_float(self, value: float, address: int, order: WordOrder) -> float:
-        """The value of one float register, decoded already."""
+        """Return the value of one float register, decoded already."""
         if not value:
             return 0.0  # -0.0 too
         if self.float_low <= value <= self.float_high and (value >= SMALLEST_MEANT or value <= -SMALLEST_MEANT):
@@ -59,7 +59,7 @@ class CommandField:
         raise self._not_a_value(value, address, order)
 
     def format(self, value: float) -> str:
-        """`12.00 N`, or `1 (voltage)` for an enumeration."""
+        """Return `12.00 N`, or `1 (voltage)` for an enumeration."""
         name = self.values.get(int(value)) if self.values and isfinite(value) else None
         return quantity(value, self.decimals, self.unit) + (f" ({name})" if name else "")
 
@@ -94,12 +94,13 @@ _CURES: Final = {
 
 
 def _swap_words_of_float(value: float) -> float:
-    """The same four bytes read in the other word order."""
+    """Return the same four bytes read in the other word order."""
     return float(unpack_number("float32", WordOrder.CDAB, pack_number("float32", WordOrder.ABCD, value)))
 
 
 def command_field(register: Register, rules: BankRules, map_name: str) -> CommandField:
-    """The register's limits narrowed by the rig's. Enumerations keep the type's range: what they lack is refused by name."""
+    """Return the register's limits narrowed by the rig's. Enumerations keep the type's range: what they lack is refused
+    by name."""
     low, high = register.minimum or 0.0, register.maximum if register.maximum is not None else 65535.0
     source = f"map {map_name}"
     rig_low, rig_high = _rig_limits(register.name, rules) or (low, high)

@@ -31,7 +31,8 @@ class ByteOrderEcho:
         return host in self._proven
 
     def write(self, address: int, data: bytes, host: str) -> WordOrder | None:
-        """A write of whole values to the proof block: the word order that it proves, None for reserved words only."""
+        """Take a write of whole values to the proof block. Return the word order that it proves, None for reserved
+        words only."""
         at = self._register.address - address
         if not 0 <= at < len(data) // 2:
             check_zeros(address, data)

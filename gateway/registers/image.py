@@ -39,7 +39,7 @@ class RegisterImage:
             self.writable[address] = 0 if is_closed else self.writable[address + 1] + 1 if address < block.last else 1
 
     def read(self, address: int, count: int) -> bytes:
-        """Words without any check."""
+        """Return words without any check."""
         return bytes(self.data[2 * address : 2 * (address + count)])
 
     def write(self, address: int, words: bytes) -> None:
@@ -54,7 +54,7 @@ class RegisterImage:
         return self.data[2 * address] << 8 | self.data[2 * address + 1]
 
     def cuts_value(self, address: int, count: int) -> Register | None:
-        """The register that a range of words would take a part of."""
+        """Return the register that a range of words would take a part of."""
         first, last = self.register_at.get(address), self.register_at.get(address + count - 1)
         if first is not None and first.address != address:
             return first

@@ -22,7 +22,7 @@ class Ownership:
         self.is_explicit = False
 
     def admits(self, host: str) -> bool:
-        """Whether this host may command without taking over."""
+        """Return whether this host may command without taking over."""
         return self.owner is None or self.owner == host
 
     def may_take_over(self, host: str) -> bool:
@@ -46,7 +46,7 @@ class Ownership:
 
 
 def ip_number(host: str | None) -> int:
-    """What owner_ip shows: 0 for nobody, the IPv4 address (also one mapped into IPv6), else NOT_IPV4."""
+    """Return what owner_ip shows: 0 for nobody, the IPv4 address (also one mapped into IPv6), else NOT_IPV4."""
     if host is None:
         return 0
     try:

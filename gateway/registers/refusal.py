@@ -33,19 +33,19 @@ class Refusal(ModbusError):  # noqa: N818  the glossary's word
 
 
 def request_refusal(error: RequestError) -> Refusal:
-    """What the protocol's own rules have refused, in the words of the registers and the log."""
+    """Return what the protocol's own rules have refused, in the words of the registers and the log."""
     address = NO_ADDRESS if error.address is None else error.address
     where = "" if error.address is None else f" at address {error.address}"
     return Refusal(_REQUEST_FAULTS[error.fault], address, f"{error}{where}", value=error.value)
 
 
 def quantity(value: float, decimals: int, unit: str) -> str:
-    """`12.00 N`; numbers that those digits would hide or swell are written as `2.34e-41 N`."""
+    """Return `12.00 N`; numbers that those digits would hide or swell are written as `2.34e-41 N`."""
     usual = value == 0.0 or 1.0e-3 <= abs(value) < 1.0e7
     number = f"{value:.{decimals}f}" if usual else f"{value:.3g}"
     return f"{number} {unit}".rstrip()
 
 
 def allowed_range(low: float, high: float, unit: str) -> str:
-    """`0 .. 60 N`."""
+    """Return `0 .. 60 N`."""
     return f"{low:g} .. {high:g} {unit}".rstrip()

@@ -147,7 +147,7 @@ def _scale(register: Register) -> _Scale:
 
 
 def _faces(register_map: RegisterMap, name: str) -> tuple[Register, ...]:
-    """The register in the status block, and where a float face repeats it."""
+    """Return the register in the status block, and where a float face repeats it."""
     blocks = {"status", *(block.name for block in register_map.blocks if "status" in block.repeats)}
     return tuple(register for register in register_map.registers if register.name == name and register.block in blocks)
 

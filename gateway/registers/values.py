@@ -38,7 +38,7 @@ RAW_LIMITS: Final = {
 
 
 def words_of(kind: str) -> int:
-    """Registers that one value of this type takes."""
+    """Return registers that one value of this type takes."""
     return _STRUCTS[kind].size // 2
 
 
@@ -57,7 +57,7 @@ def words_swapped_from_little_endian(data: bytes) -> bytes:
 
 
 def pack_number(kind: str, order: WordOrder, number: float) -> bytes:
-    """Words of one raw number. ValueError when the type cannot carry it (float32: overflow becomes infinite)."""
+    """Return words of one raw number. ValueError when the type cannot carry it (float32: overflow becomes infinite)."""
     if kind == "float32":
         data = _STRUCTS[kind].pack(float32(number))
     else:
@@ -71,7 +71,7 @@ def pack_number(kind: str, order: WordOrder, number: float) -> bytes:
 
 
 def unpack_number(kind: str, order: WordOrder, data: bytes) -> float | int:
-    """The raw number of these words; NaN where int16 says unavailable. ValueError on a wrong length."""
+    """Return the raw number of these words; NaN where int16 says unavailable. ValueError on a wrong length."""
     if len(data) != _STRUCTS[kind].size:
         raise ValueError(f"{kind} takes {words_of(kind)} registers, not {len(data) / 2:g}")
     number: float | int = _STRUCTS[kind].unpack(
@@ -81,7 +81,7 @@ def unpack_number(kind: str, order: WordOrder, data: bytes) -> float | int:
 
 
 def float32(number: float) -> float:
-    """The nearest float32; infinite beyond its range."""
+    """Return the nearest float32; infinite beyond its range."""
     try:
         return float(_STRUCTS["float32"].unpack(_STRUCTS["float32"].pack(number))[0])
     except OverflowError:
@@ -89,10 +89,10 @@ def float32(number: float) -> float:
 
 
 def decimal(number: float) -> float:
-    """The shortest decimal that a float32 stands for: 25.3 for 25.299999237. Anything else comes back as it is."""
+    """Return the shortest decimal that a float32 stands for: 25.3 for 25.299999237. Anything else comes back as it is."""
     return next((short for digits in (6, 7, 8) if float32(short := float(f"{number:.{digits}g}")) == number), number)
 
 
 def carried_by_float32(number: float) -> float:
-    """What a float register may show: NaN for anything not finite, clamped to what float32 carries."""
+    """Return what a float register may show: NaN for anything not finite, clamped to what float32 carries."""
     return max(-LARGEST_FLOAT32, min(LARGEST_FLOAT32, number)) if isfinite(number) else nan

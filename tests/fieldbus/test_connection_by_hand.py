@@ -231,7 +231,9 @@ def test_a_bug_found_while_going_on_after_a_pause_is_told_too(stand: Any, delive
 def test_a_foreign_unit_is_told_to_the_bank_with_its_peer(stand, deliver):
     made = stand()
     heard = []
-    made.bank.refused = lambda refusal, peer: heard.append((refusal.fault, refusal.value, refusal.address, peer.host))
+    made.bank.note_refusal = lambda refusal, peer: heard.append(
+        (refusal.fault, refusal.value, refusal.address, peer.host)
+    )
     near, far = made.connect("10.0.0.5")
     deliver(near, far, framed(READ, unit=9) + framed(READ, unit=1))
     assert bytes(far.written[:9]) == bytes.fromhex("0001 0000 0003 09 83 0b")

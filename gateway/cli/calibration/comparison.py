@@ -58,7 +58,7 @@ class Comparison:
         }
 
     def place_v(self, branch: BranchDifference) -> float:
-        """Where the branch differs most."""
+        """Return where the branch differs most."""
         return self.voltage_v[branch.difference_n.index(branch.max_n)]
 
 
@@ -95,7 +95,7 @@ def table(comparison: Comparison) -> str:
 
 
 def page(comparison: Comparison) -> str:
-    """A self-contained HTML page: both loops, and the differences."""
+    """Return a self-contained HTML page: both loops, and the differences."""
     from gateway.reports.style import STYLE
     from gateway.reports.svg import Axis, Chart, spread
 

@@ -8,7 +8,7 @@ from rich.text import Text
 
 
 def fit_table(document: dict[str, Any]) -> Table:
-    """One row per model and order; the chosen one stands out, those that may not drive a plant step back."""
+    """Return one row per model and order; the chosen one stands out, those that may not drive a plant step back."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="dim", caption_justify="left")
     table.add_column("model")
     for name in ("order", "coeffs", "RMS N", "max N", "held-out RMS N"):
@@ -50,7 +50,7 @@ def _verdict(fit: dict[str, Any]) -> str:
 
 
 def summary(document: dict[str, Any]) -> list[Text]:
-    """What was fitted, what was chosen and why, what was noticed, and where the report is."""
+    """Return what was fitted, what was chosen and why, what was noticed, and where the report is."""
     ladder, chosen, reversal = document["ladder"], document["chosen"], document["reversal"]
     low_v, high_v = ladder["voltage_v"]
     low_n, high_n = chosen["force_range_n"]
@@ -82,7 +82,7 @@ def summary(document: dict[str, Any]) -> list[Text]:
 
 
 def _describe_error(measured: dict[str, Any]) -> str:
-    """The error on all that was measured, and what it is to be compared with."""
+    """Return the error on all that was measured, and what it is to be compared with."""
     said = (
         f"{measured['rms_n']:.3f} N RMS, {measured['max_n']:.2f} N max on all {measured['points']} measured points, "
         f"{'reversals included' if measured['reversals'] else 'no reversals measured'}"

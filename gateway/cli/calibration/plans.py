@@ -5,7 +5,7 @@ from typing import Any
 
 
 def fields_of(path: Path) -> dict[str, Any]:
-    """The fields of a plan file. ProfileError (78) with every fault at its line and column."""
+    """Return the fields of a plan file. ProfileError (78) with every fault at its line and column."""
     from gateway.profiles.kinds.plans import load_plan_fields
 
     return load_plan_fields(path)

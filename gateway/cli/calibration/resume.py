@@ -32,7 +32,7 @@ class RestOfLadder:
     finished: bool
 
     def plan_with(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """What is left to climb with these changes."""
+        """Return what is left to climb with these changes."""
         plan = self.plan | changes
         last_start = int(plan["groups"]) - (not plan["minor_points"])
         return plan | {"first_group": min(self.groups, last_start)}
@@ -44,7 +44,7 @@ class RestOfLadder:
 
 
 def find_rest_of_ladder(state: Path) -> RestOfLadder:
-    """What is left of the last recorded ladder. CliError where none is recorded."""
+    """Return what is left of the last recorded ladder. CliError where none is recorded."""
     ladders = [entry for entry in list_recordings(state) if entry.header.get("ladder")]
     if not ladders:
         raise CliError(
@@ -66,7 +66,7 @@ def find_rest_of_ladder(state: Path) -> RestOfLadder:
 
 
 def rig_of(recording: Path, named: str) -> str:
-    """The rig file that a recording names, if that can (still) be read, else the one that was named."""
+    """Return the rig file that a recording names, if that can (still) be read, else the one that was named."""
     file = str(read_recording(recording).header.get("rig_file", ""))
     return file if file and Path(file).exists() else named
 

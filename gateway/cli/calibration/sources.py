@@ -67,7 +67,7 @@ class LocalRun:
         ask(self._state, {"do": "calibrate", "stop": True})
 
     def end(self) -> dict[str, Any]:
-        """How it ended: phase, stored, report, document, recording, sentence."""
+        """Return how it ended: phase, stored, report, document, recording, sentence."""
         last = self._last
         result = dict(last["result"])
         sentence = result.pop("refused", "") or last["ended"]

@@ -22,7 +22,7 @@ _ANY_CELL_N: Final = 5000.0  # where the rig is not known: what no calibration f
 
 
 def open_store(directory: Path, rig_name: str) -> "CalibrationStore":
-    """The store of a state directory, with the built-in calibration of the rig where that can be read."""
+    """Return the store of a state directory, with the built-in calibration of the rig where that can be read."""
     from gateway.calibrations.store import CalibrationStore
 
     rig = _rig(rig_name)
@@ -30,7 +30,7 @@ def open_store(directory: Path, rig_name: str) -> "CalibrationStore":
 
 
 def find_calibration(store: "CalibrationStore", which: str) -> "Calibration":
-    """A calibration by its number in the store, a shipped name or a file."""
+    """Return a calibration by its number in the store, a shipped name or a file."""
     from gateway.calibrations.store import StoreError
     from gateway.profiles import load_calibration
 
@@ -43,7 +43,7 @@ def find_calibration(store: "CalibrationStore", which: str) -> "Calibration":
 
 
 def in_use(store: "CalibrationStore") -> "Calibration":
-    """The calibration in use, or the one that a gateway would start with."""
+    """Return the calibration in use, or the one that a gateway would start with."""
     calibration = store.find_selected().calibration
     if calibration is None:
         raise CliError(f"E433 nothing is stored in {store.directory}; --rig names the rig's own", exit_codes.DATA)
@@ -51,7 +51,9 @@ def in_use(store: "CalibrationStore") -> "Calibration":
 
 
 def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
-    """{"use": N, "force": bool} or {"rollback": True}: the gateway's answer when it is through, or our own where none runs."""
+    """Use another calibration or roll back. request: {"use": N, "force": bool} or {"rollback": True}.
+
+    Return the gateway's answer when it is through, or what was done here where none runs."""
     with _not_running(directory) as is_free:
         if is_free:
             return _change_without_gateway(directory, rig_name, request)
@@ -94,7 +96,8 @@ def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, A
 
 
 def _exit_code(reason: int) -> int:
-    """A disk that refuses, or an internal error, is a failure; all else is a wrong calibration or number."""
+    """Return the exit code: a disk that refuses, or an internal error, is a failure; all else is a wrong calibration or
+    number."""
     from gateway.registers.words import UploadReason
 
     return exit_codes.FAILED if reason in (UploadReason.STORAGE, UploadReason.DEFECT) else exit_codes.DATA

@@ -15,7 +15,7 @@ _ERASE: Final = "\r\x1b[K"
 
 
 def words(seen: SeenStatus) -> str:
-    """`holding    11.98 N of 12.00 N   1.512 V   in band`, and what limits or warns."""
+    """Return `holding    11.98 N of 12.00 N   1.512 V   in band`, and what limits or warns."""
     parts = [f"{seen.state.name.lower():<11}", f"{_number(seen.force_n, 2)} N of {_number(seen.setpoint_n, 2)} N"]
     parts += [f"  {_number(seen.voltage_v, 3)} V", "  in band" if seen.bits & StatusBit.IN_BAND else "  not in band"]
     if seen.limited_by is not LimitedBy.NONE:
@@ -27,7 +27,7 @@ def words(seen: SeenStatus) -> str:
 
 
 def document(seen: SeenStatus, time_s: float) -> dict[str, Any]:
-    """The same as JSON; None where the gateway has no value."""
+    """Return the same as JSON; None where the gateway has no value."""
     numbers = {
         "force_n": seen.force_n,
         "setpoint_n": seen.setpoint_n,

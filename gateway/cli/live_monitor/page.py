@@ -34,7 +34,7 @@ _SHOWN_BITS: Final = {
 
 
 def page(view: View) -> RenderableType:
-    """The whole frame, `height` lines at most."""
+    """Return the whole frame, `height` lines at most."""
     alarms = _alarms(view.track)
     chart_rows = 3 if view.height < 36 else 6
     above = 1 + 5 + chart_rows + 2 + len(alarms)
@@ -65,7 +65,8 @@ def _header(view: View) -> Text:
 
 
 def _describe_run(track: Track) -> str:
-    """`ladder 43 %, 1:20 left`: how far a calibration or an experiment is. Empty for a gateway without these registers."""
+    """Return `ladder 43 %, 1:20 left`: how far a calibration or an experiment is. Empty for a gateway without these
+    registers."""
     if "calibration_phase" not in track.readings:
         return ""
     phase = track.readings["calibration_phase"].register.values.get(int(track.value("calibration_phase")), "?")
@@ -115,7 +116,7 @@ def _minute(view: View, rows: int) -> Panel:
 
 
 def _alarms(track: Track) -> list[Text]:
-    """The fault first, then warnings, each with what to do; at most three lines."""
+    """Return the fault first, then warnings, each with what to do; at most three lines."""
     codes = []
     fault = track.value("fault_code")
     if not isnan(fault) and int(fault):
@@ -130,7 +131,7 @@ def _alarms(track: Track) -> list[Text]:
 
 
 def _detail(code: str, track: Track) -> str:
-    """What else the registers say of an alarm: the name that the residual watch has for its cause."""
+    """Return what else the registers say of an alarm: the name that the residual watch has for its cause."""
     if code != WarningBit.MODEL_DIFFERS.code or "residual_cause" not in track.readings:
         return ""
     return f": {format_value(track.readings['residual_cause']).replace('_', '-')}"

@@ -27,7 +27,7 @@ _EIGHTHS: Final = " ▁▂▃▄▅▆▇█"
 
 
 def big(value: float, decimals: int, *, sign: str = "-", width: int, style: str) -> Text:
-    """A number three rows high, with as many decimals as fit into `width` columns. sign: "+" shows a plus too."""
+    """Return a number three rows high, with as many decimals as fit into `width` columns. sign: "+" shows a plus too."""
     if isnan(value):
         return Text("\n–\n", style="dim")
     for digits in range(decimals, -1, -1):
@@ -60,6 +60,6 @@ def _cell(point: TrackPoint | None, row: int, rows: int, top_n: float) -> tuple[
 
 
 def chart_top_n(points: Sequence[TrackPoint | None]) -> float:
-    """A round force above everything in the chart."""
+    """Return a round force above everything in the chart."""
     largest = max((max(point.measured_n, point.setpoint_n) for point in points if point), default=0.0)
     return next((float(top) for top in (5, 10, 20, 30, 40, 50, 75, 100, 150, 200) if largest <= 0.95 * top), 330.0)

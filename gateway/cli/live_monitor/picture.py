@@ -13,7 +13,7 @@ _WEB_FONT: Final = re.compile(r"@font-face \{.*?\}\s*", re.DOTALL)
 
 
 def svg_picture(view: View) -> str:
-    """The frame as the text of an SVG file."""
+    """Return the frame as the text of an SVG file."""
     console = Console(
         record=True,
         width=view.width,

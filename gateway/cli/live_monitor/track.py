@@ -80,7 +80,7 @@ class Track:
         return self.value("force_accepted" if self.is_calibrating else "force_requested")
 
     def change_age_s(self, name: str) -> float | None:
-        """How long ago a register changed; None when it has not since the monitor began."""
+        """Return how long ago a register changed; None when it has not since the monitor began."""
         changed_s = self._seen[name].changed_s
         return None if changed_s is None else self.time_s - changed_s
 
@@ -115,7 +115,7 @@ class Track:
 
 
 def buckets(points: Sequence[TrackPoint], now_s: float, count: int) -> list[TrackPoint | None]:
-    """The last minute in `count` equal pieces, oldest first, each its mean; None where nothing was measured."""
+    """Return the last minute in `count` equal pieces, oldest first, each its mean; None where nothing was measured."""
     width_s = WINDOW_S / count
     gathered: list[list[TrackPoint]] = [[] for _ in range(count)]
     for point in points:

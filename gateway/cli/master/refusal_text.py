@@ -50,7 +50,7 @@ def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], 
 
 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:
-    """What the gateway itself has said to this refusal; empty where it is elsewhere, or nobody answers."""
+    """Return what the gateway itself has said to this refusal; empty where it is elsewhere, or nobody answers."""
     from gateway.cli.control_socket import ask
     from gateway.cli.master.nearby import sockets_near
     from gateway.service.supervisor.run_options import default_state_root
@@ -81,7 +81,7 @@ def _last_refusal(client: GatewayClient, frames: list[Frame]) -> tuple[RefusalRe
 
 
 def _place(client: GatewayClient, address: int, value: Reading) -> str:
-    """`force_setpoint = 65 N (address 1)`; without a value where the gateway has none."""
+    """Return `force_setpoint = 65 N (address 1)`; without a value where the gateway has none."""
     for register in client.register_map.registers:
         if register.address <= address < register.address + register.words:
             number = f" = {value.value:.9g} {register.unit}".rstrip() if value.is_available else ""

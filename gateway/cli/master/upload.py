@@ -40,7 +40,7 @@ class Master(GatewayClient):
             return int(self.read_values([self.register_map.find("calibration_id")])[0].value)
 
     def outcome(self, upload: UploadFrames) -> CommitStatus:
-        """How it ended: idle after a dry run, or committed. CliError when it failed."""
+        """Return how it ended: idle after a dry run, or committed. CliError when it failed."""
         deadline_s = time.monotonic() + _PATIENCE_S
         while True:
             with explain_refusals(self):
@@ -56,7 +56,7 @@ class Master(GatewayClient):
             time.sleep(_POLL_S)
 
     def is_known_set(self) -> bool:
-        """Whether the gateway knew the committed set already, so that number and name are the old ones."""
+        """Return whether the gateway knew the committed set already, so that number and name are the old ones."""
         with explain_refusals(self):
             (word,) = self.read_words(self.register_map.find("commit_notice").address, 1)
         return bool(word & CommitNotice.KNOWN_SET)

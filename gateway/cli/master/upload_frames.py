@@ -72,7 +72,7 @@ class UploadFrames:
 def upload_of(
     calibration: Calibration, register_map: RegisterMap, *, slot: int, action: CommitAction, fc06: bool
 ) -> UploadFrames:
-    """The requests that stage a calibration and then act. ValueError for more slip stops than the registers carry."""
+    """Return the requests that stage a calibration and then act. ValueError for more slip stops than the registers carry."""
     if (stops := len(calibration.slip_radii_v)) > STOPS_CARRIED:
         raise ValueError(f"{calibration.name} has {stops} slip stops, the registers carry {STOPS_CARRIED}")
     words = CoefficientSet.of_calibration(calibration).to_words()
@@ -95,7 +95,7 @@ def upload_of(
 
 
 def _parts(words: bytes, trailer: bytes, register_map: RegisterMap) -> Iterator[Request]:
-    """The FC16 of the staging, the trailer last."""
+    """Yield the FC16 of the staging, the trailer last."""
     first = register_map.find("order@staging").address
     falling = register_map.find("falling_b_0@staging").address
     head, tail, half = words[:HEAD_BYTES], words[HEAD_BYTES:], 2 * (falling - first)
@@ -116,7 +116,7 @@ def _single(parts: tuple[Request, ...], register_map: RegisterMap) -> Iterator[R
 
 
 def register_names(register_map: RegisterMap) -> dict[int, str]:
-    """What each address of the staging block holds; halves of a float32 are told apart."""
+    """Return what each address of the staging block holds; halves of a float32 are told apart."""
     names = {}
     for register in register_map.registers_of("staging"):
         for place in range(register.words):
@@ -126,7 +126,7 @@ def register_names(register_map: RegisterMap) -> dict[int, str]:
 
 
 def listing(upload: UploadFrames, register_map: RegisterMap, unit: int) -> Iterator[str]:
-    """Every request as text: function, address, frame in hexadecimal, and for FC16 each register with its value."""
+    """Yield every request as text: function, address, frame in hexadecimal, and for FC16 each register with its value."""
     requests = (*upload.requests, upload.poll)
     for number, request in enumerate(requests, 1):
         yield f"frame {number} of {len(requests)}  {_title(request)}: {request.text}"
@@ -138,7 +138,7 @@ def listing(upload: UploadFrames, register_map: RegisterMap, unit: int) -> Itera
 
 
 def facts(upload: UploadFrames, unit: int) -> list[dict[str, Any]]:
-    """The same for --json."""
+    """Return the same for --json."""
     return [
         {
             "text": request.text,
@@ -160,7 +160,7 @@ def _title(request: Request) -> str:
 
 
 def _values(request: Request, register_map: RegisterMap) -> Iterator[str]:
-    """Each register with its value; neighbours of an array that are 0 in one line."""
+    """Yield each register with its value; neighbours of an array that are 0 in one line."""
     own = [register for register in register_map.registers_of("staging") if _within(register, request)]
     for is_zero, group in groupby(own, lambda register: "_" in register.name and not any(_own(register, request))):
         registers = list(group)

@@ -9,7 +9,7 @@ from gateway.registers import Register
 
 
 def parse_value(register: Register, text: str) -> bytes:
-    """The words for a value as typed; ValueError with a sentence."""
+    """Return the words for a value as typed; ValueError with a sentence."""
     if register.bits:
         number: float = _bits(register, text)
     elif register.values:
@@ -20,7 +20,7 @@ def parse_value(register: Register, text: str) -> bytes:
 
 
 def format_value(reading: Reading) -> str:
-    """A value with its unit or names; `-` when the gateway has none."""
+    """Return a value with its unit or names; `-` when the gateway has none."""
     register, value = reading.register, reading.value
     if isnan(value):
         return "-"
@@ -37,19 +37,19 @@ def format_value(reading: Reading) -> str:
 
 
 def bit_names(reading: Reading) -> list[str]:
-    """Names of the bits that are set, lowest first."""
+    """Return names of the bits that are set, lowest first."""
     if isnan(reading.value):
         return []
     return [name for bit, name in sorted(reading.register.bits.items()) if int(reading.value) >> bit & 1]
 
 
 def raw(reading: Reading) -> str:
-    """The words as hexadecimal."""
+    """Return the words as hexadecimal."""
     return " ".join(f"{word:04X}" for word in reading.words)
 
 
 def _bits(register: Register, text: str) -> int:
-    """A number, or names of bits joined by commas or plus signs."""
+    """Return a number, or names of bits joined by commas or plus signs."""
     bits = {_plain(name): bit for bit, name in register.bits.items()}
     number = 0
     for word in text.replace("+", ",").split(","):

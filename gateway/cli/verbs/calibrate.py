@@ -131,7 +131,8 @@ def _plan_wanted(directory: Path, wanted: dict[str, Any]) -> _WantedRun:
 
 
 def _resume(directory: Path, fields: dict[str, Any], name: str) -> _WantedRun:
-    """The rest of the last run; fields: what is asked for otherwise now, which may be more groups, but no other stairs."""
+    """Return the rest of the last run; fields: what is asked for otherwise now, which may be more groups, but no other
+    stairs."""
     from gateway.cli.calibration.resume import find_rest_of_ladder
 
     rest = find_rest_of_ladder(directory)
@@ -149,7 +150,7 @@ def _resume(directory: Path, fields: dict[str, Any], name: str) -> _WantedRun:
 
 
 def _fit_stopped_run(recording: Path, rig: str, directory: Path) -> dict[str, Any]:
-    """The end of a run that has everything but its fit: as `follow` answers."""
+    """Return the end of a run that has everything but its fit: as `follow` answers."""
     from gateway.cli.calibration.resume import rig_of
     from gateway.service.fitting.fit_process import fit_and_store
 
@@ -170,7 +171,7 @@ def _warn_of_another_rig(asked: _WantedRun, preview: dict[str, Any]) -> None:
 
 
 def _from_file(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
-    """The plan's fields; UsageError where options of a ladder stand beside an experiment."""
+    """Return the plan's fields; UsageError where options of a ladder stand beside an experiment."""
     from gateway.cli.calibration.plans import fields_of, is_experiment
 
     fields = fields_of(path)

@@ -174,7 +174,7 @@ def _number(standing: "SelectedCalibration") -> int | None:
 
 
 def _built_in(own: "Calibration | None", standing: "SelectedCalibration") -> dict[str, Any] | None:
-    """The rig's own calibration, which is no file of the store."""
+    """Return the rig's own calibration, which is no file of the store."""
     from gateway.calibrations.selection import OWN
     from gateway.registers.upload.coefficients import model_hash
 
@@ -198,7 +198,7 @@ def _facts(entry: "CalibrationEntry", standing: "SelectedCalibration") -> dict[s
 
 
 def _slots(standing: "SelectedCalibration", number: int) -> list[int]:
-    """Those that hold this calibration."""
+    """Return the slots that hold this calibration."""
     return [slot for slot, held in enumerate(standing.pointer.slots) if held == number]
 
 

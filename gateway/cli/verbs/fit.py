@@ -26,7 +26,7 @@ def _models(context: click.Context, parameter: click.Parameter, value: str) -> t
 
 
 def _orders(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
-    """`1-5`, `2`, `1,3,5` as numbers."""
+    """Return `1-5`, `2`, `1,3,5` as numbers."""
     orders: set[int] = set()
     for part in value.split(","):
         first, dash, last = part.strip().partition("-")
@@ -91,7 +91,7 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
 
 
 def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
-    """Everything that can be wrong with the data, as exit code 65."""
+    """Return the fit; whatever is wrong with the data ends with exit code 65."""
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
     from gateway.bsfm.ladder.fault import LadderError

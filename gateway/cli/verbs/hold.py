@@ -23,7 +23,7 @@ _UNITS: Final = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
 
 def _duration(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
-    """`10s`, `500ms`, `2min` or a number of seconds."""
+    """Return `10s`, `500ms`, `2min` or a number of seconds."""
     found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+) ?(ms|s|min|h|)", text.strip()) if text is not None else None
     if text is not None and found is None:
         raise click.BadParameter(f"{text} is no time such as 10s, 500ms or 2min")
@@ -69,7 +69,7 @@ def command(
 
 
 def _lease(rig: str) -> "KnownLease":
-    """What the rig file says."""
+    """Return what the rig file says."""
     from gateway.cli.force_hold.heartbeat import KnownLease
     from gateway.profiles import load_rig
 
@@ -90,7 +90,7 @@ def _told_lease(host: str, port: int) -> "KnownLease | None":
 
 
 def _check_force(register_map: Any, newton: float) -> float:
-    """A force that the register can carry; the rig's own limits are the gateway's to tell."""
+    """Return a force that the register can carry; the rig's own limits are the gateway's to tell."""
     try:
         register_map.find("force_setpoint").encode(newton)
     except ValueError as error:
@@ -154,7 +154,7 @@ def _tell(beat: "HeartbeatThread", where: str, *, as_json: bool) -> None:
 
 
 def _disabled_words(beat: "HeartbeatThread") -> str:
-    """Why the output is off although nobody here has asked for it."""
+    """Return why the output is off although nobody here has asked for it."""
     from gateway.codes.warning_bits import WarningBit
 
     if beat.warned & WarningBit.MASTER_LOST:
@@ -165,7 +165,7 @@ def _disabled_words(beat: "HeartbeatThread") -> str:
 
 
 def _fault_words(beat: "HeartbeatThread") -> str:
-    """The fault's sentence, and how to go on."""
+    """Return the fault's sentence, and how to go on."""
     assert beat.seen
     entry = beat.seen.fault.explanation
     when = f"while holding {beat.hold.force_n:g} N" if beat.hold.is_pressing else "is latched"

@@ -43,7 +43,7 @@ def command(*, state: Path | None, rig: str) -> None:
 
 
 def exposition(health: dict[str, Any]) -> Iterator[str]:
-    """Lines of the text format, version 0.0.4, of the control socket's answer."""
+    """Yield lines of the text format, version 0.0.4, of the control socket's answer."""
     for figures, table in ((health, _LOOP), (health.get("residual") or {}, _RESIDUAL)):
         for key, name, kind, scale, help_text in table:
             value = figures.get(key)

@@ -41,7 +41,7 @@ def command(*, names: tuple[str, ...], endpoint: Endpoint, unit: int, map_name: 
 
 
 def label(register: "Register") -> str:
-    """The name as `read` takes it."""
+    """Return the name as `read` takes it."""
     from gateway.registers.map.register_map import PLAIN_BLOCKS
 
     return register.name if register.block in PLAIN_BLOCKS else f"{register.name}@{register.block}"

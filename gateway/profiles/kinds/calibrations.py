@@ -24,7 +24,7 @@ _OF_ALL_STOPS: Final = (CoefficientReason.SLIP_STOPS, CoefficientReason.SLIP_STI
 
 
 def read_calibration(document: Document) -> tuple[Calibration | None, list[Fault]]:
-    """The calibration of a file, or None and every fault."""
+    """Return the calibration of a file, or None and every fault."""
     calibration, faults = build(Calibration, document)
     if calibration is None:
         return None, faults
@@ -50,7 +50,7 @@ def _length_faults(calibration: Calibration, document: Document) -> list[Fault]:
 
 
 def _model_faults(calibration: Calibration, document: Document) -> list[Fault]:
-    """What only the whole model shows: force limits that are none."""
+    """Return what only the whole model shows: force limits that are none."""
     try:
         calibration.model()
     except ValueError as error:
@@ -59,7 +59,7 @@ def _model_faults(calibration: Calibration, document: Document) -> list[Fault]:
 
 
 def _place(found: CoefficientFault) -> Path:
-    """Where a coefficient of the upload's numbering stands in the file; () for the set as a whole."""
+    """Return where a coefficient of the upload's numbering stands in the file; () for the set as a whole."""
     if found.reason in _OF_ALL_STOPS:
         return ("slip_radii_v",)
     if found.index < 0:

@@ -34,7 +34,7 @@ _MAP_KEYS: Final = frozenset(("blocks", "version"))
 
 @cache
 def _own_keys() -> Mapping[str, frozenset[str]]:
-    """The keys that only one kind of file has at its top."""
+    """Return the keys that only one kind of file has at its top."""
     keys = {kind: {field.name for one in types for field in fields(one)} for kind, types in _TYPES.items()}
     keys["registers"] = set(_MAP_KEYS)
     return {
@@ -44,7 +44,8 @@ def _own_keys() -> Mapping[str, frozenset[str]]:
 
 
 def kind_of(value: Any, wanted: str = "") -> str | None:
-    """The kind whose own keys stand most often at the top of a document, None where none does; a tie is the wanted one's."""
+    """Return the kind whose own keys stand most often at the top of a document, None where none does; a tie is the
+    wanted one's."""
     present = set(map(str, value)) if isinstance(value, dict) else set()
     counts = {kind: len(present & own) for kind, own in _own_keys().items()}
     best = max(counts, key=lambda kind: (counts[kind], kind == wanted))

@@ -25,12 +25,12 @@ _SCHEMA_LINE: Final = "# force-gateway schema plan > plan.json gives editors the
 
 
 def load_plan(path: str | Path) -> AnyPlan:
-    """The plan of a file. ProfileError with every fault."""
+    """Return the plan of a file. ProfileError with every fault."""
     return read_plan(_open_plan(path))
 
 
 def load_plan_fields(path: str | Path) -> dict[str, Any]:
-    """What a good file says and no more, for options that fill in what it leaves out. ProfileError with every fault."""
+    """Return what a good file says and no more, for options that fill in what it leaves out. ProfileError with every fault."""
     document = _open_plan(path)
     read_plan(document)
     return dict(document.value)
@@ -62,7 +62,7 @@ def _experiment(document: Document) -> tuple[ExperimentPlan | None, list[Fault]]
 
 
 def plan_of(fields_: Mapping[str, Any]) -> AnyPlan:
-    """A plan from plain values, as they come over the control socket. ValueError with the first fault's sentence."""
+    """Return a plan from plain values, as they come over the control socket. ValueError with the first fault's sentence."""
     try:
         return read_plan(Document("plan", dict(fields_), {}))
     except ProfileError as error:
@@ -79,7 +79,7 @@ def plan_document(plan: AnyPlan) -> dict[str, Any]:
 
 
 def plan_text(plan: ExperimentPlan, comment: str = "") -> str:
-    """The whole file, which `load_plan` reads back to the same plan. comment: lines to stand at its top."""
+    """Return the whole file, which `load_plan` reads back to the same plan. comment: lines to stand at its top."""
     head = "".join(f"# {printable(line)}\n" for line in comment.splitlines())
     return head + _SCHEMA_LINE + "".join(_about(plan)) + "parts:\n" + "".join(map(_part, plan.parts))
 

@@ -21,7 +21,7 @@ _SCHEMA_LINE: Final = "# force-gateway schema plant > plant.json gives editors t
 
 
 def plant_text(profile: PlantProfile, comment: str = "") -> str:
-    """The whole file. comment: lines to stand at its top. ValueError for a plant of lanes or with a number that is not
+    """Return the whole file. comment: lines to stand at its top. ValueError for a plant of lanes or with a number that is not
     finite, which no file can hold."""
     head = "".join(f"# {line}\n" for line in comment.splitlines())
     about = f"name: {_quote(profile.name)}\ndescription: {_quote(profile.description)}\n"
@@ -29,7 +29,7 @@ def plant_text(profile: PlantProfile, comment: str = "") -> str:
 
 
 def with_origins(profile: PlantProfile, plant: Plant, sources: Mapping[str, str]) -> PlantProfile:
-    """The profile with another plant's numbers. sources: by path, for the numbers whose origin is new.
+    """Return the profile with another plant's numbers. sources: by path, for the numbers whose origin is new.
 
     What has changed without a source says so; a range that the new value has left is widened to hold it.
     """

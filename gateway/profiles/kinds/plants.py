@@ -41,7 +41,7 @@ class PlantProfile:
 
 
 def read_plant(document: Document) -> tuple[PlantProfile | None, list[Fault]]:
-    """The plant of a file, or None and every fault."""
+    """Return the plant of a file, or None and every fault."""
     reader = _PlantReader(document)
     values = reader.group((), Plant)
     about = {field: values.pop(field, "") for field in ABOUT}
@@ -103,7 +103,7 @@ class _PlantReader:
 
 
 def _range_problem(leaf: dict[Any, Any], unit: str) -> tuple[str, str] | None:
-    """(key, sentence) when a leaf's range is none, or does not hold its value."""
+    """Return (key, sentence) when a leaf's range is none, or does not hold its value."""
     bounds, value = leaf.get("range", [0, 0]), leaf["value"]
     if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(_is_number, bounds)) and bounds[0] <= bounds[1]):
         return "range", "must be [low, high], two rising numbers"

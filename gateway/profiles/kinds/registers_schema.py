@@ -66,7 +66,7 @@ _BLOCK: Final[dict[str, Any]] = {
 
 
 def register_map_schema() -> dict[str, Any]:
-    """The schema of profiles/registers/*.yaml, without its head."""
+    """Return the schema of profiles/registers/*.yaml, without its head."""
     return {
         "description": "A Modbus map: blocks of registers, the single source of server, documentation and client stubs.",
         "type": "object",

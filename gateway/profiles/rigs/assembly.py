@@ -61,13 +61,13 @@ def check_report(name: str | Path, *, simulated: bool = False) -> Report:
 
 
 def _left_to_edit(findings: Findings) -> Iterator[str]:
-    """What a simulated run need not mind, and the real one will."""
+    """Yield what a simulated run need not mind, and the real one will."""
     for fault in _in_order(findings.hardware):
         yield f"to be edited before it runs without --sim: {fault}"
 
 
 def load_rig(name: str | Path, *, simulated: bool = False) -> Rig:
-    """A rig by shipped name or path; ProfileError with every fault. simulated: as in `check_report`."""
+    """Return a rig by shipped name or path; ProfileError with every fault. simulated: as in `check_report`."""
     report = check_report(name, simulated=simulated)
     if report.rig is None:
         raise ProfileError(report.faults)
@@ -81,7 +81,7 @@ def _in_order(faults: Iterable[Fault]) -> tuple[Fault, ...]:
 
 
 def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
-    """The rig of a document; None, with the faults noted, when a part is missing."""
+    """Return the rig of a document; None, with the faults noted, when a part is missing."""
     file, faults = build(RigFile, document)
     findings.faults += faults
     register_map = read_named(
@@ -119,7 +119,7 @@ def _run_checks(document: Document, found_by: Iterable[Check], parts: Parts) -> 
 
 
 def _first_of_each_path(faults: list[Fault]) -> list[Fault]:
-    """What is wrong at one place in two ways has one cause, usually the first."""
+    """Return the first fault of each place: what is wrong there in two ways has one cause, usually the first."""
     return list({fault.path: fault for fault in reversed(faults)}.values())[::-1]
 
 
@@ -128,7 +128,7 @@ def _steps(path: str) -> tuple[str | int, ...]:
 
 
 def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
-    """What can be checked together: every part that has no fault of its own."""
+    """Return what can be checked together: every part that has no fault of its own."""
 
     def read_part(
         kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]
@@ -169,7 +169,7 @@ def _compensation(plant: PlantProfile | None, extended: PlantProfile | None) -> 
 
 
 def _part(document: Document, key: str, kind: type[T]) -> T | None:
-    """One group of the file by itself; its defaults where the file leaves it out."""
+    """Return one group of the file by itself; its defaults where the file leaves it out."""
     if (key,) in document.marks:
         return build_known(kind, document, (key,))
     try:
@@ -219,7 +219,7 @@ def _cell_line(cell: CellFile, device: DeviceProfile) -> CellLine:
 
 
 def _fingerprint(texts: Iterable[bytes]) -> str:
-    """SHA-256 over every text in the order of reading, each with its length before it."""
+    """Return the SHA-256 over every text in the order of reading, each with its length before it."""
     digest = hashlib.sha256()
     for text in texts:
         digest.update(len(text).to_bytes(8, "big") + text)

@@ -108,7 +108,7 @@ def defaults_fit(parts: Parts) -> Found:
 
 
 def calibration_reaches(parts: Parts) -> Found:
-    """A rig whose maximum force exceeds its calibration fails, and the trim needs room above it."""
+    """Yield a fault where the maximum force exceeds the calibration, or leaves the trim no room above it."""
     if (limits := parts.limits) is None or (calibration := parts.calibration) is None:
         return
     model, most = calibration.model(), limits.force_max_n

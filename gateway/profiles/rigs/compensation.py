@@ -66,7 +66,7 @@ def number_at(plant: Plant, path: str) -> Any:
 
 
 def differing_treatments(base: Plant, extended: Plant) -> tuple[FieldTreatment, ...]:
-    """Effects in which the two plants differ, in the catalogue's order of compensation."""
+    """Return effects in which the two plants differ, in the catalogue's order of compensation."""
     return tuple(
         treatment
         for treatment in TREATMENTS
@@ -77,8 +77,8 @@ def differing_treatments(base: Plant, extended: Plant) -> tuple[FieldTreatment, 
 def compensation_of(
     base: Plant, extended: Plant, inputs: Iterable[str] = MASTER_INPUTS, *, new_model: bool = False
 ) -> Compensation:
-    """What control takes back. new_model: the model in use was identified on the extended plant with this compensation, so it
-    speaks straight volts and knows the friction; else what is the model's is left to a calibration.
+    """Return what control takes back. new_model: the model in use was identified on the extended plant with this
+    compensation, so it speaks straight volts and knows the friction; else what is the model's is left to a calibration.
 
     An extended plant without any of it gives the null compensation, its effects all in `limited`.
     """
@@ -102,7 +102,7 @@ def compensation_of(
 
 
 def without_compensable(plant: Plant) -> Plant:
-    """The same plant with the effects off that a controller without compensation knows nothing of, whatever plant its
+    """Return the same plant with the effects off that a controller without compensation knows nothing of, whatever plant its
     calibration was made on: those of the cell, of the command map and from outside."""
     null = Plant()
     for treatment in TREATMENTS:

@@ -16,7 +16,7 @@ PLACEHOLDER: Final = re.compile(r"\bEDIT\b")
 
 
 def find_edit_marks(document: Document, text: str) -> Iterator[Fault]:
-    """Each value whose line is still marked, with what belongs there."""
+    """Yield each value whose line is still marked, with what belongs there."""
     keys = {mark.key_line: path for path, mark in document.marks.items() if path}
     for number, line in enumerate(text.splitlines(), start=1):
         if found := _MARK.search(line):

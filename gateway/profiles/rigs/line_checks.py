@@ -15,7 +15,7 @@ _ARTICLE: Final = {Role.OUTPUT: "an output", Role.LOAD_CELL: "a load cell"}
 
 
 def lines_of(parts: Parts) -> Iterator[tuple[str, OutputFile | CellFile, DeviceProfile | None]]:
-    """Each line that the file describes: (key, what it says, the device's profile)."""
+    """Yield each line that the file describes: (key, what it says, the device's profile)."""
     if parts.output:
         yield "output", parts.output, parts.output_device
     if parts.load_cell:
@@ -23,7 +23,7 @@ def lines_of(parts: Parts) -> Iterator[tuple[str, OutputFile | CellFile, DeviceP
 
 
 def of_role(device: DeviceProfile | None, role: Role) -> DeviceProfile | None:
-    """A device at the wrong end is told once; other checks leave it alone."""
+    """Return the device where it has this role; one at the wrong end is told once, and other checks leave it alone."""
     return device if device and device.role is role else None
 
 
@@ -60,7 +60,7 @@ def ports_differ(parts: Parts) -> Found:
 
 
 def the_unit_is_known(parts: Parts) -> Found:
-    """A frame without a unit needs the rig's, one with a unit must not get a second."""
+    """Yield a fault for a frame without a unit where the rig names none, and for one that gets a second."""
     device, line = of_role(parts.cell_device, Role.LOAD_CELL), parts.load_cell
     if device and line:
         try:

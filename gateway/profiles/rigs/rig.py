@@ -99,12 +99,12 @@ class Rig:
         return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
 
     def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
-        """The calibration's model as control uses it here: a bent command map is straightened, but for a calibration that was
-        made on this very rig, for that has measured it."""
+        """Return the calibration's model as control uses it here: a bent command map is straightened, but for a
+        calibration that was made on this very rig, for that has measured it."""
         return model if calibration.rig == self.name else apply_command_map(model, self.compensation.command)
 
     def response_of(self, calibration: Calibration) -> Response | None:
-        """How this rig follows, as the calibration measured it; None for one that another rig was measured with."""
+        """Return how this rig follows, as the calibration measured it; None for one that another rig was measured with."""
         here = [
             self.name,
             *([f"twin of plant {self.plant_profile.name}"] if self.simulated and self.plant_profile else []),
@@ -112,13 +112,13 @@ class Rig:
         return calibration.response if calibration.rig in here else None
 
     def ports(self) -> dict[str, str]:
-        """The serial ports of a real rig, by line; empty for a simulated one."""
+        """Return the serial ports of a real rig, by line; empty for a simulated one."""
         ports = {"output": self.output.port, "load_cell": self.load_cell.port}
         return {name: port for name, port in ports.items() if port is not None}
 
     def as_simulated(self) -> "Rig":
-        """The same rig with its devices simulated, set as the rig says that the real ones are, on loopback. What was decided in
-        the user's stead is in `notes`."""
+        """Return the same rig with its devices simulated, set as the rig says that the real ones are, on loopback. What
+        was decided in the user's stead is in `notes`."""
         if self.simulated:
             return self
         notes, network = self.notes, self.network

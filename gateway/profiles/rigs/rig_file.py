@@ -32,7 +32,7 @@ def _network(text: Any) -> IPv4Network | IPv6Network:
 
 
 def _suggest_network(text: str) -> str:
-    """Host bits set is the usual slip: say the network that the address is in."""
+    """Return the network that the address is in, as a suggestion: host bits set are the usual slip."""
     try:
         return f"; did you mean {ip_network(text, strict=False)}?"
     except ValueError:

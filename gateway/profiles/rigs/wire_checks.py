@@ -30,7 +30,7 @@ _SLOWEST_HZ: Final = 20.0  # the pneumatics of the paper's rig settle in 0.27-0.
 
 
 def _output_talks_s(device: DeviceProfile, character_s: float) -> dict[str, float]:
-    """What question and answer take on the wire, s, of every exchange that the gateway has with an output."""
+    """Return what question and answer take on the wire, s, of every exchange that the gateway has with an output."""
     high_v = device.voltage_range_v[1]
     talks: dict[str, tuple[OutputRequest, OutputReply]] = {"set_voltage": (SetVoltage(high_v), Accepted(high_v))}
     if device.read_voltage:
@@ -66,7 +66,7 @@ class _Readings:
 
 
 def _readings(parts: Parts) -> Iterator[_Readings]:
-    """The rig's load cell, where it can be read at all (else told by the_unit_is_known)."""
+    """Yield the rig's load cell, where it can be read at all (else told by the_unit_is_known)."""
     device, line = of_role(parts.cell_device, Role.LOAD_CELL), parts.load_cell
     if not device or not line:
         return
@@ -79,14 +79,14 @@ def _readings(parts: Parts) -> Iterator[_Readings]:
 
 
 def _talks(parts: Parts) -> Iterator[tuple[str, float]]:
-    """(exchange, time on the wire in s) of the rig's output."""
+    """Yield (exchange, time on the wire in s) of the rig's output."""
     device, line = of_role(parts.output_device, Role.OUTPUT), parts.output
     if device and line:
         yield from _output_talks_s(device, device.serial.at(line.baud).character_s).items()
 
 
 def answers_fit_into_their_time(parts: Parts) -> Found:
-    """A device that is given up before its answer can be through the wire is never heard."""
+    """Yield a fault for a device that is given up before its answer can be through the wire."""
     if parts.output_device and parts.output:
         for name, took_s in _talks(parts):
             yield from _given_up("output.baud", parts.output_device, parts.output.baud, (name, took_s))
@@ -126,7 +126,7 @@ def the_wires_follow_the_rig(parts: Parts) -> Found:
 
 
 def _cycle_s(parts: Parts) -> float:
-    """A setting and the question that keeps the line alive; 0 without an output."""
+    """Return a setting and the question that keeps the line alive; 0 without an output."""
     took_s = dict(_talks(parts))
     return took_s.get("set_voltage", 0.0) + took_s.get("read_pressure", took_s.get("read_voltage", 0.0))
 
@@ -140,7 +140,7 @@ def samples_come_in_time(parts: Parts) -> Found:
 
 
 def the_display_shows_enough(parts: Parts) -> Found:
-    """A display that ends below the bound on force would show its last number for ever."""
+    """Yield a fault for a display that ends below the bound on force: it would show its last number for ever."""
     if (limits := parts.limits) is None or parts.load_cell is None:
         return
     for reading in _readings(parts):

@@ -14,7 +14,7 @@ Path = tuple[str | int, ...]
 
 
 def path_text(path: Path) -> str:
-    """`("network", "units", 1)` as a user reads it: `network.units[1]`."""
+    """Return `("network", "units", 1)` as a user reads it: `network.units[1]`."""
     text = ""
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
@@ -22,7 +22,7 @@ def path_text(path: Path) -> str:
 
 
 def printable(text: str) -> str:
-    """One line without control characters: a file cannot write on the reader's terminal."""
+    """Return one line without control characters: a file cannot write on the reader's terminal."""
     return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
 
 
@@ -71,7 +71,7 @@ class Findings:
 
 
 def closest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that a typist most likely meant, None when nothing is near."""
+    """Return the known word that a typist most likely meant, None when nothing is near."""
     candidates = {name.lower(): name for name in known}
     found = get_close_matches(word.lower(), candidates, n=1, cutoff=0.6)
     return candidates[found[0]] if found else None

@@ -22,7 +22,7 @@ Scalar = str | int | float | bool | None
 
 
 def plain_scalar(text: str) -> Scalar:
-    """The value of an unquoted word. ValueError (a sentence without its subject) for what is refused."""
+    """Return the value of an unquoted word. ValueError (a sentence without its subject) for what is refused."""
     if text in _NULL:
         return None
     if text in _BOOLEAN:

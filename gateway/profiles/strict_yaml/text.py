@@ -43,7 +43,7 @@ class Document:
     marks: dict[Path, Mark] = field(repr=False)
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
-        """A fault at path; a path that the file does not have is placed at its nearest parent."""
+        """Return a fault at path; a path that the file does not have is placed at its nearest parent."""
         place = path
         while place not in self.marks and place:
             place, at_key = place[:-1], True
@@ -52,7 +52,7 @@ class Document:
         return Fault(self.file, line, column, path_text(path), message)
 
     def at(self, *path: str | int) -> Any:
-        """The value at path, None when there is none."""
+        """Return the value at path, None when there is none."""
         value = self.value
         for step in path:
             if isinstance(value, dict):
@@ -126,7 +126,7 @@ class _Reader:
         return value
 
     def _value(self, event: Any, events: Iterator[Any], path: Path, key: Any) -> Any:
-        """One node and everything below it; `key` is the event of its key, None in lists and at the top."""
+        """Return one node and everything below it; `key` is the event of its key, None in lists and at the top."""
         start, key_start = event.start_mark, (key or event).start_mark
         self.marks[path] = Mark(start.line + 1, start.column + 1, key_start.line + 1, key_start.column + 1)
         if isinstance(event, yaml.AliasEvent):
@@ -179,7 +179,7 @@ class _Reader:
         return values
 
     def _key(self, event: Any, events: Iterator[Any], path: Path) -> str | int | None:
-        """The key's value; None, with a fault noted, for one that no profile has."""
+        """Return the key's value; None, with a fault noted, for one that no profile has."""
         known, mark = len(self.faults), self.marks[path]
         value = self._value(event, events, path, None)
         self.marks[path] = mark  # a key is no node of its own

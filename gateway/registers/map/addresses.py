@@ -15,7 +15,7 @@ _NAMES: Final = ((40001, 49999, "holding register"), (30001, 39999, "input regis
 
 
 def no_such_address(blocks: Sequence[Block], address: int, count: int) -> Refusal:
-    """The refusal of a range that no block holds."""
+    """Return the refusal of a range that no block holds."""
     if shifted := _explain_shift(blocks, address, count):
         return Refusal(OFF_BY_ONE, address, shifted)
     ranges = ", ".join(f"{block.first}-{block.last}" for block in blocks)

@@ -24,7 +24,7 @@ _HEADINGS: Final = ("4xxxx/3xxxx", "address", "hex", "R/W", "name", "type", "sca
 
 
 def render_registers(register_map: RegisterMap, form: str) -> str:
-    """The whole map, ending with a newline. ValueError for a form that is not in FORMATS."""
+    """Return the whole map, ending with a newline. ValueError for a form that is not in FORMATS."""
     if form == "markdown":
         return _markdown(register_map)
     if form == "csv":
@@ -35,7 +35,7 @@ def render_registers(register_map: RegisterMap, form: str) -> str:
 
 
 def render_block(register_map: RegisterMap, name: str) -> str:
-    """One block's table in Markdown, without heading. LookupError for an unknown block."""
+    """Return one block's table in Markdown, without heading. LookupError for an unknown block."""
     rows = [_HEADINGS, ("---",) * len(_HEADINGS)]
     rows += [_row(register) for register in register_map.registers_of(register_map.block(name).name)]
     return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |\n" for row in rows)
@@ -62,7 +62,7 @@ def _section(register_map: RegisterMap, block: Block) -> str:
 
 
 def _how_to(register_map: RegisterMap, block: Block) -> list[str]:
-    """The whole block in the words of the masters that people use, in as many requests as Modbus needs."""
+    """Return the whole block in the words of the masters that people use, in as many requests as Modbus needs."""
     registers = register_map.registers_of(block.name)
     reads = list(_requests(registers, MOST_READ))
     lines = [f"S7 MB_CLIENT: MB_MODE 0 reads, {_s7_place(each)}" for each in reads]
@@ -72,7 +72,7 @@ def _how_to(register_map: RegisterMap, block: Block) -> list[str]:
 
 
 def _requests(registers: Sequence[Register], most: int) -> Iterator[list[Register]]:
-    """Neighbours that one request carries, none of them cut, words between them included."""
+    """Yield neighbours that one request carries, none of them cut, words between them included."""
     held: list[Register] = []
     for register in registers:
         if held and register.address + register.words - held[0].address > most:
@@ -84,14 +84,14 @@ def _requests(registers: Sequence[Register], most: int) -> Iterator[list[Registe
 
 
 def _writable_runs(registers: Sequence[Register]) -> list[list[Register]]:
-    """What may be written in one stretch: up to the next register that is read only. Last those that act, each alone."""
+    """Return what may be written in one stretch: up to the next register that is read only. Last those that act, each alone."""
     stretches = groupby(registers, lambda register: register.name if register.name in ACTING else register.access)
     runs = [list(run) for kind, run in stretches if kind != "R"]
     return sorted(runs, key=lambda run: run[0].name in ACTING)
 
 
 def _span(registers: Sequence[Register]) -> tuple[int, int]:
-    """(first address, words)."""
+    """Return (first address, words)."""
     first, last = registers[0], registers[-1]
     return first.address, last.address + last.words - first.address
 

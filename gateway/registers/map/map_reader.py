@@ -90,7 +90,7 @@ class _MapReader(DocumentReader):
             yield from self.register(place, block, self.group(place, entry))
 
     def register(self, place: Place, block: Block, entry: Mapping[str, Any]) -> Iterator[Register]:
-        """One register, or `count` of them."""
+        """Yield one register, or `count` of them."""
         self.keys(place, entry, _REGISTER_KEYS)
         name, kind = self.text(place, entry, "name"), self.text(place, entry, "type")
         self.is_name((*place, "name"), name)

@@ -63,12 +63,13 @@ class Register:
         return _DECIMALS.get(self.unit, 0)
 
     def decode(self, data: bytes) -> float | int:
-        """The value of these words in `unit`; NaN when unavailable. ValueError on a wrong length."""
+        """Return the value of these words in `unit`; NaN when unavailable. ValueError on a wrong length."""
         number = unpack_number(self.type, self.word_order, data)
         return number if self.scale == 1.0 else number / self.counts_per_unit
 
     def encode(self, value: float) -> bytes:
-        """The words of a value in `unit`, rounded to the register's resolution. ValueError when the type cannot carry it."""
+        """Return the words of a value in `unit`, rounded to the register's resolution. ValueError when the type cannot
+        carry it."""
         return pack_number(self.type, self.word_order, value if self.scale == 1.0 else value * self.counts_per_unit)
 
 
@@ -89,7 +90,8 @@ class Block:
 
 
 def repeat_as_float(register: Register, source: Block, block: Block) -> Register | None:
-    """The same quantity as float32 in a float block: word k of the source at base + 2k. None if float32 cannot carry it."""
+    """Return the same quantity as float32 in a float block: word k of the source at base + 2k. None if float32 cannot
+    carry it."""
     if register.type in ("int32", "uint32"):
         return None
     return Register(
@@ -132,7 +134,7 @@ class RegisterMap:
         return tuple(register for register in self.registers if register.block == block)
 
     def find(self, name: str) -> Register:
-        """`NAME` or `NAME@BLOCK`. UnknownRegister, with "did you mean", for anything else."""
+        """Return the register of `NAME` or `NAME@BLOCK`. UnknownRegister, with "did you mean", for anything else."""
         if (register := self._by_name.get(name)) is not None:
             return register
         bare, _, block = name.partition("@")

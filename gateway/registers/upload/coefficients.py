@@ -71,8 +71,8 @@ class CoefficientSet:
 
     @classmethod
     def of_calibration(cls, calibration: Calibration) -> "CoefficientSet":
-        """The limits are the calibration's own as far as both branches reach, else that reach. Of more stops than a set
-        carries the first."""
+        """Return the set of a calibration. Its limits are its own as far as both branches reach, else that reach. Of
+        more stops than a set carries the first."""
         low_n, high_n = _limits_n(calibration)
         response = calibration.response
         return cls(
@@ -93,7 +93,7 @@ class CoefficientSet:
         )
 
     def to_words(self) -> bytes:
-        """SET_BYTES bytes. ValueError when an array is longer than there is room."""
+        """Return SET_BYTES bytes. ValueError when an array is longer than there is room."""
         branches = (number for array in self.arrays for number in _pad(array, STRIDE))
         stops = (number for array in (self.slip_radii_v, self.slip_shares) for number in _pad(array, STOPS_CARRIED))
         limits = (self.force_low_n, self.force_high_n, self.blend_span_n)
@@ -102,8 +102,8 @@ class CoefficientSet:
 
     @classmethod
     def from_words(cls, words: bytes) -> "CoefficientSet":
-        """All places of each array, whatever order and number of stops say. HEAD_BYTES make a set without stops and
-        response. ValueError on any other length than that and SET_BYTES."""
+        """Return a set with all places of each array, whatever order and number of stops say. HEAD_BYTES make a set
+        without stops and response. ValueError on any other length than that and SET_BYTES."""
         if len(words) not in (HEAD_BYTES, SET_BYTES):
             raise ValueError(f"{len(words)} bytes, a set has {SET_BYTES}, or {HEAD_BYTES} without slip stops")
         order, x0, x1, *rest = _HEAD.unpack(words[:HEAD_BYTES])
@@ -117,17 +117,18 @@ class CoefficientSet:
 
 
 def words_of_block(block: bytes) -> bytes:
-    """The set's words (SET_BYTES) out of a staging or active block."""
+    """Return the set's words (SET_BYTES) out of a staging or active block."""
     return block[:HEAD_BYTES] + block[2 * TAIL_FROM : BLOCK_BYTES]
 
 
 def set_crc(words: bytes) -> int:
-    """The number that an upload's crc32 must have."""
+    """Return the number that an upload's crc32 must have."""
     return crc32(words)
 
 
 def model_hash(calibration: Calibration) -> int:
-    """CRC-32 of all that changes a voltage: the CRC of the calibration's words, and of stops beyond those after them."""
+    """Return the CRC-32 of all that changes a voltage: the CRC of the calibration's words, and of stops beyond those
+    after them."""
     beyond = (*calibration.slip_radii_v[STOPS_CARRIED:], *calibration.slip_shares[STOPS_CARRIED:])
     words = CoefficientSet.of_calibration(calibration).to_words()
     return set_crc(words + struct.pack(f">{len(beyond)}f", *beyond))

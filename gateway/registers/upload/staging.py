@@ -69,7 +69,7 @@ class _StagedSet(NamedTuple):
 
 
 def check_staged(block: bytes, limits: CoefficientLimits) -> Staged | StagedFault:
-    """The set and its target slot, or the first fault. block: the words of the staging block, BLOCK_BYTES.
+    """Return the set and its target slot, or the first fault. block: the words of the staging block, BLOCK_BYTES.
 
     ValueError on another length: that is our own fault.
     """
@@ -93,7 +93,7 @@ def _take_apart(block: bytes) -> _StagedSet:
 
 
 def _frame_faults(block: bytes, given: _StagedSet) -> Iterator[StagedFault]:
-    """What can be said without judging a number."""
+    """Yield what can be said without judging a number."""
     staged = given.staged
     if given.length not in (SET_WORDS, HEAD_WORDS):
         text = f"length {given.length}: {SET_WORDS} is a whole set, {HEAD_WORDS} one without slip stops and response"
