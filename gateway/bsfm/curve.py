@@ -166,6 +166,19 @@ class RationalBezier:
         return "RationalBezier(x0={!r}, x1={!r}, handles={!r}, weights={!r})".format(*self._arguments())
 
 
+def elevate_order(curve: RationalBezier) -> RationalBezier:
+    """Return the same curve with one order more (degree elevation of numerator and denominator)."""
+    order = curve.order + 1
+
+    def up(numbers: Sequence[float]) -> list[float]:
+        inner = [(k * numbers[k - 1] + (order - k) * numbers[k]) / order for k in range(1, order)]
+        return [numbers[0], *inner, numbers[-1]]
+
+    weights = up(curve.weights)
+    totals = up([w * b for w, b in zip(curve.weights, curve.handles, strict=True)])
+    return RationalBezier(curve.x0, curve.x1, [t / w for t, w in zip(totals, weights, strict=True)], weights)
+
+
 def _value(side: _Side, r: Any) -> Any:
     """Numerator over denominator by Horner in r, a float or an array in [0, 1]."""
     numerator = denominator = 0.0 * r

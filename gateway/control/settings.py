@@ -77,7 +77,6 @@ class LoopTiming:
     second_lag_s: float
     landing_s: float  # how much later than dead time the force arrives with the lags inverted
     integral_per_s: float
-    patience_s: float  # after the transient should be over: what an error of the measured lags leaves must have gone
 
 
 class LeaseAction(StrEnum):

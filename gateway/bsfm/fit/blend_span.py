@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.fit.projected_problem import Floats
@@ -43,16 +44,19 @@ def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
     return np.array(errors)
 
 
-def choose_span(branches: Branches, voltage_v: Floats, force_n: Floats) -> SpanChoice | None:
-    """The span with the smallest error on the walk; None where the walk is too short to tell."""
+def choose_span(
+    branches: Branches, voltage_v: Floats, force_n: Floats, seen: NDArray[np.bool_] | None = None
+) -> SpanChoice | None:
+    """The span with the smallest error on the walk, or on those of its points that are seen; None where it is too short."""
     if len(voltage_v) < FEWEST_POINTS:
         return None
     model = Bsfm(branches, LinearBlend(0.0))
     low_n, high_n = model.force_range_n
     spans_n = np.round((high_n - low_n) * LARGEST_SHARE * np.arange(1, SPANS + 1) / SPANS, 2)
-    errors = [command_error_n(_with(model, span_n), voltage_v, force_n) for span_n in spans_n.tolist()]
+    counts = np.ones(len(force_n), bool) if seen is None else seen
+    errors = [command_error_n(_with(model, span_n), voltage_v, force_n)[counts[1:]] for span_n in spans_n.tolist()]
     best = min(range(SPANS), key=lambda k: float(np.mean(errors[k] ** 2)))
-    switched = command_error_n(model, voltage_v, force_n)
+    switched = command_error_n(model, voltage_v, force_n)[counts[1:]]
     return SpanChoice(
         float(spans_n[best]), _rms(errors[best]), float(np.abs(errors[best]).max()), _rms(switched), len(voltage_v)
     )

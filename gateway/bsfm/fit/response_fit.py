@@ -1,6 +1,7 @@
 """How a plant follows a voltage, from the steps of a calibration run: dead time and one or two lags.
 
-Fitted to the recorded force, through the static model: of each stair the model gives the way from the settled force before to
+Fitted in linearized volts (gateway.bsfm.drive_map), because a regulator's lags carry what its command map has bent, and to the
+recorded force, through the static model: of each stair the model gives the way from the settled force before to
 the settled force after it, as voltages (so that neither a bent characteristic nor friction after a reversal passes for a
 lag); both ends are the measured ones, so an error of the model's level does not matter. The voltage that has arrived is the
 command's, delayed and lagged; what stands in the recording is taken as written when its row was, so the time that wire,
@@ -11,13 +12,14 @@ over whole stairs (a sandwich estimator), because errors within a stair are not 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.bsfm.drive_map import DriveMap
 from gateway.bsfm.model import Bsfm, Response
 
 Floats = NDArray[np.float64]
@@ -92,7 +94,8 @@ def measure_response(
     when: str = "",
 ) -> MeasuredResponse:
     """From the rows of a run. slew_v_per_s: how fast a command may rise, which the rows between do not show."""
-    stairs = _stairs(time_s, command_v, force_n, model, slew_v_per_s)
+    scale = DriveMap(model)
+    stairs = [_linearize(stair, scale) for stair in _stairs(time_s, command_v, force_n, model, slew_v_per_s)]
     if len(stairs) < FEWEST_STAIRS:
         return MeasuredResponse(
             None,
@@ -101,7 +104,8 @@ def measure_response(
         )
     ratios = RATIOS[1:] if _is_better(stairs) else (0.0,)
     found = _fitted(stairs, ratios)
-    stairs = _stairs(time_s, command_v, force_n, model, slew_v_per_s, found)  # whose ends had not quite settled
+    again = _stairs(time_s, command_v, force_n, model, slew_v_per_s, found)  # whose ends had not quite settled
+    stairs = [_linearize(stair, scale) for stair in again]
     found = _fitted(stairs, ratios)
     if not (0.0 <= found.dead_time_s < LONGEST_S and SHORTEST_LAG_S < found.lags_s < LONGEST_S):
         said = f"dead time {found.dead_time_s * 1e3:.0f} ms and lags of {found.lags_s * 1e3:.0f} ms in sum"
@@ -109,6 +113,18 @@ def measure_response(
             None, f"the response was not measured: the steps give {said}, which no plant of this kind has"
         )
     return MeasuredResponse(_told(found, stairs, when))
+
+
+def _linearize(stair: Stair, scale: DriveMap) -> Stair:
+    """The same in volts that the plant's lags are linear in. Changes lead from one voltage to the next, so they are told
+    from the last one backwards."""
+    changes, after_v = [], stair.end_v
+    for at_s, moved_v in reversed(stair.changes):
+        before_v = after_v - moved_v
+        changes.append((at_s, scale.linear_v(after_v) - scale.linear_v(before_v)))
+        after_v = before_v
+    path_v = np.array([scale.linear_v(volts) for volts in stair.path_v.tolist()])
+    return replace(stair, changes=tuple(reversed(changes)), end_v=scale.linear_v(stair.end_v), path_v=path_v)
 
 
 def _told(found: "_Fit", stairs: Sequence[Stair], when: str) -> Response:

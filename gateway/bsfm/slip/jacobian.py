@@ -54,13 +54,17 @@ def in_free_numbers(rising: Floats, falling: Floats) -> Floats:
     return columns
 
 
-def penalties_by_numbers(branches: Branches, grid_v: Floats, wanted_n_per_v: float) -> Floats:
-    """Of slopes below the wanted one on each branch, then of the falling branch below the rising one: (3 grid, 4 n + 1)."""
+def penalties_by_numbers(
+    branches: Branches, grid_v: Floats, wanted_n_per_v: float, gap: tuple[Floats, float]
+) -> Floats:
+    """Of slopes below the wanted one on each branch, then of the gap between them, as shares (N,) of what it may be at each
+    place, below the wanted one: (3 grid, 4 n + 1)."""
     rising, falling = branches.rising, branches.falling
+    shares, gap_n = gap
     flat = [
         (curve.slope(grid_v) < wanted_n_per_v)[:, None] * slope_by_numbers(curve, grid_v) for curve in (rising, falling)
     ]
-    crossed = (rising.value(grid_v) > falling.value(grid_v))[:, None]
+    crossed = (((falling.value(grid_v) - rising.value(grid_v)) / shares < gap_n) / shares)[:, None]
     nothing = np.zeros_like(flat[0])
     return np.concatenate(
         [

@@ -1,4 +1,4 @@
-"""Linear blend or slip stops? Decided on the half of the minor-loop walk that neither has seen.
+"""Linear blend or slip stops? Decided on points of the minor-loop walk that neither has seen.
 
 Slip stops need the walk for many numbers where the blend has one, so they must be better on data that they were not
 fitted to; then both are fitted to all of it. The blend is identified in any case: upload and C code carry it alone.
@@ -18,14 +18,14 @@ from gateway.bsfm.slip.problem import Walk
 from gateway.bsfm.slip.reversal import LinearBlend
 from gateway.bsfm.slip.slip_fit import SlipFit, fit_joint, walk_of
 
-FEWEST_POINTS: Final = 12  # of the walk: each half must turn round a few times, as a plan's fourteen turns do
+FEWEST_POINTS: Final = 12  # of the walk: it must turn round a few times, as a plan's fourteen turns do
 BETTER_SHARE: Final = 0.9  # held-out error of the stops, of the blend's
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReversalChoice:
-    """span: of the blend on the model's own branches. slip: None where the blend is used. *_heldout_n: RMS on the second
-    half of the walk by a fit to the first, nan where it was not tried."""
+    """span: of the blend on the model's own branches. slip: None where the blend is used. *_heldout_n: RMS on the points
+    of the walk by a fit to the others, nan where it was not tried."""
 
     model: Bsfm
     span: SpanChoice
@@ -51,14 +51,18 @@ def choose_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: 
 
 
 def _held_out(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> tuple[float, float]:
-    """RMS of blend and stops on the second half. Both walk through the first, so that they remember what came before."""
-    half = len(volts) // 2
-    span = choose_span(branches, volts[:half], newtons[:half])
-    try:
-        slip = fit_joint(branches, [walk_of(ladder), Walk(volts[:half], newtons[:half])])
-    except ValueError:  # no loop between the branches that stops could select in
-        return 0.0, float("inf")
-    blend = Bsfm(branches, LinearBlend(span.span_n if span else 0.0))
-    errors = [command_error_n(model, volts, newtons)[half - 1 :] for model in (blend, slip.model)]
-    rms = [float(np.sqrt(np.mean(error * error))) for error in errors]
+    """RMS of blend and stops on the walk, each half of whose points is told by a fit to the other and to the ladder. All pass
+    all points, so that they remember what came before."""
+    halves = np.arange(len(volts)) % 2
+    errors: list[list[Floats]] = [[], []]
+    for half in (0, 1):
+        try:
+            slip = fit_joint(branches, [walk_of(ladder), Walk(volts, newtons, (halves != half).astype(float))], 0)
+        except ValueError:  # no loop between the branches that stops could select in
+            return 0.0, float("inf")
+        span = choose_span(branches, volts, newtons, halves != half)
+        blend = Bsfm(branches, LinearBlend(span.span_n if span else 0.0))
+        for found, model in zip(errors, (blend, slip.model), strict=True):
+            found.append(command_error_n(model, volts, newtons)[halves[1:] == half])
+    rms = [float(np.sqrt(np.mean(np.concatenate(found) ** 2))) for found in errors]
     return rms[0], rms[1]

@@ -18,6 +18,9 @@ RIDGE: Final = 0.1
 SLOPE_WANTED_N_PER_V: Final = 0.7
 PENALTY: Final = 10.0
 PENALTY_GRID: Final = 33
+END_PLACES: Final = np.geomspace(1.0e-4, 0.02, 8)  # of the range: beside the end at which the branches meet
+OPEN_AT: Final = 0.25  # of the range: the gap between the branches may be closing up to there
+GAP_N: Final = 0.1  # between the branches, of a margin of 1
 STEPS_MAX: Final = 200
 CLOSE: Final = 1.0e-5  # relative gain of a step that is the last
 REFUSED_N: Final = 1.0e3  # residual of branches that are no model
@@ -26,10 +29,14 @@ REFUSED_N: Final = 1.0e3  # residual of branches that are no model
 class SlipSearch:
     """Residuals of trial numbers, and their Jacobian."""
 
-    def __init__(self, problem: SlipProblem, start: Branches) -> None:
+    def __init__(self, problem: SlipProblem, start: Branches, margin: float = 0.0) -> None:
+        """margin: by which the branches are kept off what may not drive a plant: a share of the slope, and of GAP_N."""
         self._problem = problem
         self._start = start
-        self._grid_v = np.linspace(start.rising.x0, start.rising.x1, PENALTY_GRID)
+        places = np.concatenate([END_PLACES, np.linspace(0.0, 1.0, PENALTY_GRID)[1:]])
+        self._grid_v = start.rising.x0 + places * (start.rising.x1 - start.rising.x0)
+        self._wanted_n_per_v = SLOPE_WANTED_N_PER_V * (1.0 + margin)
+        self._open, self._gap_n = np.minimum(1.0, places / OPEN_AT), GAP_N * margin
         self._slope = problem.system(start).slope
         self._log_weights = 2 * start.rising.order
 
@@ -41,7 +48,7 @@ class SlipSearch:
 
     def residuals(self, numbers: Floats) -> Floats:
         """Weighted errors, penalties, ridge: (rows + 3 grid + log weights,)."""
-        refused = np.full(len(self._slope) + 3 * PENALTY_GRID + self._log_weights, REFUSED_N)
+        refused = np.full(len(self._slope) + 3 * len(self._grid_v) + self._log_weights, REFUSED_N)
         try:
             trial = branches_of(numbers, self._start)
         except ValueError:  # weights beyond a double
@@ -50,15 +57,22 @@ class SlipSearch:
             return refused
         problem, system = self._problem, self._problem.system(trial, self._slope)
         error_n = problem.weight * (system.matrix @ problem.best_shares(system) - system.wanted)
-        return np.concatenate([error_n, _penalties(trial, self._grid_v), RIDGE * numbers[-self._log_weights :]])
+        return np.concatenate([error_n, self._penalties(trial), RIDGE * numbers[-self._log_weights :]])
 
     def jacobian(self, numbers: Floats) -> Floats:
         """Of residuals where they are no refusal: (rows + 3 grid + log weights, numbers)."""
         trial = branches_of(numbers, self._start)
-        penalties = PENALTY * penalties_by_numbers(trial, self._grid_v, SLOPE_WANTED_N_PER_V)
+        penalties = PENALTY * penalties_by_numbers(trial, self._grid_v, self._wanted_n_per_v, (self._open, self._gap_n))
         ridge = np.zeros((self._log_weights, len(numbers)))
         ridge[:, -self._log_weights :] = RIDGE * np.eye(self._log_weights)
         return np.concatenate([self._errors_by_numbers(trial), penalties, ridge])
+
+    def _penalties(self, branches: Branches) -> Floats:
+        """What a plant would not bear: slopes below the wanted one in N/V, the falling branch below the rising one in N."""
+        grid_v, rising, falling = self._grid_v, branches.rising, branches.falling
+        flat = [np.maximum(0.0, self._wanted_n_per_v - curve.slope(grid_v)) for curve in (rising, falling)]
+        crossed = np.maximum(0.0, self._gap_n - (falling.value(grid_v) - rising.value(grid_v)) / self._open)
+        return PENALTY * np.concatenate([*flat, crossed])
 
     def _errors_by_numbers(self, trial: Branches) -> Floats:
         problem, system = self._problem, self._problem.system(trial, self._slope)
@@ -74,10 +88,3 @@ class SlipSearch:
         return without(
             (problem.weight[:, None] * system.matrix)[:, used], problem.heavy_rows(system)[:1, :-1][:, used], direct
         )
-
-
-def _penalties(branches: Branches, grid_v: Floats) -> Floats:
-    """What a plant would not bear: slopes below the wanted one in N/V, the falling branch below the rising one in N."""
-    rising, falling = branches.rising, branches.falling
-    flat = [np.maximum(0.0, SLOPE_WANTED_N_PER_V - curve.slope(grid_v)) for curve in (rising, falling)]
-    return PENALTY * np.concatenate([*flat, np.maximum(0.0, rising.value(grid_v) - falling.value(grid_v))])

@@ -9,7 +9,9 @@ registers carries, are dropped and the rest fitted again.
 Both are robust: one round of Huber weights after the first fit. The joint fit is a small least-squares problem with the
 shares projected out, and a ridge on the log weights, which the data leave open. It is held to what may drive a plant
 (slope floor, no crossing) by penalties on a grid: near the ends no walk reaches a branch, so nothing else would. A result
-that fails the exact verdicts all the same is none: then the stops alone are fitted.
+that fails the exact verdicts all the same, often by a millionth of a newton where the branches meet, is looked for again with
+a margin, and then with a larger one. One order more is tried, too: the walk adds points between the stairs. Where nothing
+usable is found, the stops alone are fitted.
 """
 
 from collections.abc import Sequence
@@ -19,6 +21,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.branches import Branches
+from gateway.bsfm.curve import elevate_order
 from gateway.bsfm.fit.blend_span import choose_span, command_error_n
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.fit.result import verdicts_of
@@ -37,6 +40,10 @@ HUBER: Final = 1.345
 SIGMA_OF_MAD: Final = 1.4826
 SMALLEST_SIGMA_N: Final = 1.0e-6
 SLOPE_FLOOR_N_PER_V: Final = 0.5
+MARGINS: Final = (0.0, 0.2, 0.8)
+HIGHEST_ORDER: Final = 4  # to which one more is tried
+NUMBERS_OF_AN_ORDER: Final = 4  # a handle and a weight on each branch
+LEAST_GAIN_N: Final = 0.05  # of RMS error: less is no reason for a model that costs more in C and in each step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,20 +89,42 @@ def fit_stops(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
     return _result(problem, branches, joint=False)
 
 
-def fit_joint(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
-    """Branches and stops together, from these branches on; the stops alone where that leads to no usable model."""
-    stops_only = fit_stops(branches, walks)
+def fit_joint(branches: Branches, walks: Sequence[Walk], highest_order: int = HIGHEST_ORDER) -> SlipFit:
+    """Branches and stops together, from these branches on; the stops alone where that leads to no usable model. One order more
+    is tried up to highest_order."""
+    best = fit_stops(branches, walks)
     if branches.rising.order != branches.falling.order:
-        return stops_only
-    problem = SlipProblem(list(walks), _radii_v(branches))
-    trust, moved = problem.weight, branches
-    for _ in range(2):
-        moved = SlipSearch(problem, moved).best()
-        problem.weight = trust * _huber(problem, problem.errors_n(moved))
-    if not (verdicts_of(moved, SLOPE_FLOOR_N_PER_V).usable and is_moderate(moved)):
-        return stops_only
-    joint = _result(problem, moved, joint=True)
-    return joint if joint.rms_n < stops_only.rms_n else stops_only
+        return best
+    starts = [branches, _elevated(branches)] if branches.rising.order < highest_order else [branches]
+    for start in starts:
+        found = _usable_joint(start, walks)
+        if found and (_is_worth_an_order(found, best) if best.joint else found.rms_n < best.rms_n):
+            best = found
+    return best
+
+
+def _usable_joint(start: Branches, walks: Sequence[Walk]) -> SlipFit | None:
+    """With the smallest margin that leads to what may drive a plant."""
+    for margin in MARGINS:
+        problem = SlipProblem(list(walks), _radii_v(start))
+        trust, moved = problem.weight, start
+        for _ in range(2):
+            moved = SlipSearch(problem, moved, margin).best()
+            problem.weight = trust * _huber(problem, problem.errors_n(moved))
+        if verdicts_of(moved, SLOPE_FLOOR_N_PER_V).usable and is_moderate(moved):
+            return _result(problem, moved, joint=True)
+    return None
+
+
+def _is_worth_an_order(higher: SlipFit, lower: SlipFit) -> bool:
+    """Return whether one order more pays: by Schwarz's criterion (BIC), and by an error that anybody would notice."""
+    share = higher.points ** (-NUMBERS_OF_AN_ORDER / (2.0 * higher.points))
+    return bool(higher.rms_n < min(lower.rms_n * share, lower.rms_n - LEAST_GAIN_N))
+
+
+def _elevated(branches: Branches) -> Branches:
+    """The same curves with one order more."""
+    return Branches(elevate_order(branches.rising), elevate_order(branches.falling))
 
 
 def residuals_n(model: Bsfm, walk: Walk) -> Floats:

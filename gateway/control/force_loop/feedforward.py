@@ -74,7 +74,8 @@ class Feedforward:
         """Vented: nothing applied, nothing remembered."""
         self.applied_n = self.aimed_n = self.reference_n = 0.0
         self._delayed.restart(0.0)
-        self._memory = self.model.reversal.start()
+        self._memory = self._slide = self.model.reversal.start()
+        self._slid_n = 0.0
         self._pace = RateBudget()
         self._carry_over_v = 0.0
 
@@ -96,6 +97,7 @@ class Feedforward:
         before_v, _ = self.compute_voltage(gravity_n)
         self.model, self._memory = model, model.reversal.at(self.branch_share)
         self._limits = narrow_limits(self._rig_limits, model.limits_n)
+        self._slide = self._memory
         after_v, _ = self.compute_voltage(gravity_n)
         self._carry_over_v += before_v - after_v
 
@@ -121,10 +123,26 @@ class Feedforward:
         elif from_n != to_n:
             self._memory = self.model.memory_after(self._memory, from_n, to_n)
 
+    def correct(self, correction_n: float, gravity_n: float) -> None:
+        """The slide goes where the aim and a trim's correction of it lead, in one movement: friction turns round with their
+        sum, and with nothing else."""
+        slid_n, self._slid_n = self._slid_n, self.aimed_n + correction_n - gravity_n
+        if self.applied_n <= 0.0:
+            self._slide = self._memory
+        elif slid_n != self._slid_n:
+            self._slide = self.model.memory_after(self._slide, slid_n, self._slid_n)
+
+    def correction_v(self, gravity_n: float) -> float:
+        """What the correction adds to the feedforward: by the slide's own friction, not by the target's."""
+        if self.applied_n <= 0.0 or is_below_usable(self.applied_n, self._limits):
+            return 0.0
+        corrected_v, _ = self.model.voltage_v(self._slid_n, self.model.reversal.branch_share(self._slide))
+        return corrected_v - self.model.voltage_v(self.aimed_n - gravity_n, self.branch_share)[0]
+
     def fall_back(self, goal_n: float) -> None:
         """Contact lost: at once down to the goal, and on the rising branch for the next contact."""
         self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
-        self._memory = self.model.reversal.at(RISING)
+        self._memory = self._slide = self.model.reversal.at(RISING)
 
     def slope_n_per_v(self, gravity_n: float) -> float:
         """How much force a volt makes at the working point, N/V, by the branches as they are shared there."""
@@ -137,7 +155,8 @@ class Feedforward:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
-        self._memory = self.model.reversal.at(branch_share)
+        self._memory = self._slide = self.model.reversal.at(branch_share)
+        self._slid_n = self.applied_n
 
     def compute_voltage(self, gravity_n: float) -> tuple[float, LimitedBy]:
         """Return the voltage for the applied contact force by the inverse model and what limited it. ModelError without one."""

@@ -4,8 +4,8 @@ A step answers with an event of the state table (READY, RAMPING and HOLDING are 
 A run of calibration drives the same limiter (`drive_run`), and the force that the model expects is kept here for all.
 
 When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting, and with the target
-less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured response that is where the model of the
-lags is, and it must have been there for the dead time and the trim's patience.
+less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured response: with less than NEAR_N of
+thrust on its way, which is counted as come.
 """
 
 from collections.abc import Callable
@@ -18,9 +18,10 @@ from gateway.codes.faults import FaultCode
 from gateway.control.compensation.compensation import TimingCompensation
 from gateway.control.demand import Demand
 from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
-from gateway.control.force_loop.lag_inverse import LagInverse
+from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
+from gateway.control.force_loop.transport_delay import TransportDelay
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.control.force_loop.voltage_limits import VoltageLimiter, strongest
 from gateway.control.inputs import LineStatus
@@ -37,6 +38,7 @@ Moved: TypeAlias = StateEvent | StopCause
 
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
+NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
 
@@ -59,7 +61,7 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing = timing
-        self._tune(settings)
+        self._tune(settings, model)
         self.feedforward = Feedforward(model, settings.limits, *self._course(settings))
         self.expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
         self._limiter = VoltageLimiter(settings.limits)
@@ -72,32 +74,35 @@ class ForceLoop:
         self._wanted_v = 0.0
 
     def use(self, model: Bsfm, given_n: float, settings: ControlSettings) -> None:
-        """Swap the calibration and the timing that goes with it. given_n: contact force that the slide need not give."""
-        self.feedforward.use(model, given_n)
-        self._retime(settings)
+        """Swap the calibration and the timing that goes with it. given_n: contact force that the slide need not give.
+
+        The lags' model goes on from where it is, the trim keeps what it has learned.
+        """
+        law = self.feedforward
+        is_same = model == law.model and settings.timing == self._measured and settings.lead == self._lead_settings
+        law.use(model, given_n)
         self.expected.retime(settings.supervision.response_lag_s)
         self.expected.use(model)
+        if not is_same:
+            self._retime(model, settings, given_n)
 
-    def _retime(self, settings: ControlSettings) -> None:
-        """The timing of another calibration. The lags' model goes on from where it is, the trim keeps what it has learned."""
-        if settings.timing == self._measured and settings.lead == self._lead_settings:
-            return
-        lead, value_v = self._lead, self._trim.value_v
-        self._tune(settings)
-        self._lead.first_v, self._lead.second_v = lead.first_v, lead.second_v
-        self._trim.resume(value_v)
-        self.feedforward.retime(*self._course(settings))
+    def _retime(self, model: Bsfm, settings: ControlSettings, given_n: float) -> None:
+        lead, trim, law = self._lead, self._trim, self.feedforward
+        self._tune(settings, model)
+        self._lead.go_on_from(lead.first_v, lead.second_v)
+        is_in_force = isinstance(self._trim, MeasuredTrim)
+        self._trim.resume(trim.value_v * law.slope_n_per_v(given_n) if is_in_force else trim.value_v)
+        law.retime(*self._course(settings))
 
-    def _tune(self, settings: ControlSettings) -> None:
+    def _tune(self, settings: ControlSettings, model: Bsfm) -> None:
         """LeadCompensator and trim by the measured response where there is one, else by the rig file."""
-        self._measured, self._lead_settings, self._still_s = settings.timing, settings.lead, 0.0
-        self._lead: LeadCompensator | LagInverse
+        self._measured, self._lead_settings, self._near_s = settings.timing, settings.lead, 0.0
+        self._arrived = TransportDelay(settings.timing.dead_time_s if settings.timing else 0.0)
+        self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim
         if self._measured:
-            self._lead, self._trim = (
-                LagInverse(settings.lead, settings.limits),
-                MeasuredTrim(settings.trim, self._measured),
-            )
+            self._lead = LinearizedLagInverse(settings.lead, settings.limits, model)
+            self._trim = MeasuredTrim(settings.trim, self._measured)
         else:
             self._lead, self._trim = LeadCompensator(settings.lead, settings.limits), TrimIntegral(settings.trim)
 
@@ -162,7 +167,7 @@ class ForceLoop:
         has really taken, where that is known: it carries one setting at a time."""
         self._limiter.earn(dt_s)
         self._lead.advance(self._limiter.voltage_v if line.sent_v is None else line.sent_v, dt_s)
-        if isinstance(self._lead, LagInverse):
+        if isinstance(self._lead, LinearizedLagInverse):
             self._lead.know_wire(line.wire_s)
         self.expected.advance(self.voltage_v, dt_s)
 
@@ -226,6 +231,9 @@ class ForceLoop:
         moved_n = law.advance(goal_n, rate_n_per_s, inputs.dt_s, given_n)
         self._learn(inputs, moved_n, given_n)
         model_v, by_model = law.compute_voltage(given_n)
+        if isinstance(self._trim, MeasuredTrim) and not self._trim.is_off:
+            law.correct(self._trim.value_n, given_n)
+            self._trim.take_volts(law.correction_v(given_n))
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
         wanted_v = model_v + self._trim.value_v
         push_v = self._led_v(wanted_v) - wanted_v if has_model else 0.0
@@ -237,7 +245,7 @@ class ForceLoop:
 
     def _led_v(self, wanted_v: float) -> float:
         self._wanted_v = wanted_v
-        if isinstance(self._lead, LagInverse):
+        if isinstance(self._lead, LinearizedLagInverse):
             return self._lead.led_v(wanted_v, self._limiter.voltage_v)
         return self._lead.led_v(wanted_v)
 
@@ -252,17 +260,21 @@ class ForceLoop:
             trim.integrate(law.reference_n - inputs.reading.contact_n, inputs.reading.interval_s)
 
     def _learn_measured(self, trim: MeasuredTrim, inputs: LoopInputs, given_n: float) -> None:
-        law, measured = self.feedforward, self._measured
-        assert measured
-        slope_n_per_v = law.slope_n_per_v(given_n) if inputs.reading.is_new else 1.0
-        if inputs.reading.is_new:
-            away_n = abs(self._wanted_v - self._lead.second_v) * slope_n_per_v
-            still = away_n < STILL_N and abs(law.applied_n - law.reference_n) < STILL_N
-            self._still_s = self._still_s + inputs.reading.interval_s if still else 0.0
-        if self._still_s < measured.dead_time_s + measured.patience_s:
+        """The force that will come is the measured one and what is still on its way: thrust that has not passed dead time and
+        lags, the trim's own included. So the trim learns as soon as that is little, without waiting for it to arrive."""
+        law, reading, lead = self.feedforward, inputs.reading, self._lead
+        assert isinstance(lead, LinearizedLagInverse)
+        arrived_n = self._arrived.advance(-lead.away_n(0.0), inputs.dt_s)
+        if not reading.is_new:
+            return
+        coming_n = lead.away_n(self._wanted_v) - lead.away_n(0.0) - arrived_n
+        is_near = abs(coming_n) < NEAR_N and abs(law.applied_n - law.aimed_n) < STILL_N
+        self._near_s = self._near_s + reading.interval_s if is_near else 0.0
+        if self._near_s <= 0.0:
             trim.rest()
         elif self._may_learn(inputs):
-            trim.integrate(law.reference_n - inputs.reading.contact_n, slope_n_per_v, inputs.reading.interval_s)
+            error_n = law.applied_n - reading.contact_n - coming_n
+            trim.integrate(error_n, law.slope_n_per_v(given_n), reading.interval_s)
 
     def _may_learn(self, inputs: LoopInputs) -> bool:
         free = self.limited_by is LimitedBy.NONE or self.limited_by is LimitedBy.TRIM_RANGE  # of the step before

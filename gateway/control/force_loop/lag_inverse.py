@@ -1,8 +1,8 @@
 """The lags of the plant as a calibration has measured them, inverted nearly as fast as range and slew allow.
 
-As the lead of the rig file (gateway.control.force_loop.lead_compensator), this carries a model of the two lags
-behind the voltage that really stood
-on the output, and asks for what brings the model to the wish. But how fast is not one number. With a horizon h the law is
+As the lead of the rig file (gateway.control.force_loop.lead_compensator), this carries a model of the two lags behind the
+voltage that really stood on the output, and asks for what brings the model to the wish. But how fast is not one number.
+With a horizon h the law is
 that of a second-order system of natural frequency 1/h and damping DAMPING. The shortest horizon is used from which the push
 and the brake that must follow it both stay within what the output can do: two pulses of length h that bring the model from
 where it is to rest at the wish. So a small step is nearly over when the dead time is, a large one runs along the limits, and
@@ -10,11 +10,18 @@ none is pushed harder than it can be braked; a step from 0 V, where there is lit
 
 The shortest horizon of all is a share of the lags: a shorter one gains little and asks for more than the output's wire,
 which carries one setting at a time, can follow.
+
+Where the command map bends, all that is reckoned in linearized volts (gateway.bsfm.drive_map) and asked for in volts as sent:
+LinearizedLagInverse.
 """
 
+from dataclasses import replace
 from math import exp, inf
 from typing import Final, NamedTuple
 
+from gateway.bsfm.drive_map import DriveMap
+from gateway.bsfm.model import Bsfm
+from gateway.control.limits import TICK_S
 from gateway.control.settings import LeadSettings, Limits
 
 SHORTEST_S: Final = 0.02
@@ -29,7 +36,9 @@ GROWTH: Final = 1.2  # from one horizon to the next
 HORIZONS: Final = 20
 SLEW_SHARE: Final = 0.7  # of h: how far the slew takes the output in a pulse that it has to fill
 BRAKE_S: Final = 0.03  # of slew: as far from the wish as a brake may take the output, which has to come back
-SLOW_S: Final = 0.1  # sum of the lags: below it a push of PUSH_S is most of the way, and the linear law alone is used
+SLOW_S: Final = 0.02  # and SLOW_WIRES times the wire's time, at most SLOWEST_S: of lags that are shorter in sum
+SLOW_WIRES: Final = 2.5  # a push that lasts one setting is most of the way, and the linear law alone is used
+SLOWEST_S: Final = 0.1
 EQUAL_V: Final = 1.0e-3  # below what an output can resolve: no push, the wish itself
 LEAST_LAG_S: Final = 1.0e-3
 
@@ -56,8 +65,7 @@ class LagInverse:
         self.first_v = self.second_v = limits.safe_voltage_v
         self._limits = limits
         self._lags_s = lags_s = longer_s + self._second_lag_s
-        self._is_slow = lags_s >= SLOW_S
-        self._damping = DAMPING if self._is_slow else 1.0
+        self._is_slow, self._damping = True, DAMPING
         self._horizons = [SHORTEST_S * GROWTH**k for k in range(HORIZONS)]
         if self._second_lag_s:
             self._later = [_decays(self._lag_s, self._second_lag_s, 0.06 * lags_s * 1.35**k) for k in range(12)]
@@ -70,7 +78,11 @@ class LagInverse:
         if not abs(wire_s - self._wire_s) > LATE_S:
             return
         self._wire_s = wire_s = min(wire_s, SLOWEST_WIRE_S)
+        self._is_slow = self._lags_s >= min(SLOWEST_S, SLOW_S + SLOW_WIRES * wire_s)
+        self._damping = DAMPING if self._is_slow else 1.0
         least_s = max(SHARE * self._lags_s, PERIODS * wire_s + LATE_S) if self._is_slow else FAST_PERIODS * wire_s
+        if not self._second_lag_s:  # it follows at once: a setting that outlasts its horizon goes beyond the wish
+            least_s = wire_s + LATE_S + TICK_S
         self._first = next((k for k, at_s in enumerate(self._horizons) if at_s >= least_s), HORIZONS - 1)
         self.horizon_s = self._horizons[self._first]
         self._decay = exp(-self.horizon_s / self._lag_s)
@@ -170,3 +182,55 @@ def _pulses(lag_s: float, second_lag_s: float, horizon_s: float) -> Pulses:
         -kept * kept / (1.0 - kept),
         -kept,
     )
+
+
+class LinearizedLagInverse:
+    """The same for a bent command map. The range is bent like the volts; the slew is taken as it is, for it is the same on
+    average. first_v, second_v: where the model's lags are, in volts that would keep them there."""
+
+    def __init__(self, settings: LeadSettings, limits: Limits, model: Bsfm | None = None) -> None:
+        self._limits = limits
+        self._map = scale = DriveMap(model)
+        self._inverse = LagInverse(
+            settings,
+            replace(
+                limits,
+                voltage_min_v=scale.linear_v(limits.voltage_min_v),
+                voltage_max_v=scale.linear_v(limits.voltage_max_v),
+                safe_voltage_v=scale.linear_v(limits.safe_voltage_v),
+            ),
+        )
+
+    @property
+    def first_v(self) -> float:
+        return self._map.volts(self._inverse.first_v)
+
+    @property
+    def second_v(self) -> float:
+        return self._map.volts(self._inverse.second_v)
+
+    @property
+    def n_per_v(self) -> float:
+        """How much thrust a linearized volt makes."""
+        return self._map.n_per_v
+
+    def away_n(self, wanted_v: float) -> float:
+        """By how much the thrust of the model's lags is short of the wish's, N."""
+        return (self._map.linear_v(wanted_v) - self._inverse.second_v) * self._map.n_per_v
+
+    def go_on_from(self, first_v: float, second_v: float) -> None:
+        """Take over from another model of the lags."""
+        self._inverse.first_v, self._inverse.second_v = self._map.linear_v(first_v), self._map.linear_v(second_v)
+
+    def know_wire(self, wire_s: float) -> None:
+        self._inverse.know_wire(wire_s)
+
+    def advance(self, voltage_v: float, dt_s: float) -> None:
+        """voltage_v stood on the output for the last dt_s."""
+        self._inverse.advance(self._map.linear_v(voltage_v), dt_s)
+
+    def led_v(self, wanted_v: float, standing_v: float) -> float:
+        """What to ask for now. standing_v: on the output. A wish outside the range passes, and the stage says so."""
+        linear_v = self._map.linear_v(wanted_v)
+        asked_v = self._inverse.led_v(linear_v, self._map.linear_v(standing_v))
+        return wanted_v if asked_v == linear_v else self._map.volts(asked_v)

@@ -36,6 +36,10 @@ class LeadCompensator:
         left_s = 2.0 * self._left_s if self._second_lag_s > 0.0 else self._left_s
         return max(0.0, self._lag_s + self._second_lag_s - left_s)
 
+    def go_on_from(self, first_v: float, second_v: float) -> None:
+        """Take over from another model of the lags."""
+        self.first_v, self.second_v = first_v, second_v
+
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
         if self._lag_s <= 0.0:

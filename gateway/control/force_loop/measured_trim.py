@@ -1,11 +1,13 @@
 """The trim of a rig whose response is measured: an integral of the force error that cannot hurt.
 
-It learns only once the transient of the last movement is over, by the model of dead time and lags, and some time longer, for
-what an error of that model leaves. It integrates in newtons, at the pace of
-gateway.control.force_loop.response_timing, and turns them into volts
-by the slope of the model where the rig works. Within the dead zone it rests, and having begun to correct it goes on to a
-third of it, so that an error is not left at the zone's edge. The zone is the rig's, but never less than what the noise of
-the cell makes of a smoothed error.
+It learns once the transient of the last movement is nearly over, by the model of dead time and lags, from the error that is
+left when what is on its way has come. It corrects the target, in newtons, at the pace of
+gateway.control.force_loop.response_timing; volts are
+made of that by the model, whose slide turns round with target and correction together: behind a turn friction has to be
+overcome first, and a correction needs more volts than along a branch. Within the dead zone it rests, and having begun to
+correct it goes on to a third of it, so that an error is not left at the zone's edge. The zone is a share of the rig's, for
+the stiction that a rig's zone is for is in the model here, but never less than what the noise of the cell makes of a
+smoothed error.
 
 What was learned belongs to the force and to the direction in which it was reached: friction is off the other way after a turn.
 So it fades within SAME_WAY_N of travel on and within OTHER_WAY_N of travel back, and comes back with the target. Only what was
@@ -23,9 +25,10 @@ from gateway.control.limits import trim_limited
 from gateway.control.settings import LoopTiming, Trim
 from gateway.registers.words import LimitedBy
 
-SMOOTHING_S: Final = 0.15
-LEAST_SEEN_S: Final = 0.08  # of an error, before it is believed
+SMOOTHING_S: Final = 0.10
+LEAST_SEEN_S: Final = 0.04  # of an error, before it is believed
 SIGMAS: Final = 3.5  # of the smoothed error's noise: the least zone
+ZONE_SHARE: Final = 0.5  # of the rig's dead zone
 LEFT_SHARE: Final = 0.33  # of the zone, at which a correction ends
 NOISE_S: Final = 2.0  # over which the noise is estimated
 WIDER: Final = 1.5  # zone after each turn
@@ -37,13 +40,13 @@ OTHER_WAY_N: Final = 1.0
 
 
 class MeasuredTrim:
-    """value_v is added to the feedforward; limited_by says whether it stands at its limit; hunted: it stands still because its
-    corrections kept changing sign."""
+    """value_n: the correction of the target, N; value_v: what that has come to in volts, told by whoever asked the model;
+    limited_by: whether it stands at its limit; hunted: it stands still because its corrections kept changing sign."""
 
     def __init__(self, settings: Trim, timing: LoopTiming) -> None:
         self._settings = settings
         self._timing = timing
-        self._noise_n2 = 0.0
+        self._noise_n2 = self._known_s = 0.0
         self._same_way_n = min(SAME_WAY_N, settings.memory_n)
         self._before_n: float | None = None
         self._smooth_n = self._seen_s = self._interval_s = 0.0
@@ -59,18 +62,26 @@ class MeasuredTrim:
         return self._turns >= MOST_TURNS
 
     def reset(self) -> None:
-        self.value_v, self.limited_by = 0.0, LimitedBy.NONE
-        self._at_n = self._turned_n = self._anchor_n = 0.0
+        self.value_n = self.value_v = 0.0
+        self.limited_by = LimitedBy.NONE
+        self._at_n = self._turned_n = 0.0  # of the target: now, and where it was furthest on its way
         self._going = self._going_then = 1
-        self._common_v = self._own_v = self._anchor_v = self._common_at_n = 0.0
-        self._learned_v = {1: 0.0, -1: 0.0}
+        self._learned_n = self._learned_at_n = self._own_n = 0.0
+        self._common_n = self._common_at_n = 0.0
+        self._by_way_n = {1: 0.0, -1: 0.0}
         self._rest()
         self._calm()
 
-    def resume(self, value_v: float) -> None:
+    def resume(self, value_n: float) -> None:
         """Go on from a correction that another trim has learned."""
-        self.value_v, self.limited_by = trim_limited(value_v, self._settings.limit_v)
-        self._own_v = self._anchor_v = self.value_v
+        self.value_n = self._own_n = self._learned_n = value_n
+
+    def take_volts(self, value_v: float) -> float:
+        """What the correction asks for, within the limit of the rig."""
+        self.value_v, limited_by = trim_limited(value_v, self._settings.limit_v)
+        if limited_by:
+            self.limited_by = limited_by
+        return self.value_v
 
     def travel(self, moved_n: float) -> None:
         """The applied target moved by so much, N."""
@@ -88,22 +99,22 @@ class MeasuredTrim:
 
     def _keep_common(self) -> None:
         """At a turn: what both directions agree on."""
-        self._learned_v[self._going] = self.value_v
-        up_v, down_v = self._learned_v[1], self._learned_v[-1]
-        agreed_v = min(abs(up_v), abs(down_v)) if up_v * down_v > 0.0 else 0.0
-        self._common_v, self._common_at_n = agreed_v if up_v > 0.0 else -agreed_v, self._anchor_n
-        self._own_v = self._anchor_v - self._common_v
+        self._by_way_n[self._going] = self.value_n
+        up_n, down_n = self._by_way_n[1], self._by_way_n[-1]
+        agreed_n = min(abs(up_n), abs(down_n)) if up_n * down_n > 0.0 else 0.0
+        self._common_n, self._common_at_n = agreed_n if up_n > 0.0 else -agreed_n, self._learned_at_n
+        self._own_n = self._learned_n - self._common_n
 
-    def _common_here_v(self) -> float:
-        return self._common_v * exp(-abs(self._at_n - self._common_at_n) / self._same_way_n)
+    def _common_here_n(self) -> float:
+        return self._common_n * exp(-abs(self._at_n - self._common_at_n) / self._same_way_n)
 
     def _recall(self) -> None:
         """What is left of the correction here."""
-        if not (self._own_v or self._common_v):
+        if not (self._own_n or self._common_n):
             return
-        away_n = self._going_then * (self._at_n - self._anchor_n)
+        away_n = self._going_then * (self._at_n - self._learned_at_n)
         reach_n = self._same_way_n if away_n >= 0.0 else OTHER_WAY_N
-        self.value_v = self._common_here_v() + self._own_v * exp(-abs(away_n) / reach_n)
+        self.value_n = self._common_here_n() + self._own_n * exp(-abs(away_n) / reach_n)
         self.limited_by = LimitedBy.NONE
 
     def rest(self) -> None:
@@ -111,7 +122,8 @@ class MeasuredTrim:
         self._rest()
 
     def integrate(self, error_n: float, slope_n_per_v: float, interval_s: float) -> None:
-        """error_n: wanted minus measured, on a new sample; slope_n_per_v: of the model at the working point."""
+        """error_n: wanted minus what is measured and still comes, on a new sample; slope_n_per_v: of the model at the working
+        point, which tells the limit in newtons."""
         if self.is_off or self.hunted:
             return
         self._smooth(error_n, interval_s)
@@ -123,10 +135,10 @@ class MeasuredTrim:
         if not self._way:
             return
         pace_per_s = self._timing.integral_per_s * SLOWER**self._turns
-        wanted_v = self.value_v + pace_per_s * error_n / slope_n_per_v * interval_s
-        self.value_v, self.limited_by = trim_limited(wanted_v, self._settings.limit_v)
-        self._anchor_v, self._anchor_n, self._going_then = self.value_v, self._at_n, self._going
-        self._own_v = self.value_v - self._common_here_v()
+        wanted_n = self.value_n + pace_per_s * error_n * interval_s
+        self.value_n, self.limited_by = trim_limited(wanted_n, self._settings.limit_v * slope_n_per_v)
+        self._learned_n, self._learned_at_n, self._going_then = self.value_n, self._at_n, self._going
+        self._own_n = self.value_n - self._common_here_n()
 
     def _turn(self, way: int) -> None:
         if self._last_way and way != self._last_way:
@@ -135,7 +147,8 @@ class MeasuredTrim:
 
     def _smooth(self, error_n: float, interval_s: float) -> None:
         if self._before_n is not None:
-            share = interval_s / (NOISE_S + interval_s)
+            self._known_s = min(NOISE_S, self._known_s + interval_s)  # the mean at first, then forgetting
+            share = interval_s / self._known_s
             self._noise_n2 += share * (0.5 * (error_n - self._before_n) ** 2 - self._noise_n2)
             behind_s = min(SMOOTHING_S, self._seen_s)  # the mean at first, then forgetting
             self._smooth_n += (error_n - self._smooth_n) * interval_s / (behind_s + interval_s)
@@ -146,7 +159,7 @@ class MeasuredTrim:
 
     def _zone_n(self) -> float:
         smoothed = sqrt(self._noise_n2 * min(1.0, self._interval_s / min(2.0 * SMOOTHING_S, self._seen_s)))
-        return float(max(self._settings.dead_zone_n, SIGMAS * smoothed) * WIDER**self._turns)
+        return float(max(ZONE_SHARE * self._settings.dead_zone_n, SIGMAS * smoothed) * WIDER**self._turns)
 
     def _rest(self) -> None:
         self._way, self._smooth_n, self._seen_s, self._interval_s = 0, 0.0, 0.0, 0.0

@@ -1,10 +1,10 @@
 """From a measured response to everything in control that depends on time: one pure function.
 
-The trim is an integral controller of a plant with dead time D and, with the lags inverted, a landing time L behind it. The
-lambda rule for such a plant is an integral gain of 1/(K (lambda + D + L)); lambda = 1.1 (D + L) gives a gain margin above 3
-where all is as measured, and above 1.5 where gain, dead time and lags are all 30 % larger (a test computes both). K is
-the slope of the model at the working point, so the loop is as fast at 5 N as at 40 N, on the flat part of a branch as on
-the steep one.
+The trim is an integral controller of a plant with dead time D and, with the lags inverted, a landing time L behind it. It
+integrates the error that is left once all that is on its way has come, by the model of dead time and lags (a Smith
+predictor), so that its time constant may be lambda = D + L, without what a plain integral adds for the delay. That gives a
+maximum sensitivity of 1.6 and a gain margin of 3 where all is as measured, and a gain margin above 1.6 where gain, dead time
+and lags are all 30 % off, either way (a test computes them). It corrects newtons of the target; the model makes volts of them.
 
 What the rig file says stays: whether there is a trim at all (gain 0: none), how far it may go, its least dead zone. With
 `response: rig` nothing is derived.
@@ -17,9 +17,8 @@ from gateway.bsfm.model import Response
 from gateway.control.force_loop.lag_inverse import LagInverse
 from gateway.control.settings import ControlSettings, LeadSettings, LoopTiming, ResponseSource
 
-LAMBDA_SHARE: Final = 1.1  # of dead time and landing
+LAMBDA_SHARE: Final = 1.0  # of dead time and landing
 HELD_S: Final = 0.01  # by which tick and sample are late, on average
-PATIENCE: Final = 0.7  # of the lags
 UNREACHABLE: Final = 5.0  # times the whole response
 SHORTEST_LAG_S: Final = 0.01
 LONGEST_LAG_S: Final = 2.0
@@ -38,8 +37,7 @@ def timing_of(response: Response | None, settings: ControlSettings) -> ControlSe
         lag_s=lead.lag_s,
         second_lag_s=lead.second_lag_s,
         landing_s=landing_s,
-        integral_per_s=1.0 / ((1.0 + LAMBDA_SHARE) * slow_s),
-        patience_s=PATIENCE * lags_s,
+        integral_per_s=1.0 / (LAMBDA_SHARE * slow_s),
     )
     whole_s = response.dead_time_s + lags_s
     supervision = replace(

@@ -175,3 +175,18 @@ def test_table_inverse_and_free_numbers_agree_with_the_curves() -> None:
     grid_v = np.linspace(0.0, 5.0, 50)
     assert again.falling.value(grid_v) == pytest.approx(FALLING.value(grid_v))
     assert again.rising.value(grid_v) == pytest.approx(RISING.value(grid_v))
+
+
+def test_where_the_branches_meet_a_fit_that_crosses_by_a_hair_is_looked_for_again_not_given_up() -> None:
+    """Without margins such a walk left branches that a staircase's turns had bent, and an error several times as large."""
+    rising = RationalBezier(0.0, 5.0, (2.5, 4.0, 9.0, 40.0), (1.0, 1.0, 1.0, 1.0))
+    falling = RationalBezier(0.0, 5.0, (2.5, 4.2, 22.0, 44.0), (1.0, 1.0, 1.0, 1.0))
+    truth = Bsfm(Branches(rising, falling), STOPS)
+    turns = walk(TURNS_V, 1, 0.0)
+    shares = [STOPS.branch_share(tuple(place)) for place in places(turns.voltage_v, np.array(STOPS.radii_v)).tolist()]
+    noise_n = NOISE_N * np.random.default_rng(4).standard_normal(len(shares))
+    forces_n = [truth.settled_n(volts, at) for volts, at in zip(turns.voltage_v.tolist(), shares, strict=True)]
+    found = fit_joint(truth.branches, [Walk(turns.voltage_v, np.array(forces_n) + noise_n)])
+    assert found.joint
+    assert verdicts_of(found.branches, SLOPE_FLOOR_N_PER_V).usable
+    assert found.rms_n < 1.2 * NOISE_N

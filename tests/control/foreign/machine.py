@@ -38,6 +38,7 @@ class Machine:
     noise_n: float = 0.1
     quantum_n: float = 0.01
     rate_hz: float = 100.0
+    damping: float = 1.0
     wire_s: float = 0.012
 
     def drive_n(self, voltage_v: float) -> float:
@@ -95,10 +96,22 @@ class Slide:
             self._volts, self._drive_n = voltage_v, machine.drive_n(voltage_v)
         way = self._on_the_way
         way.append(self._drive_n)
-        self._first_n += self._first_share * (way.popleft() - self._first_n)
-        self._second_n += self._second_share * (self._first_n - self._second_n)
+        way_n = way.popleft()
+        if machine.damping < 1.0:
+            self._ring(way_n)
+        else:
+            self._first_n += self._first_share * (way_n - self._first_n)
+            self._second_n += self._second_share * (self._first_n - self._second_n)
         self._slide(self._second_n)
         self.cell_n += self._cell_share * (self.force_n - self.cell_n)
+
+    def _ring(self, way_n: float) -> None:
+        """A regulator that overshoots: its natural frequency is that of the two lags, first_n its speed in N/s."""
+        machine = self.machine
+        natural = 1.0 / (machine.lag_s * machine.second_lag_s) ** 0.5
+        pull = natural * (natural * (way_n - self._second_n) - 2.0 * machine.damping * self._first_n)
+        self._first_n += MS * pull
+        self._second_n += MS * self._first_n
 
     def _slide(self, thrust_n: float) -> None:
         machine, step_s = self.machine, MS / SUBSTEPS
