@@ -3,7 +3,7 @@
 `Twin(plant, seed)` takes voltages and lets time pass; `Plant` names the physics, one field per effect, each with a null
 value that is the default; `stack` runs many plants in one twin, as numpy lanes. Modules in the order of the signal:
 regulator, slide (with friction), contact, load_cell; simulation joins them; the formulas of single effects stand in
-terms_*.py; experiment does to the twin what one does to a rig.
+gateway/twin/effects; experiment does to the twin what one does to a rig.
 
 `Replay(drive).run(plants)` runs plants over a recording, for the diagnosis. It is loaded when it is asked for, and with it
 scipy when it runs: the real-time twin knows neither.

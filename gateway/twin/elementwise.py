@@ -58,7 +58,7 @@ def exponential(value: Real) -> Real:
     return result if isinstance(value, np.ndarray) else float(result)
 
 
-def quantised(value: Real, step: Real) -> Real:
+def quantise(value: Real, step: Real) -> Real:
     """The nearest multiple of `step`; a step of 0 leaves the value alone."""
     if type(value) is float and type(step) is float:
         return value if step == 0.0 else math.floor(value / step + 0.5) * step
@@ -79,6 +79,6 @@ def root(value: Real) -> Real:
     return np.sqrt(value) if isinstance(value, np.ndarray) else math.sqrt(value)
 
 
-def chosen(condition: Real, yes: Real, no: Real) -> Real:
+def choose(condition: Real, yes: Real, no: Real) -> Real:
     """`where` for a condition that may be a numpy bool."""
     return np.where(condition, yes, no) if isinstance(condition, np.ndarray) else yes if condition else no

@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.twin.effects.term import switched_on
+from gateway.twin.effects.term import is_switched_on
 from gateway.twin.elementwise import Real, clip, exponential, larger, sign, sine
 from gateway.twin.sections import Friction
 from gateway.twin.surroundings import TwinConditions
@@ -44,26 +44,26 @@ DRY: Final = (
 """Fields without which there is no dry friction at all."""
 
 
-def side_load_n(friction: Friction, moment: TwinConditions) -> Real:
+def side_load_n(friction: Friction, conditions: TwinConditions) -> Real:
     """side-load: what the surroundings add to the limit, N; a column that is not known adds nothing."""
     load: Real = 0.0
-    if moment.feed_mm_s is not None:
-        load = load + friction.side_load_n_s_per_mm * abs(moment.feed_mm_s)
-    if moment.tilt_deg is not None:
-        load = load + friction.side_load_tilt_n * abs(sine(moment.tilt_deg * _RADIAN_PER_DEGREE))
-    if moment.aside_mm is not None:
-        load = load + friction.side_load_n_per_mm * abs(moment.aside_mm)
+    if conditions.feed_mm_s is not None:
+        load = load + friction.side_load_n_s_per_mm * abs(conditions.feed_mm_s)
+    if conditions.tilt_deg is not None:
+        load = load + friction.side_load_tilt_n * abs(sine(conditions.tilt_deg * _RADIAN_PER_DEGREE))
+    if conditions.aside_mm is not None:
+        load = load + friction.side_load_n_per_mm * abs(conditions.aside_mm)
     return load
 
 
-def side_share(friction: Friction, moment: TwinConditions) -> Real:
+def side_share(friction: Friction, conditions: TwinConditions) -> Real:
     """side-load: the surface's grip grows with the thrust as soon as the tool is dragged, N/N."""
-    if moment.feed_mm_s is None:
+    if conditions.feed_mm_s is None:
         return 0.0
-    return friction.side_load_n_per_n * (1.0 - exponential(-abs(moment.feed_mm_s) / _DRAGGED_MM_PER_S))
+    return friction.side_load_n_per_n * (1.0 - exponential(-abs(conditions.feed_mm_s) / _DRAGGED_MM_PER_S))
 
 
-def two_sided(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
+def two_sided_limit(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
     """asymmetric-friction: (limit, centre) of a friction that is larger moving out than moving in, neither below 0.
 
     Friction is then centre + limit x strain. Rejected: a limit that jumps with the direction, which chatters at rest.
@@ -72,23 +72,23 @@ def two_sided(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
     return 0.5 * (out + back), 0.5 * (out - back)
 
 
-def drags(friction: Friction) -> tuple[Real, Real]:
+def directional_drags(friction: Friction) -> tuple[Real, Real]:
     """asymmetric-friction by speed: viscous drag (moving out, moving in), N s/m, neither below 0."""
     viscous, more_out = friction.viscous_n_s_per_m, friction.asymmetry_n_s_per_m
     return larger(viscous + more_out, 0.0), larger(viscous - more_out, 0.0)
 
 
-def share_of_way(drag_n_s_per_m: Real, stiffness_n_per_m: Real, step_s: Real) -> Real:
+def travel_share(drag_n_s_per_m: Real, stiffness_n_per_m: Real, step_s: Real) -> Real:
     """How much of its way a slide behind a spring goes in one step against viscous drag (implicit Euler)."""
     return stiffness_n_per_m / (stiffness_n_per_m + drag_n_s_per_m / step_s)
 
 
-def rested(stiction_n: Real, full_n: Real, share: Real) -> Real:
+def rest_stiction(stiction_n: Real, full_n: Real, share: Real) -> Real:
     """dwell-stiction grows towards `full_n` by this share of what is missing."""
     return stiction_n + share * (full_n - stiction_n)
 
 
-def moved(stiction_n: Real, travel_m: Real, breakaway_m: Real) -> Real:
+def relieve_stiction(stiction_n: Real, travel_m: Real, breakaway_m: Real) -> Real:
     """What motion leaves of it."""
     return stiction_n * exponential(-abs(travel_m) / breakaway_m)
 
@@ -100,7 +100,7 @@ class Elements:
         self._friction = friction
         self._stribeck_travel_m = friction.stribeck_speed_m_per_s * step_s
         self._stribeck = bool(np.any(friction.stribeck_n))
-        dry = switched_on(friction, DRY)
+        dry = is_switched_on(friction, DRY)
         self._coulomb_n, self._per_n = friction.coulomb_n, friction.load_dependent_n_per_n
         self.asymmetric, self.ages = bool(np.any(friction.asymmetry_n)), bool(np.any(friction.dwell_stiction_n))
         self._rest_share = 1.0 - exponential(-step_s / friction.dwell_stiction_s)
@@ -135,15 +135,15 @@ class Elements:
     def age(self, travel_m: Real, limit: Real) -> None:
         """Rest raises the limit, motion lowers it again. What a rising limit holds it does not push: the strains give."""
         kept = self._stiction_n
-        grown = rested(kept, self._friction.dwell_stiction_n, self._rest_share)
+        grown = rest_stiction(kept, self._friction.dwell_stiction_n, self._rest_share)
         ratio = larger(limit, 1.0e-12) / larger(limit + (grown - kept), 1.0e-12)
-        self._stiction_n = moved(grown, travel_m, self._breakaway_m)
+        self._stiction_n = relieve_stiction(grown, travel_m, self._breakaway_m)
         self.strains = [strain * ratio for strain in self.strains]
         self._total = self._total * ratio
 
     def set_drag(self, step_s: Real) -> None:
         """Mean of the drags in both directions, and half of what they differ, as stiffness of a step, N/m."""
-        out, back = drags(self._friction)
+        out, back = directional_drags(self._friction)
         self.drag_n_per_m, self._more_out_n_per_m = 0.5 * (out + back) / step_s, 0.5 * (out - back) / step_s
 
     def travel_m(self, drive_n: Real, stiffness_n_per_m: Real, limit: Real) -> Real:

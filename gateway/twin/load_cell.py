@@ -1,15 +1,16 @@
 """The load cell, its amplifier and the logger: filter and clock in each step; the rest when a reading is taken.
 
-Formulas of the single effects stand in terms_cell.py. The clock's errors need the past: a history of the filtered force, as
-long as the reading lags behind. A clock that runs ahead would need the future: the running twin then reads the present.
+Formulas of the single effects stand in effects/load_cell.py. The clock's errors need the past: a history of the filtered
+force, as long as the reading lags behind. A clock that runs ahead would need the future: the running twin then reads the
+present.
 """
 
 import numpy as np
 from numpy.random import Generator
 
-from gateway.twin.effects.load_cell import TERMS, converted, without_sign
-from gateway.twin.effects.term import active
-from gateway.twin.elementwise import Real, chosen
+from gateway.twin.effects.load_cell import TERMS, convert_reading, lose_sign
+from gateway.twin.effects.term import active_formulas
+from gateway.twin.elementwise import Real, choose
 from gateway.twin.regulator import lag_factor
 from gateway.twin.sections import LoadCell
 from gateway.twin.surroundings import TwinConditions
@@ -17,7 +18,7 @@ from gateway.twin.surroundings import TwinConditions
 _SPARE = 4096  # steps of history that are dropped at once
 
 
-def earlier_s(cell: LoadCell, time_s: Real) -> Real:
+def shown_time_s(cell: LoadCell, time_s: Real) -> Real:
     """The moment that the reading of `time_s` shows: clock-offset and clock-skew."""
     return (time_s - cell.clock_offset_s) * (1.0 - cell.clock_skew)
 
@@ -69,15 +70,15 @@ class LoadCellState:
         self._loses_sign = bool(np.any(cell.sign_lost))
         shifted = bool(np.any(cell.clock_offset_s)) or bool(np.any(cell.clock_skew))
         self._history = History(step_s, zero) if shifted else None
-        self._terms = active(TERMS, cell, TwinConditions())
+        self._terms = active_formulas(TERMS, cell, TwinConditions())
         self._zero = zero
         self._last_n: Real = None
         self.filtered_n: Real = zero
         self.sign = 1.0
 
-    def look(self, moment: TwinConditions) -> None:
+    def look(self, conditions: TwinConditions) -> None:
         """Which effects are on follows from what is known of the surroundings."""
-        self._terms = active(TERMS, self._cell, moment)
+        self._terms = active_formulas(TERMS, self._cell, conditions)
 
     def step(self, force_n: Real) -> None:
         """Follow the contact force for one step."""
@@ -85,32 +86,32 @@ class LoadCellState:
         if self._history is not None:
             self._history.put(self.filtered_n)
 
-    def read(self, rng: Generator, moment: TwinConditions) -> Real:
+    def read(self, rng: Generator, conditions: TwinConditions) -> Real:
         """One reading, N, with the sign of the wiring. Chance is the same draw for all lanes, as one rig's is."""
         cell = self._cell
-        force = self.filtered_n if self._history is None else self._shown_n(moment)
+        force = self.filtered_n if self._history is None else self._shown_n(conditions)
         for term in self._terms:
-            force = term(cell, force, moment)
+            force = term(cell, force, conditions)
         force = force + cell.zero_n
         if self._noisy:
             force = force + cell.noise_n * float(rng.standard_normal())
         if self._spikes:
-            force = force + chosen(float(rng.random()) < cell.outlier_share, cell.outlier_n, self._zero)
+            force = force + choose(float(rng.random()) < cell.outlier_share, cell.outlier_n, self._zero)
         force = self.sign * force
         if self._loses_sign:
-            force = without_sign(cell, force)
-        return self._kept(converted(cell, force), rng)
+            force = lose_sign(cell, force)
+        return self._kept(convert_reading(cell, force), rng)
 
-    def _shown_n(self, moment: TwinConditions) -> Real:
+    def _shown_n(self, conditions: TwinConditions) -> Real:
         """What a wrong clock shows."""
         assert self._history is not None
-        return self._history.at(earlier_s(self._cell, moment.time_s))
+        return self._history.at(shown_time_s(self._cell, conditions.time_s))
 
     def _kept(self, reading_n: Real, rng: Generator) -> Real:
         """repeated-samples: the reading before instead of this one."""
         if not self._repeats:
             return reading_n
         if self._last_n is not None:
-            reading_n = chosen(float(rng.random()) < self._cell.repeated_share, self._last_n, reading_n)
+            reading_n = choose(float(rng.random()) < self._cell.repeated_share, self._last_n, reading_n)
         self._last_n = reading_n
         return reading_n

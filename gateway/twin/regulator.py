@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from gateway.twin.effects.regulator import bent_command, drooped, hunted, leaked
-from gateway.twin.effects.term import switched_on
-from gateway.twin.elementwise import Real, chosen, clip, exponential, larger, quantised, smaller, where
+from gateway.twin.effects.regulator import add_droop, add_hunting, apply_leak, bend_command
+from gateway.twin.effects.term import is_switched_on
+from gateway.twin.elementwise import Real, choose, clip, exponential, larger, quantise, smaller, where
 from gateway.twin.sections import UNLIMITED, Regulator
 
 
@@ -35,18 +35,18 @@ def half_decay(decay: Real) -> Real:
 
 def target_pa(regulator: Regulator, voltage_v: Real, bends: bool = False) -> Real:
     """Pressure that a command asks for, in the command's own steps. bends: is its map other than straight?"""
-    stepped_v = quantised(clip(voltage_v, 0.0, regulator.full_scale_v), regulator.command_step_v)
+    stepped_v = quantise(clip(voltage_v, 0.0, regulator.full_scale_v), regulator.command_step_v)
     if bends:
-        stepped_v = bent_command(regulator, stepped_v)
+        stepped_v = bend_command(regulator, stepped_v)
     return smaller(stepped_v, regulator.full_scale_v) * (regulator.full_scale_pa / regulator.full_scale_v)
 
 
-def noticed(target: Real, held: Real, dead_band: Real) -> Real:
+def apply_dead_band(target: Real, held: Real, dead_band: Real) -> Real:
     """The target that the regulator works on: a change within the dead band passes unnoticed."""
     return where(abs(target - held) > dead_band, target, held)
 
 
-def play(state: Real, value: Real, width: Real) -> Real:
+def apply_play(state: Real, value: Real, width: Real) -> Real:
     """Hysteresis of full width `width`: the state is dragged along, half a width behind."""
     return clip(state, value - 0.5 * width, value + 0.5 * width)
 
@@ -91,7 +91,7 @@ class RegulatorState:
         self.pressure_pa: Real = zero
         self.air = True
         self.supply_kpa: Real = None
-        self._bends = switched_on(regulator, ("command_bow", "command_s"))
+        self._bends = is_switched_on(regulator, ("command_bow", "command_s"))
         self._delay = DelayLine(regulator.delay_s, step_s, zero) if np.any(regulator.delay_s) else None
         self._slew_pa = regulator.slew_pa_per_s * step_s if np.any(regulator.slew_pa_per_s < UNLIMITED) else None
         self._lag = lag_factor(regulator.lag_s, step_s) if np.any(regulator.lag_s) else None
@@ -99,7 +99,7 @@ class RegulatorState:
         self._second_lag = lag_factor(regulator.second_lag_s, step_s) if np.any(regulator.second_lag_s) else None
         self._decay = exponential(-regulator.leak_per_s * step_s) if np.any(regulator.leak_per_s) else None
         self._kept: Real = zero + 1.0
-        self._droops = switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa"))
+        self._droops = is_switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa"))
         self._extra = self._decay is not None or self._droops
         self._caps = bool(np.any(regulator.ceiling_pa < UNLIMITED))
         self._leaks = bool(np.any(regulator.leak_flow_pa))
@@ -110,11 +110,11 @@ class RegulatorState:
         """Take a new command, V (one for all lanes, or one per lane)."""
         regulator, before = self._regulator, self._noticed_pa
         target = target_pa(regulator, voltage_v, self._bends)
-        self._noticed_pa = noticed(target, before, regulator.dead_band_pa)
-        self._play_pa = play(self._play_pa, self._noticed_pa, regulator.hysteresis_pa)
+        self._noticed_pa = apply_dead_band(target, before, regulator.dead_band_pa)
+        self._play_pa = apply_play(self._play_pa, self._noticed_pa, regulator.hysteresis_pa)
         self._target_pa = smaller(larger(self._play_pa, 0.0), regulator.supply_pa) + self._zero
         if self._decay is not None:
-            self._kept = chosen(self._noticed_pa != before, half_decay(self._decay), self._kept)
+            self._kept = choose(self._noticed_pa != before, half_decay(self._decay), self._kept)
 
     def step(self) -> Real:
         """Pressure at the end of one step, Pa."""
@@ -126,7 +126,7 @@ class RegulatorState:
         if self._lag is not None:
             lag = self._lag
             if self._fill_lag is not None:
-                lag = chosen(pressure > self._first_pa, self._fill_lag, lag)
+                lag = choose(pressure > self._first_pa, self._fill_lag, lag)
             self._first_pa = pressure = self._first_pa + lag * (pressure - self._first_pa)
         if self._second_lag is not None:
             pressure = self._smooth_pa + self._second_lag * (pressure - self._smooth_pa)
@@ -137,11 +137,11 @@ class RegulatorState:
         if self._caps:
             pressure = smaller(pressure, self._regulator.ceiling_pa)
         if self._leaks:
-            pressure = leaked(self._regulator, pressure)
+            pressure = apply_leak(self._regulator, pressure)
         self.pressure_pa = pressure
         if self._hunts:
             self._steps += 1
-            self.pressure_pa = hunted(self._regulator, pressure, self._steps * self._step_s)
+            self.pressure_pa = add_hunting(self._regulator, pressure, self._steps * self._step_s)
         return self.pressure_pa
 
     def _held_pa(self) -> Real:
@@ -151,5 +151,5 @@ class RegulatorState:
             pressure = pressure * self._kept
             self._kept = self._kept * self._decay
         if self._droops and self.supply_kpa is not None:
-            pressure = drooped(self._regulator, pressure, self.supply_kpa)
+            pressure = add_droop(self._regulator, pressure, self.supply_kpa)
         return pressure

@@ -2,7 +2,7 @@
 
 Fields without a null value are the dimensions of the machine (full scales, area, pad stiffness); their defaults are
 those of the ITV2050 and the 100 mm2 slide. A bound that is never met is UNLIMITED rather than infinity, which JSON (and
-so the schema for editors) cannot say. The functions of the effects stand in terms_*.py, regulator.py and friction.py.
+so the schema for editors) cannot say. The functions of the effects stand in gateway/twin/effects, regulator.py and friction.py.
 """
 
 from dataclasses import dataclass

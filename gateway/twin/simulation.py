@@ -36,12 +36,12 @@ class Twin:
         """Back to the start: state, time, faults and noise."""
         lanes = lane_count(self.plant)
         zero: Real = 0.0 if lanes is None else np.zeros(lanes)
-        self._moment = TwinConditions(command_v=zero)
+        self._conditions = TwinConditions(command_v=zero)
         self._regulator = RegulatorState(self.plant.regulator, STEP_S, zero)
         self._slide = SlideState(self.plant, STEP_S, zero)
-        self._contact = ContactState(self.plant.contact, STEP_S, self._moment, zero)
+        self._contact = ContactState(self.plant.contact, STEP_S, self._conditions, zero)
         self._cell = LoadCellState(self.plant.cell, STEP_S, zero)
-        self._cell.look(self._moment)
+        self._cell.look(self._conditions)
         self._rng = default_rng(self._seed)
         self._steps = 0
         self._owed_steps = 0.0
@@ -53,7 +53,7 @@ class Twin:
             raise ValueError(f"command {voltage_v} V is not finite")
         voltage_v = voltage_v if isinstance(voltage_v, np.ndarray) else float(voltage_v)
         self._regulator.command(voltage_v)
-        self._moment.command_v = voltage_v
+        self._conditions.command_v = voltage_v
 
     def advance(self, dt_s: float) -> None:
         """Let time pass. Parts of a step are kept for the next call, so that only the sum counts."""
@@ -75,17 +75,17 @@ class Twin:
     def _advance_contact(self, steps: int) -> None:
         """The same with effects of contact and tool, which look at the time and at the surroundings."""
         regulator, slide, contact, cell = self._regulator.step, self._slide.step, self._contact.step, self._cell.step
-        moment = self._moment
-        turn_rad = 0.0 if moment.spindle_rpm is None else moment.spindle_rpm * (2.0 * math.pi / 60.0 * STEP_S)
+        conditions = self._conditions
+        turn_rad = 0.0 if conditions.spindle_rpm is None else conditions.spindle_rpm * (2.0 * math.pi / 60.0 * STEP_S)
         for step in range(self._steps + 1, self._steps + steps + 1):
-            moment.time_s = step * STEP_S
-            moment.spindle_rad = moment.spindle_rad + turn_rad
+            conditions.time_s = step * STEP_S
+            conditions.spindle_rad = conditions.spindle_rad + turn_rad
             cell(contact(slide(regulator())))
 
     def read(self) -> Real:
         """A reading of the load cell now, N: each call draws new noise."""
-        self._moment.time_s = self._steps * STEP_S
-        self._reading = self._cell.read(self._rng, self._moment)
+        self._conditions.time_s = self._steps * STEP_S
+        self._reading = self._cell.read(self._rng, self._conditions)
         return self._reading
 
     @property
@@ -135,12 +135,12 @@ class Twin:
 
         The position is taken from where its effects are nothing. ValueError when a value is not finite.
         """
-        self._moment.look(around)
-        self._regulator.supply_kpa = self._moment.supply_kpa
+        self._conditions.look(around)
+        self._regulator.supply_kpa = self._conditions.supply_kpa
         friction = self.plant.friction
-        self._slide.set_side_load(side_load_n(friction, self._moment), side_share(friction, self._moment))
+        self._slide.set_side_load(side_load_n(friction, self._conditions), side_share(friction, self._conditions))
         self._contact.look(self._slide.force_n)
-        self._cell.look(self._moment)
+        self._cell.look(self._conditions)
 
     def set_disturbance(self, force_n: Real) -> None:
         """Input: an outside force on the slide, N towards the workpiece (a spindle's vibration); 0 is null.

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.twin.elementwise import Real, any_below, clip, larger, smaller
-from gateway.twin.friction import FREE_N_PER_M, Elements, two_sided
+from gateway.twin.friction import FREE_N_PER_M, Elements, two_sided_limit
 from gateway.twin.plant import Plant
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
@@ -121,7 +121,7 @@ class SlideState:
         self._limit_n = limit = elements.limit_n(thrust, self._travel_m)
         drive = thrust + self._steady_n + self._inertia_n_per_m * self._travel_m
         if elements.asymmetric:
-            self._limit_n, self._centre_n = limit, centre = two_sided(limit, self._plant.friction.asymmetry_n)
+            self._limit_n, self._centre_n = limit, centre = two_sided_limit(limit, self._plant.friction.asymmetry_n)
             drive = drive - centre
         travel = self._solve(drive, limit)
         elements.move(travel)

@@ -1,8 +1,8 @@
 """What is around the tool and enters its force: temperature, supply, spindle, feed, tilt, place on the path.
 
 Units are those of a recording's columns. None means that nobody knows: the effects that need the column are off then.
-`Moment` is the same together with what the effects need besides - the time, the command, the spindle's angle - for one
-instant of the running twin (floats) or for a whole recording (arrays): the formulas of terms_*.py take either.
+`TwinConditions` is the same together with what the effects need besides - the time, the command, the spindle's angle - for one
+instant of the running twin (floats) or for a whole recording (arrays): the formulas of gateway/twin/effects take either.
 """
 
 from dataclasses import dataclass, fields

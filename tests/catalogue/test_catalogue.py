@@ -20,7 +20,7 @@ thermal-zero-drift thermal-span-drift warm-up linear-drift sensor-quadratic sens
 repeated-samples outliers sensor-quantisation valve-crosstalk sign-loss
 """.split()
 FAMILIES = {"regulator": 11, "cylinder": 7, "contact and tool": 11, "sensing and logging": 14}
-GROUPS_OF_THE_PAGE = (
+INDISTINGUISHABLE = (
     ("regulator-hysteresis", "coulomb-friction"),
     ("transport-delay", "clock-offset", "extra-lag", "viscous-friction"),
     ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift"),
@@ -43,13 +43,13 @@ def parameters() -> Iterator[tuple[Effect, Parameter]]:
             yield effect, parameter
 
 
-def test_the_names_are_those_of_the_page() -> None:
+def test_the_names_are_those_of_the_contract() -> None:
     assert sorted(effect.name for effect in EFFECTS) == sorted(NAMES)
     assert len(EFFECTS) == 43
     assert [BY_NAME[name].name for name in NAMES] == NAMES
 
 
-def test_families_have_the_size_of_the_page() -> None:
+def test_families_have_the_size_of_the_contract() -> None:
     counts = {name: sum(effect.family == name for effect in EFFECTS) for name in FAMILIES}
     assert counts == FAMILIES
 
@@ -73,8 +73,8 @@ def test_groups_name_other_effects() -> None:
         assert len(set(effect.group)) == len(effect.group), effect.name
 
 
-@pytest.mark.parametrize("group", GROUPS_OF_THE_PAGE, ids=lambda group: group[0])
-def test_the_page_s_groups_are_known_both_ways(group: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("group", INDISTINGUISHABLE, ids=lambda group: group[0])
+def test_what_a_recording_cannot_tell_apart_is_known_both_ways(group: tuple[str, ...]) -> None:
     for name in group:
         assert set(group) - {name} <= set(BY_NAME[name].group), name
 

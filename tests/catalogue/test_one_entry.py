@@ -18,13 +18,13 @@ ADDED = """
 import json
 from click.testing import CliRunner
 from gateway.catalogue import sensing
-from gateway.catalogue.effect import By, Effect, Form, Parameter, PartName, Recipe, Treatment, fixed
+from gateway.catalogue.effect import By, Effect, EffectForm, Parameter, PartName, Recipe, Treatment, fixed_starts
 made_up = Effect(
     name="magnet-pull", number=77, family="sensing and logging", what="a magnet pulls at the tool",
     signature="the residual follows the tilt", excitation="tilts", experiment="take the magnet away",
     recipe=Recipe(parts=(PartName.LEVEL,), meanwhile="turn the tool"),
     treatments=(Treatment(why_not="nobody knows where the magnet is"),),
-    forms=(Form(parameters=(Parameter("contact", "mass_kg", "kg", 0.0, 0.0, 1.0, 0.01),), probes=fixed((0.1,)),
+    forms=(EffectForm(parameters=(Parameter("contact", "mass_kg", "kg", 0.0, 0.0, 1.0, 0.01),), probes=fixed_starts((0.1,)),
                 needs=("tilt_deg",)),),
 )
 sensing.SENSING = (*sensing.SENSING, made_up)

@@ -2,8 +2,8 @@
 
 The push gate asks nineteen, drawn from a printed seed (another: HIDDEN_EFFECTS_SEED); --long asks for every effect twenty
 times, 300 nulls, and twos and threes, and leaves its lines in HIDDEN_EFFECTS_RESULTS (else beside the test's own files).
-Anybody gets the same answers from `tools/hidden_effects --gate`. The bars of a sample are wider than those of DIAGNOSIS, which
---long holds.
+Anybody gets the same answers from `tools/hidden_effects --gate`. The bars of a sample are wider than those of README's
+table, which --long holds.
 """
 
 import fcntl

@@ -1,4 +1,4 @@
-"""What the paper says, number by number, so that each has one place. Source: the paper's text; see METHOD for its rig."""
+"""What the paper says, number by number, so that each has one place. Source: the paper's text."""
 
 from typing import Final
 

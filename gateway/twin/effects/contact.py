@@ -17,50 +17,50 @@ HARDENING_AT_N: Final = 10.0
 _RADIAN_PER_DEGREE: Final = math.pi / 180.0
 
 
-def hardened(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def add_hardening(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """contact-nonlinearity: a pad that stiffens, F + h F sqrt(|F| / 10 N)."""
     return force_n + contact.hardening * force_n * root(abs(force_n) / HARDENING_AT_N)
 
 
-def closed(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def close_backlash(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """backlash: a gap that the thrust closes first, so that no force passes below `lost_n`."""
     return larger(force_n - contact.lost_n, 0.0)
 
 
-def worn(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def apply_wear(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """pad-wear: the force falls with the distance ground."""
-    distance_m = moment.distance_m
+    distance_m = conditions.distance_m
     return force_n * (1.0 - contact.wear_per_m * distance_m) + contact.wear_n_per_m * distance_m
 
 
-def tilted(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def add_tilt(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """tilt-gravity: weight that the measured tilt brings onto the workpiece."""
-    from_zero_rad = (moment.tilt_deg - contact.tilt_zero_deg) * _RADIAN_PER_DEGREE
+    from_zero_rad = (conditions.tilt_deg - contact.tilt_zero_deg) * _RADIAN_PER_DEGREE
     return force_n + contact.tilt_n * sine(from_zero_rad + 0.5 * math.pi)
 
 
-def dragged(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def add_feed_drag(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """feed-drag: force that the feed under the tool brings."""
-    feed = moment.feed_mm_s
+    feed = conditions.feed_mm_s
     along = contact.feed_drag_n_s_per_mm * feed + contact.feed_drag_n * sign(feed)
     return force_n + along + contact.feed_drag_abs_n_s_per_mm * abs(feed)
 
 
-def placed(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def add_position_dependence(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """position-dependence: slope and curvature along the path."""
-    aside_mm = moment.aside_mm
+    aside_mm = conditions.aside_mm
     return force_n + (contact.position_n_per_mm + contact.position_n_per_mm2 * aside_mm) * aside_mm
 
 
-def rippled(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def add_ripple(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """position-ripple: a screw or a tooth belt repeats itself along the path."""
-    turn_rad = (2.0 * math.pi) * moment.position_mm / contact.ripple_pitch_mm
+    turn_rad = (2.0 * math.pi) * conditions.position_mm / contact.ripple_pitch_mm
     return force_n + contact.ripple_n * sine(turn_rad + contact.ripple_phase_rad)
 
 
-def stopped(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def apply_stop(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """end-stop, where the position is measured: an elastic stop beyond stop_mm."""
-    return force_n + contact.stop_stiffness_n_per_mm * larger(moment.position_mm - contact.stop_mm, 0.0)
+    return force_n + contact.stop_stiffness_n_per_mm * larger(conditions.position_mm - contact.stop_mm, 0.0)
 
 
 def spindle_amplitude_n(contact: Contact, spindle_rpm: Real) -> Real:
@@ -68,23 +68,23 @@ def spindle_amplitude_n(contact: Contact, spindle_rpm: Real) -> Real:
     return contact.spindle_n + contact.spindle_n_per_krpm2 * (thousands * thousands)
 
 
-def vibrating(contact: Contact, force_n: Real, moment: TwinConditions) -> Real:
+def add_vibration(contact: Contact, force_n: Real, conditions: TwinConditions) -> Real:
     """spindle-vibration: n times a turn, with an unbalance that grows with the speed squared."""
-    angle_rad = contact.spindle_order * moment.spindle_rad + contact.spindle_phase_rad
-    return force_n + spindle_amplitude_n(contact, moment.spindle_rpm) * sine(angle_rad)
+    angle_rad = contact.spindle_order * conditions.spindle_rad + contact.spindle_phase_rad
+    return force_n + spindle_amplitude_n(contact, conditions.spindle_rpm) * sine(angle_rad)
 
 
-SPINDLE: Final = Term(("spindle_n", "spindle_n_per_krpm2"), "spindle_rpm", vibrating)
+SPINDLE: Final = Term(("spindle_n", "spindle_n_per_krpm2"), "spindle_rpm", add_vibration)
 """Apart from the others: it is faster than a recording's rows, so replay must not interpolate it."""
 
 SLOW: Final = (
-    Term(("lost_n",), None, closed),
-    Term(("hardening",), None, hardened),
-    Term(("wear_per_m", "wear_n_per_m"), "distance_m", worn),
-    Term(("tilt_n",), "tilt_deg", tilted),
-    Term(("feed_drag_n_s_per_mm", "feed_drag_n", "feed_drag_abs_n_s_per_mm"), "feed_mm_s", dragged),
-    Term(("position_n_per_mm", "position_n_per_mm2"), "aside_mm", placed),
-    Term(("ripple_n",), "position_mm", rippled),
-    Term(("stop_stiffness_n_per_mm",), "position_mm", stopped),
+    Term(("lost_n",), None, close_backlash),
+    Term(("hardening",), None, add_hardening),
+    Term(("wear_per_m", "wear_n_per_m"), "distance_m", apply_wear),
+    Term(("tilt_n",), "tilt_deg", add_tilt),
+    Term(("feed_drag_n_s_per_mm", "feed_drag_n", "feed_drag_abs_n_s_per_mm"), "feed_mm_s", add_feed_drag),
+    Term(("position_n_per_mm", "position_n_per_mm2"), "aside_mm", add_position_dependence),
+    Term(("ripple_n",), "position_mm", add_ripple),
+    Term(("stop_stiffness_n_per_mm",), "position_mm", apply_stop),
 )
 """In the order in which they act."""

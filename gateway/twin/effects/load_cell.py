@@ -8,63 +8,63 @@ import math
 from typing import Final
 
 from gateway.twin.effects.term import Term
-from gateway.twin.elementwise import Real, clip, exponential, quantised, sine
+from gateway.twin.elementwise import Real, clip, exponential, quantise, sine
 from gateway.twin.sections import LoadCell
 from gateway.twin.surroundings import TwinConditions
 
 
-def bent(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
+def bend_line(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
     """sensor-quadratic and sensor-cubic: F + q F^2 + c F^3."""
     return force_n + (cell.quadratic_per_n + cell.cubic_per_n2 * force_n) * (force_n * force_n)
 
 
-def warmer_span(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
+def drift_span(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
     """thermal-span-drift."""
-    return force_n * (1.0 + cell.span_per_k * (moment.temperature_c - cell.reference_c))
+    return force_n * (1.0 + cell.span_per_k * (conditions.temperature_c - cell.reference_c))
 
 
-def warmer_zero(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
+def drift_zero(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
     """thermal-zero-drift."""
-    return force_n + cell.zero_n_per_k * (moment.temperature_c - cell.reference_c)
+    return force_n + cell.zero_n_per_k * (conditions.temperature_c - cell.reference_c)
 
 
-def warming_up(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
+def add_warm_up(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
     """warm-up: an error that dies away after switching on."""
-    return force_n + cell.warm_up_n * exponential(-moment.time_s / cell.warm_up_s)
+    return force_n + cell.warm_up_n * exponential(-conditions.time_s / cell.warm_up_s)
 
 
-def drifting(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
+def add_drift(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
     """linear-drift."""
-    return force_n + cell.drift_n_per_s * moment.time_s
+    return force_n + cell.drift_n_per_s * conditions.time_s
 
 
-def humming(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
+def add_hum(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
     """mains-hum."""
-    return force_n + cell.hum_n * sine((2.0 * math.pi) * cell.hum_hz * moment.time_s + cell.hum_phase_rad)
+    return force_n + cell.hum_n * sine((2.0 * math.pi) * cell.hum_hz * conditions.time_s + cell.hum_phase_rad)
 
 
-def disturbed(cell: LoadCell, force_n: Real, moment: TwinConditions) -> Real:
+def add_crosstalk(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
     """valve-crosstalk: the command voltage of this moment, before a new one acts."""
-    return force_n + cell.crosstalk_n_per_v * moment.command_v
+    return force_n + cell.crosstalk_n_per_v * conditions.command_v
 
 
-def without_sign(cell: LoadCell, reading_n: Real) -> Real:
+def lose_sign(cell: LoadCell, reading_n: Real) -> Real:
     """sign-loss: the share of a reading that has lost its sign."""
     return (1.0 - cell.sign_lost) * reading_n + cell.sign_lost * abs(reading_n)
 
 
-def converted(cell: LoadCell, reading_n: Real) -> Real:
+def convert_reading(cell: LoadCell, reading_n: Real) -> Real:
     """The converter: range and steps (sensor-quantisation)."""
-    return clip(quantised(clip(reading_n, -cell.range_n, cell.range_n), cell.quantum_n), -cell.range_n, cell.range_n)
+    return clip(quantise(clip(reading_n, -cell.range_n, cell.range_n), cell.quantum_n), -cell.range_n, cell.range_n)
 
 
 TERMS: Final = (
-    Term(("quadratic_per_n", "cubic_per_n2"), None, bent),
-    Term(("span_per_k",), "temperature_c", warmer_span),
-    Term(("zero_n_per_k",), "temperature_c", warmer_zero),
-    Term(("warm_up_n",), None, warming_up),
-    Term(("drift_n_per_s",), None, drifting),
-    Term(("hum_n",), None, humming),
-    Term(("crosstalk_n_per_v",), "command_v", disturbed),
+    Term(("quadratic_per_n", "cubic_per_n2"), None, bend_line),
+    Term(("span_per_k",), "temperature_c", drift_span),
+    Term(("zero_n_per_k",), "temperature_c", drift_zero),
+    Term(("warm_up_n",), None, add_warm_up),
+    Term(("drift_n_per_s",), None, add_drift),
+    Term(("hum_n",), None, add_hum),
+    Term(("crosstalk_n_per_v",), "command_v", add_crosstalk),
 )
 """In the order in which they act."""

@@ -11,7 +11,7 @@ CLOSING_PA: Final = 2.0e4
 CHOKED_RATIO: Final = 0.528  # of the pressures at a hole, below which the flow is that of sound
 
 
-def bent_command(regulator: Regulator, voltage_v: Real) -> Real:
+def bend_command(regulator: Regulator, voltage_v: Real) -> Real:
     """command-nonlinearity: u + bow 4 u (1 - u) + s 8 u (1 - u) (2 u - 1), exact at both ends of the scale."""
     share = voltage_v / regulator.full_scale_v
     middle = 4.0 * share * (1.0 - share)
@@ -20,7 +20,7 @@ def bent_command(regulator: Regulator, voltage_v: Real) -> Real:
     )
 
 
-def drooped(regulator: Regulator, pressure_pa: Real, supply_kpa: Real) -> Real:
+def add_droop(regulator: Regulator, pressure_pa: Real, supply_kpa: Real) -> Real:
     """supply-droop: what a stronger air line adds, as far as the regulator is open; never below 0."""
     excess_pa = supply_kpa * 1.0e3 - regulator.droop_reference_pa
     added = regulator.droop_pa_per_pa * open_share(pressure_pa)
@@ -32,7 +32,7 @@ def open_share(pressure_pa: Real) -> Real:
     return 1.0 - exponential(-larger(pressure_pa, 0.0) / CLOSING_PA)
 
 
-def leaked(regulator: Regulator, pressure_pa: Real) -> Real:
+def apply_leak(regulator: Regulator, pressure_pa: Real) -> Real:
     """leak: what is lost at the valve's resistance to the flow through a hole, after ISO 6358; never below 0.
 
     The flow grows with the absolute pressure, and below a pressure ratio of 0.528 (choked) with nothing else; it is
@@ -44,7 +44,7 @@ def leaked(regulator: Regulator, pressure_pa: Real) -> Real:
     return larger(pressure_pa - regulator.leak_flow_pa * flow, 0.0)
 
 
-def hunted(regulator: Regulator, pressure_pa: Real, time_s: Real) -> Real:
+def add_hunting(regulator: Regulator, pressure_pa: Real, time_s: Real) -> Real:
     """regulator-hunting: a limit cycle on the pressure, as far as the regulator is open; never below 0."""
     angle_rad = (2.0 * math.pi) * regulator.hunting_hz * time_s + regulator.hunting_phase_rad
     return larger(pressure_pa + regulator.hunting_pa * open_share(pressure_pa) * sine(angle_rad), 0.0)

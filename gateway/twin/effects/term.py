@@ -26,7 +26,7 @@ class Term:
     formula: Formula
 
 
-def switched_on(section: Any, names: Sequence[str]) -> bool:
+def is_switched_on(section: Any, names: Sequence[str]) -> bool:
     """Is one of these fields, in any lane, not 0?"""
     for name in names:
         value = getattr(section, name)
@@ -35,10 +35,11 @@ def switched_on(section: Any, names: Sequence[str]) -> bool:
     return False
 
 
-def active(terms: Sequence[Term], section: Any, moment: TwinConditions) -> tuple[Formula, ...]:
+def active_formulas(terms: Sequence[Term], section: Any, conditions: TwinConditions) -> tuple[Formula, ...]:
     """The formulas that are on for this section, in order."""
     return tuple(
         term.formula
         for term in terms
-        if switched_on(section, term.switches) and (term.column is None or getattr(moment, term.column) is not None)
+        if is_switched_on(section, term.switches)
+        and (term.column is None or getattr(conditions, term.column) is not None)
     )

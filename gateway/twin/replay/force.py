@@ -7,10 +7,10 @@ spindle is faster than the rows, so it is added at their own times instead.
 import numpy as np
 
 from gateway.twin.effects.contact import SLOW, SPINDLE
-from gateway.twin.effects.term import active
+from gateway.twin.effects.term import active_formulas
 from gateway.twin.replay.drive import Floats
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.lags import followed
+from gateway.twin.replay.lags import follow_lag
 from gateway.twin.sections import Contact
 
 
@@ -26,17 +26,17 @@ class Forces:
         if contact.backlash_n != 0.0:
             force = _backlash(force, contact.backlash_n)
         if contact.creep_share != 0.0:
-            force = force + contact.creep_share * followed(force, contact.creep_s, self._grid.steps_s)
-        for term in active(SLOW, contact, self._grid.moment):
-            force = term(contact, force, self._grid.moment)
+            force = force + contact.creep_share * follow_lag(force, contact.creep_s, self._grid.steps_s)
+        for term in active_formulas(SLOW, contact, self._grid.conditions):
+            force = term(contact, force, self._grid.conditions)
         return force
 
     def at_rows(self, contact: Contact, contact_n: Floats, found: Floats) -> None:
         """Contact force at the rows, spindle included, N."""
         found[:] = self._grid.at_rows(contact_n)
-        moment = self._grid.row_moment
-        for term in active((SPINDLE,), contact, moment):
-            found[:] = term(contact, found, moment)
+        conditions = self._grid.row_conditions
+        for term in active_formulas((SPINDLE,), contact, conditions):
+            found[:] = term(contact, found, conditions)
 
 
 def _backlash(force_n: Floats, width_n: float) -> Floats:

@@ -22,7 +22,7 @@ MOST_STEPS: Final = 80_000  # where many plants share the memory
 _ALIKE: Final = 1.0e-6  # of a step
 
 
-def alike(steps_s: Floats, first: int = 0) -> Real:
+def common_step_s(steps_s: Floats, first: int = 0) -> Real:
     """Lengths of steps, s: one float where, from the first that counts, they are alike."""
     counted = steps_s[first:]
     return float(np.mean(counted)) if np.ptp(counted) < _ALIKE * counted[0] else steps_s
@@ -39,13 +39,13 @@ class Grid:
         self.step_s: float = self._step_s(time_s, most_steps) if step_s is None else step_s
         self._parts = np.maximum(np.round(np.diff(time_s) / self.step_s), 1.0).astype(np.intp)
         self._has_rows = not self.notes  # else there would be too many points
-        self.time_s = _divided(time_s, self._parts) if self._has_rows else _even(time_s[-1], self.step_s)
+        self.time_s = _divide_rows(time_s, self._parts) if self._has_rows else _even_times_s(time_s[-1], self.step_s)
         self.points = self.time_s.size
-        self.steps_s = alike(np.diff(self.time_s))
+        self.steps_s = common_step_s(np.diff(self.time_s))
         self.is_rows = self._has_rows and self.points == self.rows
         self._row_index = np.concatenate([[0], np.cumsum(self._parts)])
-        self.row_moment = _moment(drive, self.row_s, self)
-        self.moment = self.row_moment if self.is_rows else _moment(drive, self.time_s, self)
+        self.row_conditions = _conditions(drive, self.row_s, self)
+        self.conditions = self.row_conditions if self.is_rows else _conditions(drive, self.time_s, self)
 
     def _step_s(self, time_s: Floats, most_steps: int) -> float:
         step_s = float(np.median(np.diff(time_s)))
@@ -73,7 +73,7 @@ class Grid:
         return found
 
 
-def _divided(time_s: Floats, parts: NDArray[np.intp]) -> Floats:
+def _divide_rows(time_s: Floats, parts: NDArray[np.intp]) -> Floats:
     """The rows' times, with each distance between them cut into so many equal parts."""
     if parts.max() == 1:
         return time_s
@@ -83,32 +83,32 @@ def _divided(time_s: Floats, parts: NDArray[np.intp]) -> Floats:
     return np.concatenate([between, time_s[-1:]])
 
 
-def _even(last_s: float, step_s: float) -> Floats:
+def _even_times_s(last_s: float, step_s: float) -> Floats:
     """Times from 0 to the last row, or a little beyond."""
     found: Floats = np.arange(math.ceil(last_s / step_s - _ALIKE) + 1, dtype=np.float64) * step_s
     return found
 
 
-def _moment(drive: Drive, time_s: Floats, grid: Grid) -> TwinConditions:
+def _conditions(drive: Drive, time_s: Floats, grid: Grid) -> TwinConditions:
     """The recording's surroundings at the rows or on the grid."""
-    moment, around = TwinConditions(time_s=time_s), drive.surroundings
+    conditions, around = TwinConditions(time_s=time_s), drive.surroundings
     for name in COLUMNS:
         column = getattr(around, name)
         if column is not None:
             column = np.broadcast_to(np.asarray(column, dtype=np.float64), grid.row_s.shape)
-            setattr(moment, name, np.interp(time_s, grid.row_s, column))
+            setattr(conditions, name, np.interp(time_s, grid.row_s, column))
     if around.position_mm is not None:
-        moment.aside_mm = moment.position_mm - np.mean(around.position_mm)
+        conditions.aside_mm = conditions.position_mm - np.mean(around.position_mm)
     if around.spindle_rpm is not None:
-        moment.spindle_rad = _turned_rad(time_s, moment.spindle_rpm)
+        conditions.spindle_rad = _spindle_angle_rad(time_s, conditions.spindle_rpm)
     if drive.command_v is not None:
         first_v = drive.command_v[0] if drive.before_v is None else drive.before_v
         before_v = np.concatenate([[first_v], drive.command_v[:-1]])
-        moment.command_v = before_v if time_s is grid.row_s else None  # only readings look at it
-    return moment
+        conditions.command_v = before_v if time_s is grid.row_s else None  # only readings look at it
+    return conditions
 
 
-def _turned_rad(time_s: Floats, spindle_rpm: Floats) -> Floats:
+def _spindle_angle_rad(time_s: Floats, spindle_rpm: Floats) -> Floats:
     """The spindle's angle since time 0: the integral of its speed."""
     mean_rpm = 0.5 * (spindle_rpm[1:] + spindle_rpm[:-1])
     turned = np.cumsum(mean_rpm * np.diff(time_s)) * (2.0 * math.pi / 60.0)

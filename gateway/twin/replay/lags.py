@@ -19,7 +19,7 @@ from gateway.twin.replay.drive import Floats
 from gateway.twin.sections import UNLIMITED, Regulator
 
 
-def lags(regulator: Regulator) -> bool:
+def has_lags(regulator: Regulator) -> bool:
     """Does the pressure take any time at all? If not, it jumps with the target."""
     return regulator.lag_s > 0.0 or regulator.second_lag_s > 0.0 or regulator.slew_pa_per_s < UNLIMITED
 
@@ -27,10 +27,10 @@ def lags(regulator: Regulator) -> bool:
 def is_linear(regulator: Regulator) -> bool:
     """Are there lags, and neither another one for rising nor a slew limit?"""
     slews = regulator.slew_pa_per_s < UNLIMITED
-    return lags(regulator) and not slews and regulator.fill_slowdown == 0.0
+    return has_lags(regulator) and not slews and regulator.fill_slowdown == 0.0
 
 
-def evenly(regulator: Regulator, target_pa: Floats, step_s: float) -> Floats:
+def filter_even_rows(regulator: Regulator, target_pa: Floats, step_s: float) -> Floats:
     """The pressure at rows that lie evenly, (rows,), of a linear regulator; target_pa: one more, from before the first.
 
     The taps come from what one target for one step leaves in the row where it is seen first and in the two after that.
@@ -38,8 +38,8 @@ def evenly(regulator: Regulator, target_pa: Floats, step_s: float) -> Floats:
     from scipy.signal import lfilter
 
     whole = math.floor(regulator.delay_s / step_s)
-    kept_1, kept_2, across = coupling(regulator.lag_s, regulator.second_lag_s, step_s)
-    _, part_2, part = coupling(regulator.lag_s, regulator.second_lag_s, (whole + 1) * step_s - regulator.delay_s)
+    kept_1, kept_2, across = lag_coupling(regulator.lag_s, regulator.second_lag_s, step_s)
+    _, part_2, part = lag_coupling(regulator.lag_s, regulator.second_lag_s, (whole + 1) * step_s - regulator.delay_s)
     first, second = 1.0 - kept_1, 1.0 - kept_2 - across
     left = [1.0 - part_2 - part, part * first + part_2 * second]
     left.append(part * kept_1 * first + part_2 * (kept_2 * second + across * first))
@@ -51,7 +51,7 @@ def evenly(regulator: Regulator, target_pa: Floats, step_s: float) -> Floats:
     return found
 
 
-def scanned(kept: Real, gained: Floats, start: float) -> Floats:
+def scan_recursion(kept: Real, gained: Floats, start: float) -> Floats:
     """x[0] = start, x[k + 1] = kept[k] x[k] + gained[k]; kept: a float, or one for each step.
 
     BLAS solves it as a triangular band; lfilter takes no coefficients that change. Imported here, as above: the twin's
@@ -65,16 +65,16 @@ def scanned(kept: Real, gained: Floats, start: float) -> Floats:
     return found
 
 
-def followed(series: Floats, lag_s: float, steps_s: Real) -> Floats:
+def follow_lag(series: Floats, lag_s: float, steps_s: Real) -> Floats:
     """A first-order lag behind a series that is straight between its points, from rest at its first value."""
     if lag_s <= 0.0:
         return series
     ratio = steps_s / lag_s
     kept, slope = np.exp(-ratio), -np.expm1(-ratio) / ratio
-    return scanned(kept, (1.0 - slope) * series[1:] + (slope - kept) * series[:-1], float(series[0]))
+    return scan_recursion(kept, (1.0 - slope) * series[1:] + (slope - kept) * series[:-1], float(series[0]))
 
 
-def coupling(first_s: float, second_s: float, held_s: Real) -> tuple[Real, Real, Real]:
+def lag_coupling(first_s: float, second_s: float, held_s: Real) -> tuple[Real, Real, Real]:
     """(e1, e2, K) of two lags over the times that targets are held; see the module's text. Lags of 0 are none."""
     kept_1 = np.exp(held_s * (-1.0 / first_s)) if first_s > 0.0 else 0.0
     kept_2 = np.exp(held_s * (-1.0 / second_s)) if second_s > 0.0 else 0.0
@@ -87,24 +87,24 @@ def coupling(first_s: float, second_s: float, held_s: Real) -> tuple[Real, Real,
     return kept_1, kept_2, held_s / second_s * kept_2 * growth
 
 
-def at_commands(regulator: Regulator, target_pa: Floats, held_s: Real) -> Floats:
+def states_at_commands(regulator: Regulator, target_pa: Floats, held_s: Real) -> Floats:
     """States when each target arrives: rows for the first lag, for the second and for the slew limit where there are.
 
     held_s: of all targets but the last, a float or (targets - 1,). At rest under the first target, which lasts.
     """
     fills = regulator.fill_slowdown != 0.0 and regulator.lag_s > 0.0
-    states = (_filled if fills else _lagged)(regulator, target_pa, held_s)
+    states = (_fill_states if fills else _lag_states)(regulator, target_pa, held_s)
     if regulator.slew_pa_per_s < UNLIMITED:
-        states.append(_slewed(states[-1], regulator.slew_pa_per_s * held_s))
+        states.append(_limit_slew(states[-1], regulator.slew_pa_per_s * held_s))
     return np.stack(states) if len(states) > 1 else states[0][None]
 
 
-def later(regulator: Regulator, states: Floats, target_pa: Floats, held_s: Floats) -> Floats:
+def pressure_after(regulator: Regulator, states: Floats, target_pa: Floats, held_s: Floats) -> Floats:
     """The pressure (points,) after the states of each point (as above, points) have lived under a target for so long."""
-    _, kept_2, across = coupling(regulator.lag_s, regulator.second_lag_s, held_s)
+    _, kept_2, across = lag_coupling(regulator.lag_s, regulator.second_lag_s, held_s)
     ahead = states[0] - target_pa
     if regulator.fill_slowdown != 0.0:
-        filling = coupling(_filling_s(regulator), regulator.second_lag_s, held_s)[2]
+        filling = lag_coupling(_filling_s(regulator), regulator.second_lag_s, held_s)[2]
         across = np.where(ahead < 0.0, filling, across)
     pressure: Floats = target_pa + across * ahead
     if regulator.second_lag_s > 0.0:
@@ -119,23 +119,23 @@ def _filling_s(regulator: Regulator) -> float:
     return regulator.lag_s * (1.0 + regulator.fill_slowdown)
 
 
-def _lagged(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[Floats]:
+def _lag_states(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[Floats]:
     """Both lags' states when each target arrives."""
-    kept_1, kept_2, across = coupling(regulator.lag_s, regulator.second_lag_s, held_s)
+    kept_1, kept_2, across = lag_coupling(regulator.lag_s, regulator.second_lag_s, held_s)
     start, held = float(target_pa[0]), target_pa[:-1]
-    first = scanned(kept_1, (1.0 - kept_1) * held, start)
+    first = scan_recursion(kept_1, (1.0 - kept_1) * held, start)
     if regulator.second_lag_s == 0.0:
         return [first]
-    return [first, scanned(kept_2, across * first[:-1] + (1.0 - kept_2 - across) * held, start)]
+    return [first, scan_recursion(kept_2, across * first[:-1] + (1.0 - kept_2 - across) * held, start)]
 
 
-def _filled(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[Floats]:
+def _fill_states(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[Floats]:
     """Lags of which the first is another one while the pressure rises, command by command."""
     steps = target_pa.size - 1
     ways = []
     for lag_s in (_filling_s(regulator), regulator.lag_s):
-        shares = coupling(lag_s, regulator.second_lag_s, held_s)
-        ways.append(zip(*(_each(share, steps) for share in shares), strict=True))
+        shares = lag_coupling(lag_s, regulator.second_lag_s, held_s)
+        ways.append(zip(*(_one_for_each(share, steps) for share in shares), strict=True))
     first = second = float(target_pa[0])
     firsts, seconds = [first], [second]
     for target, filling, emptying in zip(target_pa[:-1].tolist(), *ways, strict=True):
@@ -147,17 +147,17 @@ def _filled(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[Float
     return [np.array(firsts), np.array(seconds)]
 
 
-def _slewed(pressure_pa: Floats, most_pa: Real) -> Floats:
+def _limit_slew(pressure_pa: Floats, most_pa: Real) -> Floats:
     """What a slew limit of `most_pa` per step lets through."""
     pressure = float(pressure_pa[0])
     found = [pressure]
-    for asked, most in zip(pressure_pa[1:].tolist(), _each(most_pa, pressure_pa.size - 1), strict=True):
+    for asked, most in zip(pressure_pa[1:].tolist(), _one_for_each(most_pa, pressure_pa.size - 1), strict=True):
         travel = asked - pressure
         pressure += most if travel > most else -most if travel < -most else travel
         found.append(pressure)
     return np.array(found)
 
 
-def _each(values: Real, steps: int) -> Iterable[float]:
+def _one_for_each(values: Real, steps: int) -> Iterable[float]:
     """What is one for all steps, or one for each, as floats for each."""
     return values.tolist() if np.ndim(values) else repeat(float(values), steps)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.twin.elementwise import Real
-from gateway.twin.friction import ELEMENTS, side_load_n, side_share, two_sided
+from gateway.twin.friction import ELEMENTS, side_load_n, side_share, two_sided_limit
 from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import Floats, Strains
 from gateway.twin.sections import Friction
@@ -39,12 +39,12 @@ class Load:
         return min(one, most), min(two, most), min(three, most)
 
     @property
-    def begins_n(self) -> float:
+    def start_force_n(self) -> float:
         """Force at the first point where its strains are given, N."""
         return float(self.drive_n[0]) - float(self.limit_n[0]) * sum(self.strains) / ELEMENTS
 
     @property
-    def rubs(self) -> bool:
+    def has_dry_friction(self) -> bool:
         """Is there dry friction at all?"""
         return bool(np.any(self.limit_n))
 
@@ -54,26 +54,30 @@ class Load:
         return friction.presliding_m == 0.0 and friction.stribeck_n == 0.0 and friction.dwell_stiction_n == 0.0
 
     @property
-    def stays_on_the_pad(self) -> bool:
+    def is_always_pressed(self) -> bool:
         """A drive that never pulls leaves a pad without gap nowhere: friction only holds back what was pushed."""
         contact, reach_m = self.plant.contact, self.plant.cylinder.stroke_m
         bounded = float(self.drive_n.max()) <= contact.pad_stiffness_n_per_m * reach_m
         return contact.gap_m == 0.0 and bounded and float(self.drive_n.min()) >= 0.0
 
 
-def sideways_n(friction: Friction, thrust_n: Floats, moment: TwinConditions) -> Real:
+def side_load_on_grid_n(friction: Friction, thrust_n: Floats, conditions: TwinConditions) -> Real:
     """The side load on the grid, N; a float where there is none."""
-    side: Real = side_load_n(friction, moment)
-    return side + side_share(friction, moment) * thrust_n if friction.side_load_n_per_n else side
+    side: Real = side_load_n(friction, conditions)
+    return side + side_share(friction, conditions) * thrust_n if friction.side_load_n_per_n else side
 
 
-def loaded(plant: Plant, pressure_pa: Floats, moment: TwinConditions, start: Strains | None = None) -> Load:
+def load_of(plant: Plant, pressure_pa: Floats, conditions: TwinConditions, start: Strains | None = None) -> Load:
     """Thrust and friction limit of a plant under a pressure."""
     friction, contact = plant.friction, plant.contact
     thrust = plant.cylinder.area_m2 * pressure_pa
-    limit = friction.coulomb_n + sideways_n(friction, thrust, moment) + friction.load_dependent_n_per_n * thrust
+    limit = (
+        friction.coulomb_n
+        + side_load_on_grid_n(friction, thrust, conditions)
+        + friction.load_dependent_n_per_n * thrust
+    )
     drive = thrust + weight_n(contact.mass_kg, contact.tilt_deg) if contact.mass_kg else thrust
     if friction.asymmetry_n != 0.0:
-        limit, centre = two_sided(limit, friction.asymmetry_n)
+        limit, centre = two_sided_limit(limit, friction.asymmetry_n)
         drive = drive - centre
     return Load(plant, pressure_pa, thrust, drive, limit, start)

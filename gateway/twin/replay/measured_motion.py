@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.twin.friction import BREAKAWAY_M, ELEMENTS, RIGID_M, drags, moved, rested
+from gateway.twin.friction import BREAKAWAY_M, ELEMENTS, RIGID_M, directional_drags, relieve_stiction, rest_stiction
 from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats
 from gateway.twin.replay.grid import Grid
@@ -40,7 +40,7 @@ class Motions:
         """Force of one load on the grid, N: thrust - friction outward, seen from the position's own direction."""
         friction = load.plant.friction
         limit, strain = self._limit_n(friction, load.limit_n), self._mean_strain(friction.presliding_m)
-        out, back = drags(friction)
+        out, back = directional_drags(friction)
         speed = self._speed_m_per_s
         return load.drive_n - limit * strain - np.where(speed > 0.0, out, back) * speed
 
@@ -56,8 +56,8 @@ class Motions:
         shares = 1.0 - np.exp(-np.diff(self._grid.time_s) / friction.dwell_stiction_s)
         travels = self._quiet_travels_m(breakaway_m)
         stiction, found = 0.0, [0.0]
-        for kept, share in zip(moved(1.0, travels, breakaway_m).tolist(), shares.tolist(), strict=True):
-            stiction = rested(stiction, friction.dwell_stiction_n, share) * kept
+        for kept, share in zip(relieve_stiction(1.0, travels, breakaway_m).tolist(), shares.tolist(), strict=True):
+            stiction = rest_stiction(stiction, friction.dwell_stiction_n, share) * kept
             found.append(stiction)
         return np.array(found)
 
@@ -65,7 +65,7 @@ class Motions:
         """Travel of each step, without the noise of a position at rest (a play of four deviations takes it out)."""
         if self._noise_m == 0.0:
             return np.diff(self._position_m)
-        return np.diff(_dragged(self._position_m, 0.5 * NOISE_WIDTHS * self._noise_m))
+        return np.diff(_drag_element(self._position_m, 0.5 * NOISE_WIDTHS * self._noise_m))
 
     def _mean_strain(self, presliding_m: float) -> Floats:
         found = self._strains.get(presliding_m)
@@ -76,7 +76,7 @@ class Motions:
         count = ELEMENTS if presliding_m > 0.0 else 1
         least_m = max(RIGID_M, NOISE_WIDTHS * self._noise_m)
         widths = [max(presliding_m * (j + 1) / count, least_m) for j in range(count)]
-        strains = [(self._position_m - _dragged(self._position_m, width)) / width for width in widths]
+        strains = [(self._position_m - _drag_element(self._position_m, width)) / width for width in widths]
         return self._strains.put(presliding_m, np.clip(sum(strains[1:], start=strains[0]) / count, -1.0, 1.0))
 
     def _direction(self) -> Floats:
@@ -97,7 +97,7 @@ class Motions:
         return slope
 
 
-def _dragged(position_m: Floats, width_m: float) -> Floats:
+def _drag_element(position_m: Floats, width_m: float) -> Floats:
     """The far end of an element of this width: the position drags it along."""
     end = float(position_m[0])
     found = []

@@ -23,7 +23,7 @@ _SHORTEST: Final = 64  # steps of one part
 _SAME: Final = 1.0e-9  # of strains, of forces in N, of lengths in units of their scale
 
 
-def in_parts(march: March, series: list[Floats], state: Floats, guess: Floats) -> Floats:
+def march_in_parts(march: March, series: list[Floats], state: Floats, guess: Floats) -> Floats:
     """Forces (steps, lanes) under series of the same shape.
 
     state: (rows, lanes) at the beginning. guess: (rows, steps, lanes) of what it may be ahead of each step.
@@ -63,11 +63,11 @@ def _beside(series: Floats, parts: int, length: int) -> Floats:
     return np.ascontiguousarray(filled.reshape(parts, length, width).transpose(1, 0, 2)).reshape(length, -1)
 
 
-def together(series: list[Floats]) -> Floats:
+def stack_lanes(series: list[Floats]) -> Floats:
     """Lanes of one series each, (steps, lanes)."""
     return np.ascontiguousarray(np.stack(series).T)
 
 
-def apart(series: Floats) -> list[Floats]:
+def split_lanes(series: Floats) -> list[Floats]:
     """The contrary: one contiguous series per lane."""
     return [np.ascontiguousarray(lane) for lane in series.T]

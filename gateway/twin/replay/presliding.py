@@ -21,7 +21,7 @@ from gateway.twin.friction import ELEMENTS, RIGID_M
 from gateway.twin.replay.drive import Floats
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.load import Load
-from gateway.twin.replay.parts import apart, in_parts, together
+from gateway.twin.replay.parts import march_in_parts, split_lanes, stack_lanes
 
 _CHUNK: Final = 32  # steps prepared at a time: small enough for the cache
 _SINGLY: Final = 4
@@ -47,7 +47,7 @@ class PreslidingLanes:
         sticking = np.concatenate([np.zeros((1, pad.size)), np.cumsum(inverse, axis=0)])
         return cls(pad + drag, sticking, np.concatenate([pad[None], inverse]))
 
-    def taken(self, lanes: NDArray[np.intp], *stiffness: Floats) -> "PreslidingLanes":
+    def select(self, lanes: NDArray[np.intp], *stiffness: Floats) -> "PreslidingLanes":
         """Some lanes. stiffness: in the steps that are taken, where it is not that of all."""
         (own,) = stiffness or (self.stiffness[lanes],)
         return PreslidingLanes(own, self.sticking[:, lanes], self.gain[:, lanes])
@@ -57,29 +57,29 @@ class PreslidingLanes:
         return PreslidingLanes(self.gain[0], self.sticking, self.gain)
 
 
-def elastic(loads: list[Load], grid: Grid) -> list[Floats]:
+def presliding_forces(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
     lanes = PreslidingLanes.of(loads, grid.steps_s)
-    drive = together([load.drive_n for load in loads])
-    share = together([load.limit_n for load in loads]) * (1.0 / ELEMENTS)
+    drive = stack_lanes([load.drive_n for load in loads])
+    share = stack_lanes([load.limit_n for load in loads]) * (1.0 / ELEMENTS)
     state, found = np.zeros((ELEMENTS + 1, len(loads))), np.empty_like(drive)
     _march(lanes.at_rest(), drive[:1], share[:1], state, found[:1])
     for lane, load in enumerate(loads):
         if load.start is not None:
-            state[:, lane] = load.begins_n, *reversed(load.strains)
-            found[0, lane] = load.begins_n
+            state[:, lane] = load.start_force_n, *reversed(load.strains)
+            found[0, lane] = load.start_force_n
     if len(loads) <= _SINGLY:
         for lane in range(len(loads)):
-            found[1:, lane] = _single(lanes, lane, _listed(lanes.stiffness, drive[1:], share[1:], lane), state)
-        return apart(found)
+            found[1:, lane] = _single(lanes, lane, _steps_of_lane(lanes.stiffness, drive[1:], share[1:], lane), state)
+        return split_lanes(found)
 
     def march(which: NDArray[np.intp], series: list[Floats], state: Floats, forces: Floats) -> None:
         drive, share, *stiffness = series
-        _march(lanes.taken(which, *stiffness), drive, share, state, forces)
+        _march(lanes.select(which, *stiffness), drive, share, state, forces)
 
     stiffness = [lanes.stiffness] if lanes.stiffness.ndim == 2 else []
-    found[1:] = in_parts(march, [drive[1:], share[1:], *stiffness], state, _guess(drive, share))
-    return apart(found)
+    found[1:] = march_in_parts(march, [drive[1:], share[1:], *stiffness], state, _guess(drive, share))
+    return split_lanes(found)
 
 
 def _guess(drive: Floats, share: Floats) -> Floats:
@@ -89,7 +89,7 @@ def _guess(drive: Floats, share: Floats) -> Floats:
     return np.stack([force, *[rising] * ELEMENTS])
 
 
-def _listed(stiffness: Floats, drive: Floats, share: Floats, lane: int) -> Iterator[tuple[float, ...]]:
+def _steps_of_lane(stiffness: Floats, drive: Floats, share: Floats, lane: int) -> Iterator[tuple[float, ...]]:
     """For each step of a lane: stiffness, drive and share as floats."""
     stiffness = np.broadcast_to(stiffness, drive.shape)
     return zip(*(column[:, lane].tolist() for column in (stiffness, drive, share)), strict=True)
@@ -133,15 +133,15 @@ def _march(lanes: PreslidingLanes, drive: Floats, share: Floats, state: Floats, 
     for first in range(0, drive.shape[0], _CHUNK):
         part = slice(first, first + _CHUNK)
         stiffness = lanes.stiffness[part, None] if lanes.stiffness.ndim == 2 else lanes.stiffness
-        _steps(
-            _prepared((stiffness, lanes.sticking), drive[part, None], share[part, None], buffers),
+        _run_steps(
+            _prepare_steps((stiffness, lanes.sticking), drive[part, None], share[part, None], buffers),
             found[part],
             lanes.gain,
             state,
         )
 
 
-def _prepared(
+def _prepare_steps(
     stiffness: tuple[Floats, Floats], drive: Floats, share: Floats, buffers: list[Floats]
 ) -> Iterator[tuple[Floats, ...]]:
     """For each step: limits of the travel outward and inward, 1/stiffness by row, and the scale of the state."""
@@ -159,7 +159,7 @@ def _prepared(
     return zip(outward, inward, inverse, scale, strict=True)
 
 
-def _steps(prepared: Iterable[tuple[Floats, ...]], found: Floats, gain: Floats, state: Floats) -> None:
+def _run_steps(prepared: Iterable[tuple[Floats, ...]], found: Floats, gain: Floats, state: Floats) -> None:
     """The steps themselves: everything in place, one numpy call per line."""
     add, multiply, subtract, maximum, minimum = np.add, np.multiply, np.subtract, np.maximum, np.minimum
     left, out, back, change = (np.empty_like(state) for _ in range(4))

@@ -13,13 +13,13 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.twin.effects.regulator import drooped, hunted, leaked
-from gateway.twin.effects.term import switched_on
+from gateway.twin.effects.regulator import add_droop, add_hunting, apply_leak
+from gateway.twin.effects.term import is_switched_on
 from gateway.twin.regulator import target_pa
 from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats
-from gateway.twin.replay.grid import Grid, alike
-from gateway.twin.replay.lags import at_commands, evenly, is_linear, lags, later
+from gateway.twin.replay.grid import Grid, common_step_s
+from gateway.twin.replay.lags import filter_even_rows, has_lags, is_linear, pressure_after, states_at_commands
 from gateway.twin.sections import UNLIMITED, Regulator
 
 _LAGGING = ("slew_pa_per_s", "lag_s", "second_lag_s", "fill_slowdown")
@@ -35,8 +35,8 @@ class Pressures:
     def __init__(self, drive: Drive, grid: Grid) -> None:
         self._drive, self._grid = drive, grid
         self._targets, self._states, self._pressures = Cache(), Cache(), Cache()
-        self._seen = lru_cache(_DELAYS)(partial(seen, drive.time_s, grid.time_s))
-        self._held_s = alike(np.concatenate([[0.0], np.diff(drive.time_s)]), 1)
+        self._seen = lru_cache(_DELAYS)(partial(commands_seen, drive.time_s, grid.time_s))
+        self._held_s = common_step_s(np.concatenate([[0.0], np.diff(drive.time_s)]), 1)
         self._row_s = np.concatenate([np.diff(drive.time_s), [grid.step_s + grid.time_s[-1] - drive.time_s[-1]]])
 
     def of(self, regulators: Sequence[Regulator]) -> tuple[list[Floats], NDArray[np.intp]]:
@@ -66,17 +66,17 @@ class Pressures:
         if regulator.ceiling_pa < UNLIMITED:
             pressure = np.minimum(pressure, regulator.ceiling_pa)
         if regulator.leak_flow_pa != 0.0:
-            pressure = leaked(regulator, pressure)
+            pressure = apply_leak(regulator, pressure)
         if regulator.hunting_pa != 0.0:
-            pressure = hunted(regulator, pressure, self._grid.time_s)
+            pressure = add_hunting(regulator, pressure, self._grid.time_s)
         return pressure
 
     def _delayed(self, regulator: Regulator) -> Floats:
         """What lags and delay make of the target."""
-        if not lags(regulator):
+        if not has_lags(regulator):
             return self._averaged(regulator)
         if self._grid.is_rows and type(self._held_s) is float and is_linear(regulator):
-            return evenly(regulator, self._target(regulator), self._held_s)
+            return filter_even_rows(regulator, self._target(regulator), self._held_s)
         return self._lagged(regulator)
 
     def _lagged(self, regulator: Regulator) -> Floats:
@@ -85,9 +85,9 @@ class Pressures:
         key = tuple(getattr(regulator, name) for name in (*_HELD, *_LAGGING))
         state = self._states.get(key)
         if state is None:
-            state = self._states.put(key, at_commands(regulator, target, self._held_s))
+            state = self._states.put(key, states_at_commands(regulator, target, self._held_s))
         last, since_s = self._seen(regulator.delay_s)
-        return later(regulator, state[:, last], target[last], since_s)
+        return pressure_after(regulator, state[:, last], target[last], since_s)
 
     def _averaged(self, regulator: Regulator) -> Floats:
         """Mean of the delayed target over the step before each point; at point 0 the target long before."""
@@ -111,9 +111,9 @@ class Pressures:
         target, changed = held_targets(regulator, np.concatenate([[before_v], command]))
         if regulator.leak_per_s != 0.0:
             target[1:] *= self._kept(regulator.leak_per_s, changed[1:])
-        supply_kpa = self._grid.row_moment.supply_kpa
-        if supply_kpa is not None and switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa")):
-            target = drooped(regulator, target, np.concatenate([supply_kpa[:1], supply_kpa]))
+        supply_kpa = self._grid.row_conditions.supply_kpa
+        if supply_kpa is not None and is_switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa")):
+            target = add_droop(regulator, target, np.concatenate([supply_kpa[:1], supply_kpa]))
         return target
 
     def _kept(self, leak_per_s: float, changed: NDArray[np.bool_]) -> Floats:
@@ -125,7 +125,7 @@ class Pressures:
         return share / (leak_per_s * self._row_s)
 
 
-def seen(row_s: Floats, time_s: Floats, delay_s: float) -> tuple[NDArray[np.intp], Floats]:
+def commands_seen(row_s: Floats, time_s: Floats, delay_s: float) -> tuple[NDArray[np.intp], Floats]:
     """At each time: how many commands were seen behind this delay, and for how long the last one has been, s.
 
     A command that arrives just now is not seen yet. np.interp is three times as fast as np.searchsorted, for both rise.
@@ -141,22 +141,22 @@ def held_targets(regulator: Regulator, command_v: Floats) -> tuple[Floats, NDArr
 
     The state before the first command is that of rest at 0. Equal commands after one another count as one.
     """
-    asked = target_pa(regulator, command_v, switched_on(regulator, ("command_bow", "command_s")))
+    asked = target_pa(regulator, command_v, is_switched_on(regulator, ("command_bow", "command_s")))
     news = np.concatenate([[True], asked[1:] != asked[:-1]])
     places = np.cumsum(news) - 1
     values = asked[news]
     if regulator.dead_band_pa > 0.0:
-        values = np.array(_noticed(values.tolist(), regulator.dead_band_pa))
+        values = np.array(_apply_dead_band(values.tolist(), regulator.dead_band_pa))
     changed = np.zeros(asked.size, dtype=bool)
     changed[news] = np.concatenate([[True], values[1:] != values[:-1]])
     if regulator.hysteresis_pa > 0.0:
-        values = np.array(_played(values.tolist(), 0.5 * regulator.hysteresis_pa))
+        values = np.array(_apply_play(values.tolist(), 0.5 * regulator.hysteresis_pa))
     held = np.minimum(np.maximum(values, 0.0), regulator.supply_pa)
     return held[places], changed
 
 
-def _noticed(targets: list[float], dead_band: float) -> list[float]:
-    """regulator.noticed over a list."""
+def _apply_dead_band(targets: list[float], dead_band: float) -> list[float]:
+    """regulator.apply_dead_band over a list."""
     held, found = 0.0, []
     for target in targets:
         if abs(target - held) > dead_band:
@@ -165,8 +165,8 @@ def _noticed(targets: list[float], dead_band: float) -> list[float]:
     return found
 
 
-def _played(targets: list[float], half_width: float) -> list[float]:
-    """regulator.play over a list."""
+def _apply_play(targets: list[float], half_width: float) -> list[float]:
+    """regulator.apply_play over a list."""
     state, found = 0.0, []
     for target in targets:
         least, most = target - half_width, target + half_width

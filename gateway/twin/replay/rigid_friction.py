@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.twin.elementwise import Real
-from gateway.twin.friction import drags, share_of_way
+from gateway.twin.friction import directional_drags, travel_share
 from gateway.twin.replay.drive import Floats
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.load import Load
-from gateway.twin.replay.parts import apart, in_parts, together
+from gateway.twin.replay.parts import march_in_parts, split_lanes, stack_lanes
 
 Band: TypeAlias = tuple[Floats, Floats, float, Real, Real, float]
 """Lower edge, upper edge, force at the back stop (negative beyond a gap), N; share of the way out that a step goes, and of
@@ -26,7 +26,7 @@ the way in: one for all steps, or one for each; force to begin with, N."""
 _SINGLY: Final = 12  # lanes that are faster one by one in floats than together in numpy
 
 
-def played(loads: list[Load], grid: Grid) -> list[Floats]:
+def rigid_forces(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
     bands = [_band(load, grid.steps_s) for load in loads]
     found = {
@@ -38,7 +38,7 @@ def played(loads: list[Load], grid: Grid) -> list[Floats]:
     if len(dragged) <= _SINGLY:
         found |= {lane: _single(bands[lane]) for lane in dragged}
     else:
-        found |= zip(dragged, _together([bands[lane] for lane in dragged]), strict=True)
+        found |= zip(dragged, _march_lanes([bands[lane] for lane in dragged]), strict=True)
     return [np.maximum(found[lane], 0.0) if band[2] < 0.0 else found[lane] for lane, band in enumerate(bands)]
 
 
@@ -53,21 +53,23 @@ def _band(load: Load, steps_s: Real) -> Band:
     back_n = -contact.pad_stiffness_n_per_m * contact.gap_m
     most_n = contact.pad_stiffness_n_per_m * (stroke_m - contact.gap_m)
     low, high = (load.drive_n, load.drive_n)
-    if load.rubs:
+    if load.has_dry_friction:
         low, high = load.drive_n - load.limit_n, load.drive_n + load.limit_n
     if back_n < 0.0:
         low, high = np.where(low > 0.0, low, back_n), np.where(high >= 0.0, high, back_n)
-    out, back = (_share(drag, contact.pad_stiffness_n_per_m, steps_s) for drag in drags(load.plant.friction))
-    start_n = back_n if load.start is None or back_n < 0.0 else load.begins_n
-    return (*_bounded(low, high, back_n, most_n), back_n, out, back, start_n)
+    out, back = (
+        _share(drag, contact.pad_stiffness_n_per_m, steps_s) for drag in directional_drags(load.plant.friction)
+    )
+    start_n = back_n if load.start is None or back_n < 0.0 else load.start_force_n
+    return (*_bound_between_stops(low, high, back_n, most_n), back_n, out, back, start_n)
 
 
 def _share(drag_n_s_per_m: Real, stiffness_n_per_m: float, steps_s: Real) -> Real:
     """One number where there is no drag, whatever the steps are."""
-    return share_of_way(drag_n_s_per_m, stiffness_n_per_m, steps_s) if drag_n_s_per_m > 0.0 else 1.0
+    return travel_share(drag_n_s_per_m, stiffness_n_per_m, steps_s) if drag_n_s_per_m > 0.0 else 1.0
 
 
-def _bounded(low: Floats, high: Floats, back_n: float, most_n: float) -> tuple[Floats, Floats]:
+def _bound_between_stops(low: Floats, high: Floats, back_n: float, most_n: float) -> tuple[Floats, Floats]:
     """The band between the stops, N."""
     same = low is high
     if high.min() < back_n:
@@ -97,21 +99,21 @@ def _single(band: Band) -> Floats:
     return np.array(found)
 
 
-def _together(bands: list[Band]) -> list[Floats]:
+def _march_lanes(bands: list[Band]) -> list[Floats]:
     """All lanes at once, and parts of the recording beside each other."""
-    low, high = together([band[0] for band in bands]), together([band[1] for band in bands])
+    low, high = stack_lanes([band[0] for band in bands]), stack_lanes([band[1] for band in bands])
     start = np.clip(np.array([band[5] for band in bands]), low[0], high[0])
     guess = np.where(low[1:] >= low[:-1], low[:-1], high[:-1])
     ways = [[band[way] for band in bands] for way in (3, 4)]
     dragged = not all(_is_whole(share) for shares in ways for share in shares)
-    own = [together([np.broadcast_to(share, low.shape[0] - 1) for share in shares]) for shares in ways if dragged]
+    own = [stack_lanes([np.broadcast_to(share, low.shape[0] - 1) for share in shares]) for shares in ways if dragged]
 
     def march(which: NDArray[np.intp], series: list[Floats], state: Floats, forces: Floats) -> None:
         low, high, *shares = series
         _march(shares, low, high, state, forces)
 
-    force = in_parts(march, [low[1:], high[1:], *own], start[None], guess[None])
-    return apart(np.concatenate([start[None], force]))
+    force = march_in_parts(march, [low[1:], high[1:], *own], start[None], guess[None])
+    return split_lanes(np.concatenate([start[None], force]))
 
 
 def _march(shares: list[Floats], low: Floats, high: Floats, state: Floats, forces: Floats) -> None:

@@ -14,18 +14,18 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.twin.effects.term import switched_on
+from gateway.twin.effects.term import is_switched_on
 from gateway.twin.friction import DRY
 from gateway.twin.plant import Plant
 from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats, Strains
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.load import Load, loaded
+from gateway.twin.replay.load import Load, load_of
 from gateway.twin.replay.measured_motion import Motions
-from gateway.twin.replay.presliding import elastic
-from gateway.twin.replay.rigid_friction import played
-from gateway.twin.replay.stepped_slide import stepped
-from gateway.twin.replay.sticking_friction import sticking
+from gateway.twin.replay.presliding import presliding_forces
+from gateway.twin.replay.rigid_friction import rigid_forces
+from gateway.twin.replay.stepped_slide import stepped_forces
+from gateway.twin.replay.sticking_friction import sticking_forces
 
 Way: TypeAlias = Callable[[list[Load], Grid], list[Floats]]
 
@@ -53,7 +53,7 @@ class Slides:
         missing: dict[Hashable, Load] = {}
         for key, plant, place, start in zip(keys, plants, which, starts, strict=True):
             if key not in known and key not in missing:
-                missing[key] = loaded(plant, self._settled(pressures[place]), self._grid.moment, start)
+                missing[key] = load_of(plant, self._settled(pressures[place]), self._grid.conditions, start)
         fresh = dict(zip(missing, self._computed(list(missing.values())), strict=True))
         for key, force in fresh.items():  # a long recording's series push each other out, and those known before
             self._forces.put(key, force)
@@ -77,7 +77,7 @@ class Slides:
         batches: dict[tuple[Way, tuple[bool, ...]], list[Load]] = {}
         for load in loads:
             way = self._way(load)
-            batches.setdefault((way, _memories(load) if way is stepped else ()), []).append(load)
+            batches.setdefault((way, _memories(load) if way is stepped_forces else ()), []).append(load)
         for (way, _), batch in batches.items():
             found |= zip(map(id, batch), way(batch, self._grid), strict=True)
         return [found[id(load)] for load in loads]
@@ -87,17 +87,17 @@ class Slides:
         contact, friction = load.plant.contact, load.plant.friction
         drags = friction.viscous_n_s_per_m != 0.0 or friction.asymmetry_n_s_per_m != 0.0
         if load.is_rigid and (contact.gap_m == 0.0 or not drags):
-            return played
-        if not load.stays_on_the_pad:
-            return stepped
+            return rigid_forces
+        if not load.is_always_pressed:
+            return stepped_forces
         if friction.presliding_m == 0.0:
-            return sticking
+            return sticking_forces
         moved = friction.stribeck_n or friction.dwell_stiction_n or friction.asymmetry_n_s_per_m
-        return stepped if moved else elastic
+        return stepped_forces if moved else presliding_forces
 
 
 def _memories(load: Load) -> tuple[bool, ...]:
     """What a slide remembers: lanes that step together, and any part of them, must have as many elements."""
     friction = load.plant.friction
     others = (friction.presliding_m, friction.dwell_stiction_n, friction.asymmetry_n, friction.asymmetry_n_s_per_m)
-    return (switched_on(friction, DRY), *(value != 0.0 for value in others))
+    return (is_switched_on(friction, DRY), *(value != 0.0 for value in others))

@@ -16,8 +16,8 @@ from gateway.twin.friction import ELEMENTS, FREE_N_PER_M, Elements
 from gateway.twin.plant import Plant, stack
 from gateway.twin.replay.drive import Floats
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.load import Load, sideways_n
-from gateway.twin.replay.parts import apart, in_parts, together
+from gateway.twin.replay.load import Load, side_load_on_grid_n
+from gateway.twin.replay.parts import march_in_parts, split_lanes, stack_lanes
 from gateway.twin.slide import SlideState, weight_n
 
 _SINGLY: Final = 1  # lanes that are faster one by one in floats
@@ -51,32 +51,32 @@ class _Slide(SlideState):
         self._pressed_n_per_m = drag_n_per_m + self._pad_n_per_m
 
 
-def stepped(loads: list[Load], grid: Grid) -> list[Floats]:
+def stepped_forces(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
     if len(loads) <= _SINGLY:
         return [_single(load, grid) for load in loads]
     plants = [load.plant for load in loads]
-    pressure = together([load.pressure_pa for load in loads])
-    side = together([np.broadcast_to(_sideways_n(load, grid), grid.points) for load in loads])
+    pressure = stack_lanes([load.pressure_pa for load in loads])
+    side = stack_lanes([np.broadcast_to(_sideways_n(load, grid), grid.points) for load in loads])
     steps = [np.repeat(lengths[:, None], len(loads), axis=1) for lengths in _lengths(grid)]
     slide = _slide(plants, grid.step_s)
     slide.set_side_load(side[0])
     slide.settle(pressure[0])
-    first, state = slide.force_n, _scaled(slide)
+    first, state = slide.force_n, _state_scale(slide)
     for lane, load in enumerate(loads):
         if _is_given(load):
-            first[lane] = load.begins_n
-            state[:, lane] = _begun(load, state.shape[0])
+            first[lane] = load.start_force_n
+            state[:, lane] = _initial_state(load, state.shape[0])
 
     def march(which: NDArray[np.intp], series: list[Floats], state: Floats, forces: Floats) -> None:
         _march(_slide([plants[lane] for lane in which], grid.step_s), series, state, forces)
 
-    force = in_parts(march, [pressure[1:], side[1:], *steps], state, _guess(loads, state))
-    return apart(np.concatenate([first[None], force]))
+    force = march_in_parts(march, [pressure[1:], side[1:], *steps], state, _guess(loads, state))
+    return split_lanes(np.concatenate([first[None], force]))
 
 
 def _sideways_n(load: Load, grid: Grid) -> Real:
-    return sideways_n(load.plant.friction, load.thrust_n, grid.moment)
+    return side_load_on_grid_n(load.plant.friction, load.thrust_n, grid.conditions)
 
 
 def _lengths(grid: Grid) -> list[Floats]:
@@ -106,9 +106,9 @@ def _single(load: Load, grid: Grid) -> Floats:
     slide.settle(first)
     found, step = [slide.force_n], slide.step
     if _is_given(load):
-        position, *rest = _begun(load, len(slide.state()))
+        position, *rest = _initial_state(load, len(slide.state()))
         slide.resume([position * _LENGTH_M, *rest])
-        found = [load.begins_n]
+        found = [load.start_force_n]
     for point, pressure in enumerate(pressures):
         if sides is not None:
             slide.set_side_load(sides[point + 1])
@@ -120,17 +120,17 @@ def _single(load: Load, grid: Grid) -> Floats:
 
 def _is_given(load: Load) -> bool:
     """Are the strains to begin with given, and is the pad pressed there?"""
-    return load.start is not None and load.rubs and load.begins_n > 0.0
+    return load.start is not None and load.has_dry_friction and load.start_force_n > 0.0
 
 
-def _begun(load: Load, size: int) -> list[float]:
+def _initial_state(load: Load, size: int) -> list[float]:
     """The state that these strains belong to: place on the pad, no travel, no stiction, as many strains as it has."""
     contact, count = load.plant.contact, size - _BEFORE_STRAINS
     strains = load.strains if count == ELEMENTS else [sum(load.strains) / ELEMENTS] * count
-    return [(contact.gap_m + load.begins_n / contact.pad_stiffness_n_per_m) / _LENGTH_M, 0.0, 0.0, *strains]
+    return [(contact.gap_m + load.start_force_n / contact.pad_stiffness_n_per_m) / _LENGTH_M, 0.0, 0.0, *strains]
 
 
-def _scaled(slide: SlideState) -> Floats:
+def _state_scale(slide: SlideState) -> Floats:
     state = np.stack(slide.state())
     state[:2] /= _LENGTH_M
     return state
@@ -138,7 +138,7 @@ def _scaled(slide: SlideState) -> Floats:
 
 def _guess(loads: list[Load], state: Floats) -> Floats:
     """State ahead of each step but the first, if the slide slid on in the direction that the drive had."""
-    drive, limit = together([load.drive_n for load in loads]), together([load.limit_n for load in loads])
+    drive, limit = stack_lanes([load.drive_n for load in loads]), stack_lanes([load.limit_n for load in loads])
     rising = np.where(np.diff(drive, axis=0) >= 0.0, 1.0, -1.0)
     stiffness = np.array([load.plant.contact.pad_stiffness_n_per_m for load in loads])
     gap_m = np.array([load.plant.contact.gap_m for load in loads])
@@ -163,4 +163,4 @@ def _march(slide: _Slide, series: list[Floats], state: Floats, forces: Floats) -
         if lengths:
             slide.set_step(lengths[0][point], lengths[1][point])
         forces[point] = slide.step(pressure[point])
-    state[:] = _scaled(slide).reshape(state.shape)
+    state[:] = _state_scale(slide).reshape(state.shape)

@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.twin.friction import BREAKAWAY_M, drags, share_of_way
+from gateway.twin.friction import BREAKAWAY_M, directional_drags, travel_share
 from gateway.twin.replay.drive import Floats
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.load import Load
-from gateway.twin.replay.parts import apart, in_parts, together
+from gateway.twin.replay.parts import march_in_parts, split_lanes, stack_lanes
 
 _LENGTH_M: Final = 1.0e-4  # unit of travels where states are compared
 
@@ -34,7 +34,7 @@ class StickingLanes:
     @classmethod
     def of(cls, loads: list[Load]) -> "StickingLanes":
         frictions = [load.plant.friction for load in loads]
-        both = np.array([drags(friction) for friction in frictions])
+        both = np.array([directional_drags(friction) for friction in frictions])
         return cls(
             np.array([load.plant.contact.pad_stiffness_n_per_m for load in loads]),
             both[:, 0],
@@ -45,16 +45,16 @@ class StickingLanes:
             np.array([friction.dwell_stiction_s for friction in frictions]),
         )
 
-    def taken(self, lanes: NDArray[np.intp]) -> "StickingLanes":
+    def select(self, lanes: NDArray[np.intp]) -> "StickingLanes":
         return StickingLanes(*(getattr(self, name)[lanes] for name in self.__slots__))
 
 
-def sticking(loads: list[Load], grid: Grid) -> list[Floats]:
+def sticking_forces(loads: list[Load], grid: Grid) -> list[Floats]:
     """The force of each load on the grid, N."""
     lanes = StickingLanes.of(loads)
-    drive, limit = together([load.drive_n for load in loads]), together([load.limit_n for load in loads])
+    drive, limit = stack_lanes([load.drive_n for load in loads]), stack_lanes([load.limit_n for load in loads])
     state = np.zeros((3, len(loads)))
-    begins = [0.0 if load.start is None else load.begins_n for load in loads]
+    begins = [0.0 if load.start is None else load.start_force_n for load in loads]
     state[0] = first = np.clip(begins, drive[0] - limit[0], drive[0] + limit[0])
     rising = np.where(np.diff(drive, axis=0) >= 0.0, 1.0, -1.0)
     guess = np.zeros((3, *rising.shape))
@@ -63,10 +63,10 @@ def sticking(loads: list[Load], grid: Grid) -> list[Floats]:
     lengths = [np.repeat(column[:, None], len(loads), axis=1) for column in (steps_s, np.r_[steps_s[:1], steps_s[:-1]])]
 
     def march(which: NDArray[np.intp], series: list[Floats], state: Floats, forces: Floats) -> None:
-        _march(lanes.taken(which), series, state, forces)
+        _march(lanes.select(which), series, state, forces)
 
-    force = in_parts(march, [drive[1:], limit[1:], *lengths], state, guess)
-    return apart(np.concatenate([first[None], force]))
+    force = march_in_parts(march, [drive[1:], limit[1:], *lengths], state, guess)
+    return split_lanes(np.concatenate([first[None], force]))
 
 
 def _march(lanes: StickingLanes, series: list[Floats], state: Floats, forces: Floats) -> None:
@@ -74,7 +74,7 @@ def _march(lanes: StickingLanes, series: list[Floats], state: Floats, forces: Fl
     drives, limits, steps, lasts = series
     grows = 1.0 - np.exp(-steps / lanes.stiction_s)
     speeds = 1.0 / (lanes.stribeck_m_per_s * lasts)
-    outs, backs = (share_of_way(drag, lanes.pad_n_per_m, steps) for drag in (lanes.out_n_s_per_m, lanes.back_n_s_per_m))
+    outs, backs = (travel_share(drag, lanes.pad_n_per_m, steps) for drag in (lanes.out_n_s_per_m, lanes.back_n_s_per_m))
     per_n, forget = 1.0 / lanes.pad_n_per_m, -1.0 / BREAKAWAY_M
     force, travel, stiction = state[0].copy(), state[1] * _LENGTH_M, state[2].copy()
     curved, ages = bool(np.any(lanes.stribeck_n)), bool(np.any(lanes.stiction_n))

@@ -8,7 +8,7 @@ EFFECTS: dict[str, Effect] = {effect.name: effect for effect in (*INSIDE, *outsi
 NAMES = tuple(effect.name for effect in INSIDE)
 OUTSIDE = tuple(effect.name for effect in outside.EFFECTS)
 
-# DIAGNOSIS: "Indistinguishable unless an extra channel or excitation exists, and then reported as a group".
+# Indistinguishable unless an extra channel or excitation exists, and then reported as a group.
 PAGE_GROUPS = (
     ("regulator-hysteresis", "coulomb-friction"),
     ("transport-delay", "clock-offset", "extra-lag", "viscous-friction"),
@@ -29,7 +29,7 @@ PHYSICAL_GROUPS = (
 
 
 def page_group(name: str) -> frozenset[str]:
-    """Every name that DIAGNOSIS.md lets stand beside this one, itself included."""
+    """Every name that may stand beside this one, itself included, by what a recording can tell apart."""
     return frozenset({name}.union(*(group for group in PAGE_GROUPS if name in group)))
 
 

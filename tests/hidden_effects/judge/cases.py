@@ -9,7 +9,7 @@ from generator.catalogue import NAMES, OUTSIDE, physical_group
 from generator.recording import Wish
 
 KINDS = ("alone", "two", "three", "outside", "null")
-SEVERAL_SIZE = 0.7  # DIAGNOSIS: two or three effects at 0.7 times the noise
+SEVERAL_SIZE = 0.7  # two or three effects together at 0.7 times the noise
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Right, wrong, or honest about not knowing: DIAGNOSIS "What must hold", one recording at a time."""
+"""Right, wrong, or honest about not knowing: the score of one answer, one recording at a time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

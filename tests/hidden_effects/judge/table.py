@@ -1,4 +1,4 @@
-"""Rates with Wilson 95 % intervals, and the bars of DIAGNOSIS beside them, as Markdown that README can quote."""
+"""Rates with Wilson 95 % intervals, and the rates that must hold beside them, as Markdown that README can quote."""
 
 from collections.abc import Callable, Iterable, Sequence
 from math import sqrt
