@@ -4,7 +4,7 @@ All starts in one wave, the best few refined jointly with the model, then compar
 winner's name stands only if it wins nearly always; otherwise the group of those that win sometimes is the answer.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -31,7 +31,11 @@ _SURE_SHARE: Final = 0.95  # a name that wins this often stands alone
 _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
 _SIMILAR_GAIN_SHARE: Final = 0.75  # share of the gain that a relative must explain to stay in the group
 _WAVES: Final = 6
-_INCUMBENT_SHARE: Final = 0.04
+_FALSE_ALARMS: Final = 0.01  # over all starts that were tried (Bonferroni)
+_PENALTY_PER_PARAMETER: Final = 2.0  # chi-square (Akaike's criterion)
+_INCUMBENT_SHARE: Final = 0.04  # of its own gain, at most: what leaves as many rows unexplained proves no better form
+_NOISE_CHI2: Final = 1.1  # chi-square per row of a model at the noise: no bonus ...
+_BONUS_GROWS_OVER: Final = 0.4  # ... and whole so far above it
 _SEED: Final = 20
 
 
@@ -57,7 +61,7 @@ class RefinedEffect:
     @property
     def penalty(self) -> float:
         """What its parameters and its rarity cost, less its bonus, in chi-square."""
-        return 2.0 * self.dof + self.effect.rarity - self.incumbent_bonus
+        return _PENALTY_PER_PARAMETER * self.dof + self.effect.rarity - self.incumbent_bonus
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,30 +105,32 @@ def is_significant(refined: RefinedEffect, starts: int) -> bool:
     """Chi-square at 1 % over the number of starts."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
-    return bool(chi2_law.sf(refined.gain, max(refined.dof, 1)) < 0.01 / max(starts, 1))
+    return bool(chi2_law.sf(refined.gain, max(refined.dof, 1)) < _FALSE_ALARMS / max(starts, 1))
 
 
-def compare_effects(
-    bench: Bench,
-    fitted: FittedModel,
-    effects: Iterable[Effect],
-    hints: SearchHints,
-    whiten: Whiten,
-    *,
-    incumbent: RefinedEffect | None = None,
-    most: int = MOST_REFINED,
-) -> ModelComparison:
-    """Let these effects compete beside the model `fitted`, which stands at its own optimum.
+@dataclass(frozen=True, slots=True)
+class Competitors:
+    """Effects to compare, and hints where their search begins.
 
     incumbent: an effect of the model before, refined already; most: effects that are refined.
     """
-    found = simulate_candidates(bench, fitted, effects, hints)
+
+    effects: Sequence[Effect]
+    hints: SearchHints
+    incumbent: RefinedEffect | None = None
+    most: int = MOST_REFINED
+
+
+def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors, whiten: Whiten) -> ModelComparison:
+    """Return how well each of these effects explains what the model `fitted` leaves, which stands at its own optimum."""
+    hints, incumbent = competitors.hints, competitors.incumbent
+    found = simulate_candidates(bench, fitted, competitors.effects, hints)
     promised = score_candidates(found, fitted, whiten)
-    best = best_scores(promised, most)
+    best = best_scores(promised, competitors.most)
     problems = [FitProblem(each.parameters, joined_parameters(fitted, each.candidate.form)) for each in best]
     refined = refine(bench, problems, whiten, _WAVES)
     ranked = [
-        refined_effect(bench, score.candidate.effect, score.candidate.form, each, fitted, whiten)
+        refined_effect(bench, (score.candidate.effect, score.candidate.form), each, fitted, whiten)
         for score, each in zip(best, refined, strict=True)
     ]
     ranked += [replace(incumbent, incumbent_bonus=_incumbent_bonus(bench, incumbent))] if incumbent else []
@@ -137,7 +143,7 @@ def compare_effects(
 def _incumbent_bonus(bench: Bench, incumbent: RefinedEffect) -> float:
     """Where the whole model is still far from the noise, a few percent of gain are no reason to change a cause."""
     per_row = incumbent.fitted.chi2 / max(int(bench.usable.sum()), 1)
-    return _INCUMBENT_SHARE * incumbent.gain * min(max((per_row - 1.1) / 0.4, 0.0), 1.0)
+    return _INCUMBENT_SHARE * incumbent.gain * min(max((per_row - _NOISE_CHI2) / _BONUS_GROWS_OVER, 0.0), 1.0)
 
 
 def joined_parameters(fitted: FittedModel, form: EffectForm) -> tuple[Parameter, ...]:
@@ -146,12 +152,12 @@ def joined_parameters(fitted: FittedModel, form: EffectForm) -> tuple[Parameter,
 
 
 def refined_effect(
-    bench: Bench, effect: Effect, form: EffectForm, refined: FittedModel, beside: FittedModel, whiten: Whiten
+    bench: Bench, named: tuple[Effect, EffectForm], refined: FittedModel, beside: FittedModel, whiten: Whiten
 ) -> RefinedEffect:
-    """An effect at its optimum, against the model without it."""
+    """Return an effect, in one of its forms, at its optimum against the model without it."""
     block_chi2 = block_sums(bench, whiten(refined.residual_n) ** 2)
     dof = len(refined.free) - len(beside.free)
-    return RefinedEffect(effect, form, refined, beside.chi2 - refined.chi2, dof, block_chi2)
+    return RefinedEffect(*named, refined, beside.chi2 - refined.chi2, dof, block_chi2)
 
 
 def _winning_shares(ranked: Sequence[RefinedEffect]) -> dict[str, float]:

@@ -13,7 +13,7 @@ leaves must not be named. What oscillates does not count there: the rest of a si
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -29,6 +29,7 @@ from gateway.diagnosis.search.candidates import simulate_candidates, unexplained
 from gateway.diagnosis.search.hints import search_hints
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, Whiten, refine
 from gateway.diagnosis.search.model_comparison import (
+    Competitors,
     ModelComparison,
     RefinedEffect,
     compare_effects,
@@ -113,9 +114,10 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
         effects = [effect for effect in effects if effect not in usual]
         fitted, whiten, comparison = _compare_under_noise(bench, fitted, _not_accepted(effects, accepted), whiten)
         base = _refit_base(bench, base, whiten)
+    found = SearchResult(bench, base, fitted, tuple(accepted), tuple(unnamed), whiten, first, comparison)
     if len(accepted) > 1:
-        fitted, accepted = _exchange_effects(bench, fitted, base, accepted, effects, whiten)
-    return SearchResult(bench, base, fitted, tuple(accepted), tuple(unnamed), whiten, first, comparison)
+        return _exchange_effects(found, effects)
+    return found
 
 
 def _compare_under_noise(
@@ -130,12 +132,12 @@ def _compare_under_noise(
     found = simulate_candidates(bench, fitted, effects, hints)
     whiten = coloured_whitener(bench, *unexplained_residual(found, fitted), whiten.weights)
     fitted = refit(bench, fitted, whiten)
-    comparison = compare_effects(bench, fitted, effects, hints, whiten)
+    comparison = compare_effects(bench, fitted, Competitors(effects, hints), whiten)
     if comparison.ranked and comparison.winner.fitted.chi2 > _DISCREPANT_CHI2_PER_ROW * int(bench.usable.sum()):
         best = min((each.fitted for each in comparison.ranked), key=lambda each: bench.rms_n(each.residual_n))
         whiten = coloured_whitener(bench, best.residual_n, orthonormal(best.jacobian), whiten.weights)
         fitted = refit(bench, fitted, whiten, waves=5)
-        comparison = compare_effects(bench, fitted, effects, hints, whiten)
+        comparison = compare_effects(bench, fitted, Competitors(effects, hints), whiten)
     return fitted, whiten, comparison
 
 
@@ -202,7 +204,7 @@ def _cost_with_companion(
 ) -> float:
     """Return chi-square and penalty of an effect and of the best one beside it; starts by the same hints as without it."""
     others = [effect for effect in effects if effect.name != first.effect.name]
-    comparison = compare_effects(bench, first.fitted, others, hints, whiten, most=_COMPANIONS)
+    comparison = compare_effects(bench, first.fitted, Competitors(others, hints, most=_COMPANIONS), whiten)
     found = [each.fitted.chi2 + each.penalty for each in comparison.ranked if is_significant(each, comparison.starts)]
     return first.penalty + min([first.fitted.chi2, *found])
 
@@ -254,52 +256,40 @@ def _blocks_past_the_start(bench: Bench) -> NDArray[np.intp]:
     return np.flatnonzero(young <= 0.5 * counted)
 
 
-def _exchange_effects(
-    bench: Bench,
-    fitted: FittedModel,
-    base: FittedModel,
-    accepted: list[AcceptedEffect],
-    effects: Sequence[Effect],
-    whiten: Whitener,
-) -> tuple[FittedModel, list[AcceptedEffect]]:
-    """Take each accepted effect out and let all that are not in the model compete for its place.
+def _exchange_effects(found: SearchResult, effects: Sequence[Effect]) -> SearchResult:
+    """Return the search's result after each accepted effect was taken out and all that are not in the model competed for
+    its place.
 
     It competes itself with the optimum that it has already reached.
     """
-    for index in range(len(accepted) - 1, -1, -1):
-        if len(accepted) < 2:
+    bench, whiten = found.bench, found.whiten
+    for index in range(len(found.accepted) - 1, -1, -1):
+        if len(found.accepted) < 2:
             break
-        incumbent, beside = accepted[index], accepted[:index] + accepted[index + 1 :]
-        lone = refit_without(bench, fitted, base, incumbent, beside, whiten)
+        incumbent, before, after = found.accepted[index], found.accepted[:index], found.accepted[index + 1 :]
+        lone = refit_without(bench, found, incumbent, (*before, *after))
         hints = search_hints(bench, lone, whiten)
-        held = refined_effect(bench, incumbent.effect, incumbent.form, fitted, lone, whiten)
-        comparison = compare_effects(bench, lone, _not_accepted(effects, beside), hints, whiten, incumbent=held)
+        held = refined_effect(bench, (incumbent.effect, incumbent.form), found.fitted, lone, whiten)
+        competitors = Competitors(_not_accepted(effects, (*before, *after)), hints, incumbent=held)
+        comparison = compare_effects(bench, lone, competitors, whiten)
         winner = comparison.winner
-        if not is_significant(winner, comparison.starts):
-            fitted, accepted = lone, beside
+        if is_significant(winner, comparison.starts):
+            kept = AcceptedEffect(winner.effect, winner.form, comparison)
+            found = replace(found, fitted=winner.fitted, accepted=(*before, kept, *after))
         else:
-            fitted = winner.fitted
-            accepted = [
-                *accepted[:index],
-                AcceptedEffect(winner.effect, winner.form, comparison),
-                *accepted[index + 1 :],
-            ]
-    return fitted, accepted
+            found = replace(found, fitted=lone, accepted=(*before, *after))
+    return found
 
 
 def refit_without(
-    bench: Bench,
-    fitted: FittedModel,
-    base: FittedModel,
-    taken: AcceptedEffect,
-    beside: Sequence[AcceptedEffect],
-    whiten: Whiten,
+    bench: Bench, found: SearchResult, taken: AcceptedEffect, beside: Sequence[AcceptedEffect]
 ) -> FittedModel:
-    """The model without one effect, its parameters back where the base model has them, refitted."""
+    """Return the model without one effect, its parameters back where the base model has them, refitted."""
+    fitted, base = found.fitted, found.base
     kept = {parameter.path for each in beside for parameter in each.form.parameters}
     gone: tuple[Parameter, ...] = tuple(each for each in taken.form.parameters if each.path not in kept)
     paths = {each.path for each in gone}
     free = tuple(each for each in fitted.free if each.path not in paths)
     return refine(
-        bench, [FitProblem(reset_parameters(fitted.parameters, base.parameters, gone), free)], whiten, waves=4
+        bench, [FitProblem(reset_parameters(fitted.parameters, base.parameters, gone), free)], found.whiten, waves=4
     )[0]

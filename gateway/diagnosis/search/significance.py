@@ -76,7 +76,7 @@ def drop_doubtful_effects(
         taken, kept = found.accepted[worst], found.accepted[:worst] + found.accepted[worst + 1 :]
         won_n = gains[worst].held_out_rms_before_n - gains[worst].held_out_rms_after_n
         dropped.append(DoubtfulEffect(taken.effect.name, won_n, doubts[worst]))
-        fitted = refit_without(bench, found.fitted, found.base, taken, kept, found.whiten) if kept else found.base
+        fitted = refit_without(bench, found, taken, kept) if kept else found.base
         found = replace(found, fitted=fitted, accepted=kept)
         reported = _refit_for_report(bench, found)
     return found, reported, tuple(dropped)
