@@ -29,7 +29,7 @@ from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.diagnosis.search.recording_drive import MOTIONS
 from gateway.diagnosis.search.search import search_effects
-from gateway.diagnosis.verdict import Findings, compose_diagnosis
+from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
 from gateway.twin.plant import Plant, with_value
 
 _LEAST_CHANCE_S, _MOST_CHANCE_S = 1.0e-3, 9.0e-3
@@ -87,7 +87,7 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
     effects = _effects_to_search(base.free, hidden, options.late_s)
     found = search_effects(bench, base, effects, whiten)
     left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])
-    return compose_diagnosis(Findings(bench, found, evidence, left, effects), options.noise_floor_n)
+    return compose_diagnosis(SearchFindings(bench, found, evidence, left, effects), options.noise_floor_n)
 
 
 def _doubt_times(bench: Bench, base: FittedModel, whiten: Whitener, late_s: float) -> tuple[FittedModel, Whitener]:

@@ -52,7 +52,7 @@ _LEAST_REJECTED: Final = 5.0e-3  # of the RMS
 
 
 @dataclass(frozen=True, slots=True)
-class Findings:
+class SearchFindings:
     """What was found before anything is decided. bench: without rows that are no witness; evidence: what the readings tell by
     themselves; left: what the residual still depends on; effects: those that were searched for."""
 
@@ -76,7 +76,7 @@ class _NoiseFloor:
     too_high_n: float | None
 
 
-def compose_diagnosis(findings: Findings, given_floor_n: float | None) -> Diagnosis:
+def compose_diagnosis(findings: SearchFindings, given_floor_n: float | None) -> Diagnosis:
     """Return the diagnosis. given_floor_n: noise floor that the user knows, N."""
     bench, left = findings.bench, findings.left
     found, reported, dropped = drop_doubtful_effects(bench, findings.found)
@@ -116,7 +116,7 @@ def _noise_floor(
     return _NoiseFloor(rms_n, known_n, floor_n, too_high_n)
 
 
-def _unseen(findings: Findings, found: SearchResult, causes: Sequence[Cause]) -> tuple[NotIdentifiable, ...]:
+def _unseen(findings: SearchFindings, found: SearchResult, causes: Sequence[Cause]) -> tuple[NotIdentifiable, ...]:
     """Effects that the recording cannot show: not those found, and not those that the base model has anyway."""
     fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in findings.effects}
     names = frozenset(cause.name for cause in causes)

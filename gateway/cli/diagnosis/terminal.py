@@ -38,20 +38,20 @@ def render_diagnosis(
     )
     yield Text(words.sentence(diagnosis))
     yield Text()
-    yield _line("off by", _error(diagnosis))
+    yield _line("off by", _initial_error(diagnosis))
     if diagnosis.causes:
-        yield _line("left", _extended(diagnosis))
-    yield from _causes(diagnosis)
+        yield _line("left", _remaining_error(diagnosis))
+    yield from _cause_table(diagnosis)
     for rest in diagnosis.leftover:
         share = words.percent(rest.share)
         yield _line("leftover", f"depends on {rest.depends_on}: {rest.shape} ({share} of the excess)", "yellow")
-    yield from _lost(diagnosis)
+    yield from _rejected_line(diagnosis)
     for keyword, sentence in zip(("control", *[""] * len(loop)), loop, strict=False):
         yield _line(keyword, sentence)
     said = {suspect.sentence for suspect in diagnosis.suspects}
     for note in (note for note in words.all_notes(diagnosis, notes) if note not in said):
         yield _line("note", note, "dim")
-    yield from _next(diagnosis, run)
+    yield from _next_lines(diagnosis, run)
 
 
 def _line(keyword: str, text: str, style: str = "") -> RenderableType:
@@ -62,7 +62,7 @@ def _line(keyword: str, text: str, style: str = "") -> RenderableType:
     return grid
 
 
-def _error(diagnosis: Diagnosis) -> str:
+def _initial_error(diagnosis: Diagnosis) -> str:
     baseline = diagnosis.baseline
     readings = f"{baseline.samples:,}".replace(",", " ")
     return (
@@ -71,7 +71,7 @@ def _error(diagnosis: Diagnosis) -> str:
     )
 
 
-def _extended(diagnosis: Diagnosis) -> str:
+def _remaining_error(diagnosis: Diagnosis) -> str:
     reached = "at the noise floor" if diagnosis.extended.reaches_noise_floor else "above the noise floor"
     explained = words.percent(words.explained_share(diagnosis))
     return (
@@ -80,7 +80,7 @@ def _extended(diagnosis: Diagnosis) -> str:
     )
 
 
-def _causes(diagnosis: Diagnosis) -> Iterator[RenderableType]:
+def _cause_table(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     if not diagnosis.causes:
         return
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
@@ -116,22 +116,22 @@ def _cells(cause: Cause) -> tuple[str | Text, ...]:
     )
 
 
-def _lost(diagnosis: Diagnosis) -> Iterator[RenderableType]:
+def _rejected_line(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     ranked = sorted(diagnosis.rejected, key=lambda lost: -lost.gain)[:_MOST_REJECTED]
     if ranked:
         gains = ", ".join(f"{lost.name} ({words.force(lost.gain)} N)" for lost in ranked)
         yield _line("rejected", f"{gains}, nearest first")
 
 
-def _next(diagnosis: Diagnosis, run: str) -> Iterator[RenderableType]:
+def _next_lines(diagnosis: Diagnosis, run: str) -> Iterator[RenderableType]:
     proposals = words.next_recordings(diagnosis)
     if diagnosis.not_identifiable:
         count = len(diagnosis.not_identifiable)
         yield _line(
-            "unseen", f"{count} effect{'s' * (count > 1)} that this recording cannot show: {_unseen(diagnosis)}"
+            "unseen", f"{count} effect{'s' * (count > 1)} that this recording cannot show: {_unseen_names(diagnosis)}"
         )
     for keyword, (proposal, names) in zip(("next", *[""] * len(proposals)), proposals[:_MOST_PROPOSALS], strict=False):
-        yield _line(keyword, proposal + (f" (shows {_few(names)})" if names else ""), "bold" if keyword else "")
+        yield _line(keyword, proposal + (f" (shows {_first_names(names)})" if names else ""), "bold" if keyword else "")
     if len(proposals) > _MOST_PROPOSALS:
         yield _line("", f"and {len(proposals) - _MOST_PROPOSALS} more in the report (--report FILE.html)", "dim")
     if run:
@@ -140,10 +140,10 @@ def _next(diagnosis: Diagnosis, run: str) -> Iterator[RenderableType]:
         yield _line("", "--plan PLAN.yaml writes what the gateway can run of it, for calibrate --plan", "dim")
 
 
-def _unseen(diagnosis: Diagnosis) -> str:
-    return _few([item.name for item in diagnosis.not_identifiable])
+def _unseen_names(diagnosis: Diagnosis) -> str:
+    return _first_names([item.name for item in diagnosis.not_identifiable])
 
 
-def _few(names: tuple[str, ...] | list[str]) -> str:
+def _first_names(names: tuple[str, ...] | list[str]) -> str:
     more = len(names) - _MOST_NAMES
     return words.join_words([*names[:_MOST_NAMES], f"{more} more"] if more > 1 else names)

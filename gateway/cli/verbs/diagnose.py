@@ -90,10 +90,10 @@ def command(**options: Any) -> None:
         if file not in (None, _STDOUT)
     ]
     check_targets(files, sources.paths)
-    diagnosis, runtime_s = _diagnosed(sources, options)
-    gain = _gain(diagnosis, sources) if options["closed_loop"] else None
-    answer = _planned(Answer(diagnosis, sources, runtime_s, gain), options["plan_file"])
-    texts = _texts(answer, options)
+    diagnosis, runtime_s = _run_diagnosis(sources, options)
+    gain = _measure_gain(diagnosis, sources) if options["closed_loop"] else None
+    answer = _add_plan(Answer(diagnosis, sources, runtime_s, gain), options["plan_file"])
+    texts = _render_files(answer, options)
     printed = texts.pop(_STDOUT, None)
     write_all(texts)
     if printed is None:
@@ -117,7 +117,7 @@ def _check_effect(name: str | None) -> None:
     raise click.UsageError(f"--without: {name} is no effect of the catalogue; {meant}")
 
 
-def _diagnosed(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis, float]":
+def _run_diagnosis(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis, float]":
     from rich.console import Console
 
     from gateway.diagnosis import Options, diagnose
@@ -137,7 +137,7 @@ def _diagnosed(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis,
     return diagnosis, time.perf_counter() - began_s
 
 
-def _gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoopGain | str":
+def _measure_gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoopGain | str":
     from rich.console import Console
 
     from gateway.cli.diagnosis.closed_loop import measured_gain
@@ -146,7 +146,7 @@ def _gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoopGain | str":
         return measured_gain(diagnosis, sources)
 
 
-def _texts(answer: Answer, options: dict[str, Any]) -> dict[Path, str]:
+def _render_files(answer: Answer, options: dict[str, Any]) -> dict[Path, str]:
     """What is to be written, by file; `-` is for stdout."""
     texts: dict[Path, str] = {}
     if options["json_file"]:
@@ -175,7 +175,7 @@ def _extends(answer: Answer, file: Path) -> bool:
     return not why
 
 
-def _planned(answer: Answer, file: Path | None) -> Answer:
+def _add_plan(answer: Answer, file: Path | None) -> Answer:
     """The answer with what to record next; where that is nothing, it says so and there will be no file."""
     if file is None:
         return answer

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gateway.profiles import PlantProfile
 
 FORMAT = 1
-_WAYS = {
+_MOTION_NOTES = {
     "inferred": "position_mm is not taken for the motion of the slide: inferred motion fits better",
     "measured": "position_mm is taken for the motion of the slide",
     "measured-reversed": "position_mm is taken for the motion of the slide, and counts down when the tool moves out",
@@ -75,7 +75,7 @@ def _simulate(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Flo
     answers = [replay.run([profile.plant]).reading_n[0] for replay in replays]
     errors = [float(np.mean((measurement.force_n - answer)[measurement.usable] ** 2)) for answer in answers]
     best = int(np.argmin(errors))
-    told = [_WAYS[ways[best]]] if measurement.position_m is not None else []
+    told = [_MOTION_NOTES[ways[best]]] if measurement.position_m is not None else []
     return np.asarray(answers[best]), [*told, *replays[best].notes]
 
 

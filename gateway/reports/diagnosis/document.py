@@ -3,7 +3,8 @@
 from math import isfinite
 from typing import Any, Final
 
-from gateway.diagnosis.result import Cause, Diagnosis, Interval
+from gateway.diagnosis.input_checks import Suspect
+from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Interval
 from gateway.reports.diagnosis.wording import all_notes
 
 FORMAT: Final = 1
@@ -11,19 +12,14 @@ Document = dict[str, Any]
 
 
 def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
-    """Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1. A number that is not finite is null.
+    """Return plain values. Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1; not finite: null.
 
     suspects (columns that are not what they say) and notes stand beside the contract's fields.
     """
     return {
         "format": FORMAT,
         "verdict": str(diagnosis.verdict),
-        "baseline": {
-            "rms_n": _number(diagnosis.baseline.rms_n),
-            "noise_floor_n": _number(diagnosis.baseline.noise_floor_n),
-            "samples": int(diagnosis.baseline.samples),
-            "duration_s": _number(diagnosis.baseline.duration_s),
-        },
+        "baseline": _baseline(diagnosis.baseline),
         "causes": [_cause(cause) for cause in diagnosis.causes],
         "leftover": [
             {"depends_on": rest.depends_on, "shape": rest.shape, "share": _number(rest.share)}
@@ -39,21 +35,31 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
             "reaches_noise_floor": bool(diagnosis.extended.reaches_noise_floor),
         },
         "runtime_s": _number(runtime_s),
-        "suspects": [
-            {
-                "code": each.code,
-                "recording": each.recording,
-                "column": each.column,
-                "swapped_with": each.other or None,
-                "unit": each.unit or None,
-                "factor": _number(each.factor),
-                "is_sure": each.is_sure,
-                "option": each.option,
-                "sentence": each.sentence,
-            }
-            for each in diagnosis.suspects
-        ],
+        "suspects": [_suspect(each) for each in diagnosis.suspects],
         "notes": all_notes(diagnosis),
+    }
+
+
+def _baseline(baseline: Baseline) -> Document:
+    return {
+        "rms_n": _number(baseline.rms_n),
+        "noise_floor_n": _number(baseline.noise_floor_n),
+        "samples": int(baseline.samples),
+        "duration_s": _number(baseline.duration_s),
+    }
+
+
+def _suspect(suspect: Suspect) -> Document:
+    return {
+        "code": suspect.code,
+        "recording": suspect.recording,
+        "column": suspect.column,
+        "swapped_with": suspect.other or None,
+        "unit": suspect.unit or None,
+        "factor": _number(suspect.factor),
+        "is_sure": suspect.is_sure,
+        "option": suspect.option,
+        "sentence": suspect.sentence,
     }
 
 
