@@ -31,8 +31,14 @@ DEFAULT_PLANT: Final = Plant(
     contact=Contact(pad_stiffness_n_per_m=4.1e4),
     cell=LoadCell(),
 )
-_LAGS_S: Final = (0.005, 0.02, 0.05, 0.1, 0.2)
-_COULOMBS_N: Final = (0.0, 0.3, 1.0, 2.5, 6.0)
+_LAGS_S: Final = (0.005, 0.02, 0.05, 0.1, 0.2)  # from a fast valve to a regulator with long hoses
+_COULOMBS_N: Final = (0.0, 0.3, 1.0, 2.5, 6.0)  # from an air slide to a sealed cylinder; the start plant has 1 N
+_BELIEVED_GAINS: Final = (
+    0.02,
+    50.0,
+)  # measured over simulated; beyond it the force does not answer, or is in another unit
+_WAVES: Final = 8  # most waves of a base fit ...
+_WAVES_WITH_START: Final = 16  # ... and of one that also fits what friction remembers
 
 
 def without_effects(plant: Plant) -> Plant:
@@ -63,7 +69,9 @@ def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Wh
     coarse, strains = _grid_search(bench, start, free, whiten), start_parameters(bench, plant)
     coarse_ones = try_initial_strains(bench, coarse, whiten) if strains else [coarse]
     problems = [FitProblem(parameters, (*free, *strains)) for parameters in coarse_ones]
-    return min(refine(bench, problems, whiten, waves=16 if strains else 8), key=lambda each: each.chi2)
+    return min(
+        refine(bench, problems, whiten, waves=_WAVES_WITH_START if strains else _WAVES), key=lambda each: each.chi2
+    )
 
 
 def refit(bench: Bench, fitted: FittedModel, whiten: Whitener, waves: int = 3) -> FittedModel:
@@ -90,7 +98,7 @@ def _grid_search(
 def _scale_by_regression(bench: Bench, parameters: ModelParameters, simulated_n: Floats) -> ModelParameters:
     """The point with area and offsets that regression finds; unchanged where the force does not answer."""
     gain, offset, _ = _regression(bench, simulated_n, None)
-    if not 0.02 < gain < 50.0:
+    if not _BELIEVED_GAINS[0] < gain < _BELIEVED_GAINS[1]:
         return parameters.with_offsets([offset + parameters.offsets_n[0]] * len(parameters.offsets_n))
     offsets = [offset] * len(parameters.offsets_n)
     return replace(parameters, offsets_n=tuple(offsets)).with_value(AREA, parameters.value(AREA) * gain)

@@ -16,7 +16,9 @@ from gateway.diagnosis.search.parameters import ModelParameters, apply_start
 
 _LARGEST_STRETCH: Final = 3.0  # how far beyond its start a response that is not proportional is believed
 _HOPELESS: Final = 8.0  # chi-square: half of what 1 % over a hundred starts asks for
-_FAR_BEHIND: Final = 0.25
+_FAR_BEHIND: Final = 0.25  # of the best gain: what is further behind is not refined
+_LEAST_FIRST_STEP: Final = 0.2  # of a start: a refinement that begins at nothing stays there
+_INDEPENDENT: Final = 1.0e-5  # eigenvalue of normalised columns below which they are the same column
 _QUARTER: Final = {"rad": 0.5 * math.pi, "deg": 90.0}
 
 
@@ -132,7 +134,7 @@ def _score_bounded(
     begin = (
         apply_start(parameters, candidate.form, candidate.start)
         if limit
-        else _apply_sizes(candidate, parameters, kept if kept < 0.0 else max(kept, 0.2))
+        else _apply_sizes(candidate, parameters, kept if kept < 0.0 else max(kept, _LEAST_FIRST_STEP))
     )
     return CandidateScore(candidate, max(gain, 0.0) if kept != 0.0 else 0.0, begin)
 
@@ -184,7 +186,7 @@ def unexplained_residual(found: CandidateColumns, fitted: FittedModel) -> tuple[
     rows = rows[norms > 0.0] / norms[norms > 0.0, None]
     normal_matrix = rows @ rows.T
     sizes, vectors = np.linalg.eigh(normal_matrix)
-    kept = sizes > 1.0e-5
+    kept = sizes > _INDEPENDENT
     basis = (vectors[:, kept].T @ rows) / np.sqrt(sizes[kept])[:, None]
     residual = fitted.residual_n
     return residual - (residual @ basis.T) @ basis, basis

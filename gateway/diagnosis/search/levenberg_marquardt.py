@@ -17,7 +17,8 @@ from gateway.diagnosis.search.parameters import ModelParameters
 
 Whiten = Callable[[Floats], Floats]
 
-_DAMPINGS: Final = (0.0, 1.0, 30.0)
+_DAMPINGS: Final = (0.0, 1.0, 30.0)  # tried side by side: Gauss-Newton, and two steps as careful as that goes wrong
+_SECANT_SHARE: Final = 0.02  # of a size that is there: large against the twin's steps, small against its bends
 _LEAST_PROGRESS: Final = 0.02  # a gain in chi-square below this share of one row's is no progress
 
 
@@ -100,7 +101,7 @@ def _secant(parameters: ModelParameters, parameter: Parameter) -> tuple[ModelPar
     """A neighbour in one parameter, and how far it is: 0 where the limit is so far that no step changes it."""
     value = parameters.value(parameter)
     own = parameter.shape or abs(value) >= 1.0e11  # 2 % of a frequency or a pitch is many turns over a minute
-    step = parameter.step if own else max(parameter.step, 0.02 * abs(value))
+    step = parameter.step if own else max(parameter.step, _SECANT_SHARE * abs(value))
     with_value = parameters.with_value(parameter, value + step if value + step <= parameter.high else value - step)
     return with_value, with_value.value(parameter) - value
 

@@ -25,12 +25,12 @@ from gateway.diagnosis.search.candidates import (
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, Whiten, refine
 from gateway.diagnosis.search.normal_equations import block_sums
 
-MOST_REFINED: Final = 6
-_RESAMPLES: Final = 500
+MOST_REFINED: Final = 6  # effects; a wave of simulations serves all of them
+_RESAMPLES: Final = 500  # draws of blocks: a share of 95 % is then uncertain by 1 %
 _SURE_SHARE: Final = 0.95  # a name that wins this often stands alone
 _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
 _SIMILAR_GAIN_SHARE: Final = 0.75  # share of the gain that a relative must explain to stay in the group
-_WAVES: Final = 6
+_WAVES: Final = 6  # most waves of a refinement; it ends before where nothing is gained
 _FALSE_ALARMS: Final = 0.01  # over all starts that were tried (Bonferroni)
 _PENALTY_PER_PARAMETER: Final = 2.0  # chi-square (Akaike's criterion)
 _INCUMBENT_SHARE: Final = 0.04  # of its own gain, at most: what leaves as many rows unexplained proves no better form

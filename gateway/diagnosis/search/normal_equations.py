@@ -14,6 +14,7 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel, Whiten
 
+_SAME_COLUMN: Final = 1.0e-8  # share of a column that the model does not span: rounding
 _RIDGE: Final = 0.01  # of a parameter's whole weight: a block that holds all of it says nothing about itself
 
 
@@ -43,7 +44,7 @@ class NormalEquations:
 
     def add(self, indices: list[int]) -> ColumnGain:
         """Gain and sizes when these columns join the model; nothing where they are part of it already."""
-        if min(self.power[index] / max(self.raw_power[index], 1.0e-300) for index in indices) < 1.0e-8:
+        if min(self.power[index] / max(self.raw_power[index], 1.0e-300) for index in indices) < _SAME_COLUMN:
             return ColumnGain(0.0, np.zeros(len(indices)))
         scale = np.sqrt(self.power[indices])
         normal_matrix = self.normal_matrix[np.ix_(indices, indices)] / np.outer(scale, scale)

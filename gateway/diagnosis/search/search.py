@@ -40,7 +40,7 @@ from gateway.diagnosis.search.model_comparison import (
 from gateway.diagnosis.search.normal_equations import block_sums, held_out_errors, orthonormal
 from gateway.diagnosis.search.parameters import reset_parameters
 
-MOST_EFFECTS: Final = 5
+MOST_EFFECTS: Final = 5  # found, usual or without a name; each costs a comparison of all others
 _DISCREPANT_CHI2_PER_ROW: Final = 3.0  # chi-square per row of the winner
 _CLEARLY_STRONGER: Final = 1.15  # a nameless dependence must explain this much more than the best effect ...
 _CLEARLY_STRONGER_ON_ITS_COLUMN: Final = 1.3  # ... or this much more, where both look at one column ...
@@ -49,10 +49,15 @@ _SAVING_QUANTILE: Final = 0.15  # of resampled blocks may see no gain: an effect
 _EXTREME_BLOCKS: Final = 2  # best and worst blocks without which an effect that acts everywhere ...
 _LEAST_SHARE_ELSEWHERE: Final = 0.3  # ... must save this much of what it saves with them
 _OVERWHELMING_CHI2: Final = 80.0
-_MOST_RIVALS: Final = 2
+_MOST_RIVALS: Final = 2  # looked at beside the winner
 _COMPANIONS: Final = 2  # looked at closely for each
 _LEAST_RIVAL_SHARE: Final = 0.05  # share from which a rival is looked at
 _SEED: Final = 21
+_RESAMPLES: Final = 400  # draws of blocks: the 15 % quantile is then uncertain by 2 %
+_WAVES_AGAIN: Final = 2  # of a model that other rows or another noise have hardly moved ...
+_WAVES_WIDENED: Final = 3  # ... that gains a parameter ...
+_WAVES_WITHOUT: Final = 4  # ... that loses one ...
+_WAVES_DISCREPANT: Final = 5  # ... and under a noise that is several times as large
 _LEAST_GAIN: Final = 0.04  # of the held-out squared error; less is a trifle ...
 _LEAST_SURE_GAIN: Final = 0.02  # ... unless chi-square overwhelms
 _LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain ...
@@ -136,14 +141,14 @@ def _compare_under_noise(
     if comparison.ranked and comparison.winner.fitted.chi2 > _DISCREPANT_CHI2_PER_ROW * int(bench.usable.sum()):
         best = min((each.fitted for each in comparison.ranked), key=lambda each: bench.rms_n(each.residual_n))
         whiten = coloured_whitener(bench, best.residual_n, orthonormal(best.jacobian), whiten.weights)
-        fitted = refit(bench, fitted, whiten, waves=5)
+        fitted = refit(bench, fitted, whiten, waves=_WAVES_DISCREPANT)
         comparison = compare_effects(bench, fitted, Competitors(effects, hints), whiten)
     return fitted, whiten, comparison
 
 
 def _refit_base(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedModel:
     """The same model at its optimum under another noise."""
-    return refit(bench, fitted, whiten, waves=2)
+    return refit(bench, fitted, whiten, waves=_WAVES_AGAIN)
 
 
 def _not_accepted(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect]) -> list[Effect]:
@@ -225,7 +230,7 @@ def _is_noticeable(refined: RefinedEffect, before: FittedModel) -> bool:
 def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whiten) -> FittedModel:
     """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
     parameters = reset_parameters(base.parameters, usual.fitted.parameters, usual.form.parameters)
-    return refine(bench, [FitProblem(parameters, joined_parameters(base, usual.form))], whiten, waves=3)[0]
+    return refine(bench, [FitProblem(parameters, joined_parameters(base, usual.form))], whiten, waves=_WAVES_WIDENED)[0]
 
 
 def _saved_share(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten: Whitener, explained: float) -> float:
@@ -238,7 +243,7 @@ def _saved_share(bench: Bench, before: FittedModel, winner: RefinedEffect, white
     old = _blocks_past_the_start(bench)
     error_before = held_out_errors(bench, before, whiten).errors[old]
     saved = error_before - held_out_errors(bench, winner.fitted, whiten).errors[old]
-    weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=400)
+    weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=_RESAMPLES)
     if winner.form.everywhere:
         sure = float(np.sum(np.sort(saved)[_EXTREME_BLOCKS:-_EXTREME_BLOCKS])) > _LEAST_SHARE_ELSEWHERE * float(
             np.sum(saved)
@@ -291,5 +296,8 @@ def refit_without(
     paths = {each.path for each in gone}
     free = tuple(each for each in fitted.free if each.path not in paths)
     return refine(
-        bench, [FitProblem(reset_parameters(fitted.parameters, base.parameters, gone), free)], found.whiten, waves=4
+        bench,
+        [FitProblem(reset_parameters(fitted.parameters, base.parameters, gone), free)],
+        found.whiten,
+        waves=_WAVES_WITHOUT,
     )[0]

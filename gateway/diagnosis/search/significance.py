@@ -24,11 +24,15 @@ from gateway.diagnosis.search.normal_equations import HeldOutErrors, held_out_er
 from gateway.diagnosis.search.search import AcceptedEffect, SearchResult, refit_without
 
 _BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
-_SAME_AREA: Final = 0.2
+_SAME_AREA: Final = 0.2  # relative; plain optima further apart are looked for from both sides
 _LEAST_SAVED: Final = 0.02  # of the held-out squared error
 _LEFT_AS_LARGE: Final = 0.995  # of the base model's error: what is left of it is all of it
 _LEAST_SURE: Final = 0.5  # share of resampled recordings that an effect and its like must win
-_PARTS: Final = 100
+_PARTS: Final = 100  # of a recording, drawn anew for an interval
+_RESAMPLES: Final = 400  # draws: ten in each tail of a 95 % interval
+_TAILS: Final = (0.025, 0.975)
+_WAVES: Final = 3  # of a model that is at its optimum but for another weighting ...
+_WAVES_FROM_AFAR: Final = 12  # ... and of one that begins at another area
 _SEED: Final = 43
 
 
@@ -103,7 +107,7 @@ def _refit_for_report(bench: Bench, found: SearchResult) -> ReportedModels:
     models = [found.base, found.fitted, *(_model_without(each, found) for each in found.accepted)]
     problems = [FitProblem(each.parameters, each.free) for each in models]
     kinds = [
-        (found.whiten, refine(bench, problems, found.whiten, waves=3)),
+        (found.whiten, refine(bench, problems, found.whiten, waves=_WAVES)),
         (plain, _refit_plainly(bench, problems, plain)),
     ]
     errors = [held_out_errors(bench, fits[1], whiten) for whiten, fits in kinds]
@@ -115,12 +119,12 @@ def _refit_for_report(bench: Bench, found: SearchResult) -> ReportedModels:
 def _refit_plainly(bench: Bench, problems: Sequence[FitProblem], plain: Whitener) -> list[FittedModel]:
     """Each model at its plain optimum. The whitened one may be far from it in the area, which slow changes tell best:
     then it is looked for from the base model's plain area, too."""
-    fits = refine(bench, problems, plain, waves=3)
+    fits = refine(bench, problems, plain, waves=_WAVES)
     area_m2 = fits[0].parameters.value(AREA)
     if all(abs(each.parameters.value(AREA) / area_m2 - 1.0) < _SAME_AREA for each in fits):
         return fits
     again = [FitProblem(each.parameters.with_value(AREA, area_m2), each.free) for each in fits]
-    others = refine(bench, again, plain, waves=12)
+    others = refine(bench, again, plain, waves=_WAVES_FROM_AFAR)
     return [min(pair, key=lambda each: each.chi2) for pair in zip(fits, others, strict=True)]
 
 
@@ -133,10 +137,10 @@ def gain_of(before: HeldOutErrors, after: HeldOutErrors, floor_n: float) -> Gain
         np.add.reduceat(values, _part_edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
     )
     blocks = counts.size
-    weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=400)
+    weights = default_rng(_SEED).multinomial(blocks, np.full(blocks, 1.0 / blocks), size=_RESAMPLES)
     rms_before = np.sqrt((weights @ errors_before) / (weights @ counts))
     rms_after = np.sqrt((weights @ errors_after) / (weights @ counts))
-    low, high = np.quantile(rms_before - rms_after, (0.025, 0.975))
+    low, high = np.quantile(rms_before - rms_after, _TAILS)
     return Gain(
         before.rms_n, after.rms_n, (float(low), float(high)), share_of_excess(before.rms_n, after.rms_n, floor_n)
     )
