@@ -19,7 +19,7 @@ _CLOSEST_S: Final = 2.0e-3  # rows closer than this may be taken together: a reg
 
 
 def take_excerpt(measurement: Measurement, most_rows: int) -> Measurement:
-    """A thinner recording where rows are closer than they need to be; of that the liveliest stretch of at most
+    """Return a thinner recording where rows are closer than they need to be; of that the liveliest stretch of at most
     `most_rows` rows, with a note; the measurement itself if it is short enough."""
     if measurement.rows <= most_rows:
         return measurement

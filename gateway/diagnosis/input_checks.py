@@ -104,7 +104,7 @@ def find_suspects(measurements: Sequence[Measurement], plant: Plant, *, is_own: 
 
 
 def name_options(found: Sequence[Suspect], given: str = "") -> tuple[Suspect, ...]:
-    """The same with the option that mends each. given: what --columns said."""
+    """Return the same with the option that mends each. given: what --columns said."""
     return tuple(replace(each, option=columns_option(each, given)) for each in found)
 
 

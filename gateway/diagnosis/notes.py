@@ -15,7 +15,7 @@ _OFFSETS_APART_RATIO: Final = 10.0  # times the floor, from which offsets are to
 
 
 def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[float], floor_n: float) -> Iterator[str]:
-    """Each recording's own notes, then what only all of them together show."""
+    """Yield each recording's own notes, then what only all of them together show."""
     for each in measurements:
         yield from each.notes
         yield from _dead_drive_notes(each)
@@ -63,7 +63,7 @@ def _movement(measurement: Measurement) -> str:
 
 
 def implausible_area(area_m2: float, start_m2: float) -> str:
-    """A sentence where the force is of another size than the piston can give; empty else."""
+    """Return a sentence where the force is of another size than the piston can give; empty else."""
     times = area_m2 / start_m2
     if 1.0 / _IMPLAUSIBLE_RATIO < times < _IMPLAUSIBLE_RATIO:
         return ""

@@ -45,7 +45,7 @@ class Dependence:
 def strongest_dependence(
     bench: Bench, fitted: FittedModel, whiten: Whitener, given: Collection[Leftover], *, outside: bool
 ) -> Dependence | None:
-    """The most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
+    """Return the most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
     white = whiten(fitted.residual_n)
     known = {(each.depends_on, each.shape) for each in given}
     asked = (
@@ -90,7 +90,7 @@ def _dependences(normal: NormalEquations, asked: Sequence[Regressors], total: fl
 def find_dependences(
     bench: Bench, fitted: FittedModel, whiten: Whitener, given: Sequence[Leftover]
 ) -> tuple[Leftover, ...]:
-    """What the search gave already, then everything that the residual still depends on, the most telling first.
+    """Return what the search gave already, then everything that the residual still depends on, the most telling first.
 
     Each answer is taken out before the next question.
     """

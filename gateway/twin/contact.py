@@ -31,7 +31,7 @@ class ContactState:
         self.is_on = bool(self._terms) or self._backlash or self._creep is not None
 
     def step(self, force_n: Real) -> Real:
-        """The contact force of one step."""
+        """Return the contact force of one step."""
         contact, conditions = self._contact, self._conditions
         if self._backlash:
             self._play_n = force_n = apply_play(self._play_n, force_n, contact.backlash_n)

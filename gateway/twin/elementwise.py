@@ -59,7 +59,7 @@ def exponential(value: Real) -> Real:
 
 
 def quantise(value: Real, step: Real) -> Real:
-    """The nearest multiple of `step`; a step of 0 leaves the value alone."""
+    """Return the nearest multiple of `step`; a step of 0 leaves the value alone."""
     if type(value) is float and type(step) is float:
         return value if step == 0.0 else math.floor(value / step + 0.5) * step
     if type(step) is float:
@@ -75,7 +75,7 @@ def sine(value: Real) -> Real:
 
 
 def root(value: Real) -> Real:
-    """The square root of what is not negative."""
+    """Return the square root of what is not negative."""
     return np.sqrt(value) if isinstance(value, np.ndarray) else math.sqrt(value)
 
 

@@ -40,7 +40,7 @@ def settle(twin: Twin, dwell: Dwell) -> None:
 
 
 def staircase(twin: Twin, voltages_v: Iterable[float], dwell: Dwell) -> Floats:
-    """Measured force at the end of each stair, N; shape (stairs,), or (stairs, lanes)."""
+    """Return measured force at the end of each stair, N; shape (stairs,), or (stairs, lanes)."""
     measured = []
     for voltage_v in voltages_v:
         twin.command(float(voltage_v))
@@ -54,7 +54,7 @@ def staircase(twin: Twin, voltages_v: Iterable[float], dwell: Dwell) -> Floats:
 
 
 def trace(twin: Twin, duration_s: float, look: Callable[[Twin], Any], every_s: float = 1.0e-3) -> Floats:
-    """What `look` sees after each `every_s` of `duration_s`; shape (samples,), or (samples, lanes)."""
+    """Return what `look` sees after each `every_s` of `duration_s`; shape (samples,), or (samples, lanes)."""
     samples = []
     for _ in range(round(duration_s / every_s)):
         twin.advance(every_s)
@@ -63,7 +63,7 @@ def trace(twin: Twin, duration_s: float, look: Callable[[Twin], Any], every_s: f
 
 
 def step_response(twin: Twin, voltage_v: float, duration_s: float = 1.5) -> Floats:
-    """True contact force every millisecond after a step of the command, N."""
+    """Return true contact force every millisecond after a step of the command, N."""
     twin.command(voltage_v)
     return trace(twin, duration_s, lambda running: running.force_n)
 

@@ -89,7 +89,7 @@ def rest_stiction(stiction_n: Real, full_n: Real, share: Real) -> Real:
 
 
 def relieve_stiction(stiction_n: Real, travel_m: Real, breakaway_m: Real) -> Real:
-    """What motion leaves of it."""
+    """Return what motion leaves of it."""
     return stiction_n * exponential(-abs(travel_m) / breakaway_m)
 
 
@@ -177,7 +177,7 @@ class Elements:
             self.strains, self._total = other.strains, other._total
 
     def state(self) -> list[Real]:
-        """What the elements remember: the stiction after a rest, and the strains."""
+        """Return what the elements remember: the stiction after a rest, and the strains."""
         return [self._stiction_n, *self.strains]
 
     def resume(self, state: Sequence[Real]) -> None:

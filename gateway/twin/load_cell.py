@@ -19,7 +19,7 @@ _SPARE = 4096  # steps of history that are dropped at once
 
 
 def shown_time_s(cell: LoadCell, time_s: Real) -> Real:
-    """The moment that the reading of `time_s` shows: clock-offset and clock-skew."""
+    """Return the moment that the reading of `time_s` shows: clock-offset and clock-skew."""
     return (time_s - cell.clock_offset_s) * (1.0 - cell.clock_skew)
 
 
@@ -34,7 +34,7 @@ class History:
         self._values.append(value)
 
     def at(self, time_s: Real) -> Real:
-        """The force at a time, interpolated; before the start that of the start, after the end that of the end."""
+        """Return the force at a time, interpolated; before the start that of the start, after the end that of the end."""
         last = self._first + len(self._values) - 1
         steps = np.clip(np.asarray(time_s) / self._step_s, self._first, last)
         whole = np.minimum(np.floor(steps + 1.0e-9).astype(int), max(last - 1, self._first))

@@ -42,7 +42,7 @@ class Plant:
 
 
 def values(plant: Plant) -> Iterator[tuple[str, str, Real]]:
-    """Every (section, field, value) of a plant, in the order of the file."""
+    """Yield every (section, field, value) of a plant, in the order of the file."""
     for section in fields(plant):
         part = getattr(plant, section.name)
         for entry in fields(part):
@@ -50,7 +50,7 @@ def values(plant: Plant) -> Iterator[tuple[str, str, Real]]:
 
 
 def with_value(plant: Plant, section: str, name: str, value: Real) -> Plant:
-    """The same plant with one field changed; AttributeError or TypeError for a name that it does not have."""
+    """Return the same plant with one field changed; AttributeError or TypeError for a name that it does not have."""
     changed: dict[str, Any] = {section: replace(getattr(plant, section), **{name: value})}
     return replace(plant, **changed)
 

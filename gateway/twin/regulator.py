@@ -18,7 +18,7 @@ from gateway.twin.sections import UNLIMITED, Regulator
 
 
 def lag_factor(lag_s: Real, step_s: float) -> Real:
-    """Share of the remaining difference that a first-order lag covers in one step; 1 without a lag."""
+    """Return share of the remaining difference that a first-order lag covers in one step; 1 without a lag."""
     present = larger(lag_s, 1.0e-12)
     return where(lag_s > 0.0, 1.0 - exponential(-step_s / present), lag_s * 0.0 + 1.0)
 
@@ -29,12 +29,12 @@ def filling_factor(regulator: Regulator, step_s: float) -> Real:
 
 
 def half_decay(decay: Real) -> Real:
-    """A leak's decay over half a step: the first step after a command counts at its middle."""
+    """Return a leak's decay over half a step: the first step after a command counts at its middle."""
     return np.sqrt(decay) if isinstance(decay, np.ndarray) else decay**0.5
 
 
 def target_pa(regulator: Regulator, voltage_v: Real, bends: bool = False) -> Real:
-    """Pressure that a command asks for, in the command's own steps. bends: is its map other than straight?"""
+    """Return pressure that a command asks for, in the command's own steps. bends: is its map other than straight?"""
     stepped_v = quantise(clip(voltage_v, 0.0, regulator.full_scale_v), regulator.command_step_v)
     if bends:
         stepped_v = bend_command(regulator, stepped_v)
@@ -42,7 +42,7 @@ def target_pa(regulator: Regulator, voltage_v: Real, bends: bool = False) -> Rea
 
 
 def apply_dead_band(target: Real, held: Real, dead_band: Real) -> Real:
-    """The target that the regulator works on: a change within the dead band passes unnoticed."""
+    """Return the target that the regulator works on: a change within the dead band passes unnoticed."""
     return where(abs(target - held) > dead_band, target, held)
 
 
@@ -117,7 +117,7 @@ class RegulatorState:
             self._kept = choose(self._noticed_pa != before, half_decay(self._decay), self._kept)
 
     def step(self) -> Real:
-        """Pressure at the end of one step, Pa."""
+        """Return pressure at the end of one step, Pa."""
         pressure = self._target_pa if not self._extra else self._held_pa()
         if self._delay is not None:
             pressure = self._delay.put(pressure)

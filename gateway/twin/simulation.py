@@ -83,7 +83,7 @@ class Twin:
             cell(contact(slide(regulator())))
 
     def read(self) -> Real:
-        """A reading of the load cell now, N: each call draws new noise."""
+        """Return a reading of the load cell now, N: each call draws new noise."""
         self._conditions.time_s = self._steps * STEP_S
         self._reading = self._cell.read(self._rng, self._conditions)
         return self._reading

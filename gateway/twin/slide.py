@@ -23,7 +23,7 @@ MOVING = ("viscous_n_s_per_m", "asymmetry_n_s_per_m", "stribeck_n", "dwell_stict
 
 
 def weight_n(mass_kg: Real, tilt_deg: Real) -> Real:
-    """Part of the weight that presses towards the workpiece, m g cos(tilt)."""
+    """Return part of the weight that presses towards the workpiece, m g cos(tilt)."""
     upright = np.cos(np.radians(tilt_deg))
     share = np.where(np.abs(upright) < 1.0e-15, 0.0, upright)  # cos(90 deg) is 6e-17 in floats
     weight = mass_kg * STANDARD_GRAVITY_M_PER_S2 * share
@@ -102,7 +102,7 @@ class SlideState:
         self._elements.become(still._elements)
 
     def state(self) -> list[Real]:
-        """What the slide remembers: position, m, travel of the last step, m, stiction, N, and strains."""
+        """Return what the slide remembers: position, m, travel of the last step, m, stiction, N, and strains."""
         return [self.position_m, self._travel_m, *self._elements.state()]
 
     def resume(self, state: Sequence[Real]) -> None:

@@ -16,7 +16,7 @@ def next_plan(diagnosis: Diagnosis) -> Plan | None:
 
 
 def text(plan: Plan, recordings: str) -> str:
-    """The file, with what it leaves out as comments. recordings: what the diagnosis was made from."""
+    """Return the file, with what it leaves out as comments. recordings: what the diagnosis was made from."""
     lines = [
         f"Written by force-gateway diagnose for what {recordings} could not tell; about {duration(plan.total_s)}.",
         "Run it: force-gateway calibrate --plan THIS-FILE, then force-gateway diagnose with the number of the recording.",

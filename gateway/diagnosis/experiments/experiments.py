@@ -100,7 +100,7 @@ def plan_for(names: Iterable[str], *, besides: Iterable[str] = (), longest_s: fl
 
 
 def plan_next(diagnosis: Diagnosis, *, longest_s: float = USUAL_LONGEST_S) -> Plan | None:
-    """What to record after this: what tells the groups apart, and shows what the recording could not; None for nothing.
+    """Return what to record after this: what tells the groups apart, and shows what the recording could not; None for nothing.
 
     Groups come first and may take what time they need. Of the effects that the recording could not show, those are taken
     that the gateway can do alone, as far as the time goes; the others only where there is nothing else.

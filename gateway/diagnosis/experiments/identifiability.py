@@ -18,7 +18,7 @@ _VISIBLE: Final = 30.0  # chi-square that an effect must reach at a noticeable s
 def find_invisible_effects(
     bench: Bench, effects: Sequence[Effect], scores: Sequence[CandidateScore], taken: frozenset[str]
 ) -> tuple[NotIdentifiable, ...]:
-    """Effects that this recording cannot show, with the reason; `taken` are part of the base model or found."""
+    """Return effects that this recording cannot show, with the reason; `taken` are part of the base model or found."""
     strength: dict[str, float] = {}
     share: dict[str, float] = {}
     for score in scores:

@@ -42,7 +42,7 @@ _WAVES_WITH_START: Final = 16  # ... and of one that also fits what friction rem
 
 
 def without_effects(plant: Plant) -> Plant:
-    """The plant's dimensions and base parameters, every effect at its null value: what is known of a foreign machine."""
+    """Return the plant's dimensions and base parameters, every effect at its null value: what is known of a foreign machine."""
     kept = {AREA.path, LAG.path, COULOMB.path}
     for effect in EFFECTS:
         for parameter in effect.parameters:
@@ -64,7 +64,7 @@ def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -
 
 
 def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Whitener) -> FittedModel:
-    """The refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
+    """Return the refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
     start = ModelParameters(plant, tuple(0.0 for _ in bench.measurements))
     coarse, strains = _grid_search(bench, start, free, whiten), start_parameters(bench, plant)
     coarse_ones = try_initial_strains(bench, coarse, whiten) if strains else [coarse]
@@ -75,7 +75,7 @@ def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Wh
 
 
 def refit(bench: Bench, fitted: FittedModel, whiten: Whitener, waves: int = 3) -> FittedModel:
-    """The same model again, after rows or noise have changed."""
+    """Return the same model again, after rows or noise have changed."""
     return refine(bench, [FitProblem(fitted.parameters, fitted.free)], whiten, waves)[0]
 
 

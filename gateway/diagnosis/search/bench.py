@@ -78,7 +78,7 @@ class Bench:
         return np.asarray(self.force_rows & self.usable)
 
     def simulate(self, parameter_sets: Sequence[ModelParameters]) -> Floats:
-        """Readings, N; shape (points, rows), all rows."""
+        """Return readings, N; shape (points, rows), all rows."""
         result = np.empty((len(parameter_sets), self.rows))
         for recording, replay in enumerate(self.replays):
             plants = [
@@ -94,26 +94,26 @@ class Bench:
         return result
 
     def residuals(self, simulated_n: Floats) -> Floats:
-        """Measured minus simulated, zero where a row does not count; same shape as given."""
+        """Return measured minus simulated, zero where a row does not count; same shape as given."""
         return self.reduced(self.measured_n - simulated_n)
 
     def reduced(self, columns: Floats) -> Floats:
-        """The same vectors (..., rows) with rows that do not count at zero and the transducer's own errors taken out."""
+        """Return the same vectors (..., rows) with rows that do not count at zero and the transducer's own errors taken out."""
         masked: Floats = columns * self.usable
         if self._nuisance.shape[1]:
             masked = masked - (masked @ self._nuisance) @ self._nuisance.T
         return masked
 
     def without_rows(self, rows: Flags) -> "Bench":
-        """The same bench without these rows: they are no witness."""
+        """Return the same bench without these rows: they are no witness."""
         return replace(self, usable=self.usable & ~rows)
 
     def without_columns(self, columns: Floats) -> "Bench":
-        """The same bench where nothing counts that these columns (k, rows) explain."""
+        """Return the same bench where nothing counts that these columns (k, rows) explain."""
         return replace(self, taken_out=(*self.taken_out, *columns))
 
     def slope_n_per_s(self, simulated_n: Floats) -> Floats:
-        """Rate of the simulated force, per channel."""
+        """Return rate of the simulated force, per channel."""
         slope = np.zeros(self.rows)
         seconds = self.time_s()
         for channel in self.channels:
@@ -121,11 +121,11 @@ class Bench:
         return slope
 
     def rms_n(self, residual_n: Floats) -> float:
-        """Root mean square over the force rows that count."""
+        """Return root mean square over the force rows that count."""
         return float(np.sqrt(np.mean(residual_n[self.judged] ** 2)))
 
     def covariate(self, name: str) -> Floats:
-        """A column of all recordings along the stacked rows; NaN where a recording lacks it."""
+        """Return a column of all recordings along the stacked rows; NaN where a recording lacks it."""
         parts = []
         for channel in self.channels:
             measurement = self.measurements[channel.recording]
@@ -145,7 +145,7 @@ class Bench:
         return np.concatenate(parts)
 
     def columns(self) -> frozenset[str]:
-        """Names of everything that at least one recording has."""
+        """Return names of everything that at least one recording has."""
         names: set[str] = set()
         for each in self.measurements:
             names |= set(each.covariates)

@@ -43,7 +43,7 @@ class CandidateColumns:
 def simulate_candidates(
     bench: Bench, fitted: FittedModel, effects: Iterable[Effect], hints: SearchHints
 ) -> CandidateColumns:
-    """Every start of these effects that the recording's columns allow."""
+    """Return every start of these effects that the recording's columns allow."""
     parameter_sets: list[ModelParameters] = []
     candidates: list[Candidate] = []
     taken = {parameter.path for parameter in fitted.free}
@@ -89,7 +89,7 @@ class CandidateScore:
 
 
 def score_candidates(found: CandidateColumns, fitted: FittedModel, whiten: Whiten) -> list[CandidateScore]:
-    """Every candidate's promise beside the present model."""
+    """Return every candidate's promise beside the present model."""
     normal = NormalEquations(whiten(fitted.jacobian), whiten(found.columns), whiten(fitted.residual_n))
     return [
         _with_power(_score_candidate(candidate, normal, fitted.parameters), normal) for candidate in found.candidates
@@ -155,7 +155,7 @@ def _apply_sizes(candidate: Candidate, parameters: ModelParameters, size: float)
 
 
 def best_scores(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
-    """The best starts, at most one per form, the strongest `most` effects (each with up to two forms).
+    """Return the best starts, at most one per form, the strongest `most` effects (each with up to two forms).
 
     None at all where the best could not be significant even if its refinement doubled its gain, and none that is far
     behind the best.
@@ -180,7 +180,7 @@ def best_scores(found: Sequence[CandidateScore], most: int) -> list[CandidateSco
 
 
 def unexplained_residual(found: CandidateColumns, fitted: FittedModel) -> tuple[Floats, Floats]:
-    """What is left of the residual when every column may take its share, and the orthonormal columns (k, rows)."""
+    """Return what is left of the residual when every column may take its share, and the orthonormal columns (k, rows)."""
     rows = np.vstack([fitted.jacobian, found.columns])
     norms = np.sqrt(np.sum(rows**2, axis=1))
     rows = rows[norms > 0.0] / norms[norms > 0.0, None]

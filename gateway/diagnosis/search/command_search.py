@@ -39,7 +39,7 @@ _MOST_NUMBERS_AT_ONCE: Final = 3_000_000  # numbers of one kind in memory
 
 
 def likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:
-    """Steps of the command whose saw tooth is most like the residual, the best first."""
+    """Return steps of the command whose saw tooth is most like the residual, the best first."""
     return _most_likely_steps_v(bench, fitted, whiten, _steps_v(_span_v(bench))) if _span_v(bench) > 0.0 else ()
 
 

@@ -34,7 +34,7 @@ class DirectEvidence:
 
 
 def find_outliers(bench: Bench, residual_n: Floats, quantum_n: float) -> DirectEvidence | None:
-    """Rows that stand apart from both neighbours, by the residual of the model as it is, beyond one count."""
+    """Return rows that stand apart from both neighbours, by the residual of the model as it is, beyond one count."""
     flagged = np.zeros(bench.rows, dtype=bool)
     for channel in bench.channels:
         if channel.is_force:
@@ -67,7 +67,7 @@ def _stands_out(residual_n: Floats, simulated_n: Floats, usable: Flags, quantum_
 
 
 def find_repeats(bench: Bench, residual_n: Floats) -> DirectEvidence | None:
-    """Rows that the reader found to be copies of the one before."""
+    """Return rows that the reader found to be copies of the one before."""
     flagged = np.zeros(bench.rows, dtype=bool)
     for channel in bench.channels:
         if channel.is_force:
@@ -88,7 +88,7 @@ def _chance_of_a_repeat(bench: Bench, residual_n: Floats) -> float:
 
 
 def find_quantisation(bench: Bench, residual_n: Floats, known_n: float) -> DirectEvidence | None:
-    """A lattice in the readings that is coarse against their noise; known_n: the quantum that the plant states."""
+    """Return a lattice in the readings that is coarse against their noise; known_n: the quantum that the plant states."""
     quanta = [_lattice_n(each.force_n[each.usable]) for each in bench.measurements]
     quantum_n = min(quanta)
     power = fast_noise_n(residual_n[bench.judged]) ** 2

@@ -44,7 +44,7 @@ def search_hints(bench: Bench, fitted: FittedModel, whiten: Whitener) -> SearchH
 
 
 def lines_hz(bench: Bench, white: Floats) -> tuple[float, ...]:
-    """Frequencies of the strongest lines of the first recording's whitened residual, strongest first."""
+    """Return frequencies of the strongest lines of the first recording's whitened residual, strongest first."""
     part = white[bench.channels[0].rows]
     power = np.abs(np.fft.rfft(part, 4 * part.size)) ** 2
     return tuple(peak / (4 * part.size * _row_s(bench)) for peak in _peaks(power, least=16))

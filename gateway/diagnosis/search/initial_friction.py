@@ -35,7 +35,7 @@ _LONGEST_START_SHARE: Final = 0.25  # of a recording may count as its beginning
 
 
 def start_parameters(bench: Bench, plant: Plant) -> tuple[Parameter, ...]:
-    """The strains of every recording whose motion is inferred."""
+    """Return the strains of every recording whose motion is inferred."""
     if bench.motion != "inferred" or not any(each.command_v is not None for each in bench.measurements):
         return ()
     yields = plant.friction.presliding_m > 0.0
@@ -49,7 +49,7 @@ def start_parameters(bench: Bench, plant: Plant) -> tuple[Parameter, ...]:
 def try_initial_strains(
     bench: Bench, parameters: ModelParameters, whiten: Whitener, most: int = 3
 ) -> list[ModelParameters]:
-    """The point with the best few starts for each recording, the best first: a fit may end in the wrong one."""
+    """Return the point with the best few starts for each recording, the best first: a fit may end in the wrong one."""
     parameter_sets = [replace(parameters, starts=(strains,) * len(bench.measurements)) for strains in _TRIED_STRAINS]
     costs = [
         _squares_per_recording(bench, residual)

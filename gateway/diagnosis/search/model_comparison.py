@@ -147,7 +147,7 @@ def _incumbent_bonus(bench: Bench, incumbent: RefinedEffect) -> float:
 
 
 def joined_parameters(fitted: FittedModel, form: EffectForm) -> tuple[Parameter, ...]:
-    """What moves when a form joins a model; what is settled stands as the start has it."""
+    """Return what moves when a form joins a model; what is settled stands as the start has it."""
     return (*fitted.free, *(each for each in form.parameters if each not in fitted.free and not each.settled))
 
 

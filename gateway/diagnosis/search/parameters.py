@@ -52,7 +52,7 @@ class ModelParameters:
         return float(getattr(getattr(self.plant, parameter.section), parameter.name))
 
     def with_value(self, parameter: Parameter, value: float) -> "ModelParameters":
-        """The same point with one parameter at `value`, kept within its bounds."""
+        """Return the same point with one parameter at `value`, kept within its bounds."""
         kept = min(max(float(value), parameter.low), parameter.high)
         if isinstance(parameter, InitialStrain):
             return self._with_strain(parameter, kept)
@@ -85,7 +85,7 @@ def apply_start(parameters: ModelParameters, form: EffectForm, start: Start) -> 
 def reset_parameters(
     parameters: ModelParameters, before: ModelParameters, chosen: Sequence[Parameter]
 ) -> ModelParameters:
-    """The same point with these parameters where they were before."""
+    """Return the same point with these parameters where they were before."""
     for parameter in chosen:
         parameters = parameters.with_value(parameter, before.value(parameter))
     return parameters

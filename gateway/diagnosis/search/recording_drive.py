@@ -48,12 +48,12 @@ def begins_at_rest(measurement: Measurement) -> bool:
 
 
 def replay_of(measurement: Measurement, motion: Motion) -> Replay:
-    """The twin over a recording; in steps as long as the rows where the reader has made them even."""
+    """Return the twin over a recording; in steps as long as the rows where the reader has made them even."""
     return Replay(drive_of(measurement, motion), measurement.even_s or None)
 
 
 def drive_of(measurement: Measurement, motion: Motion) -> Drive:
-    """What drives the twin in a replay."""
+    """Return what drives the twin in a replay."""
     noise_m = 0.0
     if measurement.position_m is not None:
         noise_m = float(1.4826 * np.median(np.abs(np.diff(measurement.position_m, n=2))) / np.sqrt(6.0))

@@ -89,7 +89,7 @@ class SearchResult:
 
 
 def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], whiten: Whitener) -> SearchResult:
-    """All effects that the recording shows, one after the other. `base` is the refitted base model."""
+    """Return all effects that the recording shows, one after the other. `base` is the refitted base model."""
     base, whiten, comparison = _compare_under_noise(bench, base, effects, whiten)
     first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
     unnamed: list[Dependence] = []

@@ -36,7 +36,7 @@ def is_switched_on(section: Any, names: Sequence[str]) -> bool:
 
 
 def active_formulas(terms: Sequence[Term], section: Any, conditions: TwinConditions) -> tuple[Formula, ...]:
-    """The formulas that are on for this section, in order."""
+    """Return the formulas that are on for this section, in order."""
     return tuple(
         term.formula
         for term in terms

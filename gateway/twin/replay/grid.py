@@ -57,18 +57,18 @@ class Grid:
         return max(step_s, shortest_s)
 
     def at_rows(self, values: Floats) -> Floats:
-        """A series on the grid, (points,), at the rows. It may be the same array: not to be written to."""
+        """Return a series on the grid, (points,), at the rows. It may be the same array: not to be written to."""
         if self.is_rows:
             return values
         return values[self._row_index] if self._has_rows else self.at(values, self.row_s)
 
     def at(self, values: Floats, time_s: Floats) -> Floats:
-        """A series on the grid at any times; before the first point and behind the last it stays as it is there."""
+        """Return a series on the grid at any times; before the first point and behind the last it stays as it is there."""
         found: Floats = np.interp(time_s, self.time_s, values)
         return found
 
     def from_rows(self, column: Floats) -> Floats:
-        """A column of the recording on the grid, interpolated."""
+        """Return a column of the recording on the grid, interpolated."""
         found: Floats = column if self.is_rows else np.interp(self.time_s, self.row_s, column)
         return found
 

@@ -31,7 +31,7 @@ def is_linear(regulator: Regulator) -> bool:
 
 
 def filter_even_rows(regulator: Regulator, target_pa: Floats, step_s: float) -> Floats:
-    """The pressure at rows that lie evenly, (rows,), of a linear regulator; target_pa: one more, from before the first.
+    """Return the pressure at rows that lie evenly, (rows,), of a linear regulator; target_pa: one more, from before the first.
 
     The taps come from what one target for one step leaves in the row where it is seen first and in the two after that.
     """
@@ -66,7 +66,7 @@ def scan_recursion(kept: Real, gained: Floats, start: float) -> Floats:
 
 
 def follow_lag(series: Floats, lag_s: float, steps_s: Real) -> Floats:
-    """A first-order lag behind a series that is straight between its points, from rest at its first value."""
+    """Return a first-order lag behind a series that is straight between its points, from rest at its first value."""
     if lag_s <= 0.0:
         return series
     ratio = steps_s / lag_s
@@ -100,7 +100,7 @@ def states_at_commands(regulator: Regulator, target_pa: Floats, held_s: Real) ->
 
 
 def pressure_after(regulator: Regulator, states: Floats, target_pa: Floats, held_s: Floats) -> Floats:
-    """The pressure (points,) after the states of each point (as above, points) have lived under a target for so long."""
+    """Return the pressure (points,) after the states of each point (as above, points) have lived under a target for so long."""
     _, kept_2, across = lag_coupling(regulator.lag_s, regulator.second_lag_s, held_s)
     ahead = states[0] - target_pa
     if regulator.fill_slowdown != 0.0:

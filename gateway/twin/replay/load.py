@@ -62,7 +62,7 @@ class Load:
 
 
 def side_load_on_grid_n(friction: Friction, thrust_n: Floats, conditions: TwinConditions) -> Real:
-    """The side load on the grid, N; a float where there is none."""
+    """Return the side load on the grid, N; a float where there is none."""
     side: Real = side_load_n(friction, conditions)
     return side + side_share(friction, conditions) * thrust_n if friction.side_load_n_per_n else side
 

@@ -24,7 +24,7 @@ _SAME: Final = 1.0e-9  # of strains, of forces in N, of lengths in units of thei
 
 
 def march_in_parts(march: March, series: list[Floats], state: Floats, guess: Floats) -> Floats:
-    """Forces (steps, lanes) under series of the same shape.
+    """Return forces (steps, lanes) under series of the same shape.
 
     state: (rows, lanes) at the beginning. guess: (rows, steps, lanes) of what it may be ahead of each step.
     """
@@ -64,10 +64,10 @@ def _beside(series: Floats, parts: int, length: int) -> Floats:
 
 
 def stack_lanes(series: list[Floats]) -> Floats:
-    """Lanes of one series each, (steps, lanes)."""
+    """Return lanes of one series each, (steps, lanes)."""
     return np.ascontiguousarray(np.stack(series).T)
 
 
 def split_lanes(series: Floats) -> list[Floats]:
-    """The contrary: one contiguous series per lane."""
+    """Return the contrary: one contiguous series per lane."""
     return [np.ascontiguousarray(lane) for lane in series.T]

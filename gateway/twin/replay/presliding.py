@@ -58,7 +58,7 @@ class PreslidingLanes:
 
 
 def presliding_forces(loads: list[Load], grid: Grid) -> list[Floats]:
-    """The force of each load on the grid, N."""
+    """Return the force of each load on the grid, N."""
     lanes = PreslidingLanes.of(loads, grid.steps_s)
     drive = stack_lanes([load.drive_n for load in loads])
     share = stack_lanes([load.limit_n for load in loads]) * (1.0 / ELEMENTS)

@@ -40,7 +40,7 @@ class Pressures:
         self._row_s = np.concatenate([np.diff(drive.time_s), [grid.step_s + grid.time_s[-1] - drive.time_s[-1]]])
 
     def of(self, regulators: Sequence[Regulator]) -> tuple[list[Floats], NDArray[np.intp]]:
-        """(the different pressures, which of them each regulator has)."""
+        """Return (the different pressures, which of them each regulator has)."""
         if self._drive.command_v is None:
             return [self._measured()], np.zeros(len(regulators), dtype=np.intp)
         places: dict[Regulator, int] = {}

@@ -37,7 +37,7 @@ def _plain_section(section: Any) -> Any:
 
 
 def single(plant: Plant) -> Plant:
-    """A plant of Python floats: numpy's scalars, as optimisers give them, are slow. ValueError when it is stacked."""
+    """Return a plant of Python floats: numpy's scalars, as optimisers give them, are slow. ValueError when it is stacked."""
     try:
         return Plant(**{name: _plain_section(getattr(plant, name)) for name in _SECTIONS})
     except TypeError as wrong:

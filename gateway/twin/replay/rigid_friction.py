@@ -27,7 +27,7 @@ _SINGLY: Final = 12  # lanes that are faster one by one in floats than together 
 
 
 def rigid_forces(loads: list[Load], grid: Grid) -> list[Floats]:
-    """The force of each load on the grid, N."""
+    """Return the force of each load on the grid, N."""
     bands = [_band(load, grid.steps_s) for load in loads]
     found = {
         lane: low

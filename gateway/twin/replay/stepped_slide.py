@@ -52,7 +52,7 @@ class _Slide(SlideState):
 
 
 def stepped_forces(loads: list[Load], grid: Grid) -> list[Floats]:
-    """The force of each load on the grid, N."""
+    """Return the force of each load on the grid, N."""
     if len(loads) <= _SINGLY:
         return [_single(load, grid) for load in loads]
     plants = [load.plant for load in loads]

@@ -50,7 +50,7 @@ class StickingLanes:
 
 
 def sticking_forces(loads: list[Load], grid: Grid) -> list[Floats]:
-    """The force of each load on the grid, N."""
+    """Return the force of each load on the grid, N."""
     lanes = StickingLanes.of(loads)
     drive, limit = stack_lanes([load.drive_n for load in loads]), stack_lanes([load.limit_n for load in loads])
     state = np.zeros((3, len(loads)))
