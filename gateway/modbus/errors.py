@@ -16,13 +16,15 @@ TARGET_SILENT: Final = 0x0B
 
 NAMES: Final = {
     ILLEGAL_FUNCTION: "function not served",
-    ILLEGAL_ADDRESS: "address not in the map",
-    ILLEGAL_VALUE: "quantity, length or value not allowed",
-    DEVICE_FAILURE: "the device behind the gateway failed",
-    BUSY: "busy or locked",
-    TARGET_SILENT: "the target behind the gateway is silent",
+    ILLEGAL_ADDRESS: "no such address",
+    ILLEGAL_VALUE: "value refused",
+    DEVICE_FAILURE: "device or state forbids it",
+    0x05: "accepted, still working",
+    BUSY: "busy, or owned by another master",
+    0x0A: "gateway path unavailable",
+    TARGET_SILENT: "serial device or unit silent",
 }
-"""What each exception code that this gateway sends means."""
+"""What each exception code means; 05 and 0A this gateway never sends, other servers do."""
 
 
 class ModbusError(Exception):

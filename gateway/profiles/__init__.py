@@ -16,18 +16,18 @@ from gateway.profiles.rigs.assembly import Report, check_report, load_rig
 from gateway.profiles.rigs.rig import CellLine, OutputLine, Rig
 from gateway.profiles.rigs.rig_file import Network, ResidualWatch
 from gateway.profiles.schema import schema
-from gateway.profiles.strict_yaml.faults import Fault, ProfileError
+from gateway.profiles.strict_yaml.faults import ProfileError, ProfileFault
 
 __all__ = [
     "CALLED",
     "CellLine",
     "Checked",
-    "Fault",
     "Network",
     "Origin",
     "OutputLine",
     "PlantProfile",
     "ProfileError",
+    "ProfileFault",
     "Report",
     "ResidualWatch",
     "Rig",

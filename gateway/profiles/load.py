@@ -17,12 +17,12 @@ from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.kinds import CALLED, kind_of
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
-from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
+from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault
 from gateway.profiles.strict_yaml.text import Document, parse
 from gateway.registers.map.register_map import RegisterMap
 
 T = TypeVar("T")
-Read = Callable[[Document], tuple[T | None, list[Fault]]]
+Read = Callable[[Document], tuple[T | None, list[ProfileFault]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +30,13 @@ class ProfileReference:
     """A profile's name, and where it was written: `place(sentence)` makes the fault about it."""
 
     name: str
-    place: Callable[[str], Fault]
+    place: Callable[[str], ProfileFault]
     beside: Path | None = None
 
 
 def refer_to(name: str | Path) -> ProfileReference:
     """Return a profile that was named on the command line or by a program."""
-    return ProfileReference(str(name), lambda sentence: Fault(str(name), 0, 0, "", sentence))
+    return ProfileReference(str(name), lambda sentence: ProfileFault(str(name), 0, 0, "", sentence))
 
 
 def refer_at(

@@ -21,7 +21,7 @@ from gateway.cli.live_monitor.parts import big, chart, chart_top_n
 from gateway.cli.live_monitor.poll import Poller
 from gateway.cli.live_monitor.table import View, Writer
 from gateway.cli.live_monitor.track import Track, TrackPoint, buckets
-from gateway.cli.master.client import GatewayClient, Reading
+from gateway.cli.master.client import GatewayClient, RegisterReading
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers import RegisterMap
@@ -30,14 +30,14 @@ from gateway.registers.words import State, StatusBit
 IN_BAND = StatusBit.ENABLED | StatusBit.CONTACT | StatusBit.IN_BAND
 
 
-def poll_of(register_map: RegisterMap, **values: float) -> list[Reading]:
+def poll_of(register_map: RegisterMap, **values: float) -> list[RegisterReading]:
     """What a poll brings: every register of both blocks, 0 where no value is given."""
     readings = []
     for block in ("command", "status"):
         for register in register_map.registers_of(block):
             data = register.encode(values.get(register.name, 0))
             words = tuple(int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2))
-            readings.append(Reading(register, register.decode(data), words))
+            readings.append(RegisterReading(register, register.decode(data), words))
     return readings
 
 

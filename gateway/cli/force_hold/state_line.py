@@ -14,7 +14,7 @@ _PLAIN_S: Final = 1.0
 _ERASE: Final = "\r\x1b[K"
 
 
-def words(seen: SeenStatus) -> str:
+def describe_state(seen: SeenStatus) -> str:
     """Return `holding    11.98 N of 12.00 N   1.512 V   in band`, and what limits or warns."""
     parts = [f"{seen.state.name.lower():<11}", f"{_number(seen.force_n, 2)} N of {_number(seen.setpoint_n, 2)} N"]
     parts += [f"  {_number(seen.voltage_v, 3)} V", "  in band" if seen.bits & StatusBit.IN_BAND else "  not in band"]
@@ -66,10 +66,10 @@ class StateLine:
         if self._as_json:
             self._put(json.dumps(document(seen, time_s)) + "\n")
         elif self._is_live:
-            self._put(_ERASE + words(seen)[: shutil.get_terminal_size().columns - 1])
+            self._put(_ERASE + describe_state(seen)[: shutil.get_terminal_size().columns - 1])
         elif time_s - self._last_s >= _PLAIN_S or _kind(seen) != self._last_kind:
             self._last_s, self._last_kind = time_s, _kind(seen)
-            self._put(f"{time_s:7.1f} s  {words(seen)}\n")
+            self._put(f"{time_s:7.1f} s  {describe_state(seen)}\n")
 
     def close(self) -> None:
         """The live line stays, and what follows begins below it."""

@@ -10,7 +10,7 @@ from itertools import takewhile
 from math import isnan, nan
 from typing import Final
 
-from gateway.cli.master.client import Reading
+from gateway.cli.master.client import RegisterReading
 from gateway.registers.words import State, StatusBit
 
 WINDOW_S: Final = 60.0
@@ -47,13 +47,13 @@ class Track:
 
     def __init__(self) -> None:
         self.points: deque[TrackPoint] = deque()
-        self.readings: dict[str, Reading] = {}
+        self.readings: dict[str, RegisterReading] = {}
         self.settling = Settling()
         self.time_s = 0.0
         self._seen: dict[str, _Seen] = {}
         self._step_s: float | None = None
 
-    def add(self, time_s: float, readings: Iterable[Reading]) -> None:
+    def add(self, time_s: float, readings: Iterable[RegisterReading]) -> None:
         """One poll."""
         self.time_s = time_s
         self.readings = {reading.register.name: reading for reading in readings}

@@ -35,7 +35,7 @@ class RefusedError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class RegisterReading:
     """One register as read. value: in the register's unit, NaN when unavailable; words: as they came."""
 
     register: Register
@@ -93,15 +93,15 @@ class GatewayClient:
             words += self._ask("read_holding_registers", f"read {most} at {at}", at, count=most).registers
         return tuple(words)
 
-    def read_block(self, name: str) -> list[Reading]:
+    def read_block(self, name: str) -> list[RegisterReading]:
         """Every register of one block, from one snapshot where one request carries it."""
         block = self.register_map.block(name)
         words = self.read_words(block.first, block.words)
         return [_reading(register, words, block.first) for register in self.register_map.registers_of(name)]
 
-    def read_values(self, registers: Sequence[Register]) -> list[Reading]:
+    def read_values(self, registers: Sequence[Register]) -> list[RegisterReading]:
         """The registers in the order asked for; those close together come from one request."""
-        found: dict[int, Reading] = {}
+        found: dict[int, RegisterReading] = {}
         for group in _groups(registers):
             first, last = group[0].address, group[-1].address + group[-1].words
             words = self.read_words(first, last - first)
@@ -201,10 +201,10 @@ def _no_answer(where: str, unit: int, error: Exception) -> CliError:
     )
 
 
-def _reading(register: Register, words: Sequence[int], first: int) -> Reading:
+def _reading(register: Register, words: Sequence[int], first: int) -> RegisterReading:
     own = tuple(words[register.address - first : register.address - first + register.words])
     data = b"".join(word.to_bytes(2, "big") for word in own)
-    return Reading(register, register.decode(data), own)
+    return RegisterReading(register, register.decode(data), own)
 
 
 def _addresses(register: Register) -> range:

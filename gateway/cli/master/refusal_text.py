@@ -10,19 +10,10 @@ from pathlib import Path
 from typing import Final
 
 from gateway.cli.errors import CliError
-from gateway.cli.master.client import Frame, GatewayClient, Reading, RefusedError
+from gateway.cli.master.client import Frame, GatewayClient, RefusedError, RegisterReading
 from gateway.codes.refusals import RefusalReason
+from gateway.modbus.errors import NAMES
 
-EXCEPTIONS: Final = {
-    0x01: "function not served",
-    0x02: "no such address",
-    0x03: "value refused",
-    0x04: "device or state forbids it",
-    0x05: "accepted, still working",
-    0x06: "busy, or owned by another master",
-    0x0A: "gateway path unavailable",
-    0x0B: "serial device or unit silent",
-}
 _LAST_REFUSAL: Final = ("refusal_address", "refusal_reason", "refusal_value")
 
 
@@ -30,7 +21,7 @@ _LAST_REFUSAL: Final = ("refusal_address", "refusal_reason", "refusal_value")
 def explain_refusals(
     client: GatewayClient, frames: "list[Frame] | None" = None, state: Path | None = None
 ) -> Iterator[None]:
-    """Turns a Modbus exception into one message, exit code 1. frames: what is being written, if anything; state: directory
+    """Turn a Modbus exception into one message, exit code 1. frames: what is being written, if anything; state: directory
     of the gateway, where it is on this machine and not among the usual ones."""
     try:
         yield
@@ -39,7 +30,7 @@ def explain_refusals(
 
 
 def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], state: Path | None) -> str:
-    exception = f"exception {refused.code:02X} ({EXCEPTIONS.get(refused.code, 'not a known exception')})"
+    exception = f"exception {refused.code:02X} ({NAMES.get(refused.code, 'not a known exception')})"
     reason, at, where = _last_refusal(client, frames)
     if reason is RefusalReason.NONE:
         return f"{exception} to {refused.request}"
@@ -80,7 +71,7 @@ def _last_refusal(client: GatewayClient, frames: list[Frame]) -> tuple[RefusalRe
     return kind, at, f"{_place(client, at, value)}, {kind.name.lower().replace('_', ' ')}"
 
 
-def _place(client: GatewayClient, address: int, value: Reading) -> str:
+def _place(client: GatewayClient, address: int, value: RegisterReading) -> str:
     """Return `force_setpoint = 65 N (address 1)`; without a value where the gateway has none."""
     for register in client.register_map.registers:
         if register.address <= address < register.address + register.words:

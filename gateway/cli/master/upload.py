@@ -23,7 +23,7 @@ _PLACES: Final = (
 _RESPONSE: Final = ("dead time", "lag", "second lag")
 
 
-class Master(GatewayClient):
+class UploadClient(GatewayClient):
     """CliError for whatever goes wrong: no answer (69), a refusal (1), a set that fails a check (65)."""
 
     def send(self, requests: Iterable[Request]) -> None:

@@ -4,7 +4,7 @@ from difflib import get_close_matches
 from ipaddress import IPv4Address
 from math import isnan
 
-from gateway.cli.master.client import Reading
+from gateway.cli.master.client import RegisterReading
 from gateway.registers import Register
 
 
@@ -19,7 +19,7 @@ def parse_value(register: Register, text: str) -> bytes:
     return register.encode(number)
 
 
-def format_value(reading: Reading) -> str:
+def format_value(reading: RegisterReading) -> str:
     """Return a value with its unit or names; `-` when the gateway has none."""
     register, value = reading.register, reading.value
     if isnan(value):
@@ -36,14 +36,14 @@ def format_value(reading: Reading) -> str:
     return f"{number} {register.unit}" if register.unit else number
 
 
-def bit_names(reading: Reading) -> list[str]:
+def bit_names(reading: RegisterReading) -> list[str]:
     """Return names of the bits that are set, lowest first."""
     if isnan(reading.value):
         return []
     return [name for bit, name in sorted(reading.register.bits.items()) if int(reading.value) >> bit & 1]
 
 
-def raw(reading: Reading) -> str:
+def raw(reading: RegisterReading) -> str:
     """Return the words as hexadecimal."""
     return " ".join(f"{word:04X}" for word in reading.words)
 

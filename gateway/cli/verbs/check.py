@@ -11,7 +11,7 @@ from gateway.cli import exit_codes
 from gateway.cli.options import count_of, json_option
 
 if TYPE_CHECKING:
-    from gateway.profiles import Checked, Fault
+    from gateway.profiles import Checked, ProfileFault
 
 
 @click.command()
@@ -73,7 +73,7 @@ def _document(checked: "Checked") -> dict[str, Any]:
     }
 
 
-def _fault(fault: "Fault") -> dict[str, str | int]:
+def _fault(fault: "ProfileFault") -> dict[str, str | int]:
     return {
         "file": fault.file,
         "line": fault.line,

@@ -8,7 +8,7 @@ import click
 from gateway.cli.options import Endpoint, gateway_options, json_option
 
 if TYPE_CHECKING:
-    from gateway.cli.master.client import Reading
+    from gateway.cli.master.client import RegisterReading
     from gateway.registers import Register, RegisterMap
 
 
@@ -60,7 +60,7 @@ def _find_registers(register_map: "RegisterMap", names: tuple[str, ...]) -> "lis
     return found
 
 
-def _facts(reading: "Reading") -> dict[str, Any]:
+def _facts(reading: "RegisterReading") -> dict[str, Any]:
     from gateway.cli.master.value_text import format_value
 
     return {

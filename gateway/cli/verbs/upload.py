@@ -75,10 +75,10 @@ def _upload(calibration: "Calibration", register_map: "RegisterMap", options: di
 
 def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str, Any]) -> dict[str, Any]:
     """Stage, commit, wait, read back; what to tell. CliError when it did not come to that."""
-    from gateway.cli.master.upload import Master
+    from gateway.cli.master.upload import UploadClient
 
     endpoint: Endpoint = options["endpoint"]
-    master = Master(*endpoint, options["unit"], register_map)
+    master = UploadClient(*endpoint, options["unit"], register_map)
     with master:
         master.send(upload.requests)
         master.outcome(upload)

@@ -85,7 +85,7 @@ def _tell(frames: "list[Frame]", wanted: "list[Assignment]", *, dry_run: bool, a
 
 
 def _as_shown(assignment: "Assignment") -> str:
-    from gateway.cli.master.client import Reading
+    from gateway.cli.master.client import RegisterReading
     from gateway.cli.master.value_text import format_value
 
-    return format_value(Reading(assignment.register, assignment.register.decode(assignment.data), ()))
+    return format_value(RegisterReading(assignment.register, assignment.register.decode(assignment.data), ()))

@@ -14,7 +14,7 @@ from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.kinds.registers import read_registers
 from gateway.profiles.load import open_file, refer_to
 from gateway.profiles.rigs.assembly import check_report
-from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
+from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 
 
@@ -25,8 +25,8 @@ class Checked:
 
     kind: str
     value: Any
-    faults: tuple[Fault, ...] = ()
-    warnings: tuple[Fault, ...] = ()
+    faults: tuple[ProfileFault, ...] = ()
+    warnings: tuple[ProfileFault, ...] = ()
 
 
 def check_file(name: str | Path) -> Checked:
@@ -44,14 +44,14 @@ def check_file(name: str | Path) -> Checked:
     return Checked(kind, None if faults else value, tuple(sorted(faults)))
 
 
-def _plan(document: Document) -> tuple[AnyPlan | None, list[Fault]]:
+def _plan(document: Document) -> tuple[AnyPlan | None, list[ProfileFault]]:
     try:
         return read_plan(document), []
     except ProfileError as error:
         return None, list(error.faults)
 
 
-_READ: Final[Mapping[str, Callable[[Document], tuple[Any, list[Fault]]]]] = {
+_READ: Final[Mapping[str, Callable[[Document], tuple[Any, list[ProfileFault]]]]] = {
     "device": read_device,
     "plant": read_plant,
     "calibration": read_calibration,

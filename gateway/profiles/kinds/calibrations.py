@@ -12,7 +12,7 @@ from gateway.bsfm.coefficients import (
 )
 from gateway.bsfm.model import Calibration
 from gateway.bsfm.validate import validate_coefficients
-from gateway.profiles.strict_yaml.faults import Fault, Path
+from gateway.profiles.strict_yaml.faults import Path, ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
@@ -23,7 +23,7 @@ _RESPONSE: Final = ("dead_time_s", "lag_s", "second_lag_s")
 _OF_ALL_STOPS: Final = (CoefficientReason.SLIP_STOPS, CoefficientReason.SLIP_STIFFNESS)
 
 
-def read_calibration(document: Document) -> tuple[Calibration | None, list[Fault]]:
+def read_calibration(document: Document) -> tuple[Calibration | None, list[ProfileFault]]:
     """Return the calibration of a file, or None and every fault."""
     calibration, faults = build(Calibration, document)
     if calibration is None:
@@ -33,14 +33,14 @@ def read_calibration(document: Document) -> tuple[Calibration | None, list[Fault
     return (None, faults) if faults else (calibration, [])
 
 
-def coefficient_faults(calibration: Calibration, document: Document, cell_range_n: float) -> list[Fault]:
+def coefficient_faults(calibration: Calibration, document: Document, cell_range_n: float) -> list[ProfileFault]:
     """Return what is wrong with coefficients that are to drive a plant with this load cell."""
     limits = CoefficientLimits(cell_range_n=cell_range_n)
     coefficients = Coefficients.of_calibration(calibration)
     return [document.fault(_place(found), found.text) for found in validate_coefficients(coefficients, limits)]
 
 
-def _length_faults(calibration: Calibration, document: Document) -> list[Fault]:
+def _length_faults(calibration: Calibration, document: Document) -> list[ProfileFault]:
     wanted = calibration.order + 1
     return [
         document.fault((name,), f"has {len(getattr(calibration, name))} entries: order {wanted - 1} has {wanted}")
@@ -49,7 +49,7 @@ def _length_faults(calibration: Calibration, document: Document) -> list[Fault]:
     ]
 
 
-def _model_faults(calibration: Calibration, document: Document) -> list[Fault]:
+def _model_faults(calibration: Calibration, document: Document) -> list[ProfileFault]:
     """Return what only the whole model shows: force limits that are none."""
     try:
         calibration.model()

@@ -6,14 +6,14 @@ from typing import Final
 from gateway.devices import DeviceProfile, Role, cell_device, output_host
 from gateway.devices.codecs import UnknownCodecError
 from gateway.devices.rehearsal import rehearse
-from gateway.profiles.strict_yaml.faults import Fault
+from gateway.profiles.strict_yaml.faults import ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
 _MAKE: Final[dict[Role, Callable[[DeviceProfile], object]]] = {Role.OUTPUT: output_host, Role.LOAD_CELL: cell_device}
 
 
-def read_device(document: Document) -> tuple[DeviceProfile | None, list[Fault]]:
+def read_device(document: Document) -> tuple[DeviceProfile | None, list[ProfileFault]]:
     """The device profile of a file, or None and every fault."""
     device, faults = build(DeviceProfile, document)
     if device is None:

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part, plan_faults
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles.load import open_profile, refer_to
-from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError, printable
+from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault, printable
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
@@ -56,7 +56,7 @@ def read_plan(document: Document) -> AnyPlan:
     return plan
 
 
-def _experiment(document: Document) -> tuple[ExperimentPlan | None, list[Fault]]:
+def _experiment(document: Document) -> tuple[ExperimentPlan | None, list[ProfileFault]]:
     plan, faults = build(ExperimentPlan, document)
     return plan, faults + ([] if plan is None else [document.fault(path, told) for path, told in plan_faults(plan)])
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.profiles.strict_yaml.faults import Fault, Path, path_text
+from gateway.profiles.strict_yaml.faults import Path, ProfileFault, path_text
 from gateway.profiles.strict_yaml.sentences import number, shown, unit_of, unknown_key
 from gateway.profiles.strict_yaml.text import Document, Mark
 from gateway.profiles.strict_yaml.typed import build, kind_at, names
@@ -40,7 +40,7 @@ class PlantProfile:
     origins: Mapping[str, Origin]
 
 
-def read_plant(document: Document) -> tuple[PlantProfile | None, list[Fault]]:
+def read_plant(document: Document) -> tuple[PlantProfile | None, list[ProfileFault]]:
     """Return the plant of a file, or None and every fault."""
     reader = _PlantReader(document)
     values = reader.group((), Plant)
@@ -60,7 +60,7 @@ class _PlantReader:
 
     def __init__(self, document: Document) -> None:
         self.document = document
-        self.faults: list[Fault] = []
+        self.faults: list[ProfileFault] = []
         self.origins: dict[str, Origin] = {}
         self.marks: dict[Path, Mark] = {}  # of the bare numbers: a leaf stands where its value does
         self.refused: set[str] = set()  # paths with a fault of their own: pydantic need not tell a second one

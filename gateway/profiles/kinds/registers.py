@@ -1,12 +1,12 @@
 """Register maps: read by the registers room itself, its faults told with their lines."""
 
-from gateway.profiles.strict_yaml.faults import Fault
+from gateway.profiles.strict_yaml.faults import ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.registers.map.map_reader import MapError, read_map
 from gateway.registers.map.register_map import RegisterMap
 
 
-def read_registers(document: Document) -> tuple[RegisterMap | None, list[Fault]]:
+def read_registers(document: Document) -> tuple[RegisterMap | None, list[ProfileFault]]:
     """The register map of a file, or None and every fault."""
     try:
         return read_map(document.value), []

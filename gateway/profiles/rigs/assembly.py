@@ -22,7 +22,7 @@ from gateway.profiles.rigs.compensation import compensation_of, compensation_wor
 from gateway.profiles.rigs.edit_marks import find_edit_marks
 from gateway.profiles.rigs.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, RigFile
-from gateway.profiles.strict_yaml.faults import Fault, Findings, ProfileError
+from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build, build_known
 from gateway.registers.map.register_map import RegisterMap
@@ -41,8 +41,8 @@ class Report:
     """faults: what must be fixed before the rig starts; warnings: what may be meant so; rig: None while there are faults.
     With `simulated` the faults are those that keep even a simulated run from starting."""
 
-    faults: tuple[Fault, ...]
-    warnings: tuple[Fault, ...]
+    faults: tuple[ProfileFault, ...]
+    warnings: tuple[ProfileFault, ...]
     rig: Rig | None
 
 
@@ -74,7 +74,7 @@ def load_rig(name: str | Path, *, simulated: bool = False) -> Rig:
     return report.rig
 
 
-def _in_order(faults: Iterable[Fault]) -> tuple[Fault, ...]:
+def _in_order(faults: Iterable[ProfileFault]) -> tuple[ProfileFault, ...]:
     """File by file as they were read, each from top to bottom, nothing twice."""
     files = list(dict.fromkeys(fault.file for fault in faults))
     return tuple(sorted(dict.fromkeys(faults), key=lambda fault: (files.index(fault.file), fault.line, fault.column)))
@@ -105,7 +105,7 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     )
 
 
-def _marks(document: Document, path: Path, findings: Findings) -> list[Fault]:
+def _marks(document: Document, path: Path, findings: Findings) -> list[ProfileFault]:
     """Marks of a rig of the user's own; a placeholder is told already, and a shipped file is there to be copied."""
     if path.is_relative_to(root()):
         return []
@@ -114,11 +114,11 @@ def _marks(document: Document, path: Path, findings: Findings) -> list[Fault]:
     return [fault for fault in find_edit_marks(document, text) if fault.path not in told]
 
 
-def _run_checks(document: Document, found_by: Iterable[Check], parts: Parts) -> list[Fault]:
+def _run_checks(document: Document, found_by: Iterable[Check], parts: Parts) -> list[ProfileFault]:
     return [document.fault(_steps(path), sentence) for check in found_by for path, sentence in check(parts)]
 
 
-def _first_of_each_path(faults: list[Fault]) -> list[Fault]:
+def _first_of_each_path(faults: list[ProfileFault]) -> list[ProfileFault]:
     """Return the first fault of each place: what is wrong there in two ways has one cause, usually the first."""
     return list({fault.path: fault for fault in reversed(faults)}.values())[::-1]
 
@@ -131,7 +131,7 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     """Return what can be checked together: every part that has no fault of its own."""
 
     def read_part(
-        kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[Fault]]]
+        kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[ProfileFault]]]
     ) -> T | None:
         return read_named(kind, refer_at(document, path, folder), read, findings)
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from gateway.profiles.strict_yaml.faults import Fault
+from gateway.profiles.strict_yaml.faults import ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 
 _MARK: Final = re.compile(r"#\s*EDIT\b[:,]?\s*(.*)")
@@ -15,7 +15,7 @@ PLACEHOLDER: Final = re.compile(r"\bEDIT\b")
 """In a value that cannot stay as it is, such as the path of a port."""
 
 
-def find_edit_marks(document: Document, text: str) -> Iterator[Fault]:
+def find_edit_marks(document: Document, text: str) -> Iterator[ProfileFault]:
     """Yield each value whose line is still marked, with what belongs there."""
     keys = {mark.key_line: path for path, mark in document.marks.items() if path}
     for number, line in enumerate(text.splitlines(), start=1):

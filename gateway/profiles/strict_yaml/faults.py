@@ -35,7 +35,7 @@ class FaultKind(Enum):
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Fault:
+class ProfileFault:
     """One thing to fix. line and column count from 1; line 0: the file as a whole (it could not be found or read). meant:
     the key that a STRANGER probably is, empty where nobody knows."""
 
@@ -55,7 +55,7 @@ class Fault:
 class ProfileError(Exception):
     """A profile that cannot be used, with every fault found. Exit code 78 at the command line."""
 
-    def __init__(self, faults: Iterable[Fault]) -> None:
+    def __init__(self, faults: Iterable[ProfileFault]) -> None:
         self.faults = tuple(dict.fromkeys(faults))
         super().__init__("\n".join(map(str, self.faults)))
 
@@ -64,9 +64,9 @@ class ProfileError(Exception):
 class Findings:
     """Collects while files are read: faults stop a rig from starting, warnings do not. `texts`: all bytes read, by file."""
 
-    faults: list[Fault] = field(default_factory=list)
-    hardware: list[Fault] = field(default_factory=list)  # what only a run on real devices needs
-    warnings: list[Fault] = field(default_factory=list)
+    faults: list[ProfileFault] = field(default_factory=list)
+    hardware: list[ProfileFault] = field(default_factory=list)  # what only a run on real devices needs
+    warnings: list[ProfileFault] = field(default_factory=list)
     texts: dict[str, bytes] = field(default_factory=dict)
 
 

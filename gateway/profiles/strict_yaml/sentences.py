@@ -109,7 +109,7 @@ def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | 
     return None
 
 
-def _expected(what: str) -> Callable[[Any, dict[str, Any], str], str]:
+def _describe_expected(what: str) -> Callable[[Any, dict[str, Any], str], str]:
     def sentence(value: Any, context: dict[str, Any], unit: str) -> str:
         hint = _hint(value, what)
         seen = str(value) if isinstance(value, float) and hint else shown(value)
@@ -166,22 +166,22 @@ def _nearest(value: Any, choices: list[str]) -> str | None:
 _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
     "literal_error": _choice,
     "enum": _choice,
-    "float_type": _expected("a number"),
-    "float_parsing": _expected("a number"),
-    "int_type": _expected("a whole number"),
-    "int_parsing": _expected("a whole number"),
-    "int_from_float": _expected("a whole number"),
-    "int_parsing_size": _expected("a whole number of usual size"),
-    "bool_type": _expected("true or false"),
-    "bool_parsing": _expected("true or false"),
-    "string_type": _expected("text"),
-    "tuple_type": _expected("a list"),
-    "list_type": _expected("a list"),
-    "set_type": _expected("a list"),
-    "frozen_set_type": _expected("a list"),
-    "dict_type": _expected("a group of keys"),
-    "dataclass_type": _expected("a group of keys"),
-    "model_type": _expected("a group of keys"),
+    "float_type": _describe_expected("a number"),
+    "float_parsing": _describe_expected("a number"),
+    "int_type": _describe_expected("a whole number"),
+    "int_parsing": _describe_expected("a whole number"),
+    "int_from_float": _describe_expected("a whole number"),
+    "int_parsing_size": _describe_expected("a whole number of usual size"),
+    "bool_type": _describe_expected("true or false"),
+    "bool_parsing": _describe_expected("true or false"),
+    "string_type": _describe_expected("text"),
+    "tuple_type": _describe_expected("a list"),
+    "list_type": _describe_expected("a list"),
+    "set_type": _describe_expected("a list"),
+    "frozen_set_type": _describe_expected("a list"),
+    "dict_type": _describe_expected("a group of keys"),
+    "dataclass_type": _describe_expected("a group of keys"),
+    "model_type": _describe_expected("a group of keys"),
     "greater_than": lambda v, c, u: f"{shown(v)}{u} is not above {number(c['gt'])}{u}",
     "greater_than_equal": lambda v, c, u: f"{shown(v)}{u} is below {number(c['ge'])}{u}, the least allowed",
     "less_than": lambda v, c, u: f"{shown(v)}{u} is not below {number(c['lt'])}{u}",

@@ -27,7 +27,7 @@ _MEANINGS: Final = tuple(
     for row in (
         (
             "mapping values are not allowed",
-            "a second `: ` in one line, a line above without its colon, or a wrong indent: mend it, or quote the text",
+            "a second `: ` in one line, a line above without its colon, or a wrong indent: fix it, or quote the text",
         ),
         ("could not find expected ':'", "a key without a colon: write `key: value`"),
         ("found unexpected end of stream", "a quote is opened and never closed", True),

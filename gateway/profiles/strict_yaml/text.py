@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import yaml
 
-from gateway.profiles.strict_yaml.faults import Fault, Path, ProfileError, path_text
+from gateway.profiles.strict_yaml.faults import Path, ProfileError, ProfileFault, path_text
 from gateway.profiles.strict_yaml.scalars import plain_scalar
 from gateway.profiles.strict_yaml.syntax import TooDeepError, syntax_sentence
 
@@ -42,14 +42,14 @@ class Document:
     value: Any
     marks: dict[Path, Mark] = field(repr=False)
 
-    def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
+    def fault(self, path: Path, message: str, *, at_key: bool = False) -> ProfileFault:
         """Return a fault at path; a path that the file does not have is placed at its nearest parent."""
         place = path
         while place not in self.marks and place:
             place, at_key = place[:-1], True
         mark = self.marks.get(place, Mark(1, 1, 1, 1))
         line, column = (mark.key_line, mark.key_column) if at_key else (mark.line, mark.column)
-        return Fault(self.file, line, column, path_text(path), message)
+        return ProfileFault(self.file, line, column, path_text(path), message)
 
     def at(self, *path: str | int) -> Any:
         """Return the value at path, None when there is none."""
@@ -69,9 +69,11 @@ def parse(data: bytes, file: str) -> Document:
     reader = _Reader(file, _decode(data, file))
     value = reader.document()
     if not reader.faults and value is None:
-        reader.faults.append(Fault(file, 1, 1, "", "the file is empty: keys such as `name:` are expected"))
+        reader.faults.append(ProfileFault(file, 1, 1, "", "the file is empty: keys such as `name:` are expected"))
     elif not reader.faults and not isinstance(value, dict):
-        reader.faults.append(Fault(file, 1, 1, "", f"{_kind(value)} at the top: keys such as `name:` are expected"))
+        reader.faults.append(
+            ProfileFault(file, 1, 1, "", f"{_kind(value)} at the top: keys such as `name:` are expected")
+        )
     if reader.faults:
         raise ProfileError(reader.faults)
     return Document(file, value, reader.marks)
@@ -83,16 +85,16 @@ def _kind(value: object) -> str:
 
 def _decode(data: bytes, file: str) -> str:
     if len(data) > _LARGEST_BYTES:
-        raise ProfileError([Fault(file, 0, 0, "", f"{len(data)} bytes: a profile has at most {_LARGEST_BYTES}")])
+        raise ProfileError([ProfileFault(file, 0, 0, "", f"{len(data)} bytes: a profile has at most {_LARGEST_BYTES}")])
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise ProfileError([Fault(file, 1, 1, "", "the file is UTF-16: save it as UTF-8")])
+        raise ProfileError([ProfileFault(file, 1, 1, "", "the file is UTF-16: save it as UTF-8")])
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start]
         line, column = before.count(b"\n") + 1, len(before.rpartition(b"\n")[2].decode(errors="replace")) + 1
         message = f"byte 0x{data[error.start]:02X} is not UTF-8 (a Latin-1 file?): save it as UTF-8"
-        raise ProfileError([Fault(file, line, column, "", message)]) from None
+        raise ProfileError([ProfileFault(file, line, column, "", message)]) from None
 
 
 class _Reader:
@@ -102,7 +104,7 @@ class _Reader:
         self.file = file
         self.text = text
         self.marks: dict[Path, Mark] = {}
-        self.faults: list[Fault] = []
+        self.faults: list[ProfileFault] = []
 
     def document(self) -> Any:
         events = iter(yaml.parse(self.text, Loader=_PARSER))
@@ -110,7 +112,7 @@ class _Reader:
             value = self._stream(events)
         except yaml.YAMLError as error:
             line, column, sentence = syntax_sentence(error, self.text)
-            self.faults.append(Fault(self.file, line, column, "", sentence))
+            self.faults.append(ProfileFault(self.file, line, column, "", sentence))
             return None
         return value
 
@@ -191,4 +193,4 @@ class _Reader:
 
     def _fault(self, event: Any, path: Path, message: str) -> None:
         mark = event.start_mark
-        self.faults.append(Fault(self.file, mark.line + 1, mark.column + 1, path_text(path), message))
+        self.faults.append(ProfileFault(self.file, mark.line + 1, mark.column + 1, path_text(path), message))

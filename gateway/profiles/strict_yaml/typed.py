@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_t
 
 from pydantic import TypeAdapter, ValidationError
 
-from gateway.profiles.strict_yaml.faults import Fault, FaultKind, Path, path_text
+from gateway.profiles.strict_yaml.faults import FaultKind, Path, ProfileFault, path_text
 from gateway.profiles.strict_yaml.sentences import type_sentence, unit_of, unknown_key
 from gateway.profiles.strict_yaml.text import Document
 
@@ -28,7 +28,7 @@ def adapter(kind: type) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None, list[Fault]]:
+def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None, list[ProfileFault]]:
     """The dataclass at `path` of the document, or None and every fault."""
     try:
         value: T = adapter(cast("Any", kind)).validate_json(json.dumps(document.at(*path)), strict=True)
@@ -57,7 +57,7 @@ def _told_once(error: ValidationError) -> list[Any]:
     return list({_steps(found["loc"]): found for found in reversed(first)}.values())[::-1]
 
 
-def _without_echoes(faults: list[Fault]) -> list[Fault]:
+def _without_echoes(faults: list[ProfileFault]) -> list[ProfileFault]:
     """A misspelt key is also a missing one: the second finding goes, for the first tells what was meant."""
     meant = {f"{fault.path.rpartition('.')[0]}.{fault.meant}".lstrip(".") for fault in faults if fault.meant}
     return [fault for fault in faults if not (fault.path in meant and fault.kind is FaultKind.MISSING)]
@@ -67,7 +67,7 @@ def _steps(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
     return tuple(step for step in location if not (isinstance(step, str) and any(sign in step for sign in "[(-")))
 
 
-def _fault(kind: type, document: Document, path: Path, found: Mapping[str, Any]) -> Fault:
+def _fault(kind: type, document: Document, path: Path, found: Mapping[str, Any]) -> ProfileFault:
     place = _place(document, path, found["loc"])
     key = place[-1] if place else ""
     if found["type"] == "missing":
