@@ -29,6 +29,13 @@ CELL_BAUD: Final = 115200
 VOLTAGE_MAX_V: Final = 10.0
 """End of the usual range of DACs and regulators, 0 .. 10 V."""
 CELL_RANGE_N: Final = 100.0
+LARGEST_CELL_N: Final = 5000.0
+"""Of any rig: no calibration may need more, and no rig file may name more."""
+LOOP_HZ: Final = 100.0
+STALL_S: Final = 0.1
+"""Silence of the control loop after which the guardian replaces it."""
+COMMIT_PATIENCE_S: Final = 10.0
+"""For which the terminal waits for a commit: a disk may be slow, one that takes longer hangs."""
 LEASE_S: Final = 0.2
 """Of a starter rig; and what `hold` keeps where the rig's is unknown."""
 

@@ -94,7 +94,7 @@ class Supervision:
     lease_action: LeaseAction = LeaseAction.FAULT
     sample_timeout_s: Annotated[float, Gt(0)] = 0.05
     output_timeout_s: Annotated[float, Gt(0)] = 0.1
-    stall_s: Annotated[float, Gt(0)] = 0.1
+    stall_s: Annotated[float, Gt(0)] = defaults.STALL_S
     frozen_s: Annotated[float, Gt(0)] = 0.5
     sample_quantum_n: Annotated[float, Gt(0)] = 0.1  # one count of the amplifier
     saturation_n: Annotated[float, Gt(0)] = 98.0  # raw at or beyond 98 % of the cell's range

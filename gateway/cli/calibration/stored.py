@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError, disk_hangs
@@ -16,9 +17,8 @@ if TYPE_CHECKING:
     from gateway.calibrations.store import CalibrationStore
     from gateway.profiles import Rig
 
-_PATIENCE_S: Final = 10.0
+_PATIENCE_S: Final = defaults.COMMIT_PATIENCE_S
 _POLL_S: Final = 0.02
-_ANY_CELL_N: Final = 5000.0  # where the rig is not known: what no calibration file may exceed
 
 
 def open_store(directory: Path, rig_name: str) -> "CalibrationStore":
@@ -75,7 +75,9 @@ def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, A
     from gateway.calibrations.store import StoreError
 
     rig, store = _rig(rig_name), open_store(directory, rig_name)
-    activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n if rig else _ANY_CELL_N))
+    activation = Activation(
+        store, CoefficientLimits(cell_range_n=rig.load_cell.range_n if rig else defaults.LARGEST_CELL_N)
+    )
     before = store.find_selected().calibration
     try:
         force = bool(request.get("force"))

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterable
 from typing import Final
 
+from gateway import defaults
 from gateway.cli import exit_codes
 from gateway.cli.errors import CliError, disk_hangs
 from gateway.cli.master.client import Frame, GatewayClient
@@ -15,7 +16,7 @@ from gateway.registers.upload.coefficients import HEAD_WORDS, TAIL_FROM
 from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
 
 _OURS: Final = (UploadReason.STORAGE, UploadReason.DEFECT)
-_PATIENCE_S = 10.0  # a disk may be slow, a hung one is no disk
+_PATIENCE_S = defaults.COMMIT_PATIENCE_S
 _POLL_S: Final = 0.01
 _PLACES: Final = (
     "rising handle", "rising weight", "falling handle", "falling weight", "slip radius", "slip share", "response",

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from gateway import defaults
 from gateway.bsfm.coefficients import (
     RESPONSE_FROM,
     STRIDE,
@@ -16,7 +17,6 @@ from gateway.profiles.strict_yaml.faults import Path, ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
-_LARGEST_CELL_N: Final = 5000.0  # of any rig; each rig has its own cell's range, and checks against that
 _BRANCHES: Final = ("rising_handles_n", "rising_weights", "falling_handles_n", "falling_weights")
 _ARRAYS: Final = (*_BRANCHES, "slip_radii_v", "slip_shares")
 _RESPONSE: Final = ("dead_time_s", "lag_s", "second_lag_s")
@@ -28,7 +28,7 @@ def read_calibration(document: Document) -> tuple[Calibration | None, list[Profi
     calibration, faults = build(Calibration, document)
     if calibration is None:
         return None, faults
-    faults = _length_faults(calibration, document) or coefficient_faults(calibration, document, _LARGEST_CELL_N)
+    faults = _length_faults(calibration, document) or coefficient_faults(calibration, document, defaults.LARGEST_CELL_N)
     faults = faults or _model_faults(calibration, document)
     return (None, faults) if faults else (calibration, [])
 

@@ -137,7 +137,7 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
 
     plant = read_part("plant", ("plant",), read_plant)
     extended = read_part("plant", ("compensation",), read_plant)
-    loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else 100.0
+    loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else defaults.LOOP_HZ
     return Parts(
         name=str(document.at("name")),
         simulated=document.at("simulated") is True,

@@ -67,7 +67,7 @@ class CellFile:
     baud: Baud = defaults.CELL_BAUD  # as set in the amplifier
     sign: Literal[1, -1] = 1  # -1 where the wiring shows a push as a negative force
     unit: Literal["N", "kg", "g", "lb"] | None = None  # only where the amplifier's own text leaves the unit out
-    range_n: Annotated[float, Gt(0), Le(5000)] = defaults.CELL_RANGE_N  # the cell's rated force, N
+    range_n: Annotated[float, Gt(0), Le(defaults.LARGEST_CELL_N)] = defaults.CELL_RANGE_N  # the cell's rated force, N
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +115,9 @@ class RigFile:
     description: str = ""  # one line for people
     simulated: bool = False  # true: the devices are simulated, with the plant behind them
     seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 0  # of the simulation's noise
-    loop_hz: Annotated[float, Ge(50), Le(250)] = 100.0  # rate of the control loop's tick; setpoints act on arrival
+    loop_hz: Annotated[float, Ge(50), Le(250)] = (
+        defaults.LOOP_HZ
+    )  # rate of the control loop's tick; setpoints act on arrival
     registers: Annotated[str, MinLen(1)] = defaults.REGISTER_MAP  # the Modbus map
     plant: Annotated[str, MinLen(1)] | None = None  # what is simulated; in a real rig for `--sim` and residual_watch
     calibration: Annotated[str, MinLen(1)]  # voltage-force model to start with

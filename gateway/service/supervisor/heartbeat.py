@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Final
 
+from gateway import defaults
 from gateway.processes.exit_cause import Ending
 from gateway.processes.scheduler_counters import ProcessorTime, Silence, explain_silence, load_of_machine, time_between
 from gateway.service.supervisor.child_process import Child
@@ -14,7 +15,7 @@ class Heartbeat:
     """stall_s: the longest silence, which READY tells. Times are monotonic seconds."""
 
     def __init__(self) -> None:
-        self.stall_s = 0.1
+        self.stall_s = defaults.STALL_S
         self._beat_s: float | None = None  # later than it was where we were late ourselves
         self._heard_s = 0.0
         self._used: ProcessorTime | None = None  # at the last heartbeat
