@@ -1,8 +1,8 @@
 """Profiles: YAML text + positions -> frozen typed objects; every fault at once, file:line:column, in the user's words.
 
-In the order of the way of a text: scalars, syntax, text (strict YAML), typed, sentences (pydantic's findings),
-models (form of a rig file), plants, calibrations, device_files, register_files, kinds, find, load, checks, line_checks,
-wire_checks, network_checks, edit_marks, rig, report, any_file; schema stands apart, for editors.
+strict_yaml: from text to plain values with positions, and pydantic's findings in plain sentences. kinds: one file per kind of
+profile. rigs: the form of a rig file, the checks across its parts, and the rig that comes of it. find and load look profiles up by
+name or path; schema stands apart, for editors. How to write a profile is told in profiles/README.md.
 
 Nothing here imports scipy: `check` answers at once.
 """

@@ -151,7 +151,7 @@ class GatewayClient:
     def _ask(self, method: str, request: str, *arguments: Any, **options: Any) -> Any:
         from pymodbus.exceptions import ModbusException
 
-        client = self._connected()
+        client = self._connect()
         try:
             answer = getattr(client, method)(*arguments, device_id=self._unit, **options)
         except (ModbusException, OSError) as error:
@@ -161,7 +161,7 @@ class GatewayClient:
             raise RefusedError(int(answer.exception_code), request)
         return answer
 
-    def _connected(self) -> "ModbusTcpClient":
+    def _connect(self) -> "ModbusTcpClient":
         """The client with an open socket. The socket is opened here, for pymodbus does not tell why it could not."""
         if self._client is None or not self._client.connected:
             from pymodbus.client import ModbusTcpClient

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.profiles.strict_yaml.faults import Path, ProfileFault, path_text
-from gateway.profiles.strict_yaml.sentences import number, shown, unit_of, unknown_key
+from gateway.profiles.strict_yaml.sentences import number, quote_value, unit_of, unknown_key
 from gateway.profiles.strict_yaml.text import Document, Mark
 from gateway.profiles.strict_yaml.typed import build, kind_at, names
 from gateway.twin import Plant
@@ -46,7 +46,9 @@ def read_plant(document: Document) -> tuple[PlantProfile | None, list[ProfileFau
     values = reader.group((), Plant)
     about = {field: values.pop(field, "") for field in ABOUT}
     faults = [
-        document.fault((key,), f"{shown(text)} is not text") for key, text in about.items() if not isinstance(text, str)
+        document.fault((key,), f"{quote_value(text)} is not text")
+        for key, text in about.items()
+        if not isinstance(text, str)
     ]
     plant, found = build(Plant, Document(document.file, values, document.marks | reader.marks))
     faults += reader.faults + [fault for fault in found if fault.path not in reader.refused]
@@ -81,7 +83,7 @@ class _PlantReader:
 
     def _leaf(self, path: Path, leaf: Any) -> Any:
         if not isinstance(leaf, dict) or "value" not in leaf:
-            self._fault(path, f"{shown(leaf)} has no origin: write {_FORM}")
+            self._fault(path, f"{quote_value(leaf)} has no origin: write {_FORM}")
             return leaf
         self.marks[path] = self.document.marks[(*path, "value")]
         for key in leaf:
@@ -108,7 +110,10 @@ def _range_problem(leaf: dict[Any, Any], unit: str) -> tuple[str, str] | None:
     if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(_is_number, bounds)) and bounds[0] <= bounds[1]):
         return "range", "must be [low, high], two rising numbers"
     if "range" in leaf and _is_number(value) and not bounds[0] <= value <= bounds[1]:
-        return "value", f"{shown(value)}{unit} is outside its range {number(bounds[0])} .. {number(bounds[1])}{unit}"
+        return (
+            "value",
+            f"{quote_value(value)}{unit} is outside its range {number(bounds[0])} .. {number(bounds[1])}{unit}",
+        )
     return None
 
 

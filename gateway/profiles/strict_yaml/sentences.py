@@ -59,8 +59,8 @@ def second(value: float) -> str:
     return f"{number(value)} s"
 
 
-def shown(value: object) -> str:
-    """A value as the file has it, short."""
+def quote_value(value: object) -> str:
+    """Return a value as the file has it, short."""
     if value is None:
         return "empty"
     if isinstance(value, bool):
@@ -112,7 +112,7 @@ def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | 
 def _describe_expected(what: str) -> Callable[[Any, dict[str, Any], str], str]:
     def sentence(value: Any, context: dict[str, Any], unit: str) -> str:
         hint = _hint(value, what)
-        seen = str(value) if isinstance(value, float) and hint else shown(value)
+        seen = str(value) if isinstance(value, float) and hint else quote_value(value)
         return f"{seen} is not {what}{hint}"
 
     return sentence
@@ -148,7 +148,7 @@ def _number_hint(text: str) -> str:
 def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     """`expected` is pydantic's list: `'fault', 'hold' or 'ramp'`."""
     choices = [word.strip(" '") for word in str(context["expected"]).replace(" or ", ",").split(",")]
-    seen = value if isinstance(value, str) else shown(value)
+    seen = value if isinstance(value, str) else quote_value(value)
     near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
     if len(choices) == 1:
         return f"{seen} is not {choices[0]}, the only choice"
@@ -182,20 +182,20 @@ _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
     "dict_type": _describe_expected("a group of keys"),
     "dataclass_type": _describe_expected("a group of keys"),
     "model_type": _describe_expected("a group of keys"),
-    "greater_than": lambda v, c, u: f"{shown(v)}{u} is not above {number(c['gt'])}{u}",
-    "greater_than_equal": lambda v, c, u: f"{shown(v)}{u} is below {number(c['ge'])}{u}, the least allowed",
-    "less_than": lambda v, c, u: f"{shown(v)}{u} is not below {number(c['lt'])}{u}",
-    "less_than_equal": lambda v, c, u: f"{shown(v)}{u} is above {number(c['le'])}{u}, the most allowed",
-    "multiple_of": lambda v, c, u: f"{shown(v)}{u} is not a multiple of {number(c['multiple_of'])}{u}",
+    "greater_than": lambda v, c, u: f"{quote_value(v)}{u} is not above {number(c['gt'])}{u}",
+    "greater_than_equal": lambda v, c, u: f"{quote_value(v)}{u} is below {number(c['ge'])}{u}, the least allowed",
+    "less_than": lambda v, c, u: f"{quote_value(v)}{u} is not below {number(c['lt'])}{u}",
+    "less_than_equal": lambda v, c, u: f"{quote_value(v)}{u} is above {number(c['le'])}{u}, the most allowed",
+    "multiple_of": lambda v, c, u: f"{quote_value(v)}{u} is not a multiple of {number(c['multiple_of'])}{u}",
     "too_short": lambda v, c, u: f"has {c['actual_length']} entries, at least {c['min_length']} are needed",
     "too_long": lambda v, c, u: f"has more than {c['max_length']} entries, the most allowed",
     "string_too_short": lambda v, c, u: (
-        "is empty" if not v else f"{shown(v)} is shorter than {c['min_length']} characters"
+        "is empty" if not v else f"{quote_value(v)} is shorter than {c['min_length']} characters"
     ),
-    "string_too_long": lambda v, c, u: f"{shown(v)} is longer than {c['max_length']} characters",
-    "string_pattern_mismatch": lambda v, c, u: f"{shown(v)} does not have the form {c['pattern']}",
+    "string_too_long": lambda v, c, u: f"{quote_value(v)} is longer than {c['max_length']} characters",
+    "string_pattern_mismatch": lambda v, c, u: f"{quote_value(v)} does not have the form {c['pattern']}",
     "value_error": lambda v, c, u: str(c["error"]),
-    "finite_number": lambda v, c, u: f"{shown(v)} is not a finite number",
+    "finite_number": lambda v, c, u: f"{quote_value(v)} is not a finite number",
 }
 
 
@@ -205,4 +205,4 @@ def type_sentence(error: Mapping[str, Any], value: Any, key: object) -> str:
     if value is None and error["type"] != "value_error":
         return "has no value"
     words = _BY_TYPE.get(error["type"])
-    return words(value, context, unit_of(key)) if words else f"{shown(value)}: {error['msg']}"
+    return words(value, context, unit_of(key)) if words else f"{quote_value(value)}: {error['msg']}"
