@@ -1,7 +1,7 @@
 """Profiles: YAML text + positions -> frozen typed objects; every fault at once, file:line:column, in the user's words.
 
 strict_yaml: from text to plain values with positions, and pydantic's findings in plain sentences. kinds: one file per kind of
-profile. rigs: the form of a rig file, the checks across its parts, and the rig that comes of it. find and load look profiles up by
+profile. rigs: the form of a rig file, the checks across its parts, and the rig that comes of it. find and load look them up by
 name or path; schema stands apart, for editors. How to write a profile is told in profiles/README.md.
 
 Nothing here imports scipy: `check` answers at once.
