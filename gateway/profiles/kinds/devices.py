@@ -24,5 +24,5 @@ def read_device(document: Document) -> tuple[DeviceProfile | None, list[ProfileF
         return None, [document.fault(("codec",), str(error))]
     except ValueError as error:
         return None, [document.fault((), str(error))]
-    faults = [document.fault(place, told) for place, told in rehearse(device)]
+    faults = [document.fault(place, reason) for place, reason in rehearse(device)]
     return (None, faults) if faults else (device, [])

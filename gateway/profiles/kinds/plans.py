@@ -58,7 +58,7 @@ def read_plan(document: Document) -> AnyPlan:
 
 def _experiment(document: Document) -> tuple[ExperimentPlan | None, list[ProfileFault]]:
     plan, faults = build(ExperimentPlan, document)
-    return plan, faults + ([] if plan is None else [document.fault(path, told) for path, told in plan_faults(plan)])
+    return plan, faults + ([] if plan is None else [document.fault(path, reason) for path, reason in plan_faults(plan)])
 
 
 def plan_of(fields_: Mapping[str, Any]) -> AnyPlan:

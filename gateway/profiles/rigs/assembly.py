@@ -109,9 +109,9 @@ def _marks(document: Document, path: Path, findings: Findings) -> list[ProfileFa
     """Marks of a rig of the user's own; a placeholder is told already, and a shipped file is there to be copied."""
     if path.is_relative_to(root()):
         return []
-    told = {fault.path for fault in (*findings.faults, *findings.hardware)}
+    known_paths = {fault.path for fault in (*findings.faults, *findings.hardware)}
     text = findings.texts[display(path)].decode("utf-8-sig", "replace")
-    return [fault for fault in find_edit_marks(document, text) if fault.path not in told]
+    return [fault for fault in find_edit_marks(document, text) if fault.path not in known_paths]
 
 
 def _run_checks(document: Document, found_by: Iterable[Check], parts: Parts) -> list[ProfileFault]:

@@ -82,9 +82,9 @@ def compensation_of(
 
     An extended plant without any of it gives the null compensation, its effects all in `limited`.
     """
-    told, acting, limited = frozenset(inputs), [], []
+    known_inputs, acting, limited = frozenset(inputs), [], []
     for treatment in differing_treatments(base, extended):
-        why_not = _why_not(treatment, told, new_model)
+        why_not = _why_not(treatment, known_inputs, new_model)
         if why_not:
             limited.append((treatment.name, why_not))
         else:
@@ -129,10 +129,10 @@ def compensation_words(compensation: Compensation) -> tuple[str, ...]:
     return (acts, *(f"not compensated: {name}: {why}" for name, why in compensation.limited))
 
 
-def _why_not(treatment: FieldTreatment, told: frozenset[str], new_model: bool) -> str:
+def _why_not(treatment: FieldTreatment, known_inputs: frozenset[str], new_model: bool) -> str:
     if treatment.by is By.NOTHING:
         return treatment.why_not
-    if missing := [name for name in treatment.needs if name not in told]:
+    if missing := [name for name in treatment.needs if name not in known_inputs]:
         return f"needs {' and '.join(missing)}, which nobody tells the controller"
     return CALIBRATE if treatment.by is By.MODEL and not new_model else ""
 

@@ -47,8 +47,10 @@ def ports_are_given(parts: Parts) -> Found:
                 "is missing: `force-gateway ports` lists what is plugged in (no hardware: `simulated: true`)",
             )
         elif PLACEHOLDER.search(line.port):
-            told = "is the placeholder that init wrote: put your adapter's path here, `force-gateway ports` lists them"
-            yield f"{key}.port", f"{line.port} {told}"
+            reason = (
+                "is the placeholder that init wrote: put your adapter's path here, `force-gateway ports` lists them"
+            )
+            yield f"{key}.port", f"{line.port} {reason}"
         elif not line.port.startswith("/"):
             yield f"{key}.port", f'"{line.port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
 
@@ -94,8 +96,8 @@ def silence_is_accepted(parts: Parts) -> Found:
 def ports_are_stable(parts: Parts) -> Found:
     for key, line, _ in lines_of(parts):
         if line.port is not None and line.port.startswith(_BY_CHANCE):
-            told = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
-            yield f"{key}.port", f"{line.port} {told}"
+            reason = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
+            yield f"{key}.port", f"{line.port} {reason}"
 
 
 def speeds_agree(parts: Parts) -> Found:

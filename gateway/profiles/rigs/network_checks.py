@@ -12,8 +12,8 @@ def others_are_named(parts: Parts) -> Found:
     if (network := parts.network) is None:
         return
     if not is_loopback(network.bind) and not network.allow:
-        told = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
-        yield "network.bind", f"{network.bind} {told}"
+        reason = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
+        yield "network.bind", f"{network.bind} {reason}"
     if network.owner and network.allow and not any(ip_address(network.owner) in allowed for allowed in network.allow):
         yield "network.owner", f"{network.owner} is in none of the networks of network.allow: it could not connect"
 

@@ -97,9 +97,9 @@ def answers_fit_into_their_time(parts: Parts) -> Found:
 
 def _given_up(path: str, device: DeviceProfile, baud: int, talk: tuple[str, float]) -> Found:
     if talk[1] > device.reply_timeout_s:
-        told = f"question and answer of {talk[0]} take {talk[1]:.3f} s on the wire"
+        reason = f"question and answer of {talk[0]} take {talk[1]:.3f} s on the wire"
         bound = f"{device.name} gives up after reply_timeout_s = {second(device.reply_timeout_s)}"
-        yield path, f"{baud}: {told}, {bound}: raise it in the profile, or set the device to a higher speed"
+        yield path, f"{baud}: {reason}, {bound}: raise it in the profile, or set the device to a higher speed"
 
 
 def output_faults_are_no_accident(parts: Parts) -> Found:
@@ -135,8 +135,11 @@ def samples_come_in_time(parts: Parts) -> Found:
     for reading in _readings(parts):
         if parts.supervision and parts.supervision.sample_timeout_s < 2.0 * reading.period_s:
             bound, rate = second(parts.supervision.sample_timeout_s), f"{1.0 / reading.period_s:.3g} readings/s"
-            told = f"two readings of {reading.device.name} take {2.0 * reading.period_s:.3g} s ({rate} at {reading.baud} baud)"
-            yield "supervision.sample_timeout_s", f"{bound} is too short: {told}"
+            talk = f"{2.0 * reading.period_s:.3g} s ({rate} at {reading.baud} baud)"
+            yield (
+                "supervision.sample_timeout_s",
+                f"{bound} is too short: two readings of {reading.device.name} take {talk}",
+            )
 
 
 def the_display_shows_enough(parts: Parts) -> Found:
@@ -180,9 +183,9 @@ def a_frozen_cell_is_found(parts: Parts) -> Found:
         rate_hz = 1.0 / reading.period_s
         counts = counts_found_within(SLOW_S, rate_hz)
         if counts > _COUNTS_OF_NOISE:
-            told = f"noise of {counts:.2g} counts or more" if counts < inf else "no noise whatever: too few readings"
+            reason = f"noise of {counts:.2g} counts or more" if counts < inf else "no noise whatever: too few readings"
             seen = f"{reading.device.name} gives {rate_hz:.3g} readings/s"
-            found = f"at a force that stands still a frozen cell is found within {SLOW_S:.0f} s by {told} (W234)"
+            found = f"at a force that stands still a frozen cell is found within {SLOW_S:.0f} s by {reason} (W234)"
             yield "load_cell.device", f"{seen}: {found}"
 
 
@@ -195,19 +198,19 @@ def settings_are_fine_enough(parts: Parts) -> Found:
     step_v = output_host(device).resolution_v
     step_n = step_v * (high_n - low_n) / (calibration.x1_v - calibration.x0_v)
     if 0.5 * step_n > defaults.in_band_tolerance_n:
-        told = f"sets in steps of {step_v:.3g} V, about {step_n:.2g} N"
+        reason = f"sets in steps of {step_v:.3g} V, about {step_n:.2g} N"
         band = f"defaults.in_band_tolerance_n = {newton(defaults.in_band_tolerance_n)}"
         yield (
             "output.device",
-            f"{device.name} {told}: {band} cannot be held; more decimals in the template, or a wider band",
+            f"{device.name} {reason}: {band} cannot be held; more decimals in the template, or a wider band",
         )
 
 
 def the_output_wire_is_fast_enough(parts: Parts) -> Found:
     cycle_s = _cycle_s(parts)
     if cycle_s > 1.0 / _SLOWEST_HZ:
-        told = f"a setting and a reading take {cycle_s * 1e3:.0f} ms on the wire, {1 / cycle_s:.0f} Hz"
-        yield "output.baud", f"{told}; the pneumatics need {number(_SLOWEST_HZ)} Hz"
+        reason = f"a setting and a reading take {cycle_s * 1e3:.0f} ms on the wire, {1 / cycle_s:.0f} Hz"
+        yield "output.baud", f"{reason}; the pneumatics need {number(_SLOWEST_HZ)} Hz"
     if parts.supervision and parts.supervision.output_timeout_s < 3 * cycle_s:
         timeout = second(parts.supervision.output_timeout_s)
         yield (
@@ -225,8 +228,8 @@ def the_cell_wire_is_fast_enough(parts: Parts) -> Found:
                 f"{reading.baud} carries {possible_hz:.0f} readings/s, {reading.device.name} sends {number(rate_hz)}",
             )
         elif reading.period_s > 1.0 / _SLOWEST_HZ:
-            told = f"{reading.device.name} gives {1.0 / reading.period_s:.3g} readings/s"
-            yield "load_cell.baud", f"{reading.baud}: {told}; the pneumatics need {number(_SLOWEST_HZ)}"
+            reason = f"{reading.device.name} gives {1.0 / reading.period_s:.3g} readings/s"
+            yield "load_cell.baud", f"{reading.baud}: {reason}; the pneumatics need {number(_SLOWEST_HZ)}"
 
 
 def a_lost_answer_is_survived(parts: Parts) -> Found:
@@ -234,18 +237,18 @@ def a_lost_answer_is_survived(parts: Parts) -> Found:
         gap_s = reading.device.reply_timeout_s + reading.period_s
         if reading.is_asked and parts.supervision and parts.supervision.sample_timeout_s < gap_s:
             bound = second(parts.supervision.sample_timeout_s)
-            told = (
+            reason = (
                 f"one lost answer leaves a gap of {gap_s:.3g} s ({reading.device.name}: reply_timeout_s and a reading)"
             )
-            yield "supervision.sample_timeout_s", f"{bound}: {told}, and that is a fault"
+            yield "supervision.sample_timeout_s", f"{bound}: {reason}, and that is a fault"
 
 
 def the_quantum_is_the_amplifiers(parts: Parts) -> Found:
     for reading in _readings(parts):
         count_n = reading.host.resolution_n
         if parts.supervision and parts.supervision.sample_quantum_n > 2.0 * count_n:
-            told = f"is far from one count of {reading.device.name}, {count_n:.3g} N"
-            yield "supervision.sample_quantum_n", f"{newton(parts.supervision.sample_quantum_n)} {told}"
+            reason = f"is far from one count of {reading.device.name}, {count_n:.3g} N"
+            yield "supervision.sample_quantum_n", f"{newton(parts.supervision.sample_quantum_n)} {reason}"
 
 
 FAULTS: Final[tuple[Check, ...]] = (
