@@ -86,7 +86,7 @@ class GatewayClient:
             self._client = None
 
     def read_words(self, address: int, count: int) -> tuple[int, ...]:
-        """`count` words from `address` (0-based), in as many requests as Modbus needs."""
+        """Return `count` words from `address` (0-based), in as many requests as Modbus needs."""
         words: list[int] = []
         while len(words) < count:
             at, most = address + len(words), min(count - len(words), _MOST_READ)
@@ -94,13 +94,13 @@ class GatewayClient:
         return tuple(words)
 
     def read_block(self, name: str) -> list[RegisterReading]:
-        """Every register of one block, from one snapshot where one request carries it."""
+        """Return every register of one block, from one snapshot where one request carries it."""
         block = self.register_map.block(name)
         words = self.read_words(block.first, block.words)
         return [_reading(register, words, block.first) for register in self.register_map.registers_of(name)]
 
     def read_values(self, registers: Sequence[Register]) -> list[RegisterReading]:
-        """The registers in the order asked for; those close together come from one request."""
+        """Return the registers in the order asked for; those close together come from one request."""
         found: dict[int, RegisterReading] = {}
         for group in _groups(registers):
             first, last = group[0].address, group[-1].address + group[-1].words
@@ -109,7 +109,8 @@ class GatewayClient:
         return [found[register.address] for register in registers]
 
     def frames(self, assignments: Sequence[Assignment]) -> list[Frame]:
-        """What `write_values` sends: one FC16 per block, more where it is too long or a read-only register lies between."""
+        """Return what `write_values` sends: one FC16 per block, more where it is too long or a read-only register lies
+        between."""
         runs: list[list[Assignment]] = []
         for assignment in sorted(assignments, key=lambda assignment: assignment.register.address):
             if runs and self._can_join(runs[-1][0].register, runs[-1][-1].register, assignment.register):
@@ -162,7 +163,7 @@ class GatewayClient:
         return answer
 
     def _connect(self) -> "ModbusTcpClient":
-        """The client with an open socket. The socket is opened here, for pymodbus does not tell why it could not."""
+        """Return the client with an open socket. The socket is opened here, for pymodbus does not tell why it could not."""
         if self._client is None or not self._client.connected:
             from pymodbus.client import ModbusTcpClient
 

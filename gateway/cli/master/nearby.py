@@ -20,7 +20,8 @@ def sockets_near(host: str, root: Path) -> list[Path]:
 
 
 def running_at(host: str, port: int, root: Path) -> dict[str, Any] | None:
-    """What the gateway that serves this port says of itself (`running`); None where it is elsewhere, nobody says, or two do."""
+    """Return what the gateway that serves this port says of itself (`running`); None where it is elsewhere, nobody
+    says, or two do."""
     told = [one for directory in sockets_near(host, root) if (one := _said_by(directory)).get("port") == port]
     return told[0] if len(told) == 1 else None
 

@@ -78,7 +78,7 @@ def _lease(rig: str) -> "KnownLease":
 
 
 def _told_lease(host: str, port: int) -> "KnownLease | None":
-    """What the gateway that serves this port says, where it runs on this machine; None where nobody says."""
+    """Return what the gateway that serves this port says, where it runs on this machine; None where nobody says."""
     from gateway.cli.force_hold.heartbeat import KnownLease
     from gateway.cli.master.nearby import running_at
     from gateway.service.supervisor.run_options import default_state_root

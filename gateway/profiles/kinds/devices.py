@@ -14,7 +14,7 @@ _MAKE: Final[dict[Role, Callable[[DeviceProfile], object]]] = {Role.OUTPUT: outp
 
 
 def read_device(document: Document) -> tuple[DeviceProfile | None, list[ProfileFault]]:
-    """The device profile of a file, or None and every fault."""
+    """Return the device profile of a file, or None and every fault."""
     device, faults = build(DeviceProfile, document)
     if device is None:
         return None, faults

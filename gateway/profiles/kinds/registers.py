@@ -7,7 +7,7 @@ from gateway.registers.map.register_map import RegisterMap
 
 
 def read_registers(document: Document) -> tuple[RegisterMap | None, list[ProfileFault]]:
-    """The register map of a file, or None and every fault."""
+    """Return the register map of a file, or None and every fault."""
     try:
         return read_map(document.value), []
     except MapError as error:

@@ -176,7 +176,8 @@ def counts_are_fine_enough(parts: Parts) -> Found:
 
 
 def a_frozen_cell_is_found(parts: Parts) -> Found:
-    """The rate alone can be known here; the noise shows when the cell is read (W234 at a calibration's end)."""
+    """Yield a warning where the rate alone makes a frozen cell slow to find; the noise shows when the cell is read
+    (W234 at a calibration's end)."""
     if parts.supervision and parts.supervision.frozen_equal_samples is not None:
         return
     for reading in _readings(parts):

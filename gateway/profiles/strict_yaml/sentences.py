@@ -32,18 +32,18 @@ def _unit_start(key: str) -> int | None:
 
 
 def unit_of(key: object) -> str:
-    """The unit that ends a key, as it is printed: ` N/s` for `force_ramp_n_per_s`; empty when it has none."""
+    """Return the unit that ends a key, as it is printed: ` N/s` for `force_ramp_n_per_s`; empty when it has none."""
     start = _unit_start(str(key))
     return f" {_UNITS['_'.join(str(key).split('_')[start:])]}" if start else ""
 
 
 def without_unit(key: str) -> str:
-    """`force_ramp` of `force_ramp_n_per_s`."""
+    """Return `force_ramp` of `force_ramp_n_per_s`."""
     return "_".join(key.split("_")[: _unit_start(key)])
 
 
 def number(value: float) -> str:
-    """A number as people write it: without a trailing `.0`, with at most ten digits."""
+    """Return a number as people write it: without a trailing `.0`, with at most ten digits."""
     return str(value) if isinstance(value, int) else f"{value:.10g}"
 
 
@@ -75,8 +75,8 @@ def quote_value(value: object) -> str:
 def unknown_key(
     key: str, group: Mapping[Any, Any], known: Iterable[str], elsewhere: Mapping[str, str]
 ) -> tuple[str, str]:
-    """(sentence, key that was meant) for a key that its group does not have; the latter empty where nobody knows. group: what
-    stands there; elsewhere: key -> where it belongs.
+    """Return (sentence, key that was meant) for a key that its group does not have; the latter empty where nobody
+    knows. group: what stands there; elsewhere: key -> where it belongs.
 
     A key that the group has already cannot have been meant.
     """
@@ -96,7 +96,7 @@ def unknown_key(
 
 
 def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | None:
-    """`lease_ms: 200` -> (`lease_s`, `: 0.2`): the same stem with another unit of the same kind."""
+    """Return `lease_ms: 200` -> (`lease_s`, `: 0.2`): the same stem with another unit of the same kind."""
     stem, _, unit = key.rpartition("_")
     for scale in _SCALES:
         if unit not in scale:
@@ -119,7 +119,7 @@ def _describe_expected(what: str) -> Callable[[Any, dict[str, Any], str], str]:
 
 
 def _hint(value: Any, what: str) -> str:
-    """Why a value that looks right is not: quotes, decimal comma, YAML 1.1's booleans."""
+    """Return why a value that looks right is not: quotes, decimal comma, YAML 1.1's booleans."""
     if isinstance(value, float) and value.is_integer() and what == "a whole number":
         return f": write {int(value)}"
     if isinstance(value, bool) and what == "text":
@@ -146,7 +146,7 @@ def _number_hint(text: str) -> str:
 
 
 def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
-    """`expected` is pydantic's list: `'fault', 'hold' or 'ramp'`."""
+    """Return the choices in pydantic's list `expected`: `'fault', 'hold' or 'ramp'`."""
     choices = [word.strip(" '") for word in str(context["expected"]).replace(" or ", ",").split(",")]
     seen = value if isinstance(value, str) else quote_value(value)
     near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
@@ -156,7 +156,7 @@ def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
 
 
 def _nearest(value: Any, choices: list[str]) -> str | None:
-    """The number among the choices that a slip of the finger makes this one of."""
+    """Return the number among the choices that a slip of the finger makes this one of."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     near = [choice for choice in choices if choice.isdecimal() and abs(value - int(choice)) <= 0.1 * int(choice)]
@@ -200,7 +200,7 @@ _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
 
 
 def type_sentence(error: Mapping[str, Any], value: Any, key: object) -> str:
-    """The sentence for one pydantic error about a value that is there; value as the file has it."""
+    """Return the sentence for one pydantic error about a value that is there; value as the file has it."""
     context: dict[str, Any] = error.get("ctx") or {}
     if value is None and error["type"] != "value_error":
         return "has no value"

@@ -52,7 +52,7 @@ _UNKNOWN: Final = _Meaning("", "")
 
 
 def syntax_sentence(error: yaml.YAMLError, text: str) -> tuple[int, int, str]:
-    """(line, column, sentence) of a parser's complaint; line and column count from 1."""
+    """Return (line, column, sentence) of a parser's complaint; line and column count from 1."""
     problem = str(getattr(error, "problem", None) or getattr(error, "reason", None) or error)
     meaning = next((one for one in _MEANINGS if one.part in problem), _UNKNOWN)
     line, column = _place(error, text, meaning)
@@ -66,7 +66,7 @@ def syntax_sentence(error: yaml.YAMLError, text: str) -> tuple[int, int, str]:
 
 
 def _place(error: yaml.YAMLError, text: str, meaning: _Meaning) -> tuple[int, int]:
-    """Where the complaint points; an unclosed quote or bracket is placed where it was opened, not at the file's end."""
+    """Return where the complaint points; an unclosed quote or bracket is placed where it was opened, not at the file's end."""
     opened = getattr(error, "context_mark", None) if meaning.is_where_opened else None
     mark = opened or getattr(error, "problem_mark", None)
     if mark is not None:

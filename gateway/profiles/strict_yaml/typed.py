@@ -29,7 +29,7 @@ def adapter(kind: type) -> TypeAdapter[Any]:
 
 
 def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None, list[ProfileFault]]:
-    """The dataclass at `path` of the document, or None and every fault."""
+    """Return the dataclass at `path` of the document, or None and every fault."""
     try:
         value: T = adapter(cast("Any", kind)).validate_json(json.dumps(document.at(*path)), strict=True)
         return value, []
@@ -40,7 +40,8 @@ def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None,
 
 
 def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
-    """The dataclass at `path`, for cross-checks: keys that mean nothing there are left out, any other fault gives None."""
+    """Return the dataclass at `path`, for cross-checks: keys that mean nothing there are left out, any other fault
+    gives None."""
     value, faults = build(kind, document, path)
     strangers = {fault.path for fault in faults if fault.kind is FaultKind.STRANGER and not fault.meant}
     group = document.at(*path)
@@ -51,14 +52,14 @@ def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
 
 
 def _told_once(error: ValidationError) -> list[Any]:
-    """A union reports each of its members; one finding per place is enough, the first. No more than a person reads: a sentence
-    takes half a millisecond, and a hostile document may have thousands."""
+    """Return one finding per place, the first: a union reports each of its members. No more than a person
+    reads: a sentence takes half a millisecond, and a hostile document may have thousands."""
     first = error.errors(include_url=False)[:_MOST_FINDINGS]
     return list({_steps(found["loc"]): found for found in reversed(first)}.values())[::-1]
 
 
 def _without_echoes(faults: list[ProfileFault]) -> list[ProfileFault]:
-    """A misspelt key is also a missing one: the second finding goes, for the first tells what was meant."""
+    """Return the findings without a missing key that is misspelt beside it: the first tells what was meant."""
     meant = {f"{fault.path.rpartition('.')[0]}.{fault.meant}".lstrip(".") for fault in faults if fault.meant}
     return [fault for fault in faults if not (fault.path in meant and fault.kind is FaultKind.MISSING)]
 
@@ -101,12 +102,12 @@ def _what_it_is(kind: type, place: Path) -> str:
 
 
 def names(kind: type) -> list[str]:
-    """The keys that a group may have."""
+    """Return the keys that a group may have."""
     return [field.name for field in fields(kind)] if is_dataclass(kind) else []
 
 
 def kind_at(kind: type, path: Path) -> type | None:
-    """The dataclass that describes the group at `path` below `kind`, None when it is no dataclass."""
+    """Return the dataclass that describes the group at `path` below `kind`, None when it is no dataclass."""
     found: type | None = kind
     for step in path:
         if isinstance(step, int):
@@ -118,7 +119,7 @@ def kind_at(kind: type, path: Path) -> type | None:
 
 
 def groups(kind: type) -> Iterator[tuple[str, type]]:
-    """(key, dataclass) for each field of a dataclass that is one itself, also as `X | None` or `tuple[X, ...]`."""
+    """Yield (key, dataclass) for each field of a dataclass that is one itself, also as `X | None` or `tuple[X, ...]`."""
     hints = get_type_hints(kind)
     for field in fields(kind):
         for candidate in _members(hints[field.name]):
@@ -135,5 +136,5 @@ def _members(hint: Any) -> Iterator[Any]:
 
 
 def groups_by_key(kind: type) -> dict[str, str]:
-    """Where each key of a nested group belongs: {"force_max_n": "limits"}."""
+    """Return where each key of a nested group belongs: {"force_max_n": "limits"}."""
     return {name: group for group, inner in groups(kind) for name in names(inner)}
