@@ -43,7 +43,7 @@ class Activation:
         self.limits = limits
 
     def why_unusable(self, calibration: Calibration) -> str:
-        """A sentence for a calibration that this rig cannot take, empty for one that it can."""
+        """Return a sentence for a calibration that this rig cannot take, empty for one that it can."""
         fault = self._fault(calibration)
         return f"E401 calibration {calibration.number}: {fault.text}" if fault else ""
 
@@ -78,7 +78,7 @@ class Activation:
         return self.use(self.store.add(fresh), slot)
 
     def _candidates(self, fresh: Calibration) -> Iterator[int]:
-        """Numbers of the store that seem to be this set, the last one first."""
+        """Yield numbers of the store that seem to be this set, the last one first."""
         words = _words(fresh)
         for number, stored in self.store.glances():
             with suppress(ValueError, struct.error, OverflowError):
@@ -86,7 +86,7 @@ class Activation:
                     yield number
 
     def _is_same_set(self, number: int | None, fresh: Calibration) -> bool:
-        """Whether a stored set, None: the built-in one, is whole and the very same."""
+        """Return whether a stored set, None: the built-in one, is whole and the very same."""
         try:
             stored = self.store.built_in if number is None else self.store.load(number)
         except StoreError:

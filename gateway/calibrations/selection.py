@@ -56,12 +56,12 @@ class SelectionState:
         return tuple(number for number in named if number)
 
     def in_slot(self, slot: int) -> Selection | None:
-        """What selecting a slot (0 .. 7) means; None when it is empty."""
+        """Return what selecting a slot (0 .. 7) means; None when it is empty."""
         number = self.slots[slot]
         return None if number is None else Selection(number or None, slot)
 
     def with_active(self, selection: Selection, previous: Selection) -> "SelectionState":
-        """What holds after a change; a selection with a slot fills that slot."""
+        """Return what holds after a change; a selection with a slot fills that slot."""
         slots = list(self.slots)
         if selection.slot is not None:
             slots[selection.slot] = selection.number or OWN
@@ -69,7 +69,7 @@ class SelectionState:
 
 
 def read_selection(directory: Path) -> tuple[SelectionState, tuple[str, ...]]:
-    """The newest whole generation, and a sentence for each newer one that is not. Nothing stored is generation 0."""
+    """Return the newest whole generation, and a sentence for each newer one that is not. Nothing stored is generation 0."""
     damaged: list[str] = []
     for generation, name in reversed(_generations(directory)):
         try:
@@ -84,7 +84,7 @@ def read_selection(directory: Path) -> tuple[SelectionState, tuple[str, ...]]:
 
 
 def write_selection(directory: Path, descriptor: int, pointer: SelectionState) -> SelectionState:
-    """The pointer as the next generation, durable when this returns; OSError, and nothing has changed, when not.
+    """Return the pointer as the next generation, durable when this returns; OSError, and nothing has changed, when not.
 
     pointer.generation is that of the one which it follows.
     """

@@ -81,7 +81,7 @@ class CalibrationStore:
         return number
 
     def list(self) -> Entries:
-        """Every calibration of the store by number, damaged ones with their fault."""
+        """Return every calibration of the store by number, damaged ones with their fault."""
         return [self._entry(number) for number in self._numbers()]
 
     def glances(self) -> Iterator[tuple[int, Calibration]]:
@@ -92,7 +92,7 @@ class CalibrationStore:
                 yield number, _parse_unchecked((self.directory / _file_name(number)).read_text(encoding="utf-8"))
 
     def load(self, number: int) -> Calibration:
-        """A calibration by its number, that of the built-in one included. StoreError when it is not there or damaged."""
+        """Return a calibration by its number, that of the built-in one included. StoreError when it is not there or damaged."""
         path = self.directory / _file_name(number)
         try:
             calibration = _parse_checked(path.read_bytes(), path)
@@ -105,7 +105,7 @@ class CalibrationStore:
         return calibration
 
     def number_of(self, data_sha256: str) -> int | None:
-        """The calibration that was made of these very data, None where there is none."""
+        """Return the calibration that was made of these very data, None where there is none."""
         return next((e.number for e in self.list() if e.calibration and e.calibration.data_sha256 == data_sha256), None)
 
     def find_selected(self, why_unusable: Callable[[Calibration], str] = lambda calibration: "") -> SelectedCalibration:
@@ -140,7 +140,7 @@ class CalibrationStore:
         return self.use(previous.number, previous.slot)
 
     def previous(self) -> Selection:
-        """What a rollback brings back. StoreError where nothing was ever changed."""
+        """Return what a rollback brings back. StoreError where nothing was ever changed."""
         pointer, _ = self._pointer()
         if pointer.generation == 0:
             raise StoreError("E433", "no calibration was in use before this one: there is nothing to go back to")
@@ -149,7 +149,7 @@ class CalibrationStore:
         return previous if kept else Selection(previous.number)
 
     def slot(self, slot: int) -> int | None:
-        """The number of the calibration in a slot (0 .. 7), that of the built-in one included; None when it is empty."""
+        """Return the number of the calibration in a slot (0 .. 7), that of the built-in one included; None when it is empty."""
         number = self._pointer()[0].slots[slot]
         return self.built_in.number if number == OWN and self.built_in else number
 
@@ -164,7 +164,7 @@ class CalibrationStore:
             raise _store_error(error) from error
 
     def _to_go_back_to(self, pointer: SelectionState, selection: Selection) -> Selection:
-        """What is in use now, unless it is damaged or is chosen again: then what could be gone back to stays."""
+        """Return what is in use now, unless it is damaged or is chosen again: then what could be gone back to stays."""
         active = pointer.active
         if active.number == selection.number or (active.number is not None and self._entry(active.number).fault):
             return pointer.previous
@@ -208,7 +208,7 @@ class CalibrationStore:
 
 
 def as_text(calibration: Calibration) -> str:
-    """A calibration as YAML, in the form of the shipped ones: values as JSON, which is YAML and loses no digit."""
+    """Return a calibration as YAML, in the form of the shipped ones: values as JSON, which is YAML and loses no digit."""
     return "".join(f"{name}: {json.dumps(value, ensure_ascii=False)}\n" for name, value in asdict(calibration).items())
 
 
@@ -222,7 +222,7 @@ def _parse_unchecked(text: str) -> Calibration:
 
 
 def _encode_checked(calibration: Calibration) -> bytes:
-    """A calibration's file. StoreError for one that could not be read back as it is."""
+    """Return a calibration's file. StoreError for one that could not be read back as it is."""
     data = add_checksum(as_text(calibration))
     if _parse_checked(data, Path(calibration.name)) != calibration:
         raise StoreError("E432", f"{calibration.name} holds a number that no file can")
@@ -238,7 +238,7 @@ def _store_error(error: OSError) -> StoreError:
 
 
 def _parse_checked(data: bytes, path: Path) -> Calibration:
-    """The calibration of a file's bytes. StoreError for anything but what was sealed."""
+    """Return the calibration of a file's bytes. StoreError for anything but what was sealed."""
     try:
         verify_checksum(data)
         calibration, faults = read_calibration(parse(data, str(path)))

@@ -207,7 +207,7 @@ class UploadService:
         self._log("calibration", sentence)
 
     def _told(self, what: str) -> str:
-        """The log line of something that went well, with what the notice says."""
+        """Return the log line of something that went well, with what the notice says."""
         known = "; known here, it keeps number and name" if self._notice & CommitNotice.KNOWN_SET else ""
         if self._notice & CommitNotice.WITHOUT_STOPS:
             old = f"length {HEAD_WORDS}, as of map version 1: no slip stops, no response"

@@ -20,7 +20,7 @@ class RequestRate:
         self._last_s = now_s
 
     def wait_s(self, now_s: float) -> float:
-        """Seconds until the next request may run; 0 when it may now."""
+        """Return the seconds until the next request may run; 0 when it may now."""
         self._tokens = min(self._most, self._tokens + (now_s - self._last_s) * self._rate_per_s)
         self._last_s = now_s
         missing = 1.0 - self._tokens
@@ -31,7 +31,7 @@ class RequestRate:
         self._tokens -= 1.0
 
     def is_full(self, now_s: float) -> bool:
-        """Whether a new bucket would be no different."""
+        """Return whether a new bucket would be no different."""
         self.wait_s(now_s)
         return self._tokens >= self._most
 

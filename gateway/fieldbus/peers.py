@@ -14,14 +14,14 @@ Address = IPv4Address | IPv6Address
 
 
 def address_of(host: str) -> Address:
-    """The address without scope; an IPv4 one that came in through an IPv6 socket is IPv4. Raises ValueError."""
+    """Return the address without scope; an IPv4 one that came in through an IPv6 socket is IPv4. Raises ValueError."""
     address = ip_address(host.partition("%")[0])
     mapped = address.ipv4_mapped if isinstance(address, IPv6Address) else None
     return mapped or address
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach the host, a numeric address or "localhost"."""
+    """Return whether only this machine can reach the host, a numeric address or "localhost"."""
     if host == "localhost":
         return True
     try:
@@ -40,7 +40,7 @@ class Peers:
         self._rates: dict[str, RequestRate] = {}
 
     def refusal(self, host: str) -> str | None:
-        """Why this address may not connect now; None: it may."""
+        """Return why this address may not connect now; None: it may."""
         settings = self._settings
         address = address_of(host)
         if self._guarded and not any(address in network for network in settings.allow):
@@ -63,7 +63,7 @@ class Peers:
         return True
 
     def rate(self, host: str, now_s: float) -> RequestRate | None:
-        """The bucket that all connections of an address share; None: unlimited."""
+        """Return the bucket that all connections of an address share; None: unlimited."""
         if is_loopback(host):
             return None
         return self._rates.setdefault(host, RequestRate(self._settings.requests_per_s, now_s))

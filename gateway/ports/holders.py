@@ -19,7 +19,7 @@ class Holder:
 
 
 def holders_of(path: str, processes: Path = Path("/proc")) -> list[Holder]:
-    """Who has it open, each process once. Processes of other users stay hidden from all but root."""
+    """Return who has it open, each process once. Processes of other users stay hidden from all but root."""
     try:
         device = Path(path).stat().st_rdev
     except OSError:

@@ -34,12 +34,12 @@ def set_low_latency(descriptor: int, path: str, system: Path = Path("/sys")) -> 
 
 
 def latency_timer(path: str, system: Path = Path("/sys")) -> Path:
-    """Where the FTDI driver keeps its timer."""
+    """Return where the FTDI driver keeps its timer."""
     return system / "class" / "tty" / Path(os.path.realpath(path)).name / "device" / "latency_timer"
 
 
 def latency_ms(path: str, system: Path = Path("/sys")) -> int | None:
-    """The adapter's latency timer, ms; None where the driver has none."""
+    """Return the adapter's latency timer, ms; None where the driver has none."""
     try:
         return int(latency_timer(path, system).read_text())
     except (OSError, ValueError):

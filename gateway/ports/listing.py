@@ -25,14 +25,14 @@ class PortInfo:
 
 
 def list_ports(devices: Path = Path("/dev"), system: Path = Path("/sys")) -> list[PortInfo]:
-    """Every serial port of this machine that has hardware behind it."""
+    """Return every serial port of this machine that has hardware behind it."""
     by_id = _by_id(devices)
     names = sorted({entry.name for entry in _entries(system / "class" / "tty") if _is_real(entry)} | set(by_id))
     return [_info(name, by_id.get(name), devices, system) for name in names]
 
 
 def present_paths(devices: Path = Path("/dev"), system: Path = Path("/sys")) -> list[str]:
-    """The paths that could be opened, as a rig file should name them."""
+    """Return the paths that could be opened, as a rig file should name them."""
     by_id = _by_id(devices)
     names = {entry.name for entry in _entries(system / "class" / "tty") if _is_real(entry)} - set(by_id)
     return sorted(by_id.values()) + sorted(str(devices / name) for name in names)
@@ -63,7 +63,7 @@ def _info(name: str, by_id: str | None, devices: Path, system: Path) -> PortInfo
 
 
 def _description(entry: Path) -> str:
-    """What the USB adapter says it is: maker and product, from the nearest folder above that has them."""
+    """Return what the USB adapter says it is: maker and product, from the nearest folder above that has them."""
     here = Path(os.path.realpath(entry))
     for folder in (here, *list(here.parents)[:3]):
         words = [text for text in (_text(folder / "manufacturer"), _text(folder / "product")) if text]

@@ -16,7 +16,7 @@ _MINIMUM, _TIME = termios.VMIN, termios.VTIME
 
 
 def open_descriptor(path: str, settings: SerialSettings) -> int:
-    """A raw, non-blocking, exclusively locked descriptor of the port, input flushed. PortError says why there is none.
+    """Return a raw, non-blocking, exclusively locked descriptor of the port, input flushed. PortError says why there is none.
 
     The lock is flock's: TIOCEXCL would outlive a killed process as EBUSY for the guardian too. Ptys have no modem lines,
     which pyserial tolerates.

@@ -28,7 +28,7 @@ class Pty:
         os.set_blocking(self.fd, False)
 
     def client_baud(self) -> int:
-        """The speed that the client has set, bits per second: a pty's master sees it."""
+        """Return the speed that the client has set, bits per second: a pty's master sees it."""
         *_, speed = _TERMIOS2.unpack(fcntl.ioctl(self.fd, _TCGETS2, bytes(_TERMIOS2.size)))
         return int(speed)
 

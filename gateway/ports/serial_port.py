@@ -71,7 +71,7 @@ class SerialPort:
         return len(self._unsent) + _queued_bytes(self._descriptor) if self._descriptor >= 0 else 0
 
     def fileno(self) -> int:
-        """The raw descriptor; PortError E102 while the port is lost."""
+        """Return the raw descriptor; PortError E102 while the port is lost."""
         if not self.is_open:
             raise PortError("E102", f"{self._path} is not open")
         return self._descriptor
@@ -251,6 +251,6 @@ class SerialPort:
 
 
 def _queued_bytes(descriptor: int) -> int:
-    """Bytes in the driver's output queue."""
+    """Return the number of bytes in the driver's output queue."""
     (count,) = struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)))
     return int(count)

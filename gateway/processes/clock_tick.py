@@ -18,7 +18,7 @@ _EXPIRATIONS = struct.Struct("=Q")
 
 
 def _create_timerfd(period_s: float) -> int:
-    """A descriptor that becomes readable every period_s; OSError where the kernel has none."""
+    """Return a descriptor that becomes readable every period_s; OSError where the kernel has none."""
     libc = ctypes.CDLL(None, use_errno=True)
     fd = int(libc.timerfd_create(_CLOCK_MONOTONIC, _NONBLOCK_CLOEXEC))
     if fd < 0:

@@ -65,13 +65,13 @@ def remove_if_possible(directory: int, name: str) -> None:
 
 
 def add_checksum(text: str) -> bytes:
-    """The text with the CRC-32 of its bytes in a line before it."""
+    """Return the text with the CRC-32 of its bytes in a line before it."""
     data = text.encode()
     return _SEAL % crc32(data) + data
 
 
 def verify_checksum(data: bytes) -> bytes:
-    """What `sealed` was given. ValueError with a sentence for a torn, altered or foreign file."""
+    """Return what `add_checksum` was given. ValueError with a sentence for a torn, altered or foreign file."""
     first, _, rest = data.partition(b"\n")
     if first + b"\n" == _SEAL % crc32(rest):
         return rest

@@ -65,12 +65,12 @@ def utc_text(time_s: float) -> str:
 
 
 def encode_event(event: EventRecord) -> bytes:
-    """One line of the file: a JSON object in ASCII, with its newline."""
+    """Return one line of the file: a JSON object in ASCII, with its newline."""
     return json.dumps(event._asdict()).encode("ascii") + b"\n"
 
 
 def parse_event(line: bytes) -> EventRecord | None:
-    """The last whole record of a line, None where there is none: a writer that was killed leaves the start of one."""
+    """Return the last whole record of a line, None where there is none: a writer that was killed leaves the start of one."""
     start = line.rfind(RECORD_START)
     if start < 0:
         return None

@@ -56,7 +56,7 @@ class EventFile:
         return self._descriptor
 
     def _is_named(self) -> bool:
-        """Whether the path still leads to the file that we have open."""
+        """Return whether the path still leads to the file that we have open."""
         try:
             return os.path.samestat(self._path.stat(), os.fstat(self._descriptor))
         except OSError:
@@ -95,7 +95,7 @@ class EventReader:
         yield from self.read_new()
 
     def read_new(self) -> Iterator[EventRecord]:
-        """What has been written since, also to a file that has been begun anew since."""
+        """Yield what has been written since, also to a file that has been begun anew since."""
         while True:
             fresh = self._fresh()  # looked for first: what comes into the old file after its new name is read below
             yield from self._whole_lines()
@@ -121,7 +121,7 @@ class EventReader:
             yield from _events(lines)
 
     def _fresh(self) -> IO[bytes] | None:
-        """The file at the path, where it is not the one that is open."""
+        """Return the file at the path, where it is not the one that is open."""
         try:
             fresh = self._path.open("rb")
         except FileNotFoundError:
@@ -139,7 +139,7 @@ def _events(lines: Iterable[bytes]) -> Iterator[EventRecord]:
 
 
 def _open_files(path: Path) -> list[IO[bytes]]:
-    """The files that there are, oldest first. Opened newest first: one that gets its next number meanwhile is met again,
+    """Return the files that there are, oldest first. Opened newest first: one that gets its next number meanwhile is met again,
     and known by its inode."""
     opened: dict[tuple[int, int], IO[bytes]] = {}
     for number in range(KEPT + 1):

@@ -55,7 +55,7 @@ class EventLog:
         self._say(self._source, cause, sentence)
 
     def speaking_for(self, source: str) -> Callable[[str, str], None]:
-        """The same log for what another process has found and told this one."""
+        """Return the same log for what another process has found and told this one."""
         return lambda cause, sentence: self._say(source, cause, sentence)
 
     def note(self, cause: str, sentence: str) -> None:

@@ -181,7 +181,7 @@ class JsonLineServer:
     # -- requests
 
     def answer(self, line: bytes) -> bytes:
-        """The answer to one line, whatever it is."""
+        """Return the answer to one line, whatever it is."""
         try:
             answer = self._handle_line(line)
             text = _as_json(answer)
@@ -333,7 +333,7 @@ def _error(sentence: str) -> Answer:
 
 
 def _why_too_large(request: Any) -> str:
-    """Why a request is larger than any that means something; empty for one that is not.
+    """Return why a request is larger than any that means something; empty for one that is not.
 
     Checking a shape and telling what is wrong with it takes its time for each key: what could take longer than a tick or
     two is not begun.

@@ -62,7 +62,7 @@ def send(link: socket.socket, tag: str, body: dict[str, Any] | None = None, *des
 
 
 def receive(link: socket.socket) -> Message | None:
-    """The next message, None at the end of the line; a reset of a killed peer is an end too, behind its last words.
+    """Return the next message, None at the end of the line; a reset of a killed peer is an end too, behind its last words.
 
     BlockingIOError when there is none yet, ProtocolError for what is not of this protocol.
     """
@@ -85,7 +85,7 @@ def receive(link: socket.socket) -> Message | None:
 
 
 def _received(link: socket.socket) -> tuple[bytes, list[tuple[int, int, bytes]], int, Any]:
-    """A peer that died with something of ours unread gives one reset, and only then what it had said before."""
+    """Receive once more after a reset: a peer that died with something of ours unread gives one, and then its last words."""
     space = socket.CMSG_SPACE(4 * _MOST_DESCRIPTORS)
     try:
         return link.recvmsg(_LARGEST, space, _FLAGS)

@@ -19,6 +19,8 @@ from typing import Final
 LOOP_NICE: Final = -10  # guardian and control
 RIG_NICE: Final = -8  # a simulated rig stands for a device, which would not wait for anybody
 HELPER_NICE: Final = 10  # fit, watch
+_REALTIME_PRIORITY: Final = 20
+_MCL_CURRENT_AND_FUTURE: Final = 3  # sys/mman.h
 _AUTOGROUP: Final = Path("/proc/self/autogroup")
 
 
@@ -40,6 +42,24 @@ def lower_priority() -> None:
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     set_nice(HELPER_NICE)
+
+
+def use_realtime() -> tuple[str, ...]:
+    """Run before all ordinary processes and keep the memory in RAM (`run --realtime`): SCHED_FIFO and mlockall.
+
+    Return sentences for the banner about what was not permitted.
+    """
+    import ctypes  # not for the guardian, which starts in milliseconds
+
+    notes = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_REALTIME_PRIORITY))
+    except (OSError, AttributeError) as error:
+        notes.append(f"realtime: no SCHED_FIFO ({error}); grant the capability sys_nice or an rtprio limit")
+    libc = ctypes.CDLL(None, use_errno=True)
+    if not hasattr(libc, "mlockall") or libc.mlockall(_MCL_CURRENT_AND_FUTURE) != 0:
+        notes.append(f"realtime: no mlockall ({os.strerror(ctypes.get_errno())}); raise the memlock limit")
+    return tuple(notes)
 
 
 def _lowest_allowed() -> int:

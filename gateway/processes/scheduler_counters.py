@@ -78,7 +78,7 @@ def time_between(before: ProcessorTime | None, now: ProcessorTime | None) -> Pro
 
 
 def explain_silence(silence: Silence, load: str) -> Ending:
-    """The cause of a silence: what took the largest part of it. load: of the machine, in words."""
+    """Return the cause of a silence: what took the largest part of it. load: of the machine, in words."""
     seen = f"control process stalled: {_ms(silence.silent_s)} without a tick, allowed {_ms(silence.bound_s)} (stall_s)"
     if silence.state and silence.state in STOPPED_STATES:
         return Ending(EndCause.STOPPED, f"{seen}; it was stopped by a signal or a debugger")
@@ -106,7 +106,7 @@ def load_of_machine(proc: Path = Path("/proc")) -> str:
 
 
 def _cores() -> int:
-    """Those that we may use."""
+    """Return the number of cores that we may use."""
     try:
         return len(os.sched_getaffinity(0))
     except (OSError, AttributeError):

@@ -22,7 +22,7 @@ SUFFIX: Final = ".fgr"
 
 
 def header_bytes(document: bytes) -> bytes:
-    """Everything that stands before the first batch."""
+    """Return everything that stands before the first batch."""
     return MAGIC + HEADER_PREFIX.pack(len(document), crc32(document)) + document
 
 
@@ -41,7 +41,7 @@ class Batch:
 
 
 def batch_at(data: memoryview, offset: int, row_size: int) -> Batch | None:
-    """The batch that begins at offset; None when it is cut, damaged, or no batch."""
+    """Return the batch that begins at offset; None when it is cut, damaged, or no batch."""
     start = offset + BATCH_PREFIX.size
     if start > len(data):
         return None

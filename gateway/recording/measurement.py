@@ -33,7 +33,7 @@ _METRE: Final = linear_conversion("length", "mm", "m")[0]
 
 
 def measurement_of(recording: Recording) -> Measurement:
-    """The checked measurement. RecordingError in the user's words, with row and column where there is one."""
+    """Return the checked measurement. RecordingError in the user's words, with row and column where there is one."""
     _check_columns(recording)
     axis = check_time_axis(recording)
     columns, told = _replace_absurd({name: values[axis.kept] for name, values in recording.columns.items()})
@@ -79,7 +79,7 @@ def _check_columns(recording: Recording) -> None:
 
 
 def _suggest_columns(recording: Recording, missing: list[str]) -> str:
-    """A column that has the name in another unit: time_ms for time_s."""
+    """Return a hint to columns that have the name in another unit: time_ms for time_s."""
     wanted = {name.split(" ")[0] for name in missing} | (
         {"pressure_kpa"} if "command_v (or pressure_kpa)" in missing else set()
     )
@@ -95,7 +95,7 @@ def _suggest_columns(recording: Recording, missing: list[str]) -> str:
 
 
 def _replace_absurd(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
-    """The columns with NaN where a number is none of a measurement, and a sentence for each such column."""
+    """Return the columns with NaN where a number is none of a measurement, and a sentence for each such column."""
     notes = []
     for name, values in columns.items():
         absurd = np.isfinite(values) & (np.abs(values) > _LARGEST)
@@ -106,7 +106,7 @@ def _replace_absurd(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list
 
 
 def _suspicious(force_n: Floats, drive: Mapping[str, Floats]) -> list[str]:
-    """What an intact machine would not show. Told only: each has an honest reason as well."""
+    """Return notes on what an intact machine would not show. Told only: each has an honest reason as well."""
     if is_constant(force_n):
         return [f"force_n is {force_n[0]:.5g} in every row: an unplugged or frozen cell? Nothing can be seen in it"]
     command_v = drive.get("command_v")
@@ -119,7 +119,7 @@ def _suspicious(force_n: Floats, drive: Mapping[str, Floats]) -> list[str]:
 
 
 def _usable_rows(columns: Mapping[str, Floats], axis: TimeAxis) -> tuple[Flags, list[str]]:
-    """A finite, valid reading, not too soon after a gap."""
+    """Return the rows with a finite, valid reading, not too soon after a gap, and notes."""
     read = np.isfinite(columns["force_n"])
     notes = [] if read.all() else [f"{int((~read).sum())} rows without a force are not judged"]
     usable = read & ~axis.after_gap
@@ -150,7 +150,7 @@ def _drive(columns: Mapping[str, Floats], time_s: Floats) -> tuple[dict[str, Flo
 
 
 def _hold_command(command_v: Floats) -> tuple[Floats, Flags, list[str]]:
-    """A command stands until the next one: a row without one has the one before."""
+    """Return the commands without holes, the rows with a known one, and notes: a command stands until the next one."""
     known = np.isfinite(command_v)
     latest = np.maximum.accumulate(np.where(known, np.arange(command_v.size), -1))
     held = command_v[np.where(latest < 0, int(np.argmax(known)), latest)]
@@ -161,7 +161,7 @@ def _hold_command(command_v: Floats) -> tuple[Floats, Flags, list[str]]:
 
 
 def _position_m(columns: Mapping[str, Floats], time_s: Floats) -> tuple[Floats | None, list[str]]:
-    """The measured position; None when it says nothing about the direction of motion."""
+    """Return the measured position; None when it says nothing about the direction of motion."""
     values = columns.get("position_mm")
     if values is None:
         return None, []

@@ -40,7 +40,7 @@ class Recording:
     lines: "Sequence[int] | NDArray[np.int64] | None" = None
 
     def place(self, row: int) -> str:
-        """Where a row (from 0) stands, for messages: `file:line`, or the number of the row where there are no lines."""
+        """Return where a row (from 0) stands, for messages: `file:line`, or the number of the row where there are no lines."""
         return f"{self.path}, row {row + 1}" if self.lines is None else f"{self.path}:{self.lines[row]}"
 
 
@@ -59,7 +59,7 @@ class RecordingEntry:
 
 
 def read_recording(path: Path) -> Recording:
-    """Everything whole in the file; RecordingError when it is no recording or its header is cut, OSError as usual."""
+    """Return everything whole in the file; RecordingError when it is no recording or its header is cut, OSError as usual."""
     import numpy as np
 
     data = memoryview(path.read_bytes())
@@ -73,13 +73,13 @@ def read_recording(path: Path) -> Recording:
 
 
 def list_recordings(state_directory: Path) -> list[RecordingEntry]:
-    """The recordings of one state directory by number; unreadable ones are listed with their fault."""
+    """Return the recordings of one state directory by number; unreadable ones are listed with their fault."""
     paths = [path for path in (state_directory / "recordings").glob(f"*{SUFFIX}") if path.stem.isdigit()]
     return [_entry(path) for path in sorted(paths, key=lambda path: int(path.stem))]
 
 
 def find_recording(state_directory: Path, number: int) -> Path:
-    """The file of one number; RecordingError that names the ones there are."""
+    """Return the file of one number; RecordingError that names the ones there are."""
     path = state_directory / "recordings" / f"{number:04d}{SUFFIX}"
     if path.exists():
         return path
@@ -113,7 +113,7 @@ def _duration_s(data: memoryview, header: dict[str, Any], batches: list[Batch], 
 
 
 def _header(data: memoryview, path: Path) -> tuple[dict[str, Any], int]:
-    """The header and the offset of the first batch."""
+    """Return the header and the offset of the first batch."""
     start = len(MAGIC) + HEADER_PREFIX.size
     if data[: len(MAGIC)] != MAGIC[: len(data)]:
         raise RecordingError(f"{path} is not a recording of force-gateway: it begins with {bytes(data[:8]).hex(' ')}")
@@ -161,7 +161,7 @@ def _scan(data: memoryview, offset: int, row_size: int) -> Iterator[Batch | str]
 
 
 def _next_batch(data: memoryview, offset: int, row_size: int) -> int | None:
-    """Where the next whole batch begins after a damaged place, None when there is none."""
+    """Return where the next whole batch begins after a damaged place, None when there is none."""
     raw = bytes(data[offset:])  # memoryview cannot be searched
     at = raw.find(MARK, 1)
     while at >= 0:

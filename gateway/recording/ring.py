@@ -90,7 +90,7 @@ class RingReader:
         return data[lost * len(self.columns) * _ITEM :]
 
     def _places(self, first: int, end: int) -> list[tuple[int, int]]:
-        """Where the rows first .. end - 1 lie: one piece, or two around the seam."""
+        """Return where the rows first .. end - 1 lie: one piece, or two around the seam."""
         size, seam = len(self.columns) * _ITEM, (end // self._capacity) * self._capacity
         pieces = [(first, end)] if first >= seam or end == seam else [(first, seam), (seam, end)]
         return [

@@ -25,7 +25,7 @@ class Ready:
 
 
 def ready_fields(ready: Ready) -> dict[str, Any]:
-    """The JSON line's fields, without the pids, which the guardian knows."""
+    """Return the JSON line's fields, without the pids, which the guardian knows."""
     return {
         "ready": True,
         "rig": ready.rig.name,
@@ -79,7 +79,7 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
 
 
 def _reachable_host(host: str, rig: Rig) -> str:
-    """An address that takes connections: a server on all of them is reached at its loopback, where that may connect."""
+    """Return an address that takes connections: a server on all of them is reached at its loopback, where that may connect."""
     loopback = {"0.0.0.0": defaults.HOST, "::": "::1"}.get(host)
     if loopback is None:
         return host

@@ -20,7 +20,7 @@ from gateway.processes import priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
-from gateway.processes.realtime import use_realtime
+from gateway.processes.priority import use_realtime
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
 from gateway.service import banner
@@ -50,7 +50,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _report_start_failure(log: EventLog, sentence: str, exit_code: int, event: str) -> int:
-    """A person in front of the terminal is told as by any verb; the file keeps it for whoever looks later."""
+    """Say why on stderr, as any verb does, and keep it in the event file; return the exit code."""
     print(sentence, file=sys.stderr)
     log.note("start", event)
     return exit_code
@@ -68,7 +68,7 @@ def load(options: dict[str, Any]) -> Rig:
 
 
 def sample_ring(descriptor: int | None) -> SampleRing | None:
-    """The ring in the guardian's memory; None without one: nothing but the residual watch needs it."""
+    """Return the ring in the guardian's memory; None without one: nothing but the residual watch needs it."""
     if descriptor is None:
         return None
     with contextlib.suppress(OSError):
@@ -77,7 +77,7 @@ def sample_ring(descriptor: int | None) -> SampleRing | None:
 
 
 def watch_arguments(rig: Rig, ring: SampleRing | None) -> dict[str, Any] | None:
-    """What the guardian tells the residual watch; None where there is none to start."""
+    """Return what the guardian tells the residual watch; None where there is none to start."""
     if not rig.is_watched or ring is None:
         return None
     watch = rig.residual_watch

@@ -73,7 +73,7 @@ class ControlSocket(JsonLineServer):
         return {"owner": bank.owner, "writers": writers}
 
     def _last_refusal(self, request: dict[str, Any]) -> dict[str, Any]:
-        """What the last-refusal registers stand for, in the gateway's own words; empty before the first."""
+        """Return what the last-refusal registers stand for, in the gateway's own words; empty before the first."""
         parse_request(EmptyRequest, request)
         refusal = self._asked.bank.last_refusal
         if refusal is None:

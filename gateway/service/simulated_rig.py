@@ -157,7 +157,7 @@ class SimulatedRig:
 
 
 def _change_plant(plant: Plant, values: Mapping[str, float]) -> Plant:
-    """The plant with some numbers changed, by `section.field`; ValueError for what it does not have, or cannot be."""
+    """Return the plant with some numbers changed, by `section.field`; ValueError for what it does not have, or cannot be."""
     for path, value in values.items():
         section, _, field = path.partition(".")
         try:

@@ -94,7 +94,7 @@ for _shape in (
 
 
 def parse_request(shape: type[Shape], request: Mapping[str, Any]) -> Shape:
-    """The request without its verb as `shape`. ValueError names the first key that does not fit."""
+    """Return the request without its verb as `shape`. ValueError names the first key that does not fit."""
     asked = {key: value for key, value in request.items() if key != "do"}
     for key, value in asked.items():
         if value is None:

@@ -68,7 +68,7 @@ class WatchReports:
 
 
 def _numbers(told: dict[str, Any]) -> dict[str, float]:
-    """The known counters that are finite numbers."""
+    """Return the known counters that are finite numbers."""
     return {name: told[name] for name in COUNTERS if _is_number(told.get(name))}
 
 

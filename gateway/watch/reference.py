@@ -49,7 +49,7 @@ class WatchReference:
         return rms_of(window.measurement, self.plant)
 
     def floor_n(self, window: Window) -> float | None:
-        """The floor for such a window; None where none is known."""
+        """Return the floor for such a window; None where none is known."""
         return self.floors_n.get(_octave(window.excitation_v))
 
     def is_exceeded(self, window: Window, rms_n: float) -> bool:

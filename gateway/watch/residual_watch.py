@@ -100,7 +100,7 @@ class Watch:
             self._judge(fresh)
 
     def _why_unsuitable(self, window: Window) -> str:
-        """Why this window may not be the first; empty when it may, or when it is not."""
+        """Return why this window may not be the first; empty when it may, or when it is not."""
         enough = window.excitation_v >= _LEAST_EXCITATION_V and window.moves >= _LEAST_MOVES
         return "" if self._reference.is_settled or enough else "too little was commanded to begin with"
 

@@ -22,7 +22,7 @@ class WindowVerdict:
     others: tuple[str, ...] = ()
 
     def agrees_with(self, other: "WindowVerdict") -> bool:
-        """The same cause, or one of a group that both windows cannot tell apart."""
+        """Return the same cause, or one of a group that both windows cannot tell apart."""
         return self.cause is other.cause or (self.cause.effect in other.others and other.cause.effect in self.others)
 
 

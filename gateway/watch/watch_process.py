@@ -65,7 +65,7 @@ def report_to_control(state: Path, message: dict[str, Any]) -> None:
 
 
 def make_watch(ring: RingReader, options: dict[str, Any]) -> "Watch":
-    """The watch over the rig's plant. Everything heavy is imported here."""
+    """Return the watch over the rig's plant. Everything heavy is imported here."""
     from gateway.profiles import load_rig
     from gateway.watch.reference import WatchReference
     from gateway.watch.residual_watch import Watch, WatchSettings

@@ -40,7 +40,7 @@ class Window:
 
 
 def window_of(data: bytes, columns: tuple[str, ...], window_s: float) -> Window | str:
-    """The window that ends with the newest row; a sentence where there is nothing to judge."""
+    """Return the window that ends with the newest row; a sentence where there is nothing to judge."""
     table = np.frombuffer(data, dtype="<f8").reshape(-1, len(columns))
     rows = {name: table[:, index] for index, name in enumerate(columns)}
     rows = _after_last_gap(rows)
@@ -78,7 +78,7 @@ def _measurement(rows: dict[str, Floats], judged: Flags) -> Measurement | str:
 
 
 def _after_last_gap(rows: dict[str, Floats]) -> dict[str, Floats]:
-    """What follows the last gap, or the last time that runs backwards."""
+    """Return what follows the last gap, or the last time that runs backwards."""
     steps_s = np.diff(rows["time_s"])
     breaks = np.flatnonzero((steps_s > _GAP_S) | (steps_s < 0.0))
     first = int(breaks[-1]) + 1 if breaks.size else 0
@@ -86,7 +86,7 @@ def _after_last_gap(rows: dict[str, Floats]) -> dict[str, Floats]:
 
 
 def _first_replayed_row(command_v: Floats, time_s: Floats, window_s: float) -> int:
-    """The row where the replay begins."""
+    """Return the row where the replay begins."""
     begin_s = time_s[-1] - window_s
     stop = max(1, int(np.searchsorted(time_s, begin_s - _SETTLED_S)))
     start = int(np.searchsorted(time_s, begin_s - LEAD_S))
@@ -105,7 +105,7 @@ def _moving_sum(values: Floats | Flags, rows: int) -> Floats:
 
 
 def _faulty(rows: dict[str, Floats]) -> Flags:
-    """Rows with a latched fault, and those shortly after."""
+    """Return rows with a latched fault, and those shortly after."""
     faulty = rows["fault_code"] != 0.0
     time_s = rows["time_s"]
     last_s = np.maximum.accumulate(np.where(faulty, time_s, -np.inf))

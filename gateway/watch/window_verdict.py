@@ -45,7 +45,7 @@ class PlantChange:
 
 
 def judge_window(window: Window, found: Diagnosis, reference: WatchReference, least_n: float) -> WindowVerdict:
-    """The strongest difference of this window from the reference; least_n: what a difference must do to the force, N."""
+    """Return the strongest difference of this window from the reference; least_n: what a difference must do to the force, N."""
     excess_n = excess_of(window, reference)
     changes = [change for change in weigh_changes(window, found, reference.plant) if change.force_n >= least_n]
     if changes and excess_n >= least_n:
@@ -59,7 +59,7 @@ def judge_window(window: Window, found: Diagnosis, reference: WatchReference, le
 
 
 def excess_of(window: Window, reference: WatchReference) -> float:
-    """What of the residual is neither usual nor the readings' own noise, N: that is seen in their second differences."""
+    """Return what of the residual is neither usual nor the readings' own noise, N: that is seen in their second differences."""
     rms_n, usual_n = reference.rms_n(window), reference.floor_n(window) or 0.0
     force_n = window.measurement.force_n[window.measurement.usable]
     noise_n = 1.4826 * float(np.median(np.abs(np.diff(force_n, n=2)))) / np.sqrt(6.0)
@@ -67,7 +67,7 @@ def excess_of(window: Window, reference: WatchReference) -> float:
 
 
 def _describe_leftover(found: Diagnosis) -> str:
-    """What no effect explains, in the words of the screen."""
+    """Return what no effect explains, in the words of the screen."""
     if found.suspects:
         return found.suspects[0].sentence
     if not found.leftover:
@@ -77,7 +77,7 @@ def _describe_leftover(found: Diagnosis) -> str:
 
 
 def weigh_changes(window: Window, found: Diagnosis, plant: Plant) -> list[PlantChange]:
-    """Every change that the diagnosis found, with its weight: no more than it saves in rows that its fit did not see."""
+    """Return every change that the diagnosis found, with its weight: no more than it saves in rows that its fit did not see."""
     changes = [PlantChange(name, (parameter,)) for name, parameter in BASE.items()]
     for cause in found.causes:
         parameters = tuple((each.section, name, each.unit) for name, each in cause.parameters.items())

@@ -46,7 +46,7 @@ def test_upload_use_and_rollback_while_the_gateway_presses(running, tmp_path: Pa
     status = running.status()
     assert status["state"] in (RAMPING, HOLDING)
     assert abs(status["force_measured"] - 2000) <= 150
-    assert CalibrationStore(running.state).standing().selection.number == 2
+    assert CalibrationStore(running.state).find_selected().selection.number == 2
 
 
 def test_a_gateway_starts_with_what_was_last_in_use_and_says_what_it_had_to_pass_over(tmp_path: Path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gateway.reports.diagnosis.series import (
-    Residuals,
+    TraceResiduals,
     bin_means,
     dependence,
     direction,
@@ -136,5 +136,5 @@ def test_a_column_that_only_one_recording_has_is_nan_for_the_other() -> None:
 def test_the_closer_look_is_where_the_gain_is() -> None:
     time_s = np.arange(10_000) / 100.0
     before = np.where((time_s > 70.0) & (time_s < 75.0), 2.0, 0.1)
-    start, end = most_improved_window(Residuals(time_s, before, before, np.full(time_s.size, 0.1)))
+    start, end = most_improved_window(TraceResiduals(time_s, before, before, np.full(time_s.size, 0.1)))
     assert start <= 71.0 and end >= 74.0

@@ -12,7 +12,7 @@ from gateway.recording.tables.parquet_table import read_parquet
 
 
 def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool = False) -> Recording:
-    """The columns of any table, renamed and converted by `mapping`; float64, NaN where nothing was measured.
+    """Return the columns of any table, renamed and converted by `mapping`; float64, NaN where nothing was measured.
 
     lenient: rows and cells of a CSV that cannot be read are told in `notes` and left out; else they are a
     RecordingError that names row and column. OSError as usual.

@@ -26,14 +26,14 @@ _MOST_NAMES: Final = 6
 
 
 def is_own_recording(columns: Mapping[str, Floats]) -> bool:
-    """Whether our recorder wrote these columns."""
+    """Return whether our recorder wrote these columns."""
     return set(DERIVED) <= set(columns)
 
 
 def extract_covariates(
     columns: Mapping[str, Floats], time_s: Floats, force_n: Floats
 ) -> tuple[dict[str, Floats], list[str]]:
-    """The covariates without holes, and what was left out or filled. columns: all of the recording, at these times."""
+    """Return the covariates without holes, and what was left out or filled. columns: all of the recording, at these times."""
     ours = is_own_recording(columns)
     names = [
         name
@@ -74,7 +74,7 @@ def is_constant(values: Floats) -> bool:
 
 
 def _why_useless(name: str, values: Floats, time_s: Floats, force_n: Floats) -> str:
-    """Why a column is no covariate, "" when it is one."""
+    """Return why a column is no covariate, "" when it is one."""
     known = np.isfinite(values)
     if not known.any():
         return "no value in any row"
@@ -89,7 +89,7 @@ def _why_useless(name: str, values: Floats, time_s: Floats, force_n: Floats) -> 
 
 
 def _is_copy(values: Floats, force_n: Floats) -> bool:
-    """The same sensor in another unit: it shares the readings' noise, which no other sensor does."""
+    """Return whether this is the same sensor in another unit: it shares the readings' noise, which no other sensor does."""
     both = np.isfinite(values) & np.isfinite(force_n)
     if both.sum() < 3 or _correlation(values[both], force_n[both]) < _COPY:
         return False

@@ -41,18 +41,18 @@ class CsvDialect:
     sample: tuple[tuple[str, ...], ...]
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line as they stand; empty ones beyond the last column are a trailing separator, and dropped."""
+        """Return the cells of a line as they stand; empty ones beyond the last column are a trailing separator, and dropped."""
         cells = split_cells(line, self.separator)
         while len(cells) > len(self.names) and not cells[-1].strip():
             cells.pop()
         return cells
 
     def parse_number(self, cell: str) -> float | None:
-        """The value of a cell, NaN where nothing was taken; None when it is no number."""
+        """Return the value of a cell, NaN where nothing was taken; None when it is no number."""
         return parse_number(cell, self.decimal)
 
     def is_words(self, index: int) -> bool:
-        """Every filled cell of the first rows is no number."""
+        """Return whether no filled cell of the first rows is a number."""
         cells = [row[index] for row in self.sample if index < len(row) and row[index].strip().lower() not in MISSING]
         return bool(cells) and all(self.parse_number(cell) is None for cell in cells)
 

@@ -109,14 +109,14 @@ def _read_fast(form: CsvDialect, chosen: Sequence[SelectedColumn]) -> NumberTabl
 
 
 def _floats(column: Any) -> "NDArray[np.float64]":
-    """A float64 array that owns its numbers; NaN for null."""
+    """Return a float64 array that owns its numbers; NaN for null."""
     import numpy as np
 
     return np.array(column.to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
 def _is_comment_between(form: CsvDialect, data: mmap.mmap) -> bool:
-    """A comment after the first row: pyarrow could take it for data where its first cell is not asked for."""
+    """Return whether a comment follows the first row: pyarrow could take it for data where its first cell is not asked for."""
     at = 0
     for _ in range(form.skip):
         at = data.find(b"\n", at) + 1
@@ -124,7 +124,7 @@ def _is_comment_between(form: CsvDialect, data: mmap.mmap) -> bool:
 
 
 def _end(data: mmap.mmap) -> int:
-    """Where the last row ends: blank lines after it are no rows."""
+    """Return where the last row ends: blank lines after it are no rows."""
     end = len(data)
     while end > 0 and data[end - 1] in b"\r\n":
         end -= 1
@@ -183,7 +183,7 @@ class _LineReader:
         return NumberTable(facts, columns, np.array(lines, dtype=np.int64), notes, dropped=bool(self._told))
 
     def _values(self, at: int, line: str) -> list[float] | None:
-        """The chosen numbers of a row; None when it is left out."""
+        """Return the chosen numbers of a row; None when it is left out."""
         form = self._form
         cells = form.cells(line)
         if self._ragged:
@@ -245,6 +245,6 @@ class _LineReader:
 
 
 def shorten_notes(notes: Sequence[str], noun: str, most: int = _MOST_NOTES) -> list[str]:
-    """The first few, and how many more there were."""
+    """Return the first few, and how many more there were."""
     more = len(notes) - most
     return [*notes[:most], f"and {more} more {noun}"] if more > 0 else list(notes)

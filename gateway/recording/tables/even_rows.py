@@ -50,7 +50,7 @@ def resample_evenly(measurement: Measurement, sent_v: Floats, sent_age_s: Floats
 
 
 def _distinct_settings(times_s: Floats, volts: Floats) -> tuple[Floats, Floats]:
-    """What was sent and when, each setting once."""
+    """Return what was sent and when, each setting once."""
     known = np.isfinite(times_s) & np.isfinite(volts)
     times_s, volts = times_s[known], volts[known]
     new = np.append(True, np.diff(times_s) > 1.0e-6)[: times_s.size]
@@ -89,7 +89,7 @@ class _EvenClock:
         self.jitter_s = float(np.std(time_s - self.rows_s[self._index]))
 
     def count(self, flags: NDArray[np.bool_]) -> Floats:
-        """How many flagged rows fall to each tick."""
+        """Return how many flagged rows fall to each tick."""
         return np.asarray(np.bincount(self._index, weights=flags, minlength=self.rows_s.size), dtype=np.float64)
 
     def mean(self, column: Floats, usable: NDArray[np.bool_] | None = None) -> Floats:

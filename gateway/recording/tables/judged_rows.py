@@ -19,7 +19,7 @@ _FINE_STEPS: Final = 5.0
 
 
 def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
-    """Rows whose reading is valid, and what was made of the column.
+    """Return rows whose reading is valid, and what was made of the column.
 
     A foreign table may mean 0 or 1 (or 192) by good: the most frequent value is taken for it, as long as the others are
     rare. Where they are not, 0 and 1 are both kept, as our recorder means them.
@@ -42,7 +42,7 @@ def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
 
 
 def flag_repeated(force_n: Floats) -> tuple[Flags, list[str]]:
-    """Rows whose reading is bit for bit the one before, where that is more frequent than the resolution explains.
+    """Return rows whose reading is bit for bit the one before, where that is more frequent than the resolution explains.
 
     The number of steps of 0 that a resolution brings is read off those of one and two counts, whose logarithm falls
     with the square of the step. The ends of the range and 0 are left aside: a force that rests there repeats by itself.
@@ -63,7 +63,7 @@ def flag_repeated(force_n: Floats) -> tuple[Flags, list[str]]:
 
 
 def _repeats_by_resolution(force_n: Floats, resting: Flags) -> float | None:
-    """How many equal neighbours the resolution explains; None when it may explain any number."""
+    """Return how many equal neighbours the resolution explains; None when it may explain any number."""
     steps = np.abs(np.diff(force_n))[~resting[1:]]
     steps = steps[np.isfinite(steps) & (steps > 0.0)]
     if steps.size < _ENOUGH:

@@ -13,7 +13,7 @@ _KEYS: Final = {"column", "unit"}
 
 
 def column_mapping(text: str | None) -> ColumnMapping | None:
-    """The mapping of an option's value: a YAML file's name, else `NAME=COLUMN:UNIT,...`; None for None.
+    """Return the mapping of an option's value: a YAML file's name, else `NAME=COLUMN:UNIT,...`; None for None.
 
     RecordingError in the user's words, for a file with its line and column.
     """
@@ -23,7 +23,7 @@ def column_mapping(text: str | None) -> ColumnMapping | None:
 
 
 def read_mapping(path: Path) -> ColumnMapping:
-    """The mapping in a file. A value is a number, a header, either with `:unit`, or `{column: 7, unit: n}`."""
+    """Return the mapping in a file. A value is a number, a header, either with `:unit`, or `{column: 7, unit: n}`."""
     try:
         document = parse(path.read_bytes(), str(path))
     except OSError as error:

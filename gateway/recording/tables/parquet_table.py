@@ -46,7 +46,7 @@ def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
 def _columns(
     path: Path, table: Any, chosen: Sequence[SelectedColumn], headers: Sequence[str]
 ) -> "tuple[dict[str, NDArray[np.float64]], list[str]]":
-    """The columns by name, and the names of those that hold no numbers."""
+    """Return the columns by name, and the names of those that hold no numbers."""
     columns: dict[str, NDArray[np.float64]] = {}
     words: list[str] = []
     for pick in chosen:
@@ -86,7 +86,7 @@ def _is_castable(kind: Any) -> bool:
 
 
 def _facts(metadata: dict[bytes, bytes]) -> dict[str, Any]:
-    """The schema's metadata without what writers leave there for themselves; JSON where it is some."""
+    """Return the schema's metadata without what writers leave there for themselves; JSON where it is some."""
     texts = {key.decode(errors="replace"): value.decode(errors="replace") for key, value in metadata.items()}
     return {key: _fact(text) for key, text in texts.items() if key not in _NOT_FACTS}
 

@@ -12,7 +12,7 @@ import numpy as np
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.result import Trace
 from gateway.reports.diagnosis import series
-from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows, Residuals
+from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows, TraceResiduals
 from gateway.reports.diagnosis.svg import SeriesChart, limits
 from gateway.reports.svg import Axis
 
@@ -48,7 +48,7 @@ def _drawing(chart: SeriesChart) -> Drawing:
 
 
 def axis_name(quantity: str) -> str:
-    """What stands at an axis; a covariate that nobody knows has its own name."""
+    """Return what stands at an axis; a covariate that nobody knows has its own name."""
     return _UNITS.get(quantity, quantity)
 
 
@@ -61,7 +61,7 @@ def force_over_time(
     trace: Trace, after: bool, window: tuple[float, float] | None = None, *, wide: bool = True
 ) -> Drawing:
     """Measured and simulated force over time; window: (start, end), s, of a closer look."""
-    left = Residuals.of(trace)
+    left = TraceResiduals.of(trace)
     start, end = window or (float(left.time_s[0]), float(left.time_s[-1]))
     shown = (left.time_s >= start) & (left.time_s <= end)
     time_s, measured_n = left.time_s[shown], left.measured_n[shown]
@@ -81,7 +81,7 @@ def force_over_time(
 
 
 def residual_over_time(trace: Trace) -> Drawing:
-    left = Residuals.of(trace)
+    left = TraceResiduals.of(trace)
     chart = SeriesChart(
         Axis(0.0, max(trace.measurement.duration_s, 1e-9), "time (s)"),
         Axis(*limits(left.before_n, left.after_n, around=0.0), "measured − simulated (N)"),
@@ -142,7 +142,7 @@ def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing
     label = series.drive(traces[0].measurement)[0]
     alike = [trace for trace in traces if series.drive(trace.measurement)[0] == label]
     x = np.concatenate([series.drive(trace.measurement)[1][trace.measurement.usable] for trace in alike])
-    parts = [Residuals.of(trace) for trace in alike]
+    parts = [TraceResiduals.of(trace) for trace in alike]
     measured_n = np.concatenate([part.measured_n for part in parts])
     left = [np.concatenate([getattr(part, name) for part in parts]) for name in ("before_n", "after_n")]
     name = "after" if after else "before"
@@ -161,7 +161,7 @@ def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing
 
 def spectra(trace: Trace, *, wide: bool = False) -> Drawing:
     """Amplitude density of the residual, before and after; NOTHING for a recording that is too short."""
-    left = Residuals.of(trace)
+    left = TraceResiduals.of(trace)
     both = [series.spectrum(left.time_s, left_n) for left_n in (left.before_n, left.after_n)]
     frequency_hz, before = both[0]
     densities = np.concatenate([before, both[1][1]])

@@ -14,7 +14,7 @@ from gateway.reports.diagnosis.charts import Drawing
 from gateway.reports.diagnosis.grid import Panel, figure, grid
 from gateway.reports.diagnosis.series import (
     ResidualRows,
-    Residuals,
+    TraceResiduals,
     dependence,
     drive,
     is_constant,
@@ -53,7 +53,7 @@ class ReportContext:
 
 
 def diagnosis_page(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
-    """The whole page. Text from recordings and profiles is escaped."""
+    """Return the whole page. Text from recordings and profiles is escaped."""
     body = [*_summary(diagnosis, circumstances), *_pictures(diagnosis), *_outlook(diagnosis, circumstances)]
     text = "\n".join(part for part in body if part)
     return _FRAME.format(title=escape(f"Diagnosis: {words.title(diagnosis)}"), style=DIAGNOSIS_STYLE, body=text)
@@ -124,7 +124,7 @@ def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
     traces = [trace for trace in diagnosis.traces if trace.measurement.usable.any()]
     if not traces:
         return
-    worst = sorted(traces, key=lambda trace: -float((Residuals.of(trace).before_n ** 2).mean()))
+    worst = sorted(traces, key=lambda trace: -float((TraceResiduals.of(trace).before_n ** 2).mean()))
     drawn = worst[:_MOST_TRACES]
     changed = bool(diagnosis.causes)
     for trace in drawn:
@@ -143,7 +143,7 @@ def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _over_time(trace: Trace, suffix: str, changed: bool) -> Iterator[str]:
-    window = most_improved_window(Residuals.of(trace))
+    window = most_improved_window(TraceResiduals.of(trace))
     yield f"<h2>Measured and simulated{escape(suffix)}</h2>"
     yield figure("Before: the base model, refitted", charts.force_over_time(trace, after=False), style="full")
     if changed:
@@ -155,7 +155,7 @@ def _over_time(trace: Trace, suffix: str, changed: bool) -> Iterator[str]:
 
 
 def _before_and_after(title: str, draw: Callable[..., Drawing], changed: bool) -> list[Panel]:
-    """The same of both models; of the base model alone where nothing was added to it."""
+    """Return the same of both models; of the base model alone where nothing was added to it."""
     panels = [Panel(f"{title}, before", partial(draw, after=False))]
     return [*panels, Panel(f"{title}, after", partial(draw, after=True))] if changed else panels
 

@@ -59,7 +59,7 @@ def _split_at_gaps(x: Floats, gap: float) -> tuple[slice, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Residuals:
+class TraceResiduals:
     """What one recording's judged rows leave: residuals are measured minus simulated. All arrays (judged rows,)."""
 
     time_s: Floats
@@ -68,7 +68,7 @@ class Residuals:
     after_n: Floats
 
     @classmethod
-    def of(cls, trace: Trace) -> "Residuals":
+    def of(cls, trace: Trace) -> "TraceResiduals":
         measurement = trace.measurement
         usable = measurement.usable
         measured_n = measurement.force_n[usable]
@@ -103,15 +103,15 @@ def join_traces(traces: Sequence[Trace]) -> ResidualRows:
         )
 
     return ResidualRows(
-        np.concatenate([Residuals.of(trace).before_n for trace in traces]),
-        np.concatenate([Residuals.of(trace).after_n for trace in traces]),
+        np.concatenate([TraceResiduals.of(trace).before_n for trace in traces]),
+        np.concatenate([TraceResiduals.of(trace).after_n for trace in traces]),
         {name: column(name) for name in names},
         np.concatenate([direction(trace.measurement)[trace.measurement.usable] for trace in traces]),
     )
 
 
 def drive(measurement: Measurement) -> tuple[str, Floats]:
-    """The axis that a loop is drawn over: command, else pressure; time where there is neither."""
+    """Return the axis that a loop is drawn over: command, else pressure; time where there is neither."""
     if measurement.command_v is not None:
         return "command (V)", measurement.command_v
     if measurement.pressure_pa is not None:
@@ -245,7 +245,7 @@ def _peak_per_band(frequency_hz: Floats, density: Floats, points: int) -> tuple[
     return frequency_hz[at], peaks
 
 
-def most_improved_window(left: Residuals, share: float = 0.08) -> tuple[float, float]:
+def most_improved_window(left: TraceResiduals, share: float = 0.08) -> tuple[float, float]:
     """(start, end), s: the stretch in which the extended model gains most, or where the error is greatest."""
     time_s, before_n, after_n = left.time_s, left.before_n, left.after_n
     span_s = share * float(time_s[-1] - time_s[0])

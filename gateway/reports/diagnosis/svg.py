@@ -80,7 +80,7 @@ class SeriesChart(Chart):
 
 
 def _strokes(cells: NDArray[np.int64]) -> str:
-    """A run of cells in one column is one vertical stroke."""
+    """Return the path of the cells: a run of cells in one column is one vertical stroke."""
     if cells.size == 0:
         return ""
     follows = (np.diff(cells[:, 0]) == 0) & (np.diff(cells[:, 1]) == 1)

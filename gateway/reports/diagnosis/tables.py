@@ -65,7 +65,7 @@ def leftover_table(diagnosis: Diagnosis) -> str:
 
 
 def rejected_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
-    """Those that competed and lost, the nearest first."""
+    """Return those that competed and lost, the nearest first."""
     ranked = sorted(diagnosis.rejected, key=lambda lost: -lost.gain)
     rows = (
         (escape(lost.name), f"{words.force(lost.gain)} N", escape(about.get(lost.name, "")))
@@ -83,7 +83,7 @@ def unseen_table(diagnosis: Diagnosis) -> str:
 
 
 def base_table(parameters: Mapping[str, Estimate]) -> str:
-    """The base model's refitted parameters."""
+    """Return the base model's refitted parameters."""
     rows = (
         (escape(f"{found.section}.{name}" if found.section else name), escape(words.estimate(found)))
         for name, found in parameters.items()

@@ -44,7 +44,7 @@ def title(diagnosis: Diagnosis) -> str:
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The verdict, and for `partial` what it lacks."""
+    """Return the verdict, and for `partial` what it lacks."""
     if any(suspect.is_sure for suspect in diagnosis.suspects):
         return "The columns are not what their names say: no cause was looked for. Fix this first, then run it again."
     if why := why_blind(diagnosis):
@@ -54,7 +54,7 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def why_blind(diagnosis: Diagnosis) -> str:
-    """Why the recordings say nothing, where they do not and nothing else was found."""
+    """Return why the recordings say nothing, where they do not and nothing else was found."""
     found = (
         diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
     )
@@ -68,14 +68,14 @@ def _missing_evidence(diagnosis: Diagnosis) -> int:
 
 
 def _use_plural(told: str) -> str:
-    """The same of several causes."""
+    """Return the same of several causes."""
     for one, several in _PLURAL.items():
         told = told.replace(one, several)
     return told
 
 
 def label(cause: Cause) -> str:
-    """The name, or all names that the recording cannot tell apart."""
+    """Return the name, or all names that the recording cannot tell apart."""
     return " or ".join((cause.name, *others(cause)))
 
 
@@ -97,14 +97,14 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def force(value_n: float) -> str:
-    """A force without its unit; as many decimals as tell forces of this size apart."""
+    """Return a force without its unit; as many decimals as tell forces of this size apart."""
     if not isfinite(value_n):
         return "–"
     return f"{value_n:.{2 if abs(value_n) >= 10.0 else 3}f}".replace("-", "−")
 
 
 def percent(share: float) -> str:
-    """A whole percentage that never says 100 % or 0 % of what is not."""
+    """Return a whole percentage that never says 100 % or 0 % of what is not."""
     if not isfinite(share):
         return "–"
     if 0.0 < share < 0.01:
@@ -159,7 +159,7 @@ def explained_share(diagnosis: Diagnosis) -> float:
 
 
 def excess_n(diagnosis: Diagnosis) -> float:
-    """What stands above the noise in the base model's error, N RMS."""
+    """Return what stands above the noise in the base model's error, N RMS."""
     return sqrt(max(0.0, diagnosis.baseline.rms_n**2 - diagnosis.baseline.noise_floor_n**2))
 
 
@@ -172,7 +172,7 @@ def next_recordings(diagnosis: Diagnosis) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def all_notes(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
-    """Every note once: those that came before, the diagnosis' own, and the reader's with their recording's name."""
+    """Return every note once: those that came before, the diagnosis' own, and the reader's with their recording's name."""
     measurements = [trace.measurement for trace in diagnosis.traces]
     read = {note for measurement in measurements for note in measurement.notes}
     named = [

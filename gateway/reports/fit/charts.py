@@ -77,7 +77,7 @@ def _marks(chart: Chart, fits: list[Document], model: str) -> None:
 
 
 def minor_loops(evaluation: Evaluation) -> str:
-    """The walk of partial reversals within the loop; empty where there was none."""
+    """Return the walk of partial reversals within the loop; empty where there was none."""
     volts, newtons = evaluation.checked.minor_v, evaluation.checked.minor_n
     if len(volts) < 2:
         return ""
@@ -96,7 +96,7 @@ def minor_loops(evaluation: Evaluation) -> str:
 
 
 def minor_errors(evaluation: Evaluation) -> str:
-    """What control would get wrong along the walk: with the chosen reversal, and with branches switched at once."""
+    """Return what control would get wrong along the walk: with the chosen reversal, and with branches switched at once."""
     checked, reversal = evaluation.checked, evaluation.reversal
     if reversal is None:
         return ""

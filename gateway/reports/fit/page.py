@@ -21,7 +21,7 @@ _FRAME: Final = """<!doctype html>
 
 
 def fit_page(evaluation: Evaluation, document: Document) -> str:
-    """The whole page. document: `document_of` the evaluation, with `calibration` where one was stored."""
+    """Return the whole page. document: `document_of` the evaluation, with `calibration` where one was stored."""
     parts = [
         _heading(document),
         _figures(document),
@@ -48,7 +48,7 @@ def fit_page(evaluation: Evaluation, document: Document) -> str:
 
 
 def _title(document: Document) -> str:
-    """The name that the user gave, and where to find it."""
+    """Return the name that the user gave, and where to find it."""
     number = f"calibration {document['calibration']}" if document.get("calibration") else ""
     return f"{document['name']} · {number or 'fit of ' + Path(document['recording']).name}"
 

@@ -85,7 +85,7 @@ def _section_values(section: object, names: tuple[str, ...]) -> dict[str, float]
 
 
 def remove_compensated(plant: Plant, compensation: Compensation) -> Plant:
-    """What the model has to describe once control takes its part: a straight command map, a straight cell."""
+    """Return what the model has to describe once control takes its part: a straight command map, a straight cell."""
     cell, regulator = plant.cell, plant.regulator
     if compensation.cell:
         cell = replace(cell, quadratic_per_n=0.0, cubic_per_n2=0.0, crosstalk_n_per_v=0.0)
@@ -95,7 +95,7 @@ def remove_compensated(plant: Plant, compensation: Compensation) -> Plant:
 
 
 def identify_model(plant: Plant, top_v: float) -> Bsfm:
-    """The model over 0 .. top_v. ValueError with a sentence where the plant has none (no force, a branch that falls)."""
+    """Return the model over 0 .. top_v. ValueError with a sentence where the plant has none (no force, a branch that falls)."""
     return _identify(quasi_static(plant), top_v)
 
 
@@ -132,12 +132,12 @@ def _usable_branches(ladder: Ladder) -> tuple[Ladder, Branches]:
 
 
 def _full_range(ladder: Ladder) -> FitSettings:
-    """The curves span the whole ladder, also where stairs were left out."""
+    """Return the curves span the whole ladder, also where stairs were left out."""
     return FitSettings(voltage_range_v=(float(ladder.voltage_v.min()), float(ladder.voltage_v.max())))
 
 
 def condition_twin(plant: Plant, top_v: float, seed: int = 0) -> Twin:
-    """A twin whose friction remembers a full cycle: where a ladder starts, and a rig that has worked before."""
+    """Return a twin whose friction remembers a full cycle: where a ladder starts, and a rig that has worked before."""
     twin = Twin(plant, seed)
     for voltage_v in (top_v, 0.0):
         twin.command(voltage_v)

@@ -97,7 +97,7 @@ class SetpointSchedule:
 
 
 def columns_of(base: Plant, extended: Plant) -> frozenset[str]:
-    """What has to move so that the extension is felt."""
+    """Return what has to move so that the extension is felt."""
     names = {treatment.name for treatment in differing_treatments(base, extended)}
     found = {column for name, column in COLUMNS.items() if name in names}
     friction, before = extended.friction, base.friction
@@ -113,7 +113,7 @@ def columns_of(base: Plant, extended: Plant) -> frozenset[str]:
 
 
 def draw_schedule(base: Plant, extended: Plant, seed: int, force_max_n: float) -> SetpointSchedule:
-    """The wishes of a seed. force_max_n: the largest that rig and model allow."""
+    """Return the wishes of a seed. force_max_n: the largest that rig and model allow."""
     rng = default_rng([seed, 11])
     scale = min(1.0, force_max_n / LARGEST_N)
     partial = rng.uniform(8.0, 38.0, REVERSALS).tolist()

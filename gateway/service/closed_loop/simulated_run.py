@@ -114,7 +114,7 @@ def _nan_if_absent(value: float | None) -> float:
 def simulate_run(
     driver: ControlSetup, plant: Plant, schedule: SetpointSchedule, seed: int, inputs: frozenset[str]
 ) -> SimulatedRun:
-    """The whole schedule. Once a fault has stopped it, the remaining force counts as it is: gone."""
+    """Return the whole schedule. Once a fault has stopped it, the remaining force counts as it is: gone."""
     loop = SimulatedLoop(driver, plant, seed, inputs)
     errors, settled, time_s = [], [], 0.0
     for wish in (SetpointSegment(0.0, schedule.wishes[0].start_s, 0.0, 0.0), *schedule.wishes):

@@ -56,7 +56,7 @@ def judge_fit(evaluation: Evaluation, tolerance_n: float | None, in_use: Calibra
 
 
 def _sentence(error: Error, bounds: tuple[str, ...]) -> str:
-    """Why a fit that misses these bounds is rejected; empty where it misses none."""
+    """Return why a fit that misses these bounds is rejected; empty where it misses none."""
     if not bounds:
         return ""
     return (

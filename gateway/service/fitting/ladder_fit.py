@@ -35,11 +35,11 @@ class LadderFit:
     measured: MeasuredResponse
 
 
-def fit_recording(recording: Recording, question: FitRequest, background: RigContext, name: str = "") -> LadderFit:
+def fit_recording(recording: Recording, request: FitRequest, context: RigContext, name: str = "") -> LadderFit:
     """Check, fit, hold out, choose, judge. name: the user's, empty for the one given when it was recorded. LadderError with a
     sentence where the data must not be fitted."""
-    evaluation = evaluate(check_source(recording, background), question)
-    verdict = judge_fit(evaluation, *acceptance_bounds(recording, background))
+    evaluation = evaluate(check_source(recording, context), request)
+    verdict = judge_fit(evaluation, *acceptance_bounds(recording, context))
     document = fit_document(evaluation, recording.path, recording.header)
     document["data_sha256"] = data_sha256(evaluation.checked)
     response = measure_recorded_response(recording, evaluation)
@@ -56,7 +56,7 @@ def default_name(document: Document) -> str:
 
 
 def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
-    """The chosen model as a calibration without a number. LadderError where its coefficients may not drive the rig."""
+    """Return the chosen model as a calibration without a number. LadderError where its coefficients may not drive the rig."""
     model = fit.document["model"]
     coefficients = Coefficients.of(fit.evaluation.model.branches, fit.evaluation.span_n)
     faults = validate_coefficients(coefficients, CoefficientLimits(cell_range_n=cell_range_n))

@@ -27,7 +27,7 @@ class RigContext:
 
 
 def read_source(path: Path, mapping: ColumnMapping | None = None) -> Recording:
-    """A recording of ours, Parquet or a CSV, by its first bytes. RecordingError and OSError as the readers.
+    """Return a recording of ours, Parquet or a CSV, by its first bytes. RecordingError and OSError as the readers.
 
     Cells that are no number are told and left out: a fit takes stairs, not every row. A force whose unit the mapping says
     is in newtons from here on, and known to be.
@@ -38,12 +38,12 @@ def read_source(path: Path, mapping: ColumnMapping | None = None) -> Recording:
 
 
 def find_source(name: str, state: Path) -> Path:
-    """The file of a recording's number, or the path itself. RecordingError for a number that is not there."""
+    """Return the file of a recording's number, or the path itself. RecordingError for a number that is not there."""
     return find_recording(state, int(name)) if name.isdecimal() and not Path(name).exists() else Path(name)
 
 
 def read_resumed(recording: Recording) -> list[Recording]:
-    """The recordings that a resumed run goes on from, oldest first, and itself. An exported table stands alone."""
+    """Return the recordings that a resumed run goes on from, oldest first, and itself. An exported table stands alone."""
     numbers = recording.header.get("continues", ()) if recording.path.suffix == SUFFIX else ()
     earlier = numbers if isinstance(numbers, list) else ()
     beside = recording.path.parent
@@ -61,21 +61,21 @@ def _shift_to_zero(part: Recording, zero_n: float) -> Recording:
     return replace(part, columns=columns, notes=(*part.notes, said))
 
 
-def check_source(recording: Recording, background: RigContext) -> CheckedLadder:
-    """The ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
-    expected, said = expectation(recording, background)
+def check_source(recording: Recording, context: RigContext) -> CheckedLadder:
+    """Return the ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
+    expected, said = expectation(recording, context)
     recordings = read_resumed(recording)
     checked = join_ladders([check_ladder(part.columns, part.header, expected) for part in recordings])
     told = dict.fromkeys(note for part in recordings for note in part.notes)
     return replace(checked, notes=(*told, *said, *checked.notes))
 
 
-def expectation(recording: Recording, background: RigContext) -> tuple[Expectation, list[str]]:
-    """What to compare the data with, and sentences about what could not be compared."""
+def expectation(recording: Recording, context: RigContext) -> tuple[Expectation, list[str]]:
+    """Return what to compare the data with, and sentences about what could not be compared."""
     recorded = str(recording.header.get("rig", "")).strip()
-    asked = background.rig or rig_of_state(background.state)
+    asked = context.rig or rig_of_state(context.state)
     rig, said = find_rig(asked or recorded, str(recording.header.get("rig_file", "")))
-    reference = _reference(rig, background.state)
+    reference = _reference(rig, context.state)
     fingerprint = recording.header.get("rig_fingerprint")
     if rig is not None and fingerprint and fingerprint != rig.fingerprint and recorded == rig.name:
         said.append(f"the files of rig {rig.name} have changed since the recording was made")
@@ -87,21 +87,21 @@ def expectation(recording: Recording, background: RigContext) -> tuple[Expectati
         area_mm2=plant.cylinder.area_m2 * _MM2_PER_M2 if plant else None,
         rig=rig.name if rig and asked else asked,
         saturation_n=rig.control.supervision.saturation_n if rig else None,
-        force_unit=background.force_unit,
+        force_unit=context.force_unit,
     )
     return expected, said
 
 
-def acceptance_bounds(recording: Recording, background: RigContext) -> tuple[float | None, Calibration | None]:
-    """What a fit of it must not miss: the rig's in-band tolerance, N, and the calibration in use. None: not known."""
-    asked = background.rig or rig_of_state(background.state)
+def acceptance_bounds(recording: Recording, context: RigContext) -> tuple[float | None, Calibration | None]:
+    """Return what a fit of it must not miss: the rig's in-band tolerance, N, and the calibration in use. None: not known."""
+    asked = context.rig or rig_of_state(context.state)
     rig, _ = find_rig(asked or str(recording.header.get("rig", "")), str(recording.header.get("rig_file", "")))
     tolerance_n = rig.control.defaults.in_band_tolerance_n if rig else None
-    return tolerance_n, _reference(rig, background.state)
+    return tolerance_n, _reference(rig, context.state)
 
 
 def rig_of_state(state: Path | None) -> str | None:
-    """The rig whose recordings a state directory holds; None where it holds none."""
+    """Return the rig whose recordings a state directory holds; None where it holds none."""
     entries = list_recordings(state) if state else []
     return next((str(entry.header["rig"]) for entry in reversed(entries) if entry.header.get("rig")), None)
 
@@ -126,7 +126,7 @@ def _from_file(file: str) -> Rig | None:
 
 
 def _reference(rig: Rig | None, state: Path | None) -> Calibration | None:
-    """The calibration in use, else the rig's built-in one."""
+    """Return the calibration in use, else the rig's built-in one."""
     if rig is None:
         return None
     standing = CalibrationStore(state, rig.calibration).find_selected() if state else None

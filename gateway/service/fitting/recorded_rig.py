@@ -16,12 +16,12 @@ from gateway.service.fitting.ladder_source import find_rig
 
 
 def rig_of(recording: Recording) -> Rig | None:
-    """The rig that the recording names, from the files that are here now; None where none is named or known."""
+    """Return the rig that the recording names, from the files that are here now; None where none is named or known."""
     return find_rig(str(recording.header.get("rig", "")).strip(), str(recording.header.get("rig_file", "")))[0]
 
 
 def plant_of(recording: Recording) -> PlantProfile | None:
-    """The plant as it was recorded, else that of the rig of the same name; None where no plant is known.
+    """Return the plant as it was recorded, else that of the rig of the same name; None where no plant is known.
 
     ProfileError, with its place in the recorded text, when this version cannot read it.
     """
@@ -33,7 +33,7 @@ def plant_of(recording: Recording) -> PlantProfile | None:
 
 
 def rig_texts(recording: Recording) -> dict[str, str]:
-    """The recorded files by name, the rig's own first; empty for a table without them. A CSV holds them as JSON."""
+    """Return the recorded files by name, the rig's own first; empty for a table without them. A CSV holds them as JSON."""
     texts = recording.header.get("rig_texts", {})
     try:
         texts = json.loads(texts) if isinstance(texts, str) else texts
@@ -55,7 +55,7 @@ def _read_recorded_plant(texts: Mapping[str, str]) -> PlantProfile | None:
 
 
 def _is_plant(file: str, texts: Mapping[str, str]) -> bool:
-    """A device or a calibration may have the plant's name."""
+    """Return whether the file holds a plant: a device or a calibration may have the plant's name."""
     return _document(file, texts).at("cylinder") is not None
 
 

@@ -33,7 +33,7 @@ class ProbeResult:
 
 
 async def explain_silent_device(line: OutputLine | CellLine, path: str) -> str:
-    """One sentence, E110 or E111 (or E10x when the port cannot be opened)."""
+    """Return one sentence, E110 or E111 (or E10x when the port cannot be opened)."""
     try:
         heard = [await _listen(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
     except PortError as error:
@@ -42,7 +42,7 @@ async def explain_silent_device(line: OutputLine | CellLine, path: str) -> str:
 
 
 async def probe_line(line: OutputLine | CellLine, path: str) -> ProbeResult:
-    """What is heard at the speed that the rig says."""
+    """Return what is heard at the speed that the rig says."""
     return await _listen(line, path, line.baud)
 
 
@@ -87,12 +87,12 @@ async def _listen(line: OutputLine | CellLine, path: str, baud: int) -> ProbeRes
 
 
 def _question(device: DeviceProfile) -> OutputRequest:
-    """What moves nothing: a reading, or, where a device cannot be asked, the least voltage that it can be set to."""
+    """Return what moves nothing: a reading, or, where a device cannot be asked, the least voltage that it can be set to."""
     return output_host(device).idle_question or SetVoltage(device.voltage_range_v[0])
 
 
 def _question_and_counter(line: OutputLine | CellLine) -> tuple[Callable[[], bytes], Callable[[bytes, float], int]]:
-    """How to ask this device for a word (a stream is not asked), and how many valid ones a chunk completes."""
+    """Return how to ask this device for a word (a stream is not asked), and how many valid ones a chunk completes."""
     if isinstance(line, OutputLine):
         output, question = output_host(line.device), _question(line.device)
         return lambda: output.request(question), lambda chunk, now_s: _count_valid(output.receive(chunk, now_s))

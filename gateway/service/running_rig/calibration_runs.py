@@ -77,7 +77,7 @@ class CalibrationRuns:
         return self.status()
 
     def _tried(self, plan: AnyPlan) -> Answer:
-        """What a plan would do; ValueError where the rig does not allow it."""
+        """Return what a plan would do; ValueError where the rig does not allow it."""
         run = self._calibrating.build(plan)
         top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)
         top_n = self._calibrating.model.force_n(top_v, 1.0)
@@ -146,7 +146,7 @@ class CalibrationRuns:
             self._close_ladder()
 
     def _labels(self) -> tuple[float, ...]:
-        """Where a ladder is, in the columns LADDER."""
+        """Return where a ladder is, in the columns LADDER."""
         run = self._calibrating.run
         if run is None or isinstance(run, ExperimentRun):
             return ()
@@ -229,7 +229,7 @@ class CalibrationRuns:
 
 
 def _describe_experiment(plan: AnyPlan) -> Answer:
-    """What a person should know and do before an experiment."""
+    """Return what a person should know and do before an experiment."""
     if not isinstance(plan, ExperimentPlan):
         return {"experiment": "", "check": True, "notes": [], "questions": []}
     missing = [name for name in plan.columns if name not in COLUMNS]
@@ -243,7 +243,7 @@ def _describe_experiment(plan: AnyPlan) -> Answer:
 
 
 def _describe_progress(run: AnyRun | None) -> Answer:
-    """How far a run is, in its own terms."""
+    """Return how far a run is, in its own terms."""
     told: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
     if isinstance(run, ExperimentRun):
         part = run.part
@@ -264,7 +264,7 @@ def _header_of_plan(run: AnyRun) -> Answer:
 
 
 def _parse_plan(fields: Any) -> AnyPlan:
-    """A plan from JSON; ValueError for a name or a type that it does not have."""
+    """Return a plan from JSON; ValueError for a name or a type that it does not have."""
     if not isinstance(fields, dict):
         raise ValueError("plan: a JSON object is expected")
     return plan_of(fields)

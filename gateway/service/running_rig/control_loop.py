@@ -1,4 +1,4 @@
-"""One rig, wired: the way of one setpoint through the house, and the way of a measured force back.
+"""The control loop of one rig: on each command, sample and tick it decides a voltage, sends it and publishes the status.
 
 A master's write calls `on_asked` and, where control can take it, `on_command` inside the bank's write: so the answer is
 control's own, and the voltage is on its way before the master has it.
@@ -40,7 +40,11 @@ Log = Callable[[str, str], None]
 
 
 class ControlLoop:
-    """Joins bank, controller, output line and load cell; owns no file and no socket."""
+    """Runs one step of control at each event: reads the bank's command and the newest sample, lets the controller decide, hands
+    the voltage to the output line, publishes the status in the bank and the row to recordings. Owns no file and no socket.
+
+    clock: monotonic seconds; log(cause, sentence): for people.
+    """
 
     def __init__(
         self,

@@ -72,7 +72,7 @@ class Lateness:
         self._rig_ran_s = now_s
 
     def since(self, then_s: float, now_s: float, waited_s: float | None) -> Held:
-        """What fell into the time from then to now, what still lasts included."""
+        """Return what fell into the time from then to now, what still lasts included."""
         late_s, late_waited_s = self._ours.since(then_s)
         if self._tick_s is not None and (lasts_s := now_s - max(self._tick_s, then_s) - self._period_s) > 0.0:
             late_s += lasts_s

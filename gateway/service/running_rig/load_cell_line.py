@@ -37,7 +37,7 @@ class CellExchange:
         self._is_overdue = False
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
-        """What these bytes complete; the next question goes out at once where it is due."""
+        """Return what these bytes complete; the next question goes out at once where it is due."""
         found = self._host.receive(chunk, now_s)
         if any(isinstance(one, ForceSample) for one in found):
             if self._is_overdue:

@@ -1,4 +1,4 @@
-"""One running cell: the wired gateway with its real edges (two ports, the Modbus server, tick, recorder, control socket)."""
+"""One running rig: its control loop with real edges (two ports, the Modbus server, tick, recorder, control socket)."""
 
 import asyncio
 import contextlib
@@ -63,14 +63,17 @@ _FAULTS: Final = {
 
 
 def _cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCode:
-    """What the fault_code register says after an unclean end: the guardian's cause, or a run that never ended."""
+    """Return what the fault_code register says after an unclean end: the guardian's cause, or a run that never ended."""
     if restarted:
         return _FAULTS.get(restarted.cause, FaultCode.INTERNAL)
     return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
 
 
 class RunningRig:
-    """Wires one rig's gateway to its edges. `failed` is set when an internal error left the loop in an unknown state."""
+    """Wires the control loop of one rig to its edges, starts and stops them.
+
+    `failed` is set when an internal error left the loop in an unknown state.
+    """
 
     def __init__(self, rig: Rig, ports: dict[str, str], state: Path, guardian: GuardianLine, log: EventLog) -> None:
         self._calibrations = RigCalibrations(rig, state)
@@ -120,8 +123,8 @@ class RunningRig:
         self._recordings = Recordings(state / "recordings", rig, log)
 
     def _wire(self, cause: FaultCode) -> None:
-        """Bank and controller, the gateway between them, and who serves both."""
-        self._wire_gateway(cause)
+        """Make bank, controller and the loop between them, and who serves both."""
+        self._wire_loop(cause)
         rig = self._rig
         self._calibration_runs = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
         self.loop.calibration_runs = self._calibration_runs
@@ -144,7 +147,7 @@ class RunningRig:
             self._log,
         )
 
-    def _wire_gateway(self, cause: FaultCode) -> None:
+    def _wire_loop(self, cause: FaultCode) -> None:
         rig = self._rig
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
         self.bank.on_refusal = lambda refusal, peer: self._log(
@@ -229,7 +232,7 @@ class RunningRig:
         self._cell_port.move(ports["load_cell"])
 
     def _record_from_the_start(self) -> tuple[str, ...]:
-        """A disk that takes no recording is no reason not to control."""
+        """Return a disk that takes no recording is no reason not to control."""
         try:
             self._recordings.start()
         except OSError as error:
@@ -247,7 +250,7 @@ class RunningRig:
         return tuple(notes)
 
     async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, restarted: Ending | None) -> str:
-        """The port is ours alone: it is closed while the probe listens at other speeds, and opened again.
+        """Return why a device says nothing. Its port is closed while the probe listens at other speeds, and opened again.
 
         Not after a restart: seconds of listening would tell what the start has told already. Nor where the machine did not
         let us, or a simulated rig, run.

@@ -50,7 +50,7 @@ class Child:
                 os.kill(self.pid, signal.SIGKILL)
 
     def wait(self, bound_s: float = _REAP_BOUND_S) -> int:
-        """Its exit code (-9: by SIGKILL), LOST when there is none to be had within the bound."""
+        """Return its exit code (-9: by SIGKILL), LOST when there is none to be had within the bound."""
         if self._code is None and self.pid:
             if self.died >= 0:
                 _wait_readable(self.died, bound_s)

@@ -65,7 +65,7 @@ class ChildStarter:
         return self._child(fork_server.CONTROL, arguments)
 
     def rig(self, *, prepared: bool) -> Child:
-        """The simulated rig outlives a kill of control, as a real rig does; it ends when its link does.
+        """Return the simulated rig outlives a kill of control, as a real rig does; it ends when its link does.
 
         prepared: not for a second try, which avoids whatever went wrong with the first.
         """
@@ -73,7 +73,7 @@ class ChildStarter:
         return self._child(fork_server.RIG, arguments) if prepared else spawn_child(fork_server.RIG, arguments)
 
     def watch(self, arguments: dict[str, Any]) -> Child:
-        """The residual watch: what it finds it tells control, through the control socket."""
+        """Return the residual watch: what it finds it tells control, through the control socket."""
         return spawn_child(WATCH, arguments, arguments["ring"])
 
     def on_born(self) -> None:

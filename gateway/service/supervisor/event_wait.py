@@ -35,7 +35,7 @@ class SignalPipe:
         return self._reader.fileno()
 
     def take(self) -> int:
-        """How many have come since the last call."""
+        """Return how many have come since the last call."""
         with contextlib.suppress(OSError):
             return len(self._reader.recv(_MOST_SIGNALS))
         return 0

@@ -51,7 +51,7 @@ def become_subreaper() -> bool:
 
 
 def request_child(server: socket.socket, module: str, arguments: dict[str, Any], *shared: int) -> socket.socket:
-    """The guardian's side: our end of the new child's line. OSError when the server is gone or does not listen."""
+    """Return the guardian's side: our end of the new child's line. OSError when the server is gone or does not listen."""
     ours, theirs = guardian_link.create_link()
     with theirs:
         try:
@@ -109,7 +109,7 @@ def _fork(link: socket.socket, message: guardian_link.Message) -> None:
 
 
 def _run_child(message: guardian_link.Message, parent: int) -> int:
-    """The new process: a session of its own, its name, its first word, and then as if it had been started by itself."""
+    """Return the new process: a session of its own, its name, its first word, and then as if it had been started by itself."""
     while os.getppid() == parent:  # it ends at once; from then on we are the guardian's, who may ask for our end
         time.sleep(_MOMENT_S)
     os.setsid()
@@ -128,7 +128,7 @@ def _run_child(message: guardian_link.Message, parent: int) -> int:
 
 
 def is_adopted(line: socket.socket) -> bool:
-    """The child's side: tell of its birth, and wait until the guardian follows it. False when it has been given up."""
+    """Return the child's side: tell of its birth, and wait until the guardian follows it. False when it has been given up."""
     answered = select.poll()
     answered.register(line, select.POLLIN)
     try:

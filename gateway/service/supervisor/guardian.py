@@ -135,7 +135,7 @@ class Guardian:
         return max(0.0, min(deadlines) - self.clock())
 
     def _deadline_s(self) -> float:
-        """When control is overdue: its heartbeat, READY, its birth; or when it is to be started."""
+        """Return when control is overdue: its heartbeat, READY, its birth; or when it is to be started."""
         if self.control is None:
             return inf if self.leaving else self.asked_s
         if self.heartbeat.is_up:
@@ -285,7 +285,7 @@ class Guardian:
         return self._restart(ending, describe_exit(code) if is_gone else "it does not go", acknowledged)
 
     def _last_word(self) -> bool | None:
-        """The safe voltage, through the newest line that control has handed over; None where there was none."""
+        """Return the safe voltage, through the newest line that control has handed over; None where there was none."""
         if self.control:
             self.control.kill()
             if not self.link_ended:

@@ -47,7 +47,7 @@ class Heartbeat:
         return late_s >= 0.0
 
     def why_silent(self, control: Child, now_s: float) -> Callable[[], Ending]:
-        """How to find the cause of the silence until now; to be asked behind the kill, when the kernel's counters are
+        """Return how to find the cause of the silence until now; to be asked behind the kill, when the kernel's counters are
         complete and nothing waits for them any more."""
         state = control.counters.state() if control.counters else ""
         silent_s, before, was_late = now_s - self._heard_s, self._used, self._was_late

@@ -44,7 +44,7 @@ def leaving_sentence(pid: int) -> str:
 
 
 def describe_acknowledgement(acknowledged: bool | None) -> str:
-    """How the last word on the wire went; None: there was no line."""
+    """Return how the last word on the wire went; None: there was no line."""
     return {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]
 
 

@@ -23,7 +23,7 @@ class RestartPolicy:
         self._without_ready = 0
 
     def count(self, now_s: float, cause: EndCause) -> float | None:
-        """How long to wait before the next start; None when there were too many ends."""
+        """Return how long to wait before the next start; None when there were too many ends."""
         self._ends = [end for end in self._ends if now_s - end[0] < WINDOW_S] + [(now_s, cause)]
         if len(self._ends) > MOST_RESTARTS:
             return None

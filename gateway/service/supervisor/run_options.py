@@ -27,6 +27,6 @@ class RunOptions:
 
 
 def default_state_root() -> Path:
-    """Where the state directories of rigs are that were given none."""
+    """Return where the state directories of rigs are that were given none."""
     home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     return Path(home) / "force-gateway"

@@ -41,7 +41,7 @@ class SafeLine:
         return False
 
     def _wait_for_acknowledgement(self, timeout_s: float) -> bool:
-        """A reply counts only as a whole line: the 0 at the end of 510 acknowledges nothing."""
+        """Return whether the reply came. It counts as a whole line only: the 0 at the end of 510 acknowledges nothing."""
         deadline_s = time.monotonic() + timeout_s
         seen = b""
         while (left_s := deadline_s - time.monotonic()) > 0:
