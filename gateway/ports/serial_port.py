@@ -55,7 +55,6 @@ class SerialPort:
         self._reopening: asyncio.TimerHandle | None = None
         self._failure: PortError | None = None  # found while writing, told in the loop's next turn
         self.warning = ""  # a sentence about the adapter's latency, empty if there is nothing to say
-        self.reopened = 0
 
     @property
     def path(self) -> str:
@@ -230,7 +229,6 @@ class SerialPort:
             return
         try:
             self._open()
-            self.reopened += 1
         except PortError:
             self._backoff_s = min(2.0 * self._backoff_s, _LONGEST_BACKOFF_S)
             self._reopen_after(self._backoff_s)

@@ -19,19 +19,14 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
-Answer = dict[str, Any]
+from gateway.processes.json_messages import Answer, encode_answer, error_answer, refuse_constant, why_too_large
+
 Handler = Callable[[dict[str, Any]], Answer]
 _LONGEST_PATH: Final = 107  # bytes, of a Unix socket's address
 _LONGEST_ANSWER: Final = 1 << 20
-_LONGEST_SENTENCE: Final = 500
-_DEEPEST: Final = 10
-_MOST_KEYS: Final = 64
-_LONGEST_KEY: Final = 100
-_MOST_VALUES: Final = 3000
 _SHARE: Final = 0.1  # of the loop's time
 _LONGEST_REST_S: Final = 0.5
 _NO_DESCRIPTOR_S: Final = 0.1
@@ -184,30 +179,30 @@ class JsonLineServer:
         """Return the answer to one line, whatever it is."""
         try:
             answer = self._handle_line(line)
-            text = _as_json(answer)
+            text = encode_answer(answer)
             if len(text) > _LONGEST_ANSWER:
-                text = _as_json(_error(f"the answer would have {len(text)} bytes"))
+                text = encode_answer(error_answer(f"the answer would have {len(text)} bytes"))
         except Exception as error:
             self._log(
                 "internal",
                 "A499 internal error in an answer of the control socket, please report it:\n" + traceback.format_exc(),
             )
             told = f"internal error, please report it with the gateway's log: {type(error).__name__}: {error}"
-            text = _as_json(_error(told))
+            text = encode_answer(error_answer(told))
         return text.encode() + b"\n"
 
     def _handle_line(self, line: bytes) -> Answer:
         try:
-            request = json.loads(line, parse_constant=_no_number)
+            request = json.loads(line, parse_constant=refuse_constant)
             handler = self._handlers[request["do"]]
         except (ValueError, KeyError, TypeError, RecursionError):
-            return _error(f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}')
-        if too_much := _why_too_large(request):
-            return _error(too_much)
+            return error_answer(f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}')
+        if too_much := why_too_large(request):
+            return error_answer(too_much)
         try:
             return {"ok": True} | handler(request)
         except (ValueError, OSError) as error:
-            return _error(str(error))
+            return error_answer(str(error))
 
 
 class _Client:
@@ -302,7 +297,7 @@ class _Client:
         """Say why, if it takes a line now, and close."""
         if not self._unsent:
             with contextlib.suppress(OSError):
-                self._peer.send(_as_json(_error(f"{why}: closed")).encode() + b"\n")
+                self._peer.send(encode_answer(error_answer(f"{why}: closed")).encode() + b"\n")
         self.close()
 
     def _stop_listening(self, why: str) -> None:
@@ -310,7 +305,7 @@ class _Client:
         self._said.clear()
         self._is_deaf = True
         with contextlib.suppress(OSError):
-            self._peer.send(_as_json(_error(f"{why}: closed")).encode() + b"\n")
+            self._peer.send(encode_answer(error_answer(f"{why}: closed")).encode() + b"\n")
             self._peer.shutdown(socket.SHUT_WR)
         self.listen()
 
@@ -326,57 +321,7 @@ class _Client:
         self._server.forget_client(self)
 
 
-def _error(sentence: str) -> Answer:
-    if len(sentence) > _LONGEST_SENTENCE:
-        sentence = f"{sentence[:_LONGEST_SENTENCE]} ..."
-    return {"ok": False, "error": sentence}
-
-
-def _why_too_large(request: Any) -> str:
-    """Return why a request is larger than any that means something; empty for one that is not.
-
-    Checking a shape and telling what is wrong with it takes its time for each key: what could take longer than a tick or
-    two is not begun.
-    """
-    level, values = [request], 0
-    for _ in range(_DEEPEST):
-        below: list[Any] = []
-        for value in level:
-            if isinstance(value, dict):
-                if len(value) > _MOST_KEYS or any(len(key) > _LONGEST_KEY for key in value):
-                    return (
-                        f"an object with more than {_MOST_KEYS} keys, or a key of more than {_LONGEST_KEY} characters"
-                    )
-                below += value.values()
-            elif isinstance(value, list):
-                below += value
-        level, values = below, values + len(below)
-        if values > _MOST_VALUES:
-            return f"more than {_MOST_VALUES} values"
-    return f"nested more than {_DEEPEST} deep" if level else ""
-
-
-def _as_json(answer: Answer) -> str:
-    """RFC 8259 has no NaN: what is not finite is null."""
-    try:
-        return json.dumps(answer, allow_nan=False)
-    except ValueError:
-        return json.dumps(_finite(answer), allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(part) for key, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(part) for part in value]
-    return None if isinstance(value, float) and not isfinite(value) else value
-
-
-def _no_number(name: str) -> float:
-    raise ValueError(f"{name} is no number")
-
-
 def _say_and_close(peer: socket.socket, sentence: str) -> None:
     with contextlib.suppress(OSError):
-        peer.send(_as_json(_error(sentence)).encode() + b"\n")
+        peer.send(encode_answer(error_answer(sentence)).encode() + b"\n")
     peer.close()

@@ -1,7 +1,6 @@
 """Why does a device say nothing that makes sense? Listen at every usual speed, and say what was heard in numbers.
 
-Opens the port by itself, so the caller closes its own first. Used when a line stays without valid words at the start, and
-by `check --probe`.
+Opens the port by itself, so the caller closes its own first. Used when a line stays without valid words at the start.
 """
 
 import asyncio
@@ -35,15 +34,10 @@ class ProbeResult:
 async def explain_silent_device(line: OutputLine | CellLine, path: str) -> str:
     """Return one sentence, E110 or E111 (or E10x when the port cannot be opened)."""
     try:
-        heard = [await _listen(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
+        heard = [await listen_at(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
     except PortError as error:
         return str(error)
     return _sentence(path, heard[0], heard[1:])
-
-
-async def probe_line(line: OutputLine | CellLine, path: str) -> ProbeResult:
-    """Return what is heard at the speed that the rig says."""
-    return await _listen(line, path, line.baud)
 
 
 def _sentence(path: str, here: ProbeResult, elsewhere: list[ProbeResult]) -> str:
@@ -61,7 +55,8 @@ def _sentence(path: str, here: ProbeResult, elsewhere: list[ProbeResult]) -> str
     return f"E111 {path}: silence at every speed; power, crossed wires, stream mode? force-gateway explain E111"
 
 
-async def _listen(line: OutputLine | CellLine, path: str, baud: int) -> ProbeResult:
+async def listen_at(line: OutputLine | CellLine, path: str, baud: int) -> ProbeResult:
+    """Open the port, ask or listen at this speed, and return what came. PortError where it does not open."""
     ask, count = _question_and_counter(line)
     enough = asyncio.Event()
     total = valid = 0

@@ -26,7 +26,6 @@ class CellExchange:
         self._question = host.poll()
         self._reply_timeout_s = profile.reply_timeout_s
         self._period_s = 1.0 / min(profile.reading.rate_hz or inf, _FASTEST_HZ)
-        self.overdue = 0
         self.reset()
 
     def reset(self) -> None:
@@ -51,7 +50,6 @@ class CellExchange:
         """Give up waiting for an overdue answer, and ask again."""
         if self._sent_s is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
-            self.overdue += 1
             self._sent_s, self._is_overdue, self._next_s = None, True, now_s
         self._send_next(now_s)
 

@@ -55,7 +55,6 @@ class OutputExchange:
         self._reply_timeout_s = reply_timeout_s
         self.garbage_bytes = 0
         self.round_trip_s = nan
-        self.on_pressure: Callable[[float], None] = lambda pressure_pa: None
         self.reset()
 
     def reset(self) -> None:
@@ -145,7 +144,6 @@ class OutputExchange:
         if isinstance(reply, Pressure):
             self._failures[type(asked)] = 0
             self.pressure_pa = reply.pressure_pa
-            self.on_pressure(reply.pressure_pa)
         elif isinstance(reply, Refused):
             self._count_failure(type(asked), FaultCode.OUTPUT_REFUSED)
         elif asked is not None and isinstance(reply, Accepted):

@@ -11,7 +11,7 @@ from gateway.devices import DeviceProfile, cell_device, output_device
 from gateway.devices.messages import Accepted, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
-from gateway.service.running_rig.baud_probe import explain_silent_device, probe_line
+from gateway.service.running_rig.baud_probe import explain_silent_device, listen_at
 from tests.service.rigs import demo
 
 FRAME_PERIOD_S = 0.01
@@ -136,12 +136,14 @@ def test_a_device_that_speaks_now_was_silent_a_moment_ago(cell: CellLine) -> Non
 
 
 def test_a_refusal_in_the_devices_own_words_is_heard(output: OutputLine) -> None:
-    heard = asked(AnsweringRegulator(output.device, 9600, only_refuses=True), lambda path: probe_line(output, path))
+    heard = asked(
+        AnsweringRegulator(output.device, 9600, only_refuses=True), lambda path: listen_at(output, path, output.baud)
+    )
     assert heard.valid >= 1
 
 
 def test_what_is_heard_is_told_in_numbers(cell: CellLine) -> None:
-    heard = asked(SpeakingCell(cell.device, 115200), lambda path: probe_line(cell, path))
+    heard = asked(SpeakingCell(cell.device, 115200), lambda path: listen_at(cell, path, cell.baud))
     assert heard.baud == 115200
     assert heard.valid >= 3
     assert heard.bytes >= 3 * 18

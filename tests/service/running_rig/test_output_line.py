@@ -22,7 +22,6 @@ class Wire:
         self.written: list[bytes] = []
         self.pressures_pa: list[float] = []
         self.exchange = OutputExchange(output_host(demo().output.device), self.written.append, REPLY_TIMEOUT_S)
-        self.exchange.on_pressure = self.pressures_pa.append
         self.now_s = 100.0
 
     @property
@@ -36,6 +35,8 @@ class Wire:
     def answer(self, text: str, after_s: float = ROUND_TRIP_S) -> None:
         self.now_s += after_s
         self.exchange.on_bytes(text.encode() + b"\r\n", self.now_s)
+        if self.exchange.pressure_pa == self.exchange.pressure_pa:
+            self.pressures_pa.append(self.exchange.pressure_pa)
 
     def tick(self, after_s: float = 0.01) -> None:
         self.now_s += after_s

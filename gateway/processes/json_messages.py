@@ -1,0 +1,64 @@
+"""Requests and answers of a local socket as JSON: what is too large to be looked at, and what has no number in JSON."""
+
+import json
+from math import isfinite
+from typing import Any, Final
+
+Answer = dict[str, Any]
+_LONGEST_SENTENCE: Final = 500
+_DEEPEST: Final = 10
+_MOST_KEYS: Final = 64
+_LONGEST_KEY: Final = 100
+_MOST_VALUES: Final = 3000
+
+
+def error_answer(sentence: str) -> Answer:
+    """Return the answer of a request that is refused, with the sentence that says why, cut to 500 characters."""
+    if len(sentence) > _LONGEST_SENTENCE:
+        sentence = f"{sentence[:_LONGEST_SENTENCE]} ..."
+    return {"ok": False, "error": sentence}
+
+
+def why_too_large(request: Any) -> str:
+    """Return why a request is larger than any that means something; empty for one that is not.
+
+    Checking a shape and telling what is wrong with it takes its time for each key: what could take longer than a tick or
+    two is not begun.
+    """
+    level, values = [request], 0
+    for _ in range(_DEEPEST):
+        below: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                if len(value) > _MOST_KEYS or any(len(key) > _LONGEST_KEY for key in value):
+                    return (
+                        f"an object with more than {_MOST_KEYS} keys, or a key of more than {_LONGEST_KEY} characters"
+                    )
+                below += value.values()
+            elif isinstance(value, list):
+                below += value
+        level, values = below, values + len(below)
+        if values > _MOST_VALUES:
+            return f"more than {_MOST_VALUES} values"
+    return f"nested more than {_DEEPEST} deep" if level else ""
+
+
+def encode_answer(answer: Answer) -> str:
+    """Return the answer as JSON text. RFC 8259 has no NaN: what is not finite is null."""
+    try:
+        return json.dumps(answer, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(answer), allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def refuse_constant(name: str) -> float:
+    """Refuse NaN and Infinity, for json.loads(parse_constant=...)."""
+    raise ValueError(f"{name} is no number")
