@@ -104,7 +104,7 @@ class UploadService:
         else:
             self._notice = CommitNotice.WITHOUT_STOPS if found.without_stops else NO_NOTICE
             if action is CommitAction.DRY_RUN:
-                self._end(CommitStatus.IDLE, self._told("the set would be accepted"))
+                self._end(CommitStatus.IDLE, self._describe_success("the set would be accepted"))
             else:
                 self._take(found, peer)
 
@@ -183,7 +183,7 @@ class UploadService:
         self._pointer = taken.pointer
         self.on_use(taken)
         self._notice |= taken.notice
-        self._end(CommitStatus.COMMITTED, self._told(_describe_active(taken)))
+        self._end(CommitStatus.COMMITTED, self._describe_success(_describe_active(taken)))
 
     def _fail(self, error: Exception) -> None:
         """UnusableCalibration and StoreError are answers; anything else, an internal error, must not stop the control."""
@@ -206,7 +206,7 @@ class UploadService:
             self._staging.show_commit(status, index, reason, self._notice)
         self._log("calibration", sentence)
 
-    def _told(self, what: str) -> str:
+    def _describe_success(self, what: str) -> str:
         """Return the log line of something that went well, with what the notice says."""
         known = "; known here, it keeps number and name" if self._notice & CommitNotice.KNOWN_SET else ""
         if self._notice & CommitNotice.WITHOUT_STOPS:

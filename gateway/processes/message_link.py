@@ -67,7 +67,7 @@ def receive(link: socket.socket) -> Message | None:
     BlockingIOError when there is none yet, ProtocolError for what is not of this protocol.
     """
     try:
-        data, ancillary, flags, _ = _received(link)
+        data, ancillary, flags, _ = _receive_raw(link)
     except BlockingIOError:
         raise
     except OSError:
@@ -84,7 +84,7 @@ def receive(link: socket.socket) -> Message | None:
     return message
 
 
-def _received(link: socket.socket) -> tuple[bytes, list[tuple[int, int, bytes]], int, Any]:
+def _receive_raw(link: socket.socket) -> tuple[bytes, list[tuple[int, int, bytes]], int, Any]:
     """Receive once more after a reset: a peer that died with something of ours unread gives one, and then its last words."""
     space = socket.CMSG_SPACE(4 * _MOST_DESCRIPTORS)
     try:

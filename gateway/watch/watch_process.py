@@ -87,7 +87,7 @@ def pause_s(every_s: float, spent_s: float) -> float:
     return max(every_s, spent_s / SHARE) - min(spent_s, every_s)
 
 
-def run(options: dict[str, Any]) -> None:
+def watch_forever(options: dict[str, Any]) -> None:
     """Look, tell, sleep; for ever."""
     ring, state, every_s = RingReader(options["ring"]), Path(options["state"]), options["every_s"]
     time.sleep(options["window_s"])
@@ -107,7 +107,7 @@ def run(options: dict[str, Any]) -> None:
 def main(arguments: list[str]) -> int:
     yield_to_others()
     exit_with_guardian(socket.socket(fileno=int(arguments[0])))
-    run(json.loads(arguments[1]))
+    watch_forever(json.loads(arguments[1]))
     return 0
 
 

@@ -68,8 +68,8 @@ def test_a_control_process_killed_at_any_moment_of_its_start_comes_up_in_the_end
 
 
 def test_whoever_else_dies_the_gateway_goes_on(running):
-    a_simulated_rig_that_dies_comes_back_and_presses_again(running)
-    without_its_prepared_process_a_restart_only_takes_longer(running)
+    assert_a_simulated_rig_comes_back_and_presses_again(running)
+    assert_a_restart_without_fork_server_only_takes_longer(running)
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or len(os.sched_getaffinity(0)) < 2, reason="needs SCHED_FIFO and a second core")
@@ -93,7 +93,7 @@ def test_a_machine_that_does_not_let_the_loop_run_is_named_as_the_cause(running)
     assert any("A403" in note for note in running.ready["notes"])
 
 
-def without_its_prepared_process_a_restart_only_takes_longer(running: RunningGateway) -> None:
+def assert_a_restart_without_fork_server_only_takes_longer(running: RunningGateway) -> None:
     os.kill(running.ready["pids"]["fork_server"], signal.SIGKILL)
     assert "another one in 5 s" in running.said("A407")
     os.kill(running.ready["pids"]["control"], signal.SIGKILL)
@@ -104,7 +104,7 @@ def without_its_prepared_process_a_restart_only_takes_longer(running: RunningGat
     running.wait_until(lambda status: status["state"] == HOLDING)
 
 
-def a_simulated_rig_that_dies_comes_back_and_presses_again(running: RunningGateway) -> None:
+def assert_a_simulated_rig_comes_back_and_presses_again(running: RunningGateway) -> None:
     assert not running.write(0, 1, 1000).isError()
     running.wait_until(lambda status: status["state"] == HOLDING)
     os.kill(running.ready["pids"]["rig"], signal.SIGKILL)

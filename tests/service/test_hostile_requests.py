@@ -87,7 +87,7 @@ class Stage:
         wired.run(0.1)
 
     def ask(self, line: bytes) -> dict[str, Any]:
-        return answered(self.server, line)
+        return assert_answered(self.server, line)
 
     def close(self) -> None:
         self.recordings.stop()
@@ -95,7 +95,7 @@ class Stage:
         self.upload.close()
 
 
-def answered(server: JsonLineServer, line: bytes) -> dict[str, Any]:
+def assert_answered(server: JsonLineServer, line: bytes) -> dict[str, Any]:
     """The answer, which must be one line of true JSON, and no internal error."""
     data = server.answer(line)
     assert data.count(b"\n") == 1 and data.endswith(b"\n")
@@ -211,10 +211,10 @@ def test_no_request_ends_the_simulated_rig() -> None:
     stage = RigStage()
     for seed, number in ((1, 120), (2, 120)):
         for line in mutants(RIG, number, seed):
-            answered(stage.server, line)
+            assert_answered(stage.server, line)
             stage.wired.world.advance(stage.wired.world._now_s + 0.01)
     for line in garbage(RIG, 500, 3):
-        answered(stage.server, line)
+        assert_answered(stage.server, line)
 
 
 @pytest.mark.parametrize(
@@ -233,6 +233,7 @@ def test_no_plant_that_the_twin_cannot_be(values: dict[str, Any]) -> None:
     stage = RigStage()
     twin = stage.rig.twin
     assert (
-        answered(stage.server, json.dumps({"do": "fault", "name": "plant", "values": values}).encode())["ok"] is False
+        assert_answered(stage.server, json.dumps({"do": "fault", "name": "plant", "values": values}).encode())["ok"]
+        is False
     )
     assert stage.rig.twin is twin

@@ -66,7 +66,7 @@ class CalibrationRuns:
         asked = parse_request(CalibrateRequest, request)
         self._followed_s = self._clock()
         if asked.dry_run:
-            return self._tried(_parse_plan(asked.plan))
+            return self._try_plan(_parse_plan(asked.plan))
         if asked.stop:
             self._calibrating.ask_stop("calibration stopped at this machine")
         elif asked.plan is not None:
@@ -76,7 +76,7 @@ class CalibrationRuns:
             raise ValueError(refused)
         return self.status()
 
-    def _tried(self, plan: AnyPlan) -> Answer:
+    def _try_plan(self, plan: AnyPlan) -> Answer:
         """Return what a plan would do; ValueError where the rig does not allow it."""
         run = self._calibrating.build(plan)
         top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)

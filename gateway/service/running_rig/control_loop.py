@@ -148,7 +148,7 @@ class ControlLoop:
             return None
         return waited_s - self._last_waited_s
 
-    def _held(self, since_s: float | None, now_s: float) -> Held:
+    def _processor_held(self, since_s: float | None, now_s: float) -> Held:
         """Asked of the kernel only once a device has not been heard for a while."""
         if self.lateness is None or since_s is None or not _LONG_SILENCE_S <= now_s - since_s <= _LONGEST_SILENCE_S:
             return NOT_HELD
@@ -168,8 +168,8 @@ class ControlLoop:
             warnings=self.warnings,
             sent_v=self.output.sent_v,
             wire_s=self.output.round_trip_s,
-            cell_held=self._held(self.sample.time_s if self.sample else None, now_s),
-            output_held=self._held(self.output.unanswered_since_s, now_s),
+            cell_held=self._processor_held(self.sample.time_s if self.sample else None, now_s),
+            output_held=self._processor_held(self.output.unanswered_since_s, now_s),
         )
 
     def _decide(self, now_s: float) -> Output:

@@ -125,6 +125,7 @@ def test_a_run_of_this_machine_needs_no_heartbeat_on_its_way_to_0() -> None:
     rig = SmallRig(replace(control, defaults=replace(control.defaults, force_ramp_n_per_s=10.0)))
     locally(rig).run(3.0).controller.active_run.ask_stop("calibration stopped at this machine")
     rig.until(State.OFF, 6.0)
+    assert rig.state is State.OFF
 
 
 @pytest.mark.parametrize("action", [LeaseAction.HOLD, LeaseAction.RAMP])
@@ -165,6 +166,7 @@ def test_one_write_begins_a_run_again_and_again() -> None:
         rig.calibrating()
         rig.controller.active_run.ask_stop("calibration stopped at this machine")
         rig.until(State.OFF)
+        assert rig.word("calibration_phase") == CalibrationPhase.STOPPED
 
 
 def test_a_run_shows_what_it_does_and_how_long_it_still_takes() -> None:

@@ -25,7 +25,7 @@ def at_twenty(rig: Rig | None = None) -> Wired:
     return Wired(rig or strict()).pressing(20.0)
 
 
-def fails_with(wired: Wired, cause: FaultCode, within_s: float) -> float:
+def assert_fails_with(wired: Wired, cause: FaultCode, within_s: float) -> float:
     """Seconds until the fault; then the safe voltage must follow within a sentence's time on the wire."""
     took_s = wired.until(lambda: wired.state is State.FAULT, within_s)
     assert wired.fault_code is cause
@@ -34,7 +34,7 @@ def fails_with(wired: Wired, cause: FaultCode, within_s: float) -> float:
     return took_s
 
 
-def heal_and_reset(wired: Wired) -> None:
+def assert_heals_after_reset(wired: Wired) -> None:
     wired.run(0.3)
     wired.write(0, RESET, 0, 0, 0)
     wired.run(0.3)
@@ -47,10 +47,10 @@ def heal_and_reset(wired: Wired) -> None:
 def test_a_cut_cell_is_a_fault_within_its_bound_and_safe_on_the_wire() -> None:
     wired = at_twenty()
     wired.fault("cell-cut")
-    assert fails_with(wired, FaultCode.SAMPLE_STALE, 0.05 + 2 * TICK_S) >= 0.04
+    assert assert_fails_with(wired, FaultCode.SAMPLE_STALE, 0.05 + 2 * TICK_S) >= 0.04
     assert wired.voltage_reaches_safe(WIRE_S) <= WIRE_S
     wired.fault("cell-cut", on=False)
-    heal_and_reset(wired)
+    assert_heals_after_reset(wired)
 
 
 def test_a_silent_output_device_is_a_fault_within_its_bound_and_is_told_the_safe_voltage() -> None:
@@ -58,14 +58,14 @@ def test_a_silent_output_device_is_a_fault_within_its_bound_and_is_told_the_safe
     wired = at_twenty()
     cut_s = wired.now_s
     wired.fault("output-cut")
-    fails_with(wired, FaultCode.OUTPUT_SILENT, 0.1 + 0.1 + 2 * TICK_S)
+    assert_fails_with(wired, FaultCode.OUTPUT_SILENT, 0.1 + 0.1 + 2 * TICK_S)
     wired.voltage_reaches_safe(0.06 + TICK_S + WIRE_S)
     assert wired.now_s - cut_s < 0.35
     assert wired.twin.pressure_pa > 0
     wired.run(0.5)
     assert wired.observer.settings[-1].voltage_v == 0.0
     wired.fault("output-cut", on=False)
-    heal_and_reset(wired)
+    assert_heals_after_reset(wired)
 
 
 def test_a_moving_setpoint_finds_a_silent_output_in_a_tenth_of_a_second() -> None:
@@ -73,7 +73,7 @@ def test_a_moving_setpoint_finds_a_silent_output_in_a_tenth_of_a_second() -> Non
     wired.fault("output-cut")
     began_s = wired.now_s
     wired.write(0, ENABLE, 3000)
-    fails_with(wired, FaultCode.OUTPUT_SILENT, 0.2)
+    assert_fails_with(wired, FaultCode.OUTPUT_SILENT, 0.2)
     assert wired.now_s - began_s <= 0.1 + 3 * TICK_S
 
 
@@ -150,7 +150,7 @@ def test_an_inverted_sign_is_a_fault_within_a_second(force_n: float) -> None:
     wired = Wired().ready()
     wired.fault("sign-inverted")
     wired.write(0, ENABLE, round(100 * force_n))
-    fails_with(wired, FaultCode.SIGN_INVERTED, 1.0)
+    assert_fails_with(wired, FaultCode.SIGN_INVERTED, 1.0)
     assert wired.said("A302")
     assert "-1" in wired.said("A302")[0]
 
@@ -158,13 +158,13 @@ def test_an_inverted_sign_is_a_fault_within_a_second(force_n: float) -> None:
 def test_a_sign_that_turns_under_force_is_found_too() -> None:
     wired = at_twenty()
     wired.fault("sign-inverted")
-    fails_with(wired, FaultCode.SIGN_INVERTED, 1.0)
+    assert_fails_with(wired, FaultCode.SIGN_INVERTED, 1.0)
 
 
 def test_an_unplugged_output_is_a_fault_at_once_and_comes_back_safe() -> None:
     wired = at_twenty()
     wired.unplug()
-    fails_with(wired, FaultCode.OUTPUT_LOST, TICK_S)
+    assert_fails_with(wired, FaultCode.OUTPUT_LOST, TICK_S)
     wired.run(0.4)
     assert wired.value("force_applied") == 0.0
     wired.replug()
@@ -173,7 +173,7 @@ def test_an_unplugged_output_is_a_fault_at_once_and_comes_back_safe() -> None:
     first = wired.settings_since(reopened_s)[0]
     assert first.voltage_v == 0.0, "I6: the first command after a reopening is safe"
     assert wired.state is State.FAULT, "I5: a fault stays until it is reset"
-    heal_and_reset(wired)
+    assert_heals_after_reset(wired)
 
 
 def test_unplugged_and_replugged_between_two_ticks_is_a_fault_all_the_same() -> None:
@@ -204,10 +204,10 @@ def test_an_unplugged_cell_is_named_as_such() -> None:
     wired = at_twenty()
     wired.is_cell_plugged = False
     wired.loop.cell_lost = True
-    fails_with(wired, FaultCode.CELL_LOST, 2 * TICK_S)
+    assert_fails_with(wired, FaultCode.CELL_LOST, 2 * TICK_S)
     wired.is_cell_plugged = True
     wired.loop.on_cell_opened()
-    heal_and_reset(wired)
+    assert_heals_after_reset(wired)
 
 
 def test_a_cell_that_comes_back_within_half_a_frame_gives_no_wrong_force() -> None:
@@ -234,7 +234,7 @@ def test_a_defect_of_ours_is_the_safe_voltage_a_latched_fault_and_a_sentence(mon
     assert wired.word("force_setpoint") == 0
     wired.run(0.2)
     assert wired.state is State.FAULT, "the defect is gone, the fault stays"
-    heal_and_reset(wired)
+    assert_heals_after_reset(wired)
 
 
 def test_a_defect_inside_a_masters_write_is_the_safe_voltage_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -257,7 +257,7 @@ def test_what_arrived_during_a_stall_is_dropped() -> None:
     wired.run(0.3)
     high_v = max(one.voltage_v for one in wired.observer.settings if one.time_s <= stalled_s)
     assert all(one.voltage_v <= high_v for one in wired.settings_since(stalled_s))
-    heal_and_reset(wired)
+    assert_heals_after_reset(wired)
 
 
 def test_a_short_stall_is_no_fault() -> None:
@@ -290,14 +290,14 @@ def test_the_owners_last_connection_closed_is_a_fault_where_there_is_a_lease() -
     wired.write(0, ENABLE, 1500, 0, 0, 1)
     wired.run(0.5)
     wired.loop.owner_connected = False
-    fails_with(wired, FaultCode.MASTER_LOST, 2 * TICK_S)
+    assert_fails_with(wired, FaultCode.MASTER_LOST, 2 * TICK_S)
 
 
 def test_over_force_is_a_fault_within_three_samples() -> None:
     """The workpiece pushes back; what the cell saturates at counts as well."""
     wired = at_twenty()
     wired.twin.set_disturbance(70.0)
-    fails_with(wired, FaultCode.OVER_FORCE, 0.5)
+    assert_fails_with(wired, FaultCode.OVER_FORCE, 0.5)
     assert wired.voltage_reaches_safe(WIRE_S) <= WIRE_S
 
 
@@ -315,14 +315,14 @@ def test_three_altered_echoes_are_a_fault(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(device, "reply", stops_at_two_volts)
     wired.write(0, ENABLE, 4000)
-    fails_with(wired, FaultCode.OUTPUT_ALTERED, 2.0)
+    assert_fails_with(wired, FaultCode.OUTPUT_ALTERED, 2.0)
 
 
 def test_a_fault_has_one_first_cause_and_latches() -> None:
     """I5, I11: the cell goes, then the output goes; the cell is the cause, and healing alone resets nothing."""
     wired = at_twenty()
     wired.fault("cell-cut")
-    fails_with(wired, FaultCode.SAMPLE_STALE, 0.2)
+    assert_fails_with(wired, FaultCode.SAMPLE_STALE, 0.2)
     wired.fault("output-cut")
     wired.run(0.5)
     assert wired.fault_code is FaultCode.SAMPLE_STALE
@@ -333,7 +333,7 @@ def test_a_fault_has_one_first_cause_and_latches() -> None:
     with pytest.raises(Refusal) as refused:
         wired.write(0, ENABLE, 1000)
     assert refused.value.code == 4
-    heal_and_reset(wired)
+    assert_heals_after_reset(wired)
 
 
 def test_after_an_unclean_end_the_cause_is_readable_until_somebody_enables() -> None:
@@ -412,7 +412,7 @@ def test_whatever_happens_the_wire_keeps_the_invariants(seed: int, budget: int) 
             wired.replug()
         wired.run(0.5)
         wired.write(0, 0)
-        heal_and_reset(wired)
+        assert_heals_after_reset(wired)
 
 
 def test_the_observer_sees_planted_violations() -> None:

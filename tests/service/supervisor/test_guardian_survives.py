@@ -84,7 +84,7 @@ def scene(tmp_path: Path) -> Iterator[Callable[..., Scene]]:
     assert open_descriptors() <= before, "the guardian keeps descriptors of children that are gone"
 
 
-def comes_up(one: Scene) -> None:
+def assert_comes_up(one: Scene) -> None:
     assert one.run(lambda: one.guardian.heartbeat.is_up) is None, one.said
 
 
@@ -99,7 +99,7 @@ def test_a_control_process_that_dies_at_the_nth_step_is_started_again(scene, por
     if not (steps == 0 and code is None):  # nobody has risked anything: the long way, which counts as no restart
         (line,) = [line for line in one.said if line.startswith("A401")]
         assert ("acknowledged" if had_line else "no line was open") in line
-    comes_up(one)
+    assert_comes_up(one)
     restarted = Ending.from_json(one.starter.arguments[1]["restarted"])
     assert (restarted is None) is (steps == 0 and code is None)
 
@@ -148,7 +148,7 @@ def test_the_nth_call_on_any_line_may_fail_until_none_does(scene, port, error):
 
         one = scene(script, lives(port), rigs=(rig, rig_lives))
         assert one.run(lambda one=one: one.now_s > 160.0 or one.guardian.heartbeat.is_up, 400) is None, n
-        comes_up(one)
+        assert_comes_up(one)
         one.signals.send()
         one.signals.send()
         assert one.run() == 0
@@ -213,7 +213,7 @@ def test_a_word_of_a_newer_version_is_passed_over(scene, port):
         child.say("?", {"what": 1}, port.writer)
         dies_after(8, port, None)(child)
 
-    comes_up(scene(script))
+    assert_comes_up(scene(script))
 
 
 def no_process(child: FakeChild) -> None:
@@ -222,7 +222,7 @@ def no_process(child: FakeChild) -> None:
 
 def test_a_machine_without_a_process_for_us_is_asked_again_later(scene, port):
     one = scene(no_process, no_process, no_process, lives(port))
-    comes_up(one)
+    assert_comes_up(one)
     assert one.now_s > 100.0, "not in a hurry"
     assert Ending.from_json(one.starter.arguments[3]["restarted"]).cause is EndCause.NOT_STARTED
 
@@ -270,7 +270,7 @@ def test_there_are_never_two_control_processes(scene, port):
     assert one.guardian._on_deadline() is None
     assert len(one.starter.started) == 1
     one.child.dies(-9)
-    comes_up(one)
+    assert_comes_up(one)
     assert len(one.starter.started) == 2
 
 
@@ -337,7 +337,7 @@ def test_a_rig_that_dies_is_started_again_and_control_learns_where_it_is_now(sce
         child.say(message_link.PTYS, {"ptys": moved})
 
     one = scene(lives(port), rigs=(rig_lives, second))
-    comes_up(one)
+    assert_comes_up(one)
     assert beats_until_told(one) == [message_link.Message(message_link.RIG, {"ptys": PTYS})]
     one.starter.rigs_started[0].dies(-9)
     assert beats_until_told(one) == [message_link.Message(message_link.RIG, {"ptys": moved})]
@@ -374,7 +374,7 @@ def test_a_stop_before_there_is_a_line_waits_for_nothing(scene, port):
 
 def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, monkeypatch):
     one = scene(lives(port))
-    comes_up(one)
+    assert_comes_up(one)
 
     def broken(*_: object) -> None:
         raise RuntimeError("a defect of the guardian itself")
