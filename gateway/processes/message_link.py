@@ -85,7 +85,7 @@ def receive(link: socket.socket) -> Message | None:
 
 
 def _receive_raw(link: socket.socket) -> tuple[bytes, list[tuple[int, int, bytes]], int, Any]:
-    """Receive once more after a reset: a peer that died with something of ours unread gives one, and then its last words."""
+    """Receive, once more after a reset: a peer that died with something of ours unread gives one, and then its last words."""
     space = socket.CMSG_SPACE(4 * _MOST_DESCRIPTORS)
     try:
         return link.recvmsg(_LARGEST, space, _FLAGS)

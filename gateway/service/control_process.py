@@ -26,7 +26,8 @@ from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.recorded_row import COLUMNS
-from gateway.service.running_rig.running_rig import RunningRig, StartError
+from gateway.service.running_rig.running_rig import RunningRig
+from gateway.service.running_rig.starting import StartError
 
 EXIT_DEFECT, EXIT_DEVICE, EXIT_CONFIGURATION = 1, 69, 78
 

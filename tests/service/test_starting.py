@@ -13,7 +13,7 @@ from gateway.processes.exit_cause import EndCause, Ending
 from gateway.service.banner import Ready, format_banner, ready_fields, try_lines
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.running_rig.bank_rules import bank_rules, server_settings
-from gateway.service.running_rig.running_rig import _cause_of_restart
+from gateway.service.running_rig.starting import cause_of_restart
 from tests.service.rigs import demo, with_supervision
 
 
@@ -130,7 +130,7 @@ def test_the_cause_of_an_unclean_end_is_readable_whatever_the_words_are(
     restarted: EndCause | None, was_unclean: bool, cause: FaultCode, text: str
 ) -> None:
     ending = Ending.from_json(json.loads(json.dumps(Ending(restarted, text).to_json()))) if restarted else None
-    assert _cause_of_restart(ending, was_unclean=was_unclean) is cause
+    assert cause_of_restart(ending, was_unclean=was_unclean) is cause
 
 
 def test_the_bank_holds_to_the_rigs_limits() -> None:

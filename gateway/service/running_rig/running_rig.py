@@ -6,21 +6,20 @@ import os
 import time
 import traceback
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from gateway import defaults
 from gateway.calibrations.activation import ActiveCalibration
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.control.silence import cause_of_silence
 from gateway.devices import cell_host, output_host
-from gateway.fieldbus import BindError, ModbusTcpServer
+from gateway.fieldbus import ModbusTcpServer
 from gateway.modbus import Peer
 from gateway.ports import PortError, SerialPort
 from gateway.processes.clock_tick import ClockTick
 from gateway.processes.event_log import EventLog
-from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.exit_cause import Ending
 from gateway.processes.scheduler_counters import SchedulerCounters
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.recording.ring import SampleRing
@@ -38,35 +37,12 @@ from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.starting import cause_of_restart, listen, open_again
 from gateway.service.watch_reports import WatchReports
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
 _WORDS_AGAIN_S = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
 _STOP_BOUND_S = 4.5  # the guardian waits 5 s
-_HELD_BOUND_S = 0.5  # how long a restart waits for a port that somebody holds who is about to end
-_HELD_AGAIN_S = 0.05
-
-
-class StartError(Exception):
-    """The gateway can't start; the sentence says why, exit_code how the process ends."""
-
-    def __init__(self, sentence: str, exit_code: int) -> None:
-        super().__init__(sentence)
-        self.exit_code = exit_code
-
-
-_FAULTS: Final = {
-    EndCause.MACHINE_BUSY: FaultCode.MACHINE_BUSY,
-    EndCause.STALLED: FaultCode.LOOP_STALLED,
-    EndCause.STOPPED: FaultCode.LOOP_STALLED,
-}
-
-
-def _cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCode:
-    """Return what the fault_code register says after an unclean end: the guardian's cause, or a run that never ended."""
-    if restarted:
-        return _FAULTS.get(restarted.cause, FaultCode.INTERNAL)
-    return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
 
 
 class RunningRig:
@@ -181,9 +157,12 @@ class RunningRig:
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
-        self._wire(_cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
+        self._wire(cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
         for port in (self._output_port, self._cell_port):
-            await (self._open_again(port) if restarted else port.open())
+            if not restarted:
+                await port.open()
+            elif error := await open_again(port):
+                self._not_opened[port.path] = error
         self._tick.start()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
@@ -194,7 +173,7 @@ class RunningRig:
             notes += (f"E152 {unserved}",)
         for note in notes:
             self._log.note("start", note)
-        modbus = await self._listen(bind)
+        modbus = await listen(self._server, *(bind or (self._rig.network.bind, self._rig.network.port)))
         self._running["port"] = modbus[1]
         return banner.Ready(
             rig=self._rig,
@@ -205,21 +184,6 @@ class RunningRig:
             force_n=self.loop.sample.force_n if self.loop.sample else None,
             notes=notes,
         )
-
-    async def _open_again(self, port: SerialPort) -> None:
-        """After a restart a port that is held or away is a lost one, as it would be without the restart: a fault, and
-        tried again for as long as it takes. Ending over it would use up the restarts within seconds (A402)."""
-        deadline_s = time.monotonic() + _HELD_BOUND_S
-        while True:
-            try:
-                return await port.open()
-            except PortError as error:
-                if error.code == "E101":  # no time will mend a permission
-                    raise
-                if error.code != "E103" or time.monotonic() >= deadline_s:
-                    self._not_opened[port.path] = error
-                    return port.begin_lost(error)
-            await asyncio.sleep(_HELD_AGAIN_S)
 
     def _follow_rig(self) -> None:
         pid = self._guardian.rig_pid
@@ -232,7 +196,7 @@ class RunningRig:
         self._cell_port.move(ports["load_cell"])
 
     def _record_from_the_start(self) -> tuple[str, ...]:
-        """Return a disk that takes no recording is no reason not to control."""
+        """Begin a recording; a sentence where the disk takes none, which is no reason not to control."""
         try:
             self._recordings.start()
         except OSError as error:
@@ -267,21 +231,6 @@ class RunningRig:
         sentence = await explain_silent_device(line, port.path)
         await port.open()
         return sentence
-
-    async def _listen(self, bind: list[Any] | None) -> tuple[str, int]:
-        host, port = bind or (self._rig.network.bind, self._rig.network.port)
-        try:
-            return await self._server.start(str(host), int(port))
-        except PermissionError as error:
-            raise StartError(
-                f"E120 port {port} needs the capability net_bind_service; use --bind {host}:{defaults.MODBUS_PORT} "
-                "(force-gateway explain E120)",
-                77,
-            ) from error
-        except BindError as error:
-            raise StartError(str(error), 78) from error
-        except OSError as error:
-            raise StartError(f"E121 cannot listen on {host}:{port}: {error}; another --bind HOST:PORT?", 69) from error
 
     async def ramp_down(self) -> None:
         """Force to 0 along the ramp, then the safe voltage (at most 4.5 s)."""

@@ -116,7 +116,7 @@ def test_a_restart_whose_port_stays_held_comes_up_without_it_and_takes_it_when_i
     devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ending over it would use up five restarts within seconds, and with them the gateway."""
-    monkeypatch.setattr("gateway.service.running_rig.running_rig._HELD_BOUND_S", 0.0)
+    monkeypatch.setattr("gateway.service.running_rig.starting._HELD_BOUND_S", 0.0)
     holder = held(str(devices.output.link))
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:

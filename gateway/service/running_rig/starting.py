@@ -1,0 +1,74 @@
+"""What can go wrong while a running rig starts, and how it then goes on or ends: ports, the Modbus server, the run before."""
+
+import asyncio
+import time
+from typing import Final
+
+from gateway import defaults
+from gateway.codes.faults import FaultCode
+from gateway.fieldbus import BindError, ModbusTcpServer
+from gateway.ports import PortError, SerialPort
+from gateway.processes.exit_cause import EndCause, Ending
+
+_HELD_BOUND_S: Final = 0.5  # how long a restart waits for a port that somebody holds who is about to end
+_HELD_AGAIN_S: Final = 0.05
+_NO_PERMISSION, _WRONG_CONFIGURATION, _NO_DEVICE = 77, 78, 69  # exit codes, as in sysexits.h
+
+
+class StartError(Exception):
+    """The gateway cannot start; the sentence says why, exit_code how the process ends."""
+
+    def __init__(self, sentence: str, exit_code: int) -> None:
+        super().__init__(sentence)
+        self.exit_code = exit_code
+
+
+_FAULTS: Final = {
+    EndCause.MACHINE_BUSY: FaultCode.MACHINE_BUSY,
+    EndCause.STALLED: FaultCode.LOOP_STALLED,
+    EndCause.STOPPED: FaultCode.LOOP_STALLED,
+}
+
+
+def cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCode:
+    """Return what the fault_code register says after an unclean end: the guardian's cause, or a run that never ended."""
+    if restarted:
+        return _FAULTS.get(restarted.cause, FaultCode.INTERNAL)
+    return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
+
+
+async def open_again(port: SerialPort) -> PortError | None:
+    """Open a port after a restart; the reason where it did not open, None where it did.
+
+    One that is held or away is a lost one, as it would be without the restart: a fault, and tried again for as long as it
+    takes. Ending over it would use up the restarts within seconds (A402). PortError where the permission is missing.
+    """
+    deadline_s = time.monotonic() + _HELD_BOUND_S
+    while True:
+        try:
+            await port.open()
+            return None
+        except PortError as error:
+            if error.code == "E101":  # no time will mend a permission
+                raise
+            if error.code != "E103" or time.monotonic() >= deadline_s:
+                port.begin_lost(error)
+                return error
+        await asyncio.sleep(_HELD_AGAIN_S)
+
+
+async def listen(server: ModbusTcpServer, host: str, port: int) -> tuple[str, int]:
+    """Start the Modbus server; return the address and port really bound. StartError says why it does not listen."""
+    try:
+        return await server.start(str(host), int(port))
+    except PermissionError as error:
+        raise StartError(
+            f"E120 port {port} needs the capability net_bind_service; use --bind {host}:{defaults.MODBUS_PORT} "
+            "(force-gateway explain E120)",
+            _NO_PERMISSION,
+        ) from error
+    except BindError as error:
+        raise StartError(str(error), _WRONG_CONFIGURATION) from error
+    except OSError as error:
+        sentence = f"E121 cannot listen on {host}:{port}: {error}; another --bind HOST:PORT?"
+        raise StartError(sentence, _NO_DEVICE) from error
