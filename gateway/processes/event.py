@@ -50,7 +50,7 @@ def severity_of(code: str | None) -> str:
 
 
 def make_event(time_s: float, source: str, group: str, sentence: str) -> EventRecord:
-    """From what the house says to a record. group: the cause, and what else lines are limited by (`refusal 10.0.0.5`)."""
+    """Make a record of what a process says. group: the cause, and what else lines are limited by (`refusal 10.0.0.5`)."""
     found = _CODE.match(sentence)
     code = found[1] if found else None
     text = sentence[found.end() :] if found else sentence

@@ -4,7 +4,7 @@ A plant file tells of regulator, slide and cell; it does not know that a setting
 reading 2 ms. The first well excited window shows it, and as far as it is of that size it is taken into the reference
 once. Anything larger, and anything later, is a difference.
 
-A floor is the residual's rms in a window that was acquitted by the whole search. The residual grows with what is asked of
+A floor is the residual's rms in a window in which the whole search found nothing. The residual grows with what is asked of
 the machine, so there is one for each octave of excitation; where none is known, the search is run.
 """
 
@@ -57,7 +57,7 @@ class WatchReference:
         return floor_n is None or rms_n > _EXCESS * floor_n
 
     def raise_floor(self, window: Window, rms_n: float) -> None:
-        """This window was acquitted."""
+        """Note that nothing was found in this window."""
         octave = _octave(window.excitation_v)
         self.floors_n[octave] = max(rms_n, self.floors_n.get(octave, 0.0))
 

@@ -1,7 +1,7 @@
-"""What stands after several windows: the warning rises slowly and falls when a window that could have seen it acquits.
+"""What stands after several windows: the warning rises slowly and falls when a window that could have seen it shows none.
 
 A window in which a change happened is half old and half new, and its cause may be misnamed. So two windows in a row must
-convict, and the cause has a name only where both give the same one. Pure.
+show a cause, and it has a name only where both give the same one. Pure.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from typing import Final
 
 from gateway.registers.residual_cause import ResidualCause
 
-_AS_GOOD: Final = 0.5  # share of the convicting window's excitation from which a window may acquit
+_AS_GOOD: Final = 0.5  # of the excitation of the window that named a cause; from this share on a window may clear it
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class WindowVerdict:
     others: tuple[str, ...] = ()
 
     def agrees_with(self, other: "WindowVerdict") -> bool:
-        """Return the same cause, or one of a group that both windows cannot tell apart."""
+        """Return whether both name the same cause, or one of a group that both cannot tell apart."""
         return self.cause is other.cause or (self.cause.effect in other.others and other.cause.effect in self.others)
 
 

@@ -39,10 +39,10 @@ def test_a_damaged_calibration_in_use_gives_way_to_the_one_before_it(used):
     whole = path.read_bytes()
     for damaged in damages(whole, Random(1)):
         path.write_bytes(damaged)
-        standing = used.find_selected()
-        assert standing.calibration is not None
-        assert mark_of(standing.calibration) == 2, damaged
-        assert "E432" in standing.notes[0] and "0003.yaml" in standing.notes[0]
+        selected = used.find_selected()
+        assert selected.calibration is not None
+        assert mark_of(selected.calibration) == 2, damaged
+        assert "E432" in selected.notes[0] and "0003.yaml" in selected.notes[0]
         assert used.list()[1].calibration is None and "E432" in used.list()[1].fault
         with pytest.raises(StoreError, match="E432"):
             used.use(3)
@@ -53,10 +53,10 @@ def test_a_damaged_calibration_in_use_gives_way_to_the_one_before_it(used):
 def test_both_damaged_is_the_built_in_one(used):
     for name in ("0002.yaml", "0003.yaml"):
         (used.directory / name).write_bytes(b"number: 2\n")
-    standing = used.find_selected()
-    assert standing.calibration == OWN
-    assert standing.selection == BUILT_IN
-    assert len(standing.notes) == 2
+    selected = used.find_selected()
+    assert selected.calibration == OWN
+    assert selected.selection == BUILT_IN
+    assert len(selected.notes) == 2
     with pytest.raises(StoreError, match="0002"):
         used.rollback()
 
@@ -65,17 +65,17 @@ def test_a_damaged_selection_gives_way_to_the_generation_before_it(used):
     path = used.directory / "active.000002"
     for damaged in damages(path.read_bytes(), Random(2)):
         path.write_bytes(damaged)
-        standing = used.find_selected()
-        assert standing.calibration is not None and mark_of(standing.calibration) == 2, damaged
-        assert "E432" in standing.notes[0] and "active.000002" in standing.notes[0]
+        selected = used.find_selected()
+        assert selected.calibration is not None and mark_of(selected.calibration) == 2, damaged
+        assert "E432" in selected.notes[0] and "active.000002" in selected.notes[0]
 
 
 def test_no_whole_selection_is_the_built_in_one_and_a_change_mends_it(used):
     for name in ("active.000001", "active.000002"):
         (used.directory / name).write_bytes(b"")
-    standing = used.find_selected()
-    assert standing.calibration == OWN
-    assert len(standing.notes) == 2
+    selected = used.find_selected()
+    assert selected.calibration == OWN
+    assert len(selected.notes) == 2
     assert used.use(3).generation == 3
     assert active_mark(used) == 3
     assert used.find_selected().notes == ()
@@ -89,9 +89,9 @@ def test_after_damage_a_rollback_does_not_lead_to_the_damaged_one(used):
 
 
 def test_a_calibration_that_does_not_fit_the_rig_gives_way_too(used):
-    standing = used.find_selected(lambda given: "E401 handle 2" if given.number == 3 else "")
-    assert standing.calibration is not None and mark_of(standing.calibration) == 2
-    assert standing.notes == ("E401 handle 2; the one before it is used instead of calibration 3",)
+    selected = used.find_selected(lambda given: "E401 handle 2" if given.number == 3 else "")
+    assert selected.calibration is not None and mark_of(selected.calibration) == 2
+    assert selected.notes == ("E401 handle 2; the one before it is used instead of calibration 3",)
 
 
 def test_a_file_under_another_number_is_no_calibration(used):

@@ -84,8 +84,8 @@ def test_an_unknown_number_is_told_with_those_that_there_are(used):
 
 
 def test_nothing_stored_is_the_built_in_calibration(store):
-    standing = store.find_selected()
-    assert (standing.calibration, standing.selection, standing.notes) == (OWN, BUILT_IN, ())
+    selected = store.find_selected()
+    assert (selected.calibration, selected.selection, selected.notes) == (OWN, BUILT_IN, ())
     assert store.slot(0) is None
     with pytest.raises(StoreError, match="nothing to go back to"):
         store.rollback()
@@ -236,6 +236,6 @@ def test_a_directory_that_may_not_be_read_is_said(used, monkeypatch):
 
     with disk() as there:
         monkeypatch.setattr(there, "_counted", lambda what: refuse)
-        standing = used.find_selected()
-    assert standing.calibration == OWN
-    assert "cannot be read: Permission denied" in standing.notes[0]
+        selected = used.find_selected()
+    assert selected.calibration == OWN
+    assert "cannot be read: Permission denied" in selected.notes[0]

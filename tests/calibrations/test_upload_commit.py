@@ -272,5 +272,5 @@ def test_force_limits_stay_with_their_set_and_the_smaller_of_them_and_the_rigs_h
 def test_a_gateway_without_any_calibration_is_a_defect(bench):
     with pytest.raises(ValueError, match="has a calibration"):
         type(bench.upload)(
-            bench.bank.staging, bench.upload._activation, replace(bench.standing, calibration=None), None, print
+            bench.bank.staging, bench.upload._activation, replace(bench.selected, calibration=None), None, print
         )

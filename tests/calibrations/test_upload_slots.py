@@ -154,7 +154,7 @@ def test_a_calibration_beyond_the_rigs_cell_is_not_used_and_not_started_with(fil
     filled.store.use(number)
     again = filled.restarted()
     assert again.active_words == filled.active_words
-    assert "E401 calibration 5" in again.standing.notes[0]
+    assert "E401 calibration 5" in again.selected.notes[0]
 
 
 def test_a_master_goes_back_to_what_was_in_use_before(filled):

@@ -40,19 +40,19 @@ class Bench:
         rules = BankRules(rig_name="demo", force_max_n=60.0, allow_plain_upload=True)
         self.bank = RegisterBank(self.register_map, rules, now=lambda: 0.0)
         activation = Activation(self.store, CoefficientLimits(cell_range_n=100.0))
-        self.standing = self.store.find_selected(activation.why_unusable)
+        self.selected = self.store.find_selected(activation.why_unusable)
         upload_rules = UploadRules.of("demo", self.register_map, lambda: "2026-11-22")
         self.upload = UploadService(
             self.bank.staging,
             activation,
-            self.standing,
+            self.selected,
             upload_rules,
             lambda cause, sentence: self.log.append(sentence),
         )
         self.upload.run_in_background = lambda work, done: self.work.append((work, done))
         self.upload.on_use = self._on_use
-        assert self.standing.calibration
-        self.bank.set_active_model(self.standing.calibration, self.standing.selection.slot_word)
+        assert self.selected.calibration
+        self.bank.set_active_model(self.selected.calibration, self.selected.selection.slot_word)
 
     def _on_use(self, taken: ActiveCalibration) -> None:
         self.used.append(taken)

@@ -28,7 +28,7 @@ COMMITTED = 3
 RAMPING, HOLDING = 2, 3
 
 
-class Nursery:
+class Uploads:
     def __init__(self, process: "subprocess.Popen[str]") -> None:
         self._process = process
 
@@ -50,7 +50,7 @@ class Nursery:
 
 
 @pytest.fixture
-def nursery() -> Iterator[Nursery]:
+def uploads() -> Iterator[Uploads]:
     root = Path(__file__).parents[2]
     process = subprocess.Popen(
         [sys.executable, "-m", "tests.end_to_end.commit_forks"],
@@ -60,7 +60,7 @@ def nursery() -> Iterator[Nursery]:
         cwd=root,
     )
     with process:
-        yield Nursery(process)
+        yield Uploads(process)
         assert process.stdin
         process.stdin.close()
         assert process.wait(10) == 0
@@ -70,22 +70,22 @@ def active_mark(state: Path) -> int:
     """The mark in use; everything in the store is whole, and every part of a calibration is of one mark."""
     store = CalibrationStore(state)
     assert not [entry.fault for entry in store.list() if entry.fault]
-    standing = store.find_selected()
-    assert standing.notes == ()
-    assert standing.calibration is not None
-    mark = mark_of(standing.calibration)
-    assert standing.selection.slot == mark % 8
-    assert store.slot(mark % 8) == standing.selection.number
+    selected = store.find_selected()
+    assert selected.notes == ()
+    assert selected.calibration is not None
+    mark = mark_of(selected.calibration)
+    assert selected.selection.slot == mark % 8
+    assert store.slot(mark % 8) == selected.selection.number
     return mark
 
 
-def test_killed_at_every_call_of_a_commit(nursery: Nursery, tmp_path: Path):
+def test_killed_at_every_call_of_a_commit(uploads: Uploads, tmp_path: Path):
     for n in count(1):
         state = tmp_path / str(n)
         store = CalibrationStore(state)
         store.use(store.add(calibration(1)), 1)
-        nursery.start(state, 2, n)
-        if nursery.until_gone() == [2]:
+        uploads.start(state, 2, n)
+        if uploads.until_gone() == [2]:
             assert active_mark(state) == 2
             break
         assert active_mark(state) in (1, 2)
@@ -95,7 +95,7 @@ def test_killed_at_every_call_of_a_commit(nursery: Nursery, tmp_path: Path):
     assert n > 14
 
 
-def test_killed_at_any_time_in_a_row_of_commits(nursery: Nursery, tmp_path: Path, budget: int):
+def test_killed_at_any_time_in_a_row_of_commits(uploads: Uploads, tmp_path: Path, budget: int):
     seed = int.from_bytes(os.urandom(4), "big")
     print(f"seed {seed}")
     rng = Random(seed)
@@ -103,11 +103,11 @@ def test_killed_at_any_time_in_a_row_of_commits(nursery: Nursery, tmp_path: Path
     for kill in range(KILLS * budget):
         state = tmp_path / str(kill // PER_STATE)
         mark = mark + 1 if kill % PER_STATE else 1
-        pid = nursery.start(state, mark)
-        first = int(nursery.line())
+        pid = uploads.start(state, mark)
+        first = int(uploads.line())
         time.sleep(rng.uniform(0.0, 0.02))
         os.kill(pid, signal.SIGKILL)
-        said = [first, *nursery.until_gone()]
+        said = [first, *uploads.until_gone()]
         assert said == list(range(mark, mark + len(said)))
         mark = active_mark(state)
         assert mark in (said[-1], said[-1] + 1), f"kill {kill}: {said[-1]} was acknowledged, {mark} is in use"

@@ -16,7 +16,7 @@ from gateway.recording import ColumnMapping, Recorder, RecordingError, export_cs
 from gateway.recording.tables import csv_table
 from gateway.recording.tables.any_table import read_table
 from gateway.recording.tables.column_mapping import select_columns
-from gateway.recording.tables.csv_form import detect_dialect
+from gateway.recording.tables.csv_dialect import detect_dialect
 from gateway.recording.tables.csv_table import read_csv
 
 ROWS = [(0.0, 1.5, -0.25), (0.005, 1.5, 3.75), (0.01, 2.25, float("nan"))]

@@ -15,7 +15,7 @@ def wired() -> Wired:
 
 
 @pytest.fixture
-def desk(wired: Wired) -> WatchReports:
+def reports(wired: Wired) -> WatchReports:
     return WatchReports(
         wired.loop, lambda: wired.now_s, lambda cause, sentence: wired.log.append((wired.now_s, sentence))
     )
@@ -25,38 +25,38 @@ def told(cause: int, sentence: str = "friction has doubled", **counters: object)
     return {"do": "residual", "cause": int(cause), "sentence": sentence, "counters": counters}
 
 
-def test_a_cause_raises_the_warning_and_names_itself_in_all_three_faces(wired, desk):
-    desk.answer(told(ResidualCause.COULOMB_FRICTION))
+def test_a_cause_raises_the_warning_and_names_itself_in_all_three_faces(wired, reports):
+    reports.answer(told(ResidualCause.COULOMB_FRICTION))
     assert wired.warnings & WarningBit.MODEL_DIFFERS
     assert wired.word("residual_cause") == 12
     assert wired.floats(232 + 2 * 29, 1) == (12.0,)
     assert wired.said("A345") == ["A345 friction has doubled"]
 
 
-def test_it_changes_nothing_else(wired, desk):
+def test_it_changes_nothing_else(wired, reports):
     before = (wired.state, wired.value("output_voltage"), wired.word("fault_code"))
-    desk.answer(told(ResidualCause.UNKNOWN))
+    reports.answer(told(ResidualCause.UNKNOWN))
     assert (wired.state, wired.value("output_voltage"), wired.word("fault_code")) == before
     wired.run(0.5)
     assert wired.state is State.HOLDING
 
 
-def test_repeated_words_are_logged_once_and_agreement_clears_it(wired, desk):
+def test_repeated_words_are_logged_once_and_agreement_clears_it(wired, reports):
     for _ in range(5):
-        desk.answer(told(ResidualCause.LINEAR_DRIFT))
+        reports.answer(told(ResidualCause.LINEAR_DRIFT))
     assert len(wired.said("A345")) == 1
-    assert desk.figures()["warnings"] == 1
-    desk.answer(told(ResidualCause.NONE, ""))
+    assert reports.figures()["warnings"] == 1
+    reports.answer(told(ResidualCause.NONE, ""))
     assert not wired.warnings & WarningBit.MODEL_DIFFERS
     assert wired.word("residual_cause") == 0
     assert wired.said("the model agrees")
 
 
-def test_counters_and_age_can_be_read(wired, desk):
-    assert desk.figures()["age_s"] is None
-    desk.answer(told(0, "", looks=7, cpu_s=1.5, nonsense=3, rms_n=float("nan")))
+def test_counters_and_age_can_be_read(wired, reports):
+    assert reports.figures()["age_s"] is None
+    reports.answer(told(0, "", looks=7, cpu_s=1.5, nonsense=3, rms_n=float("nan")))
     wired.run(2.0)
-    figures = desk.answer({"do": "residual"})
+    figures = reports.answer({"do": "residual"})
     assert (figures["looks"], figures["cpu_s"], figures["name"]) == (7, 1.5, "none")
     assert figures["age_s"] == pytest.approx(2.0)
     assert not {"nonsense", "rms_n"} & set(figures)
@@ -75,14 +75,16 @@ def test_counters_and_age_can_be_read(wired, desk):
         {"cause": 12, "caus": 12},
     ],
 )
-def test_nonsense_is_refused_and_leaves_no_trace(wired, desk, request_):
+def test_nonsense_is_refused_and_leaves_no_trace(wired, reports, request_):
     with pytest.raises(ValueError, match=r"cause|sentence|counters"):
-        desk.answer(request_)
+        reports.answer(request_)
     assert wired.word("residual_cause") == 0
-    assert desk.figures()["age_s"] is None
+    assert reports.figures()["age_s"] is None
 
 
-def test_strange_counters_and_long_sentences_do_no_harm(wired, desk):
-    desk.answer({"cause": 12, "sentence": "x" * 10000, "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]}})
-    assert not {"looks", "cpu_s", "judged"} & set(desk.figures())
+def test_strange_counters_and_long_sentences_do_no_harm(wired, reports):
+    reports.answer(
+        {"cause": 12, "sentence": "x" * 10000, "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]}}
+    )
+    assert not {"looks", "cpu_s", "judged"} & set(reports.figures())
     assert len(wired.said("A345")[0]) < 600

@@ -5,17 +5,17 @@ from gateway.watch.warning_filter import WarningFilter, WindowVerdict
 
 
 def after(*findings: WindowVerdict) -> C:
-    opinion = WarningFilter()
+    warning = WarningFilter()
     for finding in findings:
-        opinion.add(finding)
-    return opinion.published.cause
+        warning.add(finding)
+    return warning.published.cause
 
 
-def convicts(cause: C, *others: str, excitation_v: float = 1.0) -> WindowVerdict:
+def names_cause(cause: C, *others: str, excitation_v: float = 1.0) -> WindowVerdict:
     return WindowVerdict(cause, cause.effect, excitation_v, (cause.effect, *others))
 
 
-FRICTION, DELAY = convicts(C.COULOMB_FRICTION), convicts(C.TRANSPORT_DELAY)
+FRICTION, DELAY = names_cause(C.COULOMB_FRICTION), names_cause(C.TRANSPORT_DELAY)
 FINE = WindowVerdict(excitation_v=1.0)
 
 
@@ -35,8 +35,8 @@ def test_two_that_differ_raise_it_without_a_name_until_two_agree():
 
 
 def test_members_of_one_group_agree_and_the_name_stays():
-    offset = convicts(C.CLOCK_OFFSET, "transport-delay")
-    delay = convicts(C.TRANSPORT_DELAY, "clock-offset")
+    offset = names_cause(C.CLOCK_OFFSET, "transport-delay")
+    delay = names_cause(C.TRANSPORT_DELAY, "clock-offset")
     assert after(delay, delay, offset) is C.TRANSPORT_DELAY
     assert after(offset, delay) is C.TRANSPORT_DELAY
 

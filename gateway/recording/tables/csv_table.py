@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
 from gateway.recording.tables.column_mapping import EXAMPLE, ColumnMapping, SelectedColumn, join_names, select_columns
-from gateway.recording.tables.csv_form import MISSING, CsvDialect, detect_dialect, rows_of
+from gateway.recording.tables.csv_dialect import MISSING, CsvDialect, detect_dialect, rows_of
 
 if TYPE_CHECKING:
     import numpy as np

@@ -32,8 +32,8 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
     try:
         rig = load_rig(rig_name)
         store = CalibrationStore(state, rig.calibration)
-        standing = store.find_selected().calibration or rig.calibration
-        request = FitRequest(reference_span_n=standing.blend_span_n)
+        selected = store.find_selected().calibration or rig.calibration
+        request = FitRequest(reference_span_n=selected.blend_span_n)
         fit = fit_recording(read_source(recording), request, RigContext(rig=rig_name, state=state))
         fresh = calibration_of(fit, rig.load_cell.range_n)
         number = store.number_of(fresh.data_sha256)

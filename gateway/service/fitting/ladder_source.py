@@ -129,5 +129,5 @@ def _reference(rig: Rig | None, state: Path | None) -> Calibration | None:
     """Return the calibration in use, else the rig's built-in one."""
     if rig is None:
         return None
-    standing = CalibrationStore(state, rig.calibration).find_selected() if state else None
-    return (standing.calibration if standing else None) or rig.calibration
+    selected = CalibrationStore(state, rig.calibration).find_selected() if state else None
+    return (selected.calibration if selected else None) or rig.calibration

@@ -40,12 +40,12 @@ class NoFit:
     def close(self) -> None: ...
 
 
-def climbed(wired: Wired, keeper: CalibrationRuns, request: dict[str, Any]) -> Recording:
-    keeper.answer(request)
-    while keeper.answer({})["phase"] != "fitting":
+def climbed(wired: Wired, runs: CalibrationRuns, request: dict[str, Any]) -> Recording:
+    runs.answer(request)
+    while runs.answer({})["phase"] != "fitting":
         wired.run(0.5)
     wired.run(0.1)
-    return read_recording(Path(keeper.status()["recording"]))
+    return read_recording(Path(runs.status()["recording"]))
 
 
 @dataclass(frozen=True)
@@ -64,12 +64,12 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
         recordings = []
         for first_group in (None, 1, 2):
             wired = Wired(seed=11 + (first_group or 0)).ready()
-            keeper = kept(wired, state)
+            runs = kept(wired, state)
             if first_group is None:
-                recordings.append(climbed(wired, keeper, {"plan": PLAN, "name": "left cell"}))
+                recordings.append(climbed(wired, runs, {"plan": PLAN, "name": "left cell"}))
             else:
                 plan = PLAN | {"first_group": first_group, "v_max_v": recordings[0].header["ladder"]["top_v"]}
-                recordings.append(climbed(wired, keeper, {"plan": plan, "continues": [1]}))
+                recordings.append(climbed(wired, runs, {"plan": plan, "continues": [1]}))
     return Runs(recordings[0], dict(zip((1, 2), recordings[1:], strict=True)))
 
 

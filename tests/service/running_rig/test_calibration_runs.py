@@ -15,32 +15,32 @@ POLL_S = 0.2  # of `calibrate`
 
 
 def kept(wired: Wired, state: Path) -> CalibrationRuns:
-    keeper = CalibrationRuns(
+    runs = CalibrationRuns(
         wired.controller,
         wired.rig,
         state,
         lambda: wired.now_s,
         lambda cause, sentence: wired.log.append((wired.now_s, sentence)),
     )
-    wired.loop.calibration_runs = keeper
+    wired.loop.calibration_runs = runs
     wired.run(0.1)
-    return keeper
+    return runs
 
 
 def test_a_run_goes_on_while_it_is_followed_and_ends_when_it_is_not(tmp_path: Path) -> None:
     wired = Wired().ready()
-    keeper = kept(wired, tmp_path)
-    keeper.answer({"plan": PLAN})
+    runs = kept(wired, tmp_path)
+    runs.answer({"plan": PLAN})
     for _ in range(round(2.0 * FOLLOWED_S / POLL_S)):
         wired.run(POLL_S)
-        assert keeper.answer({})["running"]
+        assert runs.answer({})["running"]
     left_s = wired.now_s
     wired.until(lambda: wired.state is State.OFF, FOLLOWED_S + 0.1)
     assert wired.now_s - left_s >= FOLLOWED_S
     assert wired.value("output_voltage") == 0.0
     assert wired.word("calibration_phase") == CalibrationPhase.STOPPED
     assert wired.said("A330")
-    told = keeper.status()
+    told = runs.status()
     assert "nobody at this machine" in told["ended"]
     assert read_recording(Path(told["recording"])).header["ladder"]["groups"] == QUICK.groups
 
@@ -48,28 +48,28 @@ def test_a_run_goes_on_while_it_is_followed_and_ends_when_it_is_not(tmp_path: Pa
 def test_a_starved_load_cell_ends_it_as_a_fault_and_not_as_a_departure(tmp_path: Path) -> None:
     """What a busy machine does to a simulated rig: the cause that is told is the cell."""
     wired = Wired().ready()
-    keeper = kept(wired, tmp_path)
-    keeper.answer({"plan": PLAN})
+    runs = kept(wired, tmp_path)
+    runs.answer({"plan": PLAN})
     wired.run(1.0)
     wired.fault("cell-cut")
     wired.until(lambda: wired.state is State.FAULT, 0.4)
     wired.run(0.1)
     assert wired.said("A311")
-    assert "A311" in keeper.status()["ended"]
+    assert "A311" in runs.status()["ended"]
     assert wired.word("calibration_phase") == CalibrationPhase.STOPPED
 
 
 def test_without_a_fresh_sample_or_while_pressing_no_run_begins(tmp_path: Path) -> None:
     wired = Wired().ready()
-    keeper = kept(wired, tmp_path)
+    runs = kept(wired, tmp_path)
     wired.fault("cell-cut")
     wired.run(0.5)
     with pytest.raises(ValueError, match="no fresh sample of the load cell"):
-        keeper.answer({"plan": PLAN})
+        runs.answer({"plan": PLAN})
     wired.fault("cell-cut", on=False)
     wired.run(0.5)
     wired.write(0, ENABLE, 1200)
     wired.run(0.5)
     with pytest.raises(ValueError, match="W305 calibration refused: state HOLDING, it begins from OFF"):
-        keeper.answer({"plan": PLAN})
-    assert not keeper.status()["running"]
+        runs.answer({"plan": PLAN})
+    assert not runs.status()["running"]

@@ -30,7 +30,7 @@ class FakeChild:
 
 
 @dataclass
-class Nursery:
+class FakeStarter:
     children: list[FakeChild] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
     error: OSError | None = None
@@ -43,12 +43,12 @@ class Nursery:
 
 
 @pytest.fixture
-def starter() -> Nursery:
-    return Nursery()
+def starter() -> FakeStarter:
+    return FakeStarter()
 
 
 @pytest.fixture
-def supervisor(starter: Nursery) -> WatchSupervisor:
+def supervisor(starter: FakeStarter) -> WatchSupervisor:
     return WatchSupervisor(starter.spawn, starter.said.append)  # type: ignore[arg-type]
 
 
