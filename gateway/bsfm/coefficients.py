@@ -106,7 +106,7 @@ class Coefficients:
             calibration.response,
         )
 
-    def rounded(self) -> "Coefficients":
+    def round_to_float32(self) -> "Coefficients":
         """As float32 stores them; what overflows float32 becomes infinite."""
         return Coefficients(
             float32(self.x0_v),
@@ -118,7 +118,7 @@ class Coefficients:
             float32(self.blend_span_n),
             tuple(map(float32, self.slip_radii_v)),
             tuple(map(float32, self.slip_shares)),
-            None if self.response is None else _rounded(self.response),
+            None if self.response is None else _round_response(self.response),
         )
 
 
@@ -137,7 +137,7 @@ class Allowed:
         tiny = 0.0 < abs(number) < _NO_FIT_GIVES
         if self.low <= number <= self.high and not tiny:
             return
-        swapped = _swapped(number)
+        swapped = _swap_words(number)
         if self.low <= swapped <= self.high and abs(swapped) > _MEANT:
             text = f"{self.name} = {number:g}; with its words swapped {swapped:g}: the sender uses the other word order"
             yield CoefficientFault(index, CoefficientReason.WORDS_SWAPPED, text)
@@ -155,7 +155,7 @@ def float32(number: float) -> float:
         return float("inf") if number > 0 else float("-inf")
 
 
-def _rounded(response: Response) -> Response:
+def _round_response(response: Response) -> Response:
     return replace(
         response,
         dead_time_s=float32(response.dead_time_s),
@@ -164,6 +164,6 @@ def _rounded(response: Response) -> Response:
     )
 
 
-def _swapped(number: float) -> float:
+def _swap_words(number: float) -> float:
     data = struct.pack(">f", number)
     return float(struct.unpack(">f", data[2:] + data[:2])[0])

@@ -50,7 +50,7 @@ class RationalBezier:
         self.weights = tuple(float(weight) for weight in weights)
         self.order = len(self.handles) - 1
         _check(self)
-        scaled = _scaled(self.weights)
+        scaled = _scale_weights(self.weights)
         self._multiply_out(scaled)
         self._increasing = exact.place_not_positive(self._numerator) is None
         self.inverse = inverse_of(self.x0, self.x1, self.handles, scaled) if self._increasing else refuse_inverse
@@ -98,7 +98,7 @@ class RationalBezier:
 
     def slope_is_at_least(self, floor_n_per_v: float) -> bool:
         """Exactly whether df/dx >= floor on [x0, x1]: numerator - floor (x1 - x0) W^2 is nowhere negative."""
-        (weights, _), (handles, scale) = map(exact.whole_numbers, (_scaled(self.weights), self.handles))
+        (weights, _), (handles, scale) = map(exact.whole_numbers, (_scale_weights(self.weights), self.handles))
         ((low, high), span_scale), ((floor,), floor_scale) = map(
             exact.whole_numbers, ((self.x0, self.x1), (floor_n_per_v,))
         )
@@ -204,7 +204,7 @@ def _check(curve: RationalBezier) -> None:
                 )
 
 
-def _scaled(weights: Sequence[float]) -> tuple[float, ...]:
+def _scale_weights(weights: Sequence[float]) -> tuple[float, ...]:
     exponent = frexp(max(weights))[1]
     scaled = tuple(ldexp(weight, -exponent) for weight in weights)
     if min(scaled) == 0.0:

@@ -39,7 +39,7 @@ def validate(branches: Branches, limits: CoefficientLimits) -> list[CoefficientF
 def validate_coefficients(raw: Coefficients, limits: CoefficientLimits) -> list[CoefficientFault]:
     """All faults of numbers that may be anything. Curves are built and proven only
     from numbers that passed one by one, and stops against curves that passed."""
-    stored = raw.rounded()
+    stored = raw.round_to_float32()
     faults = [*_frame_faults(stored, limits), *_number_faults(stored, limits)]
     faults += [*stop_faults(stored, limits), *response_faults(stored.response, limits)]
     if faults:

@@ -43,15 +43,15 @@ class LineSplitter:
         window = LONGEST_LINE_BYTES + len(self._terminator)
         end = self._buffer.find(self._terminator, 0, window)
         if end >= 0:
-            data = self._cut(end + len(self._terminator))
+            data = self._take(end + len(self._terminator))
             was_skipping, self._is_skipping = self._is_skipping, False
             return Line(data, data[:end], not was_skipping)
         if len(self._buffer) < window:
             return None
         self._is_skipping = True
-        data = self._cut(LONGEST_LINE_BYTES)
+        data = self._take(LONGEST_LINE_BYTES)
         return Line(data, data, False)
 
-    def _cut(self, length: int) -> bytes:
+    def _take(self, length: int) -> bytes:
         data, self._buffer = self._buffer[:length], self._buffer[length:]
         return data

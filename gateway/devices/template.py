@@ -30,7 +30,7 @@ class Template:
     def encode(self, values: Mapping[str, Value], may_be_blank: str = "") -> bytes:
         """The bytes of one sentence. A choice that is not given is its first word. ValueRefused when a value does not fit."""
         text = "".join(
-            piece if isinstance(piece, str) else _encoded(piece, values, may_be_blank) for piece in self.pieces
+            piece if isinstance(piece, str) else _encode_field(piece, values, may_be_blank) for piece in self.pieces
         )
         data = text.encode("ascii")
         if any(isinstance(field, Text) for field in self.fields) and self.decode(data, may_be_blank) is None:
@@ -51,7 +51,7 @@ class Template:
         return values
 
 
-def _encoded(field: Field, values: Mapping[str, Value], may_be_blank: str) -> str:
+def _encode_field(field: Field, values: Mapping[str, Value], may_be_blank: str) -> str:
     value = values.get(field.name)
     if value is None and isinstance(field, Choice):
         return field.words[0]

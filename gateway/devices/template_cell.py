@@ -95,16 +95,16 @@ class TemplateCellDevice:
         raw = force_n / NEWTON_PER_UNIT[self._unit]
         if quality is not Quality.OVERLOAD and isfinite(raw):
             try:
-                return self._encoded(raw, quality)
+                return self._encode_frame(raw, quality)
             except ValueRefused:  # more digits than the display has
                 pass
-        return self._encoded(nan if self._reading.blank_is_overload else self._largest(), Quality.OVERLOAD)
+        return self._encode_frame(nan if self._reading.blank_is_overload else self._largest(), Quality.OVERLOAD)
 
     def _largest(self) -> float:
         """The largest number that the display can show: what a grammar without blanks says at overload."""
         return self._reading.largest_shown
 
-    def _encoded(self, raw: float, quality: Quality) -> bytes:
+    def _encode_frame(self, raw: float, quality: Quality) -> bytes:
         values: dict[str, Value] = {**self._around, **self._grammar.profile.constants, UNIT: self._unit}
         values[FORCE] = round(raw, self._reading.decimals) if isfinite(raw) else raw
         word = self._reading.word(quality)

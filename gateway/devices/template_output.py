@@ -58,12 +58,12 @@ class TemplateOutputHost:
         return abs(reply.voltage_v - voltage_v) <= self._tolerance_v[type(question)]
 
     def safe_frame(self, voltage_v: float) -> bytes:
-        frame = self._encoded(SetVoltage(voltage_v))
+        frame = self._encode_request(SetVoltage(voltage_v))
         self._safe_v = voltage_v
         return frame
 
     def request(self, message: OutputRequest) -> bytes:
-        data = self._encoded(message)
+        data = self._encode_request(message)
         if not self._expected:
             self._lines.forget()  # bytes that came before the question are no part of its answer
         self._expected.append(message)
@@ -76,7 +76,7 @@ class TemplateOutputHost:
     def receive(self, chunk: bytes, now_s: float) -> list[OutputReply]:
         return [self._reply(line) for line in self._lines.feed(chunk)]
 
-    def _encoded(self, message: OutputRequest) -> bytes:
+    def _encode_request(self, message: OutputRequest) -> bytes:
         if not isinstance(message, SetVoltage):
             return self._grammar.number_line(self._grammar.exchange(message).ask, 0.0)
         setting = self._grammar.number_line(self._grammar.set_voltage.ask, self._grammar.setting(message.voltage_v))
@@ -95,7 +95,7 @@ class TemplateOutputHost:
         return self.resolution_v + (0.0 if same else step_v)
 
     def _reply(self, line: Line) -> OutputReply:
-        reply = self._understood(self._grammar.body(line)) if self._expected else None
+        reply = self._decode_reply(self._grammar.body(line)) if self._expected else None
         if reply is not None:
             self._expected.popleft()
             return reply
@@ -103,7 +103,7 @@ class TemplateOutputHost:
             self._expected.clear()
         return Garbage(line.data)
 
-    def _understood(self, body: bytes | None) -> OutputReply | None:
+    def _decode_reply(self, body: bytes | None) -> OutputReply | None:
         if body is not None and body in self._refusals:
             return Refused(self._refusals[body])
         asked = self._expected[0]
@@ -152,7 +152,7 @@ class TemplateOutputDevice:
 
     def refusal(self, garbage: Garbage) -> Refused:
         refusals = self._profile.refusals
-        number = self._asked_number(garbage)
+        number = self._number_in(garbage)
         beyond = refusals.out_of_range
         if beyond and number is not None and beyond.numbers[0] <= number <= beyond.numbers[1]:
             return Refused(beyond.text)
@@ -163,7 +163,7 @@ class TemplateOutputDevice:
         exchange = self._grammar.exchange(question)
         return self._grammar.answer_line(exchange, value) if exchange.answer else b""
 
-    def _asked_number(self, garbage: Garbage) -> float | None:
+    def _number_in(self, garbage: Garbage) -> float | None:
         lines = LineSplitter(self._profile.terminator_bytes).feed(garbage.data)
         return self._set_number(self._grammar.body(lines[0])) if len(lines) == 1 else None
 
@@ -176,7 +176,7 @@ class TemplateOutputDevice:
         body = self._grammar.body(line)
         number = self._set_number(body)
         if number is None:
-            number = self._stepped(body)
+            number = self._setting_after_step(body)
         if number is not None and self._scale.carries(number, self._grammar.half_step(self._grammar.set_voltage.ask)):
             self._setting = number
             return SetVoltage(self._scale.to_physical(number))
@@ -189,7 +189,7 @@ class TemplateOutputDevice:
                 return message
         return None
 
-    def _stepped(self, body: bytes | None) -> float | None:
+    def _setting_after_step(self, body: bytes | None) -> float | None:
         """The setting after INC or DEC; it stays within the range (what the real device does there is not documented)."""
         for step in self._profile.steps:
             if self._grammar.read(step.ask, body) is not None:

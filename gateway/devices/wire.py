@@ -19,7 +19,7 @@ class PacedWire:
         self._free_s = 0.0  # when the last byte was through
         self.dropped_bytes = 0
 
-    def put(self, data: bytes, now_s: float) -> None:
+    def send(self, data: bytes, now_s: float) -> None:
         """Bytes handed to the sender at now_s; they follow what is still on the wire."""
         taken = data[: self.room]
         self.dropped_bytes += len(data) - len(taken)

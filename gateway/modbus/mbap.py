@@ -51,7 +51,7 @@ class MbapFramer:
             if len(buffer) >= 4 and (buffer[2] or buffer[3]):
                 raise FramingLost(f"protocol id {buffer[2] << 8 | buffer[3]}, Modbus is 0")
             return None
-        end = 6 + _checked_length(buffer)
+        end = 6 + _check_length(buffer)
         if len(buffer) < end:
             return None
         frame = Adu(buffer[0] << 8 | buffer[1], buffer[6], bytes(buffer[7:end]))
@@ -77,7 +77,7 @@ def encode(adu: Adu) -> bytes:
     return HEADER.pack(adu.transaction, 0, len(adu.pdu) + 1, adu.unit) + adu.pdu
 
 
-def _checked_length(buffer: bytearray) -> int:
+def _check_length(buffer: bytearray) -> int:
     """Bytes after the length field. Raises FramingLost outside 2..254 or when the protocol is another."""
     protocol = buffer[2] << 8 | buffer[3]
     length = buffer[4] << 8 | buffer[5]

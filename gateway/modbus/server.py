@@ -3,7 +3,7 @@
 Order (V1.1b3, section 7): function 01, shape and quantity 03, address 02, value 03. Addresses and values are the bank's to
 judge, in that order; FC05 with a value other than 0x0000/0xFF00 is 03 only when the coil exists. FC23 checks both
 halves before it writes: the read half here by check_registers_readable, the write half by the bank, whose writes are
-all or nothing. What is refused here, before the bank has looked at it, the bank is told (refused): it keeps the reasons.
+all or nothing. What is refused here, before the bank has looked at it, the bank is told (note_refusal): it keeps the reasons.
 Only ModbusError becomes an answer; anything else a bank raises is our bug and reaches the caller.
 """
 
@@ -130,7 +130,7 @@ def _read_write(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     return bytes((P.READ_WRITE, len(words))) + words
 
 
-def _encapsulated(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
+def _identification(pdu: bytes, bank: DataBank, _peer: Peer) -> bytes:
     return identification_answer(pdu, bank.identity)
 
 
@@ -155,5 +155,5 @@ _HANDLERS: Final[Mapping[int, Callable[[bytes, DataBank, Peer], bytes]]] = {
     P.REPORT_SERVER: _report_server,
     P.MASK_WRITE: _mask_write,
     P.READ_WRITE: _read_write,
-    P.ENCAPSULATED: _encapsulated,
+    P.ENCAPSULATED: _identification,
 }

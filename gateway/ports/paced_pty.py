@@ -100,7 +100,7 @@ class _Flow:
         self._timer: asyncio.TimerHandle | None = None
 
     def put(self, data: bytes) -> None:
-        self.wire.put(data, monotonic_s())
+        self.wire.send(data, monotonic_s())
         if self._timer is None:
             self._wait()
 

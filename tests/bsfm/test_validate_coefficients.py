@@ -75,7 +75,7 @@ def test_what_is_checked_is_what_float32_stores():
     limits = replace(LIMITS, slope_floor_n_per_v=0.0)
     double = branches(rising, rising)
     assert double.rising.is_increasing()
-    stored = Coefficients.of(double).rounded()
+    stored = Coefficients.of(double).round_to_float32()
     assert stored.rising_handles_n == (0.0, 10.0, 20.0, 20.0)
     assert validate(double, limits) == []  # still increasing inside: the end may be flat
     flat = branches((0.0, math.nextafter(0.0, 1.0)), (0.0, math.nextafter(0.0, 1.0)))

@@ -10,7 +10,7 @@ from gateway.devices.wire import MOST_QUEUED_BYTES
 
 def test_a_byte_is_through_when_its_last_bit_has_passed() -> None:
     wire = PacedWire(9600)
-    wire.put(b"SET 512\r\n", 1.0)
+    wire.send(b"SET 512\r\n", 1.0)
     assert wire.bytes_through(1.0) == b""
     assert wire.bytes_through(1.0 + 10 / 9600 - 1e-9) == b""
     assert wire.bytes_through(1.0 + 10 / 9600) == b"S"
@@ -21,11 +21,11 @@ def test_a_byte_is_through_when_its_last_bit_has_passed() -> None:
 
 def test_a_write_waits_for_the_one_before_it() -> None:
     wire = PacedWire(9600)
-    wire.put(b"ab", 0.0)
-    wire.put(b"cd", 0.0001)
+    wire.send(b"ab", 0.0)
+    wire.send(b"cd", 0.0001)
     assert wire.last_through_s == pytest.approx(40 / 9600)
     assert wire.bytes_through(40 / 9600) == b"abcd"
-    wire.put(b"e", 1.0)
+    wire.send(b"e", 1.0)
     assert wire.last_through_s == pytest.approx(1.0 + 10 / 9600)
 
 
@@ -35,8 +35,8 @@ def test_looking_more_often_changes_nothing(writes: list[tuple[bytes, float]], l
     patient, hasty = PacedWire(9600), PacedWire(9600)
     now_s, seen = 0.0, b""
     for data, pause_s in writes:
-        patient.put(data, now_s)
-        hasty.put(data, now_s)
+        patient.send(data, now_s)
+        hasty.send(data, now_s)
         until_s = now_s + pause_s
         while now_s + look_s < until_s:
             now_s += look_s
@@ -57,7 +57,7 @@ def test_a_parity_bit_takes_its_time_too() -> None:
 
 def test_the_wire_does_not_grow_without_bound() -> None:
     wire = PacedWire(9600)
-    wire.put(b"x" * (MOST_QUEUED_BYTES + 5), 0.0)
+    wire.send(b"x" * (MOST_QUEUED_BYTES + 5), 0.0)
     assert (wire.room, wire.dropped_bytes) == (0, 5)
 
 

@@ -134,8 +134,8 @@ LIMITS = CoefficientLimits(cell_range_n=98.0, slope_floor_n_per_v=0.0)
 @given(increasing_curves(2))
 def test_rounding_to_float32_keeps_a_usable_curve_or_is_refused(curve):
     raw = Coefficients(0.0, curve.x1, curve.handles, curve.weights, curve.handles, curve.weights)
-    stored = raw.rounded()
-    assert stored == stored.rounded()
+    stored = raw.round_to_float32()
+    assert stored == stored.round_to_float32()
     if validate_coefficients(raw, LIMITS):
         return
     kept = RationalBezier(stored.x0_v, stored.x1_v, stored.rising_handles_n, stored.rising_weights)

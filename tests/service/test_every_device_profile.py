@@ -55,8 +55,8 @@ def test_an_output_follows_a_moving_setpoint_for_five_seconds_at_its_own_speed(n
     profile = PROFILES[name]
     there, back = PacedWire(profile.serial.baud), PacedWire(profile.serial.baud)
     now_s = 0.0
-    device = Device(profile, lambda data: back.put(data, now_s))
-    line = OutputExchange(output_host(profile), lambda data: there.put(data, now_s), profile.reply_timeout_s)
+    device = Device(profile, lambda data: back.send(data, now_s))
+    line = OutputExchange(output_host(profile), lambda data: there.send(data, now_s), profile.reply_timeout_s)
     low_v, high_v = profile.voltage_range_v
     for now_s in milliseconds():
         if sent := there.bytes_through(now_s):
@@ -82,7 +82,7 @@ def test_a_cell_is_read_for_five_seconds_at_its_own_speed(name: str) -> None:
     for index, now_s in enumerate(milliseconds()):
         if index % period == 0 and (host.poll() == b"" or device.receive(host.poll(), now_s)):
             sent_n.append(0.1 * (index // period) - 20.0)
-            wire.put(device.frame(sent_n[-1]), now_s)
+            wire.send(device.frame(sent_n[-1]), now_s)
         if heard := wire.bytes_through(now_s):
             found.extend(host.receive(heard, now_s))
     read_n = [sample.force_n for sample in found if isinstance(sample, ForceSample)]

@@ -97,8 +97,8 @@ class Wired:
         self._frame_steps = round(1.0 / (STEP_S * rig.load_cell.device.rate_hz)) if rig.load_cell.device.rate_hz else 0
         self.world = SimulatedRig(
             rig,
-            send_output=lambda data: self._down.put(data, self.now_s),
-            send_cell=lambda data: self._stream.put(data, self.now_s),
+            send_output=lambda data: self._down.send(data, self.now_s),
+            send_cell=lambda data: self._stream.send(data, self.now_s),
             now_s=0.0,
         )
         self.twin = self.world.twin
@@ -201,11 +201,11 @@ class Wired:
 
     def _write(self, data: bytes) -> None:
         if self.is_plugged:
-            self._up.put(data, self.now_s)
+            self._up.send(data, self.now_s)
 
     def _ask_cell(self, data: bytes) -> None:
         if self.is_cell_plugged:
-            self._asks.put(data, self.now_s)
+            self._asks.send(data, self.now_s)
 
     # -- a master
 

@@ -10,7 +10,7 @@ from math import floor, log10
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.c_export.float32_model import Float32, Float32Model
-from gateway.bsfm.c_export.tables import Tables, rounded
+from gateway.bsfm.c_export.tables import Tables, round_to_float32
 from gateway.bsfm.model import Bsfm, Calibration
 
 POINTS = 17
@@ -35,7 +35,7 @@ def self_test_of(calibration: Calibration, tables: Tables) -> SelfTest:
     """ValueError if float32 cannot follow this calibration."""
     branches, single = calibration.model().branches, Float32Model(tables)
     grid = tuple(_point(branches, tables, i / GRID) for i in range(GRID + 1))
-    reversals = tuple(_replayed(Bsfm(branches, calibration.reversal), tables))
+    reversals = tuple(_replay(Bsfm(branches, calibration.reversal), tables))
     error_n = max(_force_error_n(single, point) for point in grid)
     error_v = max(*(_voltage_error_v(single, point) for point in grid), _reversal_error_v(single, reversals))
     low_n, high_n = tables.reached_n
@@ -55,8 +55,12 @@ def self_test_of(calibration: Calibration, tables: Tables) -> SelfTest:
 
 
 def _point(branches: Branches, tables: Tables, share: float) -> tuple[float, float, float]:
-    voltage_v = tables.x1_v if share == 1.0 else rounded(tables.x0_v + tables.x_span_v * share)
-    return voltage_v, rounded(branches.rising.value(voltage_v)), rounded(branches.falling.value(voltage_v))
+    voltage_v = tables.x1_v if share == 1.0 else round_to_float32(tables.x0_v + tables.x_span_v * share)
+    return (
+        voltage_v,
+        round_to_float32(branches.rising.value(voltage_v)),
+        round_to_float32(branches.falling.value(voltage_v)),
+    )
 
 
 def _force_error_n(single: Float32Model, point: tuple[float, float, float]) -> float:
@@ -76,14 +80,14 @@ def _reversal_error_v(single: Float32Model, reversals: tuple[tuple[float, float]
     return max(abs(float(single.command(state, Float32(n))[0]) - v) for n, v in reversals)
 
 
-def _replayed(model: Bsfm, tables: Tables) -> list[tuple[float, float]]:
+def _replay(model: Bsfm, tables: Tables) -> list[tuple[float, float]]:
     """What the double model answers to a rise, partial reversals, loops within loops, a full fall and a repetition."""
     last_n, memory = tables.reached_n[0], model.reversal.start()
     record = []
-    for force_n in map(rounded, _commands_n(tables)):
+    for force_n in map(round_to_float32, _commands_n(tables)):
         memory = model.memory_after(memory, last_n, force_n)
         last_n = force_n
-        record.append((force_n, rounded(model.voltage_v(force_n, model.branch_share(memory))[0])))
+        record.append((force_n, round_to_float32(model.voltage_v(force_n, model.branch_share(memory))[0])))
     return record
 
 

@@ -17,7 +17,7 @@ from typing import Final
 from gateway import VERSION
 from gateway.bsfm.c_export.accuracy import SelfTest, self_test_of
 from gateway.bsfm.c_export.float32_model import CLOSE, ROUNDS_MAX
-from gateway.bsfm.c_export.tables import BranchTable, Tables, rounded, tables_of
+from gateway.bsfm.c_export.tables import BranchTable, Tables, round_to_float32, tables_of
 from gateway.bsfm.model import Calibration
 
 TEXT_LENGTH = 200  # characters of a calibration's own texts in a comment
@@ -66,7 +66,13 @@ def _comment_text(text: str) -> str:
 def _numbers(calibration: Calibration, tables: Tables) -> dict[str, str]:
     (low_n, high_n), (lowest_n, highest_n) = tables.shared_n, tables.reached_n
     shown = {"x0": tables.x0_v, "x1": tables.x1_v, "force_min": low_n, "force_max": high_n, "span": tables.blend_span_n}
-    exact = {**shown, "x_span": tables.x_span_v, "lowest": lowest_n, "highest": highest_n, "close": rounded(CLOSE)}
+    exact = {
+        **shown,
+        "x_span": tables.x_span_v,
+        "lowest": lowest_n,
+        "highest": highest_n,
+        "close": round_to_float32(CLOSE),
+    }
     return {
         "number": str(calibration.number),
         "order": str(tables.order),
@@ -145,8 +151,8 @@ def _slip(tables: Tables) -> dict[str, str]:
         "memory": f"    float places[{stops}]; /* of the slip stops, -1 .. 1: where they stand since the last reversals */",
         "rest": ", fallen there",
         "stops": str(stops),
-        "radii": _wrapped(tables.radii_v),
-        "shares": _wrapped(tables.shares),
+        "radii": _wrap(tables.radii_v),
+        "shares": _wrap(tables.shares),
         "stiffness_f": _literal(tables.stiffness_per_v),
     }
 
@@ -165,12 +171,12 @@ def _fields(table: BranchTable) -> list[tuple[str, str, tuple[float, ...]]]:
 
 def _initialiser(table: BranchTable) -> str:
     lines = [
-        f"    {_wrapped(values) if '[' in declared else _literal(values[0])}," for declared, _, values in _fields(table)
+        f"    {_wrap(values) if '[' in declared else _literal(values[0])}," for declared, _, values in _fields(table)
     ]
     return "\n".join(lines).removesuffix(",")
 
 
-def _wrapped(values: tuple[float, ...]) -> str:
+def _wrap(values: tuple[float, ...]) -> str:
     literals = [_literal(value) for value in values]
     lines = [", ".join(literals[i : i + PER_LINE]) for i in range(0, len(literals), PER_LINE)]
     return "{ " + ",\n      ".join(lines) + " }"

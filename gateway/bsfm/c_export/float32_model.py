@@ -82,7 +82,7 @@ class Float32Model:
             if abs(delta_n) >= self.blend_span:
                 return _ONE if delta_n > 0 else -_ONE
             blend = blend + _TWO * delta_n / self.blend_span
-        return _clipped(blend, -_ONE, _ONE)
+        return _clip(blend, -_ONE, _ONE)
 
     def voltage(self, force_n: Float32, blend: Float32) -> Answer:
         if not _is_blend(blend):
@@ -109,7 +109,7 @@ class Float32Model:
         total = _ZERO
         for share, place in zip(self.shares, state.memory, strict=True):
             total = total + share * place
-        return _clipped(total, -_ONE, _ONE)
+        return _clip(total, -_ONE, _ONE)
 
     def reset(self) -> CommandState:
         return CommandState(self.lowest, [-_ONE] * len(self.radii) or [_ONE], self.x0)
@@ -119,7 +119,7 @@ class Float32Model:
             return self.x0, Code.INVALID
         if not isfinite(force_n):
             return state.voltage_v, Code.INVALID
-        reached_n = _clipped(force_n, self.lowest, self.highest)
+        reached_n = _clip(force_n, self.lowest, self.highest)
         self._move_to(state, reached_n)
         state.force_n = reached_n
         state.voltage_v, status = self.voltage(force_n, self.branch_share(state))
@@ -140,7 +140,7 @@ class Float32Model:
         stuck_v = middle_v - from_middle_v + self.branch_share(state) * (half_v - from_half_v)
         travel_v = self._travel(state, stuck_v, half_v)
         state.memory = [
-            _clipped(place + travel_v / radius, -_ONE, _ONE)
+            _clip(place + travel_v / radius, -_ONE, _ONE)
             for place, radius in zip(state.memory, self.radii, strict=True)
         ]
 
@@ -260,5 +260,5 @@ def _is_blend(blend: Float32) -> bool:
     return bool(-1 <= blend <= 1)
 
 
-def _clipped(value: Float32, low: Float32, high: Float32) -> Float32:
+def _clip(value: Float32, low: Float32, high: Float32) -> Float32:
     return low if value < low else high if value > high else value

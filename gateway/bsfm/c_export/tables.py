@@ -60,8 +60,8 @@ class Tables:
         return max(rising[0], falling[0]), min(rising[-1], falling[-1])
 
 
-def rounded(value: float) -> float:
-    """The nearest float32. OverflowError beyond its range."""
+def round_to_float32(value: float) -> float:
+    """Return the nearest float32. OverflowError beyond its range."""
     nearest: float = struct.unpack("<f", struct.pack("<f", value))[0]
     return nearest
 
@@ -72,17 +72,17 @@ def tables_of(calibration: Calibration) -> Tables:
     _check_range("voltage", "V", (calibration.x0_v, calibration.x1_v), VOLTAGE_LIMIT_V)
     if calibration.blend_span_n > FORCE_LIMIT_N:
         raise ValueError(f"blend span {calibration.blend_span_n:g} N: at most {FORCE_LIMIT_N:g} N is allowed in C")
-    x0_v, x1_v = rounded(calibration.x0_v), rounded(calibration.x1_v)
+    x0_v, x1_v = round_to_float32(calibration.x0_v), round_to_float32(calibration.x1_v)
     found = Tables(
         order=calibration.order,
         x0_v=x0_v,
         x1_v=x1_v,
-        x_span_v=rounded(x1_v - x0_v),
-        blend_span_n=rounded(calibration.blend_span_n),
+        x_span_v=round_to_float32(x1_v - x0_v),
+        blend_span_n=round_to_float32(calibration.blend_span_n),
         rising=_branch_table("rising", calibration.rising_handles_n, calibration.rising_weights),
         falling=_branch_table("falling", calibration.falling_handles_n, calibration.falling_weights),
-        radii_v=tuple(map(rounded, calibration.slip_radii_v)),
-        shares=tuple(map(rounded, calibration.slip_shares)),
+        radii_v=tuple(map(round_to_float32, calibration.slip_radii_v)),
+        shares=tuple(map(round_to_float32, calibration.slip_shares)),
     )
     low_n, high_n = found.shared_n
     if low_n >= high_n:
@@ -98,7 +98,7 @@ def _stiffness_per_v(tables: Tables) -> float:
         for table in (tables.rising, tables.falling)
     ]
     stops.check(Branches(*curves))
-    return rounded(stops.stiffness_per_v)
+    return round_to_float32(stops.stiffness_per_v)
 
 
 def _branch_table(name: str, handles_n: tuple[float, ...], weights: tuple[float, ...]) -> BranchTable:
@@ -106,14 +106,20 @@ def _branch_table(name: str, handles_n: tuple[float, ...], weights: tuple[float,
     if max(weights) > WEIGHT_SPREAD * min(weights):
         raise ValueError(f"{name} weights: spread over more than {WEIGHT_SPREAD:g}, more than float32 can carry")
     exponent = frexp(max(weights))[1]
-    handles = tuple(map(rounded, handles_n))
-    scaled = tuple(rounded(ldexp(weight, -exponent)) for weight in weights)
+    handles = tuple(map(round_to_float32, handles_n))
+    scaled = tuple(round_to_float32(ldexp(weight, -exponent)) for weight in weights)
     if not RationalBezier(0.0, 1.0, handles, scaled).is_increasing():
         raise ValueError(f"the {name} branch stops increasing when its handles and weights are rounded to float32")
     totals = [comb(len(handles) - 1, i) * weight for i, weight in enumerate(scaled)]
     products = [total * handle for total, handle in zip(totals, handles, strict=True)]
     half_n = sum(products) / sum(totals)
-    return BranchTable(handles, scaled, tuple(map(rounded, totals)), tuple(map(rounded, products)), rounded(half_n))
+    return BranchTable(
+        handles,
+        scaled,
+        tuple(map(round_to_float32, totals)),
+        tuple(map(round_to_float32, products)),
+        round_to_float32(half_n),
+    )
 
 
 def _check_range(what: str, unit: str, values: tuple[float, ...], limit: float) -> None:

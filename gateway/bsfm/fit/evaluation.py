@@ -67,9 +67,9 @@ def evaluate(checked: CheckedLadder, question: FitRequest) -> Evaluation:
     scores = score_orders(ladder, question.models, orders, question.ties, settings)
     chosen = choose(scores)
     if _is_poor(chosen, scores):
-        chosen = _constrained(ladder, orders, question, settings, chosen, said)
+        chosen = _fit_constrained(ladder, orders, question, settings, chosen, said)
     reversal = choose_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)
-    span_n = reversal.span.span_n if reversal else _assumed_span(chosen, question, said)
+    span_n = reversal.span.span_n if reversal else _assume_span(chosen, question, said)
     model = reversal.model if reversal else chosen.result.bsfm(span_n)
     return Evaluation(checked, tuple(scores), chosen, model, span_n, reversal, (*checked.notes, *said))
 
@@ -116,7 +116,7 @@ def _may_drive(score: Score) -> bool:
     return score.result.verdicts.usable and is_moderate(score.result.branches)
 
 
-def _constrained(
+def _fit_constrained(
     ladder: Ladder, orders: Sequence[int], question: FitRequest, settings: FitSettings, free: Score, said: list[str]
 ) -> Score:
     """The best BSFM that is held to what may drive a plant, where it beats the best free optimum that may."""
@@ -149,7 +149,7 @@ def _to_move(chosen: Score, scores: Sequence[Score]) -> Branches:
     return min(lower, key=lambda score: score.heldout_n2).result.branches
 
 
-def _assumed_span(chosen: Score, question: FitRequest, said: list[str]) -> float:
+def _assume_span(chosen: Score, question: FitRequest, said: list[str]) -> float:
     low_n, high_n = chosen.result.bsfm(0.0).force_range_n
     if question.reference_span_n is not None:
         said.append(

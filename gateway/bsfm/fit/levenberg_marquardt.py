@@ -85,7 +85,7 @@ def polish(problem: ProjectedProblem, starts: Floats, effort: Effort) -> FitLane
 def minima(problem: ProjectedProblem, known: Floats, effort: Effort, count: int = 3) -> Floats:
     """Different minima (count or fewer, d), lowest first, from starts known (k, d) and from the spread ones."""
     curves = len(problem.curves)
-    seeds = _spread(problem.unknowns, curves * effort.screened, effort.log_weight_max)
+    seeds = _spread_starts(problem.unknowns, curves * effort.screened, effort.log_weight_max)
     chosen = lowest(problem.evaluate(seeds), curves * effort.descending).theta
     flat = np.zeros((1, problem.unknowns))
     found = descend(problem, np.concatenate([flat, known, chosen]), effort.ridge_n2, effort, EXPLORING_STEPS)
@@ -95,7 +95,7 @@ def minima(problem: ProjectedProblem, known: Floats, effort: Effort, count: int 
     return found.theta[new][:count]
 
 
-def _spread(unknowns: int, count: int, bound: float) -> Floats:
+def _spread_starts(unknowns: int, count: int, bound: float) -> Floats:
     """Log weights that fill the box evenly, always the same: multiples of irrational numbers (Weyl), denser near 0."""
     even = 2.0 * np.modf(np.arange(1, count + 1)[:, None] * np.sqrt(PRIMES[:unknowns]))[0] - 1.0
     return np.asarray(bound * even * np.abs(even))
@@ -129,7 +129,7 @@ def descend(
         at, damping = at.pick(~done), damping[~done]
         if not len(damping):
             break
-    return _joined([*finished, at])
+    return _join_lanes([*finished, at])
 
 
 def _total(at: FitLanes, ridge: float) -> Floats:
@@ -148,6 +148,6 @@ def _step(problem: ProjectedProblem, at: FitLanes, ridge: float, damping: Floats
     return np.asarray(-np.linalg.solve(curvature, (gradient * free)[:, :, None])[:, :, 0])
 
 
-def _joined(lanes: list[FitLanes]) -> FitLanes:
+def _join_lanes(lanes: list[FitLanes]) -> FitLanes:
     names = FitLanes.__slots__
     return FitLanes(*(np.concatenate([getattr(part, name) for part in lanes]) for name in names))

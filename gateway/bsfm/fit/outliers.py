@@ -34,16 +34,16 @@ def inlier_mask(ladder: Ladder) -> NDArray[np.bool_]:
         repeated[members] = len(members) >= 3
     if not repeated.any():
         return np.ones(len(ladder), dtype=bool)
-    return np.asarray(~repeated | (np.abs(away) <= REJECT_AT * _spread(away[repeated])))
+    return np.asarray(~repeated | (np.abs(away) <= REJECT_AT * _robust_sigma(away[repeated])))
 
 
 def huber_weight(residual_n: Floats) -> Floats:
     """1 for small residuals, falling as 1/|r| beyond 1.345 robust standard deviations."""
-    scale = max(_spread(residual_n), 1.0e-12)
+    scale = max(_robust_sigma(residual_n), 1.0e-12)
     return np.asarray(np.minimum(1.0, HUBER_AT * scale / np.maximum(np.abs(residual_n), 1.0e-300)))
 
 
-def _spread(away_n: Floats) -> float:
+def _robust_sigma(away_n: Floats) -> float:
     """Robust standard deviation; coarse counts make the median 0, then the middle 95 % decide."""
     size = np.abs(away_n)
     middle = size[size <= np.quantile(size, 0.95)]

@@ -42,7 +42,7 @@ def explore_starts(samples: tuple[Samples, ...], form: ModelForm, lower: Floats 
         None if lower is None else np.stack([raise_order(part, form.order - lower.shape[1]) for part in lower])
     )
     single = [
-        minima(ProjectedProblem((part,), form.order, False), _known(raised_lower, c, form.order), effort)
+        minima(ProjectedProblem((part,), form.order, False), _known_start(raised_lower, c, form.order), effort)
         for c, part in enumerate(coarse)
     ]
     if not form.tied:
@@ -70,7 +70,7 @@ def _solution(samples: tuple[Samples, ...], form: ModelForm, starts: list[Floats
     return Solution(form, problems, tuple(lanes))
 
 
-def _known(log_weights: Floats | None, curve: int, order: int) -> Floats:
+def _known_start(log_weights: Floats | None, curve: int, order: int) -> Floats:
     return np.zeros((0, order)) if log_weights is None else log_weights[curve][None]
 
 

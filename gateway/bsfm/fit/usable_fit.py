@@ -54,17 +54,17 @@ class _Search:
 
     def margins(self, u: Floats) -> Floats:
         """Nowhere negative where all is well: rises from place to place, then gaps."""
-        return np.asarray(-self._rows @ self._probed(u)[0] - self._least)
+        return np.asarray(-self._rows @ self._values_at(u)[0] - self._least)
 
     def margin_slopes(self, u: Floats) -> Floats:
-        return np.asarray(-self._rows @ self._probed(u)[1])
+        return np.asarray(-self._rows @ self._values_at(u)[1])
 
     def cost(self, u: Floats) -> tuple[float, Floats]:
         """Mean square and its gradient."""
         residual, jacobian = self.problem.at_fixed(*np.split(u, [self.problem.unknowns]))
         return float(residual @ residual), 2.0 * jacobian.T @ residual
 
-    def _probed(self, u: Floats) -> tuple[Floats, Floats]:
+    def _values_at(self, u: Floats) -> tuple[Floats, Floats]:
         values, slopes = self._probe.at_fixed(*np.split(u, [self.problem.unknowns]))
         return self._unit * values, self._unit * slopes
 
@@ -90,7 +90,7 @@ def fit_usable(
         weight = weight * huber_weight(residual_n(used, free.branches))
     problem = ProjectedProblem(split_samples(used, weight, free.form, chosen), order, free.form.tied)
     for margin in MARGINS:
-        results = [_constrained(problem, start, margin, used, free, chosen) for start in _starts(problem, free)]
+        results = [_fit_constrained(problem, start, margin, used, free, chosen) for start in _starts(problem, free)]
         usable = [result for result in results if result.verdicts.usable and is_moderate(result.branches)]
         if usable:
             return min(usable, key=lambda result: result.rms_n)
@@ -122,7 +122,7 @@ def _starts(problem: ProjectedProblem, free: FitResult) -> list[Floats]:
     return [np.concatenate([free.log_weights.ravel(), own]), np.concatenate([np.zeros(problem.unknowns), line])]
 
 
-def _constrained(
+def _fit_constrained(
     problem: ProjectedProblem, start: Floats, margin: float, ladder: Ladder, free: FitResult, settings: FitSettings
 ) -> FitResult:
     from scipy.optimize import minimize  # here: whoever only fits freely does not pay for it

@@ -82,7 +82,7 @@ def check_ladder(
     ladder = _whole_groups(walk)
     said += [*walk.left_out, *_check_scale(rows, slope_n_per_v, expected)]
     ladder, clipped = _without_saturated(ladder, expected.saturation_n)
-    said += [*clipped, *_unsettled(points)]
+    said += [*clipped, *_warn_of_unsettled(points)]
     _check_increasing(ladder)
     return CheckedLadder(
         ladder,
@@ -237,7 +237,7 @@ def _without_saturated(ladder: Ladder, saturation_n: float | None) -> tuple[Ladd
     return left, [f"{said}: these stairs are left out, the calibration ends at {left.voltage_v.max():.2f} V"]
 
 
-def _unsettled(points: Points) -> list[str]:
+def _warn_of_unsettled(points: Points) -> list[str]:
     if not np.isfinite(points.noise_n):
         return []
     limit_n = max(0.3, 4.0 * points.noise_n)

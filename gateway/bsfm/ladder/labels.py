@@ -96,7 +96,7 @@ def split_by_labels(points: Points, labels: Labels, *, by_check: bool = False) -
     walk = (
         [*range(walk[0] - 1, walk[0]), *walk] if walk and walk[0] > 0 else walk
     )  # its first point says where it began
-    return LabelSplit(_ladder(points, found), points.voltage_v[walk], points.force_n[walk], _left_out(labels))
+    return LabelSplit(_ladder(points, found), points.voltage_v[walk], points.force_n[walk], _describe_left_out(labels))
 
 
 def _ladder(points: Points, groups: list[list[int]]) -> Ladder | None:
@@ -115,7 +115,7 @@ def _directions(voltage_v: Floats) -> Integers:
     return np.where(rising, RISING, FALLING)
 
 
-def _left_out(labels: Labels) -> tuple[str, ...]:
+def _describe_left_out(labels: Labels) -> tuple[str, ...]:
     said = [
         f"group {group + 1} was cut after {len(np.unique(labels.stair[labels.group == group]))} stairs: left out"
         for group in labels.cut_groups

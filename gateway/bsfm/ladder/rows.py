@@ -56,7 +56,7 @@ def usable_rows(columns: Mapping[str, Floats], facts: Mapping[str, object], forc
             LadderFlaw.TOO_SHORT,
             f"{len(time_s)} rows: a ladder goes up and down in stairs, {FEWEST_ROWS} rows are the least",
         )
-    keep, dropped = _kept(columns, time_s, command_v, force)
+    keep, dropped = _select_rows(columns, time_s, command_v, force)
     pressure = columns.get("pressure_kpa")
     rows = Rows(
         time_s[keep],
@@ -98,7 +98,7 @@ def _force_column(
     return name, factor, True, said
 
 
-def _kept(
+def _select_rows(
     columns: Mapping[str, Floats], time_s: Floats, command_v: Floats, force: Floats
 ) -> tuple[NDArray[np.bool_], list[str]]:
     """Which rows are readings, and a sentence for each kind that is not."""
@@ -150,12 +150,13 @@ def _look_swapped(command: Floats, force: Floats) -> bool:
     """Stairs take few values and take them again; a measured force does not, and leaves the range of a command."""
     force_is_command = force.min() >= -0.5 and force.max() <= LARGEST_COMMAND_V
     command_is_not = command.max() > LARGEST_COMMAND_V or command.min() < -0.5
-    regular, irregular = _repeated(force) > REGULAR_SHARE, _repeated(command) < 0.5 * REGULAR_SHARE
+    regular, irregular = _repeat_share(force) > REGULAR_SHARE, _repeat_share(command) < 0.5 * REGULAR_SHARE
     return bool(
-        force_is_command and ((command_is_not and _repeated(force) > _repeated(command)) or (regular and irregular))
+        force_is_command
+        and ((command_is_not and _repeat_share(force) > _repeat_share(command)) or (regular and irregular))
     )
 
 
-def _repeated(values: Floats) -> float:
+def _repeat_share(values: Floats) -> float:
     """Share of the values that were seen before."""
     return 1.0 - len(np.unique(np.round(values, 6))) / len(values)

@@ -42,7 +42,7 @@ def choose_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: 
     blend = Bsfm(branches, LinearBlend(span.span_n))
     if len(volts) < FEWEST_POINTS:
         return ReversalChoice(blend, span, None, float("nan"), float("nan"))
-    errors_n = _held_out(branches, ladder, volts, newtons)
+    errors_n = _held_out_errors(branches, ladder, volts, newtons)
     if errors_n[1] >= BETTER_SHARE * errors_n[0]:
         return ReversalChoice(blend, span, None, *errors_n)
     slip = fit_joint(branches, [walk_of(ladder), Walk(volts, newtons)])
@@ -50,7 +50,7 @@ def choose_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: 
     return ReversalChoice(slip.model, carried or span, slip, *errors_n)
 
 
-def _held_out(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> tuple[float, float]:
+def _held_out_errors(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> tuple[float, float]:
     """RMS of blend and stops on the walk, each half of whose points is told by a fit to the other and to the ladder. All pass
     all points, so that they remember what came before."""
     halves = np.arange(len(volts)) % 2

@@ -106,10 +106,10 @@ class ActiveRun:
         step = run.step(now_s, reading)
         self.phase, self.progress, self.eta_s = step.phase, step.progress, step.eta_s
         self.last_row = step.row or self.last_row
-        if run.found:
-            return run.found
+        if run.stop_cause:
+            return run.stop_cause
         if run.is_done:
-            return StopCause(FaultCode.NONE, run.ended)
+            return StopCause(FaultCode.NONE, run.end_sentence)
         voltage_v = self._below_ceiling(now_s, reading, step, loop.voltage_v)
         if voltage_v is None:
             return StopCause(FaultCode.NONE, self._too_high(step.voltage_v, "the run is stopped"))
@@ -155,7 +155,7 @@ class ActiveRun:
         assert run
         ceiling.observe(reading)
         if step.row:
-            ceiling.settled(step.row)
+            ceiling.observe_row(step.row)
         was_reached = run.branch_share > 0.0 and ceiling.is_reached(run.noise_n)
         if not was_reached and not (step.row and ceiling.is_beyond(step.voltage_v, run.noise_n)):
             return step.voltage_v

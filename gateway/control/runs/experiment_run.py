@@ -35,8 +35,8 @@ class ExperimentRun:
         self._elapsed_s = 0.0
 
     @property
-    def found(self) -> StopCause | None:
-        return self._check.found
+    def stop_cause(self) -> StopCause | None:
+        return self._check.stop_cause
 
     @property
     def noise_n(self) -> float:
@@ -61,7 +61,7 @@ class ExperimentRun:
         return self.schedule.segments[self.schedule.index(self._elapsed_s)].part
 
     @property
-    def ended(self) -> str:
+    def end_sentence(self) -> str:
         """What is said at its end."""
         return f"experiment {self.plan.name} done: {len(self.plan.parts)} parts, {self.schedule.duration_s:.0f} s"
 

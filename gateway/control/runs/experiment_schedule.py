@@ -43,7 +43,7 @@ class _Range:
         if move.to_share is not None:
             return self.low_v + move.to_share * (self.top_v - self.low_v)
         volts, told = (move.to_v, f"{move.to_v:g} V") if move.to_v is not None else self._of_force(move.to_n or 0.0)
-        return self.checked_v(float(volts or 0.0), told)
+        return self.check_level_v(float(volts or 0.0), told)
 
     def _of_force(self, force_n: float) -> tuple[float, str]:
         volts, status = self.model.branches.rising.inverse(force_n)
@@ -53,7 +53,7 @@ class _Range:
             )
         return max(volts, self.low_v), f"{force_n:g} N"
 
-    def checked_v(self, volts: float, told: str) -> float:
+    def check_level_v(self, volts: float, told: str) -> float:
         if not (isfinite(volts) and self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V):
             low_n, high_n = (self.model.branches.rising.value(end_v) for end_v in (self.low_v, self.top_v))
             raise ValueError(
@@ -74,7 +74,7 @@ def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segm
     for p, part in enumerate(plan.parts):
         for m, move in enumerate(part.moves):
             try:
-                found = list(_moved(move, at_v, usable, p))
+                found = list(_segments_of_move(move, at_v, usable, p))
             except ValueError as error:
                 raise ValueError(f"plan {plan.name}, part {part.name}, move {m + 1} ({move.do}): {error}") from None
             segments += found
@@ -84,7 +84,7 @@ def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segm
     return tuple(segments)
 
 
-def _moved(move: Move, at_v: float, usable: _Range, part: int) -> Iterator[Segment]:
+def _segments_of_move(move: Move, at_v: float, usable: _Range, part: int) -> Iterator[Segment]:
     over_s, hold_s = move.over_s or 0.0, move.hold_s or 0.0
     if move.do is MoveKind.DWELL:
         yield Segment(at_v, 0.0, hold_s, part)
@@ -103,7 +103,7 @@ def _swings(move: Move, at_v: float, usable: _Range, part: int) -> Iterator[Segm
     size_v = move.size_v if move.size_v is not None else (move.size_share or 0.0) * (usable.top_v - usable.low_v)
     over_s, hold_s = move.over_s or 0.0, move.hold_s or 0.0
     turns = [
-        usable.checked_v(turn_v, f"{size_v:.3g} V around {at_v:.3g} V")
+        usable.check_level_v(turn_v, f"{size_v:.3g} V around {at_v:.3g} V")
         for turn_v in (at_v + size_v / 2.0, at_v - size_v / 2.0)
     ]
     for k in range(2 * (move.times or 0)):

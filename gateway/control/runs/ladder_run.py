@@ -67,7 +67,7 @@ class LadderRun:
     ) -> None:
         self.plan = plan
         self.stairs = stairs_of(plan, settings.limits, model) if stairs is None else stairs
-        self.found: StopCause | None = None
+        self.stop_cause: StopCause | None = None
         self.noise_n = self.rest_n = 0.0
         self.unsettled = 0
         self.done = 0
@@ -90,7 +90,7 @@ class LadderRun:
         return self._stair_s is None
 
     @property
-    def ended(self) -> str:
+    def end_sentence(self) -> str:
         """What is said at its end."""
         return f"calibration ladder done: {self.done} stairs, {self.unsettled} of them never settled"
 
@@ -136,11 +136,11 @@ class LadderRun:
             return self._answer(None)
         self._window.append((now_s, reading.cell_n))
         if self._stair_s is None:
-            return self._zero(now_s)
+            return self._measure_zero(now_s)
         self._trace.append((now_s - self._stair_s, reading.cell_n))
-        row = self._finished(now_s, self._stair_s)
+        row = self._row_if_settled(now_s, self._stair_s)
         if row:
-            self._judge(row)
+            self._check_against_model(row)
             self._begin_next(now_s, row.force_n)
         return self._answer(row)
 
@@ -151,7 +151,7 @@ class LadderRun:
         self._window.clear()
         self._trace.clear()
 
-    def _zero(self, now_s: float) -> RunStep:
+    def _measure_zero(self, now_s: float) -> RunStep:
         """Rest force and noise, once the force of before has left: else its way down would count as both."""
         assert self._began_s is not None
         window, waited_s = self._window, now_s - self._began_s
@@ -170,7 +170,7 @@ class LadderRun:
         noise_n = sqrt(sum((b - a) ** 2 for a, b in pairwise(forces)) / (2.0 * (len(forces) - 1)))
         return self._drift_n() <= max(SMALLEST_DRIFT_N, SETTLED_SIGMA * noise_n * sqrt(4.0 / len(forces)))
 
-    def _finished(self, now_s: float, since_s: float) -> LadderRow | None:
+    def _row_if_settled(self, now_s: float, since_s: float) -> LadderRow | None:
         """The row of this stair once it has settled, or has had its time."""
         dwell_s, blind_s = now_s - since_s, self._blind_s()
         window = self._window
@@ -178,7 +178,7 @@ class LadderRun:
             window.popleft()
         if dwell_s < blind_s + WINDOW_S or len(window) < FEWEST_READINGS:
             return None if dwell_s < MOST_DWELL_S or not window else self._row(dwell_s, settled=False)
-        if self._drift_n() <= self._allowed_n():
+        if self._drift_n() <= self._drift_limit_n():
             return self._row(dwell_s, settled=True)
         return self._row(dwell_s, settled=False) if dwell_s >= MOST_DWELL_S else None
 
@@ -200,7 +200,7 @@ class LadderRun:
         half = len(forces) // 2
         return abs(sum(forces[-half:]) - sum(forces[:half])) / half
 
-    def _allowed_n(self) -> float:
+    def _drift_limit_n(self) -> float:
         """What the noise alone makes of the difference of two half windows."""
         return max(SMALLEST_DRIFT_N, SETTLED_SIGMA * self.noise_n * sqrt(4.0 / len(self._window)))
 
@@ -212,7 +212,7 @@ class LadderRun:
         self._dwelt_s += dwell_s
         return row
 
-    def _judge(self, row: LadderRow) -> None:
+    def _check_against_model(self, row: LadderRow) -> None:
         """Sign and scale of a rising stair of the check (A302, A303), or no answer at all (A301)."""
         if row.stair.phase is not CalibrationPhase.CHECK or row.stair.direction < 0:
             return
@@ -222,11 +222,11 @@ class LadderRun:
         if expected_n < LEAST_EXPECTED_N or LOWEST_SHARE * expected_n <= rise_n <= HIGHEST_SHARE * expected_n:
             return
         if rise_n <= -LOWEST_SHARE * expected_n:
-            self.found = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
+            self.stop_cause = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
         elif rise_n < SILENT_SHARE * expected_n:
-            self.found = StopCause(FaultCode.NONE, ladder_silent_sentence(volts, rise_n, expected_n))
+            self.stop_cause = StopCause(FaultCode.NONE, ladder_silent_sentence(volts, rise_n, expected_n))
         else:
-            self.found = StopCause(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
+            self.stop_cause = StopCause(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
 
     def _answer(self, row: LadderRow | None) -> RunStep:
         if self._stair_s is None or not self.stairs:

@@ -41,7 +41,7 @@ class ForceCeiling:
             self._recent_n.append(reading.contact_n)
             self._given_n = reading.contact_n - reading.cell_n
 
-    def settled(self, row: LadderRow) -> None:
+    def observe_row(self, row: LadderRow) -> None:
         """A stair that has ended."""
         if row.stair.direction < 0:
             self._last = self._before = None
