@@ -1,4 +1,4 @@
-"""A decision put into words and bits: what one step answers."""
+"""Put a decision into sentences, status bits and warning bits: what one step answers."""
 
 from dataclasses import dataclass, field
 from math import nan
@@ -33,7 +33,7 @@ class StepOutcome:
 
 @dataclass(frozen=True, slots=True)
 class ControllerStatus:
-    """Where the controller stands at the end of a step."""
+    """The state of the controller at the end of a step, for the output."""
 
     state: State
     fault: FaultCode
@@ -89,7 +89,7 @@ def warning_bits(word: int, loop: ForceLoop, restarted: bool, master_lost: bool)
 def output_of(
     command: Command, status: ControllerStatus, loop: ForceLoop, reading: Reading, outcome: StepOutcome
 ) -> Output:
-    """The frozen answer. The measured force is nan unless fresh and usable: a stale number with an age is still a lie
+    """Return the answer of a step. The measured force is nan unless fresh and usable: a stale number with an age is still a lie
     to most readers."""
     is_force = command.mode is Mode.FORCE or status.state is State.CALIBRATING
     believed = reading.is_fresh and reading.is_usable

@@ -1,4 +1,4 @@
-"""What a command asks for once the rig's defaults stand in for its zeros: computed once per command, not once per step.
+"""Complete a command with the rig's defaults where it says 0: computed once per command, not once per step.
 
 Gravity: tilt 0 means that the tool points down; then the whole payload presses, at 90 degrees none of it, at 180 all of
 it pulls back. The load cell sits between slide and payload, so it does not feel the payload's weight in the contact:
@@ -68,6 +68,6 @@ def _or_default(value: float, default: float, name: str) -> float:
 
 
 def ramp_down_demand(demand: Demand, settings: ControlSettings) -> Demand:
-    """The same on the way to 0 N, within STOP_S whatever the force is."""
+    """Return the same on the way to 0 N, within STOP_S whatever the force is."""
     rate_n_per_s = max(settings.defaults.force_ramp_n_per_s, settings.limits.force_max_n / STOP_S)
     return replace(demand, mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)

@@ -1,4 +1,4 @@
-"""Can this write be taken now? The one place that knows, asked by the bank inside the write, answered without any effect.
+"""Check whether a write can be taken now: asked by the bank inside the write, answered without any effect.
 
 What is answered with None here the controller does: its step has no refusal of its own. Edges in one write are decided in
 the order in which they act (stop, reset, tare, enable, start calibration), each for the state that the one before leaves.
@@ -25,7 +25,8 @@ _CALIBRATE, _TAKE = int(ControlBit.START_CALIBRATION), int(ControlBit.TAKE_OWNER
 _WHOLE: Final = ControlBit(0)
 
 BLOCKS: Final = {
-    RefusalReason.FAULT_LATCHED: "a fault is latched: see fault_code, then write force_setpoint 0 and reset_fault (bit 1)",
+    RefusalReason.FAULT_LATCHED: "a fault is latched: fix its cause (fault_code), then write force_setpoint 0 and "
+    "reset_fault (bit 1)",
     RefusalReason.NOT_READY: "not ready yet: wait for bit 1 (ready) of status_word; first words of a device, an overloaded "
     "cell, a force that stays at the safe voltage, or the end of the gateway",
     RefusalReason.OUTPUT_FAULT: "the output device does not answer as it should: power, cable, baud?",
@@ -53,7 +54,7 @@ class Situation:
 
 
 class EdgeCheck:
-    """Reads what it is given, changes nothing of it."""
+    """Answers for the controller; changes nothing of what it is given."""
 
     def __init__(self, commands: CommandTracker, conditioner: SampleConditioner, active_run: ActiveRun) -> None:
         self._commands = commands
@@ -61,14 +62,14 @@ class EdgeCheck:
         self._active_run = active_run
 
     def refusal(self, asked: ProposedWrite, at: Situation) -> EdgeRefusal | None:
-        """Why this write cannot be taken now; None takes it."""
+        """Return why this write cannot be taken now; None takes it."""
         edges = self._commands.edges_of(asked.command)
         if not edges.stops and (busy := self._busy(asked, edges, at)):
             return busy
         return next(self._refusals(asked.command, edges, at), None)
 
     def of_run(self, plan: AnyPlan, at: Situation) -> EdgeRefusal | None:
-        """Why a run cannot begin now, for whoever asks; None begins it."""
+        """Return why a run cannot begin now, for whoever asks; None begins it."""
         if at.state is State.CALIBRATING:
             return _no_run(RefusalReason.CALIBRATING, self._running())
         if self._active_run.is_busy:
@@ -141,7 +142,7 @@ class EdgeCheck:
 
     def _forbids_tare(self, command: Command, state: State, at: Situation) -> str:
         if state is State.FAULT:
-            return "a fault is latched: reset it first"
+            return "a fault is latched: fix its cause, then reset"
         if at.state in ENABLED_STATES and at.voltage_v > 0.0:
             return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
         if not at.reading.is_fresh:

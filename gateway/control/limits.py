@@ -1,5 +1,6 @@
-"""Every bound as a named function that tells whether it acted. `isfinite` comes before min and max: max(0, min(100,
-nan)) is 100.
+"""Bound forces and voltages: every bound is a named function that tells whether it acted.
+
+`isfinite` comes before min and max: max(0, min(100, nan)) is 100.
 
 Time-bounded movements (voltage slew, force ramp) claim time from a `RateBudget`: it earns what passes, holds at most one
 nominal tick when nothing moves, and so lets a new command act at the moment it arrives without letting calls in quick
@@ -37,8 +38,9 @@ def force_limited(target_n: float, limits: Limits) -> Limited:
 
 
 def narrow_limits(limits: Limits, own_n: tuple[float, float] | None) -> Limits:
-    """The rig's limits with the smaller of its largest force and a calibration's. The smallest force of a set bounds setpoints,
-    in the bank: here it would keep a tool from its pre-contact force."""
+    """Return the rig's limits with the smaller of its largest force and a calibration's.
+
+    The smallest force of a set bounds setpoints, in the bank: here it would keep a tool from its pre-contact force."""
     if own_n is None:
         return limits
     return replace(limits, force_max_n=min(limits.force_max_n, finite(own_n[1], "force_high_n")))

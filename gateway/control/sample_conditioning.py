@@ -1,5 +1,5 @@
-"""What a sample means at the time of a step: corrected for known defects of the cell, zeroed, gravity compensated, with its
-age and whether it can be used."""
+"""Condition the samples of the load cell: corrected for its known defects, zeroed, gravity compensated, with their age and
+whether they can be used."""
 
 from dataclasses import dataclass, replace
 from math import isfinite, nan

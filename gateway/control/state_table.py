@@ -1,4 +1,4 @@
-"""The control states as a table. A pair that is missing is a defect of ours and raises: no state is entered by accident.
+"""The control states as a table. A pair that is missing is an internal error and raises: no state is entered by accident.
 
 OFF: output disabled, safe voltage (after start, disable, reset, restart). READY: enabled with nothing to pursue:
 setpoint 0, or waiting at the pre-contact force for contact. RAMPING: the target moves or the force is out of band.
@@ -31,7 +31,7 @@ _CALIBRATING = State.CALIBRATING
 
 TRANSITIONS: Final[dict[tuple[State, StateEvent], State]] = {
     (_OFF, StateEvent.ENABLE): _READY,
-    (_OFF, StateEvent.FAILED): _FAULT,  # only a defect of ours fails while off
+    (_OFF, StateEvent.FAILED): _FAULT,  # only an internal error fails while off
     (_OFF, StateEvent.CALIBRATE): _CALIBRATING,
     (_READY, StateEvent.CALIBRATE): _CALIBRATING,
     (_READY, StateEvent.WAIT): _READY,
@@ -59,7 +59,7 @@ ENABLED_STATES: Final = frozenset({_READY, _RAMPING, _HOLDING, _CALIBRATING})
 
 
 class TransitionError(Exception):
-    """A pair that the table does not have: our own defect."""
+    """A pair that the table does not have: an internal error."""
 
 
 def next_state(state: State, event: StateEvent) -> State:

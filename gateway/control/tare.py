@@ -1,4 +1,4 @@
-"""The zero of the load cell: the mean of recent samples, taken when the tare bit is written.
+"""Tare: the zero of the load cell is the mean of recent samples, taken when the tare bit is written.
 
 Allowed only while nothing presses on purpose: output off, or enabled with setpoint 0; and only on a steady, usable
 signal, so that a force that is still decaying cannot become the zero. The payload's weight is added first: after a tare

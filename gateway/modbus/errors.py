@@ -1,7 +1,7 @@
 """The exception of an answer: one number on the wire, one sentence for people.
 
 Numbers are those of "MODBUS Application Protocol Specification V1.1b3", section 7. Anything else that escapes a bank is
-our own bug and is deliberately not turned into an exception answer here (it goes to the safe voltage instead).
+an internal error and is deliberately not turned into an exception answer here (it goes to the safe voltage instead).
 """
 
 from enum import Enum

@@ -2,8 +2,8 @@
 
 Plain functions and tuples on purpose: a frozen dataclass for each request costs more than the answer itself.
 parse_* check shape and quantity and raise RequestError(03): a truncated PDU, surplus bytes and a byte count that
-disagrees are all 03, and they are checked before any address is looked at. *_request raise ValueError: that is our own
-mistake, never the wire's.
+disagrees are all 03, and they are checked before any address is looked at. *_request raise ValueError: that is the
+caller's mistake, never the wire's.
 Source of layouts and limits: MODBUS Application Protocol V1.1b3, section 6.
 """
 

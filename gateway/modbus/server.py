@@ -4,7 +4,7 @@ Order (V1.1b3, section 7): function 01, shape and quantity 03, address 02, value
 judge, in that order; FC05 with a value other than 0x0000/0xFF00 is 03 only when the coil exists. FC23 checks both
 halves before it writes: the read half here by check_registers_readable, the write half by the bank, whose writes are
 all or nothing. What is refused here, before the bank has looked at it, the bank is told (note_refusal): it keeps the reasons.
-Only ModbusError becomes an answer; anything else a bank raises is our bug and reaches the caller.
+Only ModbusError becomes an answer; anything else a bank raises is an internal error and reaches the caller.
 """
 
 from collections.abc import Callable, Mapping, Sequence

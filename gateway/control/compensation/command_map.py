@@ -1,4 +1,4 @@
-"""The command map, straightened: what must be sent so that the regulator does what a straight one would.
+"""Straighten the command map: what must be sent so that a bent regulator does what a straight one would.
 
 A bent regulator acts as if it heard  u + bow 4 u (1 - u) + s 8 u (1 - u) (2 u - 1), u = v / full scale (the twin's
 command-nonlinearity). A model that was calibrated on a straight map keeps its volts; `sent_v` bends them on their way out.
@@ -79,7 +79,7 @@ class SentBsfm(Bsfm):
 
 
 def apply_command_map(model: Bsfm, command: CommandMap | None) -> Bsfm:
-    """The model with its volts as they are sent; the same object where the map is straight."""
+    """Return the model with its volts as they are sent; the same object where the map is straight."""
     if command is None:
         return model
     return SentBsfm(model.branches, model.reversal, model.limits_n, command)

@@ -1,4 +1,4 @@
-"""What control takes back of the defects that a diagnosis has found: known, small, and named one by one.
+"""Compensate the defects that a diagnosis has found: known, small, and named one by one.
 
 Four places, each a formula that is inverted exactly (the twin's terms of the same name are the forward direction):
 - the cell: a bent, warm or disturbed reading becomes the force that made it, before anything looks at it;

@@ -1,4 +1,4 @@
-"""The load cell's reading, taken back to the force that made it.
+"""Straighten the load cell's reading: back to the force that made it.
 
 The cell reads  (F + q F^2 + c F^3) (1 + span (T - T0)) + zero (T - T0) + crosstalk x command voltage + its constant zero:
 the terms of the twin's load cell, in their order. The constant zero stays in the result, for the tare takes it.

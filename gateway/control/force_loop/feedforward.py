@@ -1,4 +1,4 @@
-"""From the accepted force to the feedforward voltage: approach, ramp, direction, inverse model.
+"""Feed the accepted force forward to a voltage: approach, ramp, reversal, inverse model.
 
 Approach: without contact the tool waits at the pre-contact force; from contact the target rises over contact_ramp_s, or
 by the force ramp where that is slower. Lost contact takes the target back at once: a free tool must not shoot out with

@@ -1,4 +1,5 @@
-"""The regulator's two lags inverted: a step of the wish becomes a short push beyond it, so that the pressure arrives sooner.
+"""Invert the regulator's two lags: a step of the wanted voltage becomes a short push beyond it, so that the
+pressure arrives sooner.
 
 The lead carries a model of the lags, driven by the voltage that really stood on the output, and asks for the voltage
 that makes the model follow two shorter lags. Whatever the range, the slew limit or another mode made of the command is

@@ -1,4 +1,4 @@
-"""A value as it was a transport delay ago: what the force can have heard of it by now."""
+"""Delay a value by a transport delay: what the force can have heard of it by now."""
 
 from collections import deque
 

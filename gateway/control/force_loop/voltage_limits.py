@@ -1,4 +1,4 @@
-"""The last station before the wire: range, then slew, and what limited the voltage.
+"""Limit the voltage just before the wire: range, then slew, and which of them acted.
 
 The safe voltage is not a movement but a state: it is set at once in either direction.
 """

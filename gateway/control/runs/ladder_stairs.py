@@ -55,7 +55,7 @@ class PlannedStair:
 
 
 def stairs_of(plan: CalibrationPlan, limits: Limits, model: Bsfm) -> tuple[PlannedStair, ...]:
-    """The whole run. ValueError with a sentence for a plan that the rig does not allow."""
+    """Return the stairs of a whole run. ValueError with a sentence for a plan that the rig does not allow."""
     top_v = _top(plan.v_max_v, limits, model)
     _check(plan, top_v)
     ladder = ladder_plan(top_v, plan.step_v, plan.groups)
@@ -73,14 +73,15 @@ def stairs_of(plan: CalibrationPlan, limits: Limits, model: Bsfm) -> tuple[Plann
 
 
 def highest_voltage_v(limits: Limits, model: Bsfm) -> float:
-    """As far as limits and calibration go without nearing the over-force trip or force_max_n, to a hundredth of a volt."""
+    """Return how high limits and calibration let a run go, to a hundredth of a volt: not near the over-force trip or
+    force_max_n."""
     allowed_v = min(limits.voltage_max_v, model.voltage_range_v[1])
     force_v, _ = model.branches.rising.inverse(highest_force_n(limits))
     return int(100.0 * min(allowed_v, force_v) + 1.0e-6) / 100.0
 
 
 def highest_force_n(limits: Limits) -> float:
-    """The largest force that a run may plan."""
+    """Return the largest force that a run may plan, N."""
     return min(FORCE_MAX_SHARE * limits.force_max_n, OVER_FORCE_SHARE * limits.over_force_n)
 
 
@@ -121,7 +122,7 @@ def _check(plan: CalibrationPlan, top_v: float) -> None:
 
 
 def check_stairs(top_v: float, model: Bsfm) -> tuple[PlannedStair, ...]:
-    """The coarse cycle at the beginning of a run, up to top_v."""
+    """Return the coarse cycle at the beginning of a run, up to top_v."""
     first_v, _ = model.branches.rising.inverse(FIRST_STAIR_N + model.branches.rising.value(0.0))
     voltages = [min(first_v, 0.2 * top_v), *(share * top_v for share in CHECK_SHARES)]
     ways = [RISING if b > a else FALLING for a, b in zip([0.0, *voltages], voltages, strict=False)]

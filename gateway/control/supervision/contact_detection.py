@@ -1,4 +1,4 @@
-"""Does the tool touch? Threshold with hysteresis in force and in time: two samples make contact, 0.1 s below half the
+"""Detect contact: a threshold with hysteresis in force and in time: two samples make contact, 0.1 s below half the
 threshold ends it.
 
 The release waits because a fast unloading undershoots; the onset does not, because the force must not stay at the

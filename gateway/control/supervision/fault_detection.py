@@ -50,7 +50,9 @@ def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
         return stop_cause(FaultCode.LOOP_STALLED, f"{seen}: the machine is overloaded; {dropped}")
     waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"
     if line.waited_s < 0.5 * line.late_s:
-        return stop_cause(FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or a defect of ours; {dropped}")
+        return stop_cause(
+            FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or an internal error (please report); {dropped}"
+        )
     cure = "the machine is too busy: end other programs, or `run --realtime`"
     return stop_cause(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {cure}; {dropped}")
 

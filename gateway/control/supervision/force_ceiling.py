@@ -1,6 +1,6 @@
-"""A run stays below the rig's largest force, whatever the calibration in use expects: by what the load cell says.
+"""Keep a run below the rig's largest force by what the load cell says, whatever the calibration in use expects.
 
-Two looks. Before a higher stair: were the force to go on as it rose from the stair before to this one, in the shape of the
+Two checks. Before a higher stair: were the force to go on as it rose from the stair before to this one, in the shape of the
 calibration in use, it must not pass the ceiling. And at every sample of a rising stair, for what rises otherwise. The
 ceiling is force_max_n less what noise makes of single readings.
 """

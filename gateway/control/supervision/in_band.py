@@ -1,4 +1,4 @@
-"""In band, and never reaching it: two timers on the same comparison.
+"""Time how long the force has been in band, and how long it has not: two timers on the same comparison.
 
 In band means: target at its goal, contact, and the measured force within the tolerance, for the in-band time without a
 break. Without contact there is no band: a reading of 0.2 N in free air is not a held force. Target-unreachable means

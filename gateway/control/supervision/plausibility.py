@@ -1,4 +1,4 @@
-"""The measured force against the model: residual, sign and gain.
+"""Compare the measured force with the model: residual, sign and gain.
 
 There is no separate test move: the first rise in contact is the test. Expected is the model's force at the voltage
 after a first-order lag, above its force at rest. SIGN_INVERTED: the cell goes down where the model goes up, watched for

@@ -1,4 +1,4 @@
-"""Is the load cell still alive behind its readings? A cell that repeats one value, bit for bit, while its frames go on.
+"""Find a load cell that repeats one value, bit for bit, while its frames go on.
 
 Two ways to tell. While the force changes: since the value last changed, the rising branch (the least force a voltage can
 leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five quanta. That is

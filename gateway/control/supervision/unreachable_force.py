@@ -1,4 +1,4 @@
-"""Why a force is not reached, told apart as far as the witnesses go: no air, another unit of force, no contact.
+"""Tell why a force is not reached, as far as the measurements go: no air, another unit of force, no contact.
 
 The pressure that the output device measures decides, where it measures one: too little for the voltage is no air; enough,
 and no force, is no contact. What is enough has been seen while the force was right; before that it is read from the ranges of
