@@ -38,6 +38,7 @@ def product(a: Sequence[int], b: Sequence[int]) -> list[int]:
 
 
 def difference(a: Sequence[int], b: Sequence[int]) -> list[int]:
+    """Return a - b, both of one degree."""
     return [left - right for left, right in zip(a, b, strict=True)]
 
 

@@ -17,9 +17,9 @@ from gateway.control.compensation.compensation import NO_COMPENSATION, Compensat
 from gateway.control.decision import ControllerStatus, StepOutcome, output_of, safe_output, warning_bits
 from gateway.control.demand import Demand, ramp_down_demand
 from gateway.control.edge_checks import EdgeCheck, Situation
-from gateway.control.force_loop.force_loop import ForceLoop, LoopInputs, Moved
+from gateway.control.force_loop.force_loop import ForceLoop, Moved
 from gateway.control.force_loop.response_timing import timing_of
-from gateway.control.inputs import LineStatus, Output
+from gateway.control.inputs import LineStatus, LoopInputs, Output
 from gateway.control.messages import fault_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan

@@ -62,6 +62,7 @@ def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
 
 
 def status_bits(status: ControllerStatus, loop: ForceLoop) -> int:
+    """Return status_word: StatusBit as a plain integer."""
     enabled = status.state in ENABLED_STATES
     return (
         (_ENABLED if enabled else 0)

@@ -7,6 +7,7 @@ from typing import Final
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
+from gateway.control.sample_conditioning import Reading
 from gateway.control.silence import NOT_HELD, Held
 from gateway.registers.command import Command
 from gateway.registers.words import LimitedBy, State, StatusBit
@@ -46,6 +47,20 @@ class LineStatus:
     wire_s: float = nan
     cell_held: Held = NOT_HELD
     output_held: Held = NOT_HELD
+
+
+@dataclass(frozen=True, slots=True)
+class LoopInputs:
+    """What one step of the force loop knows. expected_n: the model's contact force at the lagged voltage; held_back: the
+    first rise looks wrong; outside_n: contact force that neither slide nor payload gives (compensation)."""
+
+    now_s: float
+    dt_s: float
+    reading: Reading
+    touching: bool
+    expected_n: float
+    held_back: bool = False
+    outside_n: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ class NotFiniteError(ValueError):
 
 
 def finite(value: float, name: str) -> float:
+    """Return the value. NotFiniteError with its name where it is NaN or infinite."""
     if not isfinite(value):
         raise NotFiniteError(f"{name} = {value}")
     return value

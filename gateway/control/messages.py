@@ -5,6 +5,7 @@ from gateway.control.supervision.unreachable_force import Evidence, unreachable_
 
 
 def fault_sentence(fault: FaultCode, detail: str) -> str:
+    """Return the detail with the code of its fault before it."""
     return f"{fault.code} {detail}"
 
 
@@ -25,6 +26,7 @@ def hunting_sentence(force_n: float, turns: int) -> str:
 
 
 def sign_sentence(rise_n: float, expected_n: float) -> str:
+    """Return A302 in numbers, and what to do."""
     return fault_sentence(
         FaultCode.SIGN_INVERTED,
         f"force went {rise_n:+.1f} N where {expected_n:+.1f} N were expected: swap the cell's signal wires or set sign: -1",
@@ -32,6 +34,7 @@ def sign_sentence(rise_n: float, expected_n: float) -> str:
 
 
 def gain_sentence(rise_n: float, expected_n: float) -> str:
+    """Return A303 in numbers, and what to do."""
     share = rise_n / expected_n
     return fault_sentence(
         FaultCode.GAIN_WRONG,
@@ -41,6 +44,7 @@ def gain_sentence(rise_n: float, expected_n: float) -> str:
 
 
 def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -> str:
+    """Return A301 of a calibration run: no force answers the voltage."""
     return (
         f"A301 calibration stopped: {voltage_v:.2f} V out, the force rose by {rise_n:.1f} N where {expected_n:.1f} N were "
         "expected: no air, valve closed or no contact"
@@ -48,6 +52,7 @@ def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -
 
 
 def stuck_sentence(measured_n: float, limit_n: float) -> str:
+    """Return W304: a force at the safe voltage."""
     return (
         f"W304 {measured_n:.1f} N measured at the safe voltage, allowed {limit_n:.1f} N: stuck in contact, valve open or zero "
         "moved; free the tool or tare"

@@ -62,6 +62,8 @@ class LeadSettings:
 
 
 class ResponseSource(StrEnum):
+    """Where control takes the timing of the rig from."""
+
     MEASURED = "measured"  # by the calibration in use, where it has measured it; else the numbers of this file
     RIG = "rig"  # the numbers of this file: trim.gain_v_per_n_s, lead, supervision.response_lag_s
 
@@ -80,6 +82,8 @@ class LoopTiming:
 
 
 class LeaseAction(StrEnum):
+    """What happens when the master is lost."""
+
     FAULT = "fault"  # safe voltage at once, latched
     HOLD = "hold"  # keep the last setpoint, raise a warning
     RAMP = "ramp"  # ramp to 0 N, then off
@@ -106,6 +110,8 @@ class Supervision:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlSettings:
+    """All that a rig file says about control, and the timing that a calibration has measured."""
+
     limits: Limits
     defaults: Defaults = Defaults()
     trim: Trim = Trim()

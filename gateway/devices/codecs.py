@@ -36,6 +36,7 @@ def output_host(profile: DeviceProfile) -> OutputHost:
 
 
 def output_device(profile: DeviceProfile) -> OutputDevice:
+    """Return the device's end of an output's line."""
     return _find(OUTPUT_CODECS, profile, Role.OUTPUT)[1](profile)
 
 

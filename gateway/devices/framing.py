@@ -33,6 +33,7 @@ class LineSplitter:
         return dropped
 
     def feed(self, chunk: bytes) -> list[Line]:
+        """Return the lines that these bytes complete; an unfinished one waits."""
         self._buffer += chunk
         lines = []
         while (line := self._next()) is not None:

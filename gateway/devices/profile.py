@@ -35,6 +35,8 @@ class Certainty(StrEnum):
 
 
 class Role(StrEnum):
+    """What a device is for."""
+
     OUTPUT = "output"
     LOAD_CELL = "load cell"
 

@@ -104,6 +104,7 @@ class Float32Model:
         return falling_n + (_HALF + _HALF * blend) * (rising_n - falling_n), status
 
     def branch_share(self, state: CommandState) -> Float32:
+        """Return s in [-1, 1] of the memory, as the C does."""
         if not self.radii:
             return state.memory[0]
         total = _ZERO

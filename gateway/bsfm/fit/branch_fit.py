@@ -88,10 +88,12 @@ def solve_robustly(
 
 
 def own_weight(ladder: Ladder) -> Floats:
+    """Return the weights of the ladder itself, 1 each where it has none: (N,)."""
     return np.ones(len(ladder)) if ladder.weight is None else ladder.weight
 
 
 def voltage_range(ladder: Ladder, settings: FitSettings) -> tuple[float, float]:
+    """Return the voltages of the curves, V. ValueError where they do not cover the ladder."""
     low, high = float(ladder.voltage_v.min()), float(ladder.voltage_v.max())
     x0_v, x1_v = settings.voltage_range_v or (low, high)
     if not (x0_v <= low and high <= x1_v and x0_v < x1_v):
@@ -126,6 +128,7 @@ def _samples(t: Floats, ladder: Ladder, weight: Floats, mask: NDArray[np.bool_],
 
 
 def branches_of(solution: Solution, x0_v: float, x1_v: float) -> Branches:
+    """Return the solution as two branches; a pooled model has the same curve twice."""
     curves = solution.curves(x0_v, x1_v)
     return Branches(curves[0], curves[-1])
 

@@ -62,12 +62,12 @@ def evaluate(checked: CheckedLadder, question: FitRequest) -> Evaluation:
     if not checked.closed:
         question = replace(question, ties=Ties.FREE)
         said.append("the loop's top is cut off: each branch gets its own ends")
-    orders = _possible(ladder, question.orders, said)
+    question = replace(question, orders=_possible(ladder, question.orders, said))
     settings = _settings(ladder, question)
-    scores = score_orders(ladder, question.models, orders, question.ties, settings)
+    scores = score_orders(ladder, question.models, question.orders, question.ties, settings)
     chosen = choose(scores)
     if _is_poor(chosen, scores):
-        chosen = _fit_constrained(ladder, orders, question, settings, chosen, said)
+        chosen = _fit_constrained(ladder, question, settings, chosen, said)
     reversal = choose_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)
     span_n = reversal.span.span_n if reversal else _assume_span(chosen, question, said)
     model = reversal.model if reversal else chosen.result.bsfm(span_n)
@@ -85,12 +85,12 @@ def _with_groups(ladder: Ladder) -> tuple[Ladder, list[str]]:
     return replace(ladder, group=np.arange(len(ladder)) % FOLDS), [said]
 
 
-def _possible(ladder: Ladder, orders: Sequence[int], said: list[str]) -> list[int]:
+def _possible(ladder: Ladder, orders: Sequence[int], said: list[str]) -> tuple[int, ...]:
     """Orders that the fewest stairs of one branch in any rest can carry with some to spare: the groups visit the same
     voltages, so leaving one out does not show what a curve does between the stairs."""
     rests = [ladder.part(ladder.group != group) for group in ladder.groups]
     stairs = min(len(np.unique(rest.voltage_v[rest.direction == way])) for rest in rests for way in (1, -1))
-    possible = [order for order in orders if 2 * order + 1 <= SPARING * stairs]
+    possible = tuple(order for order in orders if 2 * order + 1 <= SPARING * stairs)
     if not possible:
         raise LadderError(
             LadderFlaw.TOO_SHORT, f"{stairs} stairs on a branch carry no order of {', '.join(map(str, orders))}"
@@ -117,11 +117,11 @@ def _may_drive(score: Score) -> bool:
 
 
 def _fit_constrained(
-    ladder: Ladder, orders: Sequence[int], question: FitRequest, settings: FitSettings, free: Score, said: list[str]
+    ladder: Ladder, question: FitRequest, settings: FitSettings, free: Score, said: list[str]
 ) -> Score:
     """The best BSFM that is held to what may drive a plant, where it beats the best free optimum that may."""
     found = []
-    for order in orders[:3]:
+    for order in question.orders[:3]:
         try:
             found.append(fit_usable(ladder, ModelName.BSFM, order, question.ties, settings))
         except ValueError:

@@ -107,6 +107,7 @@ def pairs_of(rising: Floats, falling: Floats) -> Floats:
 
 
 def lowest(lanes: FitLanes, count: int) -> FitLanes:
+    """Return the lanes with the smallest costs, the best first."""
     return lanes.pick(np.argsort(lanes.cost, kind="stable")[:count])
 
 

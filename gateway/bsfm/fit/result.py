@@ -156,6 +156,7 @@ class FitResult:
 
 
 def verdicts_of(branches: Branches, slope_floor_n_per_v: float) -> Verdicts:
+    """Return what the exact tests say of two branches."""
     rising, falling = branches.rising, branches.falling
     steep = all(curve.slope_is_at_least(slope_floor_n_per_v) for curve in (rising, falling))
     return Verdicts(

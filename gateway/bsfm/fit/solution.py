@@ -26,6 +26,7 @@ class Solution:
         return np.concatenate([at.theta.reshape(-1, self.form.order) for at in self.lanes])
 
     def curves(self, x0_v: float, x1_v: float) -> list[RationalBezier]:
+        """Return one curve per direction, or the only one, over x0_v .. x1_v."""
         found = []
         for problem, at in zip(self.problems, self.lanes, strict=True):
             for columns, weights in zip(problem.columns, problem.weights(at.theta)[0], strict=True):

@@ -14,6 +14,7 @@ CONDITION_MAX = 1.0e10  # of the scaled normal matrix, whose inverse is wanted
 
 
 def residuals_of(residual_n: Floats) -> Residuals:
+    """Return RMS, largest, mean and count of errors in N, (N,)."""
     if not len(residual_n):
         return Residuals(0.0, 0.0, 0.0, 0)
     rms_n = float(np.sqrt(np.mean(residual_n * residual_n)))

@@ -96,6 +96,7 @@ class SlipProblem:
         return self.best_shares(self.system(branches))
 
     def best_shares(self, system: System) -> Floats:
+        """Return the best c of a system, (shares,): non-negative least squares."""
         rows = np.column_stack([self.weight[:, None] * system.matrix, np.zeros(len(system.matrix))])
         bound = np.concatenate([rows, self.heavy_rows(system)])
         found, _ = nnls(bound, np.append(self.weight * system.wanted, [HEAVY, HEAVY]))

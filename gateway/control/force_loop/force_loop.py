@@ -9,7 +9,6 @@ thrust on its way, which is counted as come.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf
 from typing import Final, TypeAlias
 
@@ -24,9 +23,8 @@ from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.transport_delay import TransportDelay
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.control.force_loop.voltage_limits import VoltageLimiter, strongest
-from gateway.control.inputs import LineStatus
+from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.limits import TICK_S, NotFiniteError
-from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause
@@ -40,20 +38,6 @@ QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
-
-
-@dataclass(frozen=True, slots=True)
-class LoopInputs:
-    """What one step knows. expected_n: the model's contact force at the lagged voltage; held_back: the first rise looks
-    wrong; outside_n: contact force that neither slide nor payload gives (compensation)."""
-
-    now_s: float
-    dt_s: float
-    reading: Reading
-    touching: bool
-    expected_n: float
-    held_back: bool = False
-    outside_n: float = 0.0
 
 
 class ForceLoop:

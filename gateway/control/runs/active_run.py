@@ -89,6 +89,7 @@ class ActiveRun:
         return asked
 
     def begin(self, plan: AnyPlan, *, is_local: bool) -> None:
+        """Begin the run of this plan. ValueError for a plan that the rig does not allow."""
         self.run = self.build(plan)
         self.is_local, self._stop_asked = is_local, ""
         self.phase, self.progress, self.last_row = CalibrationPhase.ZERO, 0.0, None

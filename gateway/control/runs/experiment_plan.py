@@ -50,6 +50,7 @@ class Move:
 
     @property
     def duration_s(self) -> float:
+        """Seconds of the move."""
         over_s, hold_s = self.over_s or 0.0, self.hold_s or 0.0
         if self.do is MoveKind.LADDER:
             return (self.stairs or 0) * hold_s

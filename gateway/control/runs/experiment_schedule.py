@@ -136,6 +136,7 @@ class Schedule:
         return min(bisect_right(self._starts_s, elapsed_s) - 1, len(self.segments) - 1)
 
     def voltage_v(self, elapsed_s: float) -> float:
+        """Return the voltage, V, so long after the start."""
         k = self.index(elapsed_s)
         segment, since_s = self.segments[k], elapsed_s - self._starts_s[k]
         if since_s >= segment.over_s:

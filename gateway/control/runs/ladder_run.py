@@ -96,6 +96,7 @@ class LadderRun:
 
     @property
     def eta_s(self) -> float:
+        """Seconds that are left, by the stairs so far."""
         dwell_s = self._dwelt_s / self.done if self.done else GUESSED_DWELL_S
         rest_s = 0.0 if self._stair_s is not None else ZERO_S
         return rest_s + dwell_s * (len(self.stairs) - self.done)

@@ -6,9 +6,9 @@ Each `..._event` answers with its sentence the first time, and with nothing as l
 from math import isfinite, nan
 from typing import Final
 
-from gateway.control.force_loop.force_loop import ForceLoop, LoopInputs
+from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.force_loop.measured_trim import MOST_TURNS
-from gateway.control.inputs import LineStatus
+from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.messages import hunting_sentence, stuck_sentence, unreachable_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.unreachable_force import Evidence

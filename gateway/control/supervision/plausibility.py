@@ -38,6 +38,7 @@ class ExpectedForce:
         self._lag_s = lag_s
 
     def use(self, model: Bsfm) -> None:
+        """Expect by another model from now on; the lagged voltage stays."""
         self._model = model
         self._rest_n = model.force_n(self._rest_v, 1.0)
         self._evaluate()
