@@ -22,7 +22,7 @@ from gateway.bsfm.fit.solution import Solution, explore_starts, refine_solution
 from gateway.bsfm.fit.statistics import covariance_of, paper_norm, residuals_of
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 
-HUBER_ROUNDS = 8
+HUBER_ROUNDS = 8  # of reweighting, each from the solution before
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,15 +23,19 @@ from gateway.control.settings import ControlSettings
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.registers.words import CalibrationPhase
 
-ZERO_S: Final = 0.6
-WINDOW_S: Final = 0.2
-FEWEST_READINGS: Final = 6
-MOST_DWELL_S: Final = 3.5
-GUESSED_DWELL_S: Final = 0.65
-SETTLED_SIGMA: Final = 2.0
-SMALLEST_DRIFT_N: Final = 0.03
-LEAST_EXPECTED_N: Final = 3.0
-LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = 0.3, 3.0, 0.1
+ZERO_S: Final = 0.6  # for rest force and noise: 60 readings of a 100 Hz cell know sigma to 9 % (1 / sqrt(2 (n - 1)))
+WINDOW_S: Final = 0.2  # whose two halves are compared
+FEWEST_READINGS: Final = 6  # in a window: three in each half
+MOST_DWELL_S: Final = 3.5  # then a stair is left, settled or not
+GUESSED_DWELL_S: Final = 0.65  # for the time left, until a stair has been timed
+SETTLED_SIGMA: Final = 2.0  # of the difference between the means of the halves: noise alone exceeds it once in twenty
+SMALLEST_DRIFT_N: Final = 0.03  # less is no drift, however quiet the cell: a third of a usual count (0.1 N)
+LEAST_EXPECTED_N: Final = 3.0  # smaller stairs of the check are not judged: friction may hold as much
+LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = (
+    0.3,
+    3.0,
+    0.1,
+)  # of the expected rise: the first two as in supervision.plausibility
 
 
 class LadderRow(NamedTuple):

@@ -9,9 +9,9 @@ from typing import Final
 
 from gateway.control.sample_conditioning import Reading
 
-_SAMPLES_TO_TOUCH: Final = 2
-_RELEASE_S: Final = 0.1
-_RELEASE_SHARE: Final = 0.5
+_SAMPLES_TO_TOUCH: Final = 2  # one alone may be a spike
+_RELEASE_S: Final = 0.1  # longer than the undershoot of a fast unloading
+_RELEASE_SHARE: Final = 0.5  # of the threshold: the hysteresis
 
 
 class ContactDetector:

@@ -18,7 +18,7 @@ from gateway.control.silence import cause_of_silence
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 
-_STUCK_S: Final = 1.0
+_STUCK_S: Final = 1.0  # that a force must stay at the safe voltage, not only decay
 _FAR_OFF: Final = 3.0  # measured over expected force that points at the cell rather than at the process
 
 

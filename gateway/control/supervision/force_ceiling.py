@@ -13,9 +13,9 @@ from gateway.bsfm.ladder.plan import RISING
 from gateway.control.runs.ladder_run import LadderRow
 from gateway.control.sample_conditioning import Reading
 
-_SAMPLES: Final = 3
-_LEAST_MARGIN_N: Final = 0.4
-_SIGMAS: Final = 3.0
+_SAMPLES: Final = 3  # whose mean is compared, as over-force takes three
+_LEAST_MARGIN_N: Final = 0.4  # below force_max_n: a few counts of a usual amplifier (0.1 N)
+_SIGMAS: Final = 3.0  # of the noise of single readings, where that is more
 
 
 class ForceCeiling:

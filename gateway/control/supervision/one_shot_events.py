@@ -14,7 +14,7 @@ from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.unreachable_force import Evidence
 
 _LEARNING: Final = 0.02  # of each new ratio of pressure to voltage
-_LEAST_V: Final = 0.2
+_LEAST_V: Final = 0.2  # below it the ratio is offset and noise
 
 
 class OneShotEvents:

@@ -15,13 +15,13 @@ from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.sample_conditioning import Reading
 
-_SMOOTHING_S: Final = 0.05
+_SMOOTHING_S: Final = 0.05  # of the measured rise: five readings of a 100 Hz cell
 _LASTING_S: Final = 0.3  # a violation must last this long: impacts and lag do not
 _LEAST_RISE_N: Final = 1.0  # below it noise decides
 _PROVING_RISE_N: Final = 5.0  # a rise of this size with the right gain ends the gain check
-_LOWEST_SHARE: Final = 0.3
-_HIGHEST_SHARE: Final = 3.0
-_SLACK_N: Final = 1.0
+_LOWEST_SHARE: Final = 0.3  # of the expected rise: kgf read as N is a tenth
+_HIGHEST_SHARE: Final = 3.0  # of it: N read as kgf is ten times
+_SLACK_N: Final = 1.0  # beside what friction explains: zero and noise
 
 
 class ExpectedForce:
