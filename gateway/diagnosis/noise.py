@@ -90,7 +90,7 @@ def timing_weights(bench: Bench, simulated_n: Floats, late_s: float, noise_n: fl
 
 
 def fast_noise_n(values: Floats) -> float:
-    """Return standard deviation of white noise from second differences, robust; never 0."""
+    """Return the standard deviation of white noise from second differences, robust; never 0."""
     if values.size < 8:
         return max(float(np.std(values)) if values.size else 0.0, 1.0e-9)
     spread = float(np.median(np.abs(np.diff(values, n=2)))) * 1.4826 / np.sqrt(6.0)
@@ -187,7 +187,7 @@ class Spectrum:
         return self.with_gradient(lines)[0]
 
     def with_gradient(self, lines: Floats) -> tuple[Floats, Floats]:
-        """Return level at each line, and its derivative by the logarithm of each number, (numbers, lines)."""
+        """Return the level at each line, and its derivative by the logarithm of each number, (numbers, lines)."""
         value = np.full(lines.shape, float(self.numbers[0]))
         gradient = [np.full(lines.shape, float(self.numbers[0]))]
         for level, width, centre in self.numbers[1:].reshape(-1, 3):

@@ -12,7 +12,7 @@ _LEAST_SHARE: Final = 0.2  # of the rows
 
 
 def replicate_floor_n(measurement: Measurement) -> float | None:
-    """Return standard deviation of one reading from replicates, N; None where the command does not repeat itself.
+    """Return the standard deviation of one reading from replicates, N; None where the command does not repeat itself.
 
     Slow changes between the cycles (drift, temperature) count as floor only as far as they are common to no model: the
     differences of replicates are taken about their median.

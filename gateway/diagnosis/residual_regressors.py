@@ -35,7 +35,7 @@ class Regressors:
 
 
 def list_regressors(bench: Bench, residual_n: Floats, white: Floats) -> Iterator[Regressors]:
-    """Yield all of them, for the raw and the whitened residual of the present model."""
+    """Yield all regressors, for the raw and the whitened residual of the present model."""
     simulated = bench.measured_n - residual_n
     force = standardise(simulated, bench)
     yield from _column_regressors(bench, force)
@@ -46,7 +46,7 @@ def list_regressors(bench: Bench, residual_n: Floats, white: Floats) -> Iterator
 
 
 def standardise(column: Floats, bench: Bench) -> Floats:
-    """Return mean 0 and spread 1 over the judged force rows, zero elsewhere."""
+    """Return the column with mean 0 and spread 1 over the judged force rows, zero elsewhere."""
     rows = bench.judged & np.isfinite(column)
     if not rows.any():
         return np.zeros(bench.rows)

@@ -40,7 +40,7 @@ def settle(twin: Twin, dwell: Dwell) -> None:
 
 
 def staircase(twin: Twin, voltages_v: Iterable[float], dwell: Dwell) -> Floats:
-    """Return measured force at the end of each stair, N; shape (stairs,), or (stairs, lanes)."""
+    """Return the measured force at the end of each stair, N; shape (stairs,), or (stairs, lanes)."""
     measured = []
     for voltage_v in voltages_v:
         twin.command(float(voltage_v))
@@ -63,7 +63,7 @@ def trace(twin: Twin, duration_s: float, look: Callable[[Twin], Any], every_s: f
 
 
 def step_response(twin: Twin, voltage_v: float, duration_s: float = 1.5) -> Floats:
-    """Return true contact force every millisecond after a step of the command, N."""
+    """Return the true contact force every millisecond after a step of the command, N."""
     twin.command(voltage_v)
     return trace(twin, duration_s, lambda running: running.force_n)
 

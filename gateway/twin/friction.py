@@ -89,7 +89,7 @@ def rest_stiction(stiction_n: Real, full_n: Real, share: Real) -> Real:
 
 
 def relieve_stiction(stiction_n: Real, travel_m: Real, breakaway_m: Real) -> Real:
-    """Return what motion leaves of it."""
+    """Return what motion leaves of the stiction."""
     return stiction_n * exponential(-abs(travel_m) / breakaway_m)
 
 

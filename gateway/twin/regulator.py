@@ -18,7 +18,7 @@ from gateway.twin.sections import UNLIMITED, Regulator
 
 
 def lag_factor(lag_s: Real, step_s: float) -> Real:
-    """Return share of the remaining difference that a first-order lag covers in one step; 1 without a lag."""
+    """Return the share of the remaining difference that a first-order lag covers in one step; 1 without a lag."""
     present = larger(lag_s, 1.0e-12)
     return where(lag_s > 0.0, 1.0 - exponential(-step_s / present), lag_s * 0.0 + 1.0)
 
@@ -34,7 +34,7 @@ def half_decay(decay: Real) -> Real:
 
 
 def target_pa(regulator: Regulator, voltage_v: Real, bends: bool = False) -> Real:
-    """Return pressure that a command asks for, in the command's own steps. bends: is its map other than straight?"""
+    """Return the pressure that a command asks for, in the command's own steps. bends: is its map other than straight?"""
     stepped_v = quantise(clip(voltage_v, 0.0, regulator.full_scale_v), regulator.command_step_v)
     if bends:
         stepped_v = bend_command(regulator, stepped_v)
@@ -117,7 +117,7 @@ class RegulatorState:
             self._kept = choose(self._noticed_pa != before, half_decay(self._decay), self._kept)
 
     def step(self) -> Real:
-        """Return pressure at the end of one step, Pa."""
+        """Return the pressure at the end of one step, Pa."""
         pressure = self._target_pa if not self._extra else self._held_pa()
         if self._delay is not None:
             pressure = self._delay.put(pressure)

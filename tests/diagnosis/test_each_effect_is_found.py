@@ -36,7 +36,7 @@ def cause_of(found: Diagnosis, name: str) -> Cause:
     return causes[0]
 
 
-def check_sizes(example: Hidden, cause: Cause) -> None:
+def assert_sizes(example: Hidden, cause: Cause) -> None:
     """Only where the name is right do its parameters mean the same."""
     for name, value in example.expected.items():
         estimate = cause.parameters[name]
@@ -44,7 +44,7 @@ def check_sizes(example: Hidden, cause: Cause) -> None:
         assert estimate.ci95[0] <= estimate.value <= estimate.ci95[1]
 
 
-def check_found(example: Hidden) -> None:
+def assert_found(example: Hidden) -> None:
     name = example.name
     found = diagnosed(example, hidden=True)
     cause = cause_of(found, name)
@@ -52,14 +52,14 @@ def check_found(example: Hidden) -> None:
     assert cause.name in cause.group
     assert 0.0 <= cause.confidence <= 1.0
     if cause.name == name:
-        check_sizes(example, cause)
+        assert_sizes(example, cause)
     if example.changes:
         assert found.baseline.rms_n > 1.5 * NOISE_N
         assert found.extended.held_out_rms_n < 0.75 * found.baseline.rms_n
         assert cause.gain.ci95[0] > 0.0
 
 
-def check_nothing(name: str) -> None:
+def assert_nothing_found(name: str) -> None:
     found = diagnosed(BY_NAME[name], hidden=False)
     assert found.causes == ()
     assert found.verdict == Verdict.NOTHING_FOUND, found.leftover
@@ -69,32 +69,32 @@ def check_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", GATE)
 def test_an_effect_is_named_with_its_size(name: str) -> None:
-    check_found(BY_NAME[name])
+    assert_found(BY_NAME[name])
 
 
 @pytest.mark.parametrize("name", GATE_WITHOUT)
 def test_without_the_effect_nothing_is_found(name: str) -> None:
-    check_nothing(name)
+    assert_nothing_found(name)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in ALL if name not in GATE])
 def test_every_other_effect_is_named_with_its_size(name: str) -> None:
-    check_found(BY_NAME[name])
+    assert_found(BY_NAME[name])
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in ALL if name not in GATE_WITHOUT])
 def test_without_any_other_effect_nothing_is_found(name: str) -> None:
-    check_nothing(name)
+    assert_nothing_found(name)
 
 
 @pytest.mark.parametrize("example", OTHER_FORMS[:1], ids=lambda each: each.name)
 def test_an_effect_is_named_in_another_form(example: Hidden) -> None:
-    check_found(example)
+    assert_found(example)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("example", OTHER_FORMS[1:], ids=lambda each: each.name)
 def test_every_other_form_is_named(example: Hidden) -> None:
-    check_found(example)
+    assert_found(example)

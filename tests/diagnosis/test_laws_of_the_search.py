@@ -151,7 +151,7 @@ def sizes(found: Diagnosis) -> Mapping[str, float]:
     return {name: each.value for cause in found.causes for name, each in cause.parameters.items()}
 
 
-def check_same(one: Diagnosis, other: Diagnosis) -> None:
+def assert_same(one: Diagnosis, other: Diagnosis) -> None:
     assert told(one) == told(other) and told(one) != []
     assert one.verdict == other.verdict
     assert sizes(other) == pytest.approx(sizes(one), rel=0.01)
@@ -179,14 +179,14 @@ def test_what_every_machine_has_is_no_finding_and_no_noise() -> None:
 
 @pytest.mark.parametrize("constant_n", [-30.0, 500.0])
 def test_a_constant_added_to_the_force_changes_nothing(plain: Diagnosis, constant_n: float) -> None:
-    check_same(plain, diagnose([short(constant_n)]))
+    assert_same(plain, diagnose([short(constant_n)]))
 
 
 def test_the_order_of_covariates_changes_nothing() -> None:
     one = short(columns=("temperature_c", "supply_kpa", "feed_mm_s"))
     turned = dict(reversed(list(one.covariates.items())))
     assert list(turned) != list(one.covariates)
-    check_same(diagnose([one]), diagnose([replace(one, covariates=turned)]))
+    assert_same(diagnose([one]), diagnose([replace(one, covariates=turned)]))
 
 
 def test_a_shift_in_time_changes_nothing() -> None:
@@ -197,7 +197,7 @@ def test_a_shift_in_time_changes_nothing() -> None:
     shifted = {**table, "time_s": one.time_s + 86400.0}
     first, second = (measurement_of(Recording(Path("x.csv"), {}, each, one.rows, False)) for each in (table, shifted))
     np.testing.assert_allclose(second.time_s, first.time_s, atol=1e-9)
-    check_same(diagnose([first]), diagnose([second]))
+    assert_same(diagnose([first]), diagnose([second]))
 
 
 def test_recordings_with_their_own_offsets_share_one_model(plain: Diagnosis) -> None:

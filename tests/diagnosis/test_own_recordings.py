@@ -36,7 +36,7 @@ def answer(sources: Sources) -> Diagnosis:
     return diagnose(sources.measurements, sources.plant.plant, options)
 
 
-def check_nothing_is_named(found: Diagnosis) -> None:
+def assert_nothing_is_named(found: Diagnosis) -> None:
     assert found.causes == (), [(cause.name, cause.gain) for cause in found.causes]
     assert found.suspects == ()
     assert found.verdict is Verdict.NOTHING_FOUND, found.leftover
@@ -46,7 +46,7 @@ def check_nothing_is_named(found: Diagnosis) -> None:
 @pytest.mark.parametrize("kind", ["from a hold", "taps"])
 def test_a_recording_that_begins_in_the_middle_of_work_gives_no_name(tmp_path: Path, kind: str) -> None:
     """Before, they gave `warm-up or presliding` and `regulator-hysteresis`."""
-    check_nothing_is_named(answer(read(kind, 1, tmp_path, 20.0)))
+    assert_nothing_is_named(answer(read(kind, 1, tmp_path, 20.0)))
 
 
 @pytest.mark.parametrize("kind", ["from wiggles", "from a fall", "sine"])
@@ -62,7 +62,7 @@ def test_what_was_sent_and_the_start_leave_the_cell_s_noise_only(tmp_path: Path,
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_kind_of_clean_recording_gives_a_name(tmp_path: Path, kind: str, seed: int) -> None:
-    check_nothing_is_named(answer(read(kind, seed, tmp_path, 70.0)))
+    assert_nothing_is_named(answer(read(kind, seed, tmp_path, 70.0)))
 
 
 class Ring:

@@ -193,7 +193,7 @@ IN_THE_GATE = (
 )
 
 
-def check_answer(tmp_path: Path, table: Columns) -> None:
+def assert_answered(tmp_path: Path, table: Columns) -> None:
     code, output, document = answered(tmp_path, table)
     assert code == 0, output
     assert document["verdict"] in ("nothing-found", "confirmed", "partial", "unknown")
@@ -203,13 +203,13 @@ def check_answer(tmp_path: Path, table: Columns) -> None:
 
 @pytest.mark.parametrize("what", IN_THE_GATE)
 def test_a_strange_table_gets_an_answer(tmp_path: Path, what: str) -> None:
-    check_answer(tmp_path, ANSWERED[what])
+    assert_answered(tmp_path, ANSWERED[what])
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("what", [what for what in ANSWERED if what not in IN_THE_GATE])
 def test_any_other_strange_table_gets_an_answer(tmp_path: Path, what: str) -> None:
-    check_answer(tmp_path, ANSWERED[what])
+    assert_answered(tmp_path, ANSWERED[what])
 
 
 def test_a_plain_machine_without_a_rig_has_no_cause(tmp_path: Path) -> None:

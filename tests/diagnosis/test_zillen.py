@@ -42,7 +42,7 @@ def names_of(found: Diagnosis) -> list[str]:
     return [cause.name for cause in found.causes]
 
 
-def check_friction(found: Diagnosis, most_n: float) -> None:
+def assert_friction_found(found: Diagnosis, most_n: float) -> None:
     """Strongest of all, and worth so much on blocks that the fit did not see."""
     assert found.causes, found.leftover
     strongest = found.causes[0]
@@ -62,13 +62,13 @@ def test_the_tables_are_read_as_their_readme_says() -> None:
 
 def test_hidden_friction_of_the_lip_seal_is_found() -> None:
     found = diagnosed(("PK_1bar",))
-    check_friction(found, 0.27)
+    assert_friction_found(found, 0.27)
     assert 0.75 < found.baseline.rms_n < 1.1
 
 
 def test_hidden_friction_of_the_o_ring_is_found() -> None:
     found = diagnosed(("O-ring257_1bar",))
-    check_friction(found, 0.65)
+    assert_friction_found(found, 0.65)
     assert 1.45 < found.baseline.rms_n < 1.75
 
 
@@ -76,7 +76,7 @@ def test_hidden_friction_of_the_o_ring_is_found() -> None:
 @pytest.mark.parametrize("name", ["PK_3bar", "O-ring257_3bar"])
 def test_friction_at_three_bar_is_the_strongest_cause(name: str) -> None:
     found = diagnosed((name,))
-    check_friction(found, 0.65 * found.baseline.rms_n)
+    assert_friction_found(found, 0.65 * found.baseline.rms_n)
 
 
 def _both(without: str | None) -> Diagnosis:
@@ -86,7 +86,7 @@ def _both(without: str | None) -> Diagnosis:
 @pytest.mark.long
 def test_two_pressures_under_one_model_need_friction() -> None:
     found = _both(HIDDEN)
-    check_friction(found, 0.66)
+    assert_friction_found(found, 0.66)
     assert len(found.traces) == 2
 
 

@@ -113,7 +113,7 @@ class Bench:
         return replace(self, taken_out=(*self.taken_out, *columns))
 
     def slope_n_per_s(self, simulated_n: Floats) -> Floats:
-        """Return rate of the simulated force, per channel."""
+        """Return the rate of the simulated force, per channel."""
         slope = np.zeros(self.rows)
         seconds = self.time_s()
         for channel in self.channels:
@@ -121,7 +121,7 @@ class Bench:
         return slope
 
     def rms_n(self, residual_n: Floats) -> float:
-        """Return root mean square over the force rows that count."""
+        """Return the root mean square over the force rows that count."""
         return float(np.sqrt(np.mean(residual_n[self.judged] ** 2)))
 
     def covariate(self, name: str) -> Floats:

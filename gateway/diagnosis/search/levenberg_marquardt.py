@@ -73,7 +73,7 @@ def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten, waves: 
 
 
 def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten) -> list[FittedModel]:
-    """Return residual and derivatives of each problem where it stands; one wave."""
+    """Return the residual and derivatives of each problem where it stands; one wave."""
     if not problems:
         return []
     parameter_sets: list[ModelParameters] = []

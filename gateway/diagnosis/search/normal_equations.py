@@ -43,7 +43,7 @@ class NormalEquations:
         return np.asarray(self.columns @ self.columns.T)
 
     def add(self, indices: list[int]) -> ColumnGain:
-        """Return gain and sizes when these columns join the model; nothing where they are part of it already."""
+        """Return the gain and sizes when these columns join the model; nothing where they are part of it already."""
         if min(self.power[index] / max(self.raw_power[index], 1.0e-300) for index in indices) < _SAME_COLUMN:
             return ColumnGain(0.0, np.zeros(len(indices)))
         scale = np.sqrt(self.power[indices])
@@ -62,7 +62,7 @@ def orthonormal(rows: Floats) -> Floats:
 
 
 def block_sums(bench: Bench, values: Floats, rows: Floats | None = None) -> Floats:
-    """Return sum of values (rows,) in each block; `rows` restricts it."""
+    """Return the sum of values (rows,) in each block; `rows` restricts it."""
     chosen = slice(None) if rows is None else rows
     blocks = int(bench.block_of_row.max()) + 1
     sums: Floats = np.bincount(bench.block_of_row[chosen], weights=values[chosen], minlength=blocks).astype(np.float64)
@@ -120,7 +120,7 @@ def held_out_errors(bench: Bench, fitted: FittedModel, whiten: Whiten) -> HeldOu
 
 
 def covariance(fitted: FittedModel, whiten: Whiten) -> Floats:
-    """Return covariance of offsets and free parameters, from the whitened derivatives; (size, size)."""
+    """Return the covariance of offsets and free parameters, from the whitened derivatives; (size, size)."""
     columns = whiten(fitted.jacobian)
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
     normal_matrix = (columns @ columns.T) / np.outer(scale, scale)

@@ -54,7 +54,7 @@ def lose_sign(cell: LoadCell, reading_n: Real) -> Real:
 
 
 def convert_reading(cell: LoadCell, reading_n: Real) -> Real:
-    """Return the converter: range and steps (sensor-quantisation)."""
+    """Return what the converter makes of a reading: range and steps (sensor-quantisation)."""
     return clip(quantise(clip(reading_n, -cell.range_n, cell.range_n), cell.quantum_n), -cell.range_n, cell.range_n)
 
 

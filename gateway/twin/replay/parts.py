@@ -64,10 +64,10 @@ def _beside(series: Floats, parts: int, length: int) -> Floats:
 
 
 def stack_lanes(series: list[Floats]) -> Floats:
-    """Return lanes of one series each, (steps, lanes)."""
+    """Return lanes side by side, of one series each, (steps, lanes)."""
     return np.ascontiguousarray(np.stack(series).T)
 
 
 def split_lanes(series: Floats) -> list[Floats]:
-    """Return the contrary: one contiguous series per lane."""
+    """Return one contiguous series per lane: the contrary of stack_lanes."""
     return [np.ascontiguousarray(lane) for lane in series.T]
