@@ -54,7 +54,7 @@ def test_the_bounds_of_the_hazards_page_are_the_defaults() -> None:
     rows = re.findall(r"^\| `(\w+)` \| ([\w.]+) \|", HAZARDS.read_text(encoding="utf-8"), flags=re.M)
     defaults = {field.name: field.default for field in fields(Supervision)}
     assert len(rows) >= 8
-    assert {name: value for name, value in rows} == {name: str(defaults[name]).lower() for name, _ in rows}
+    assert dict(rows) == {name: str(defaults[name]).lower() for name, _ in rows}
 
 
 def test_every_room_is_on_the_page_of_the_rooms() -> None:

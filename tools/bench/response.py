@@ -5,12 +5,11 @@
     .venv/bin/python tools/bench/response.py --seeds 20
     .venv/bin/python tools/bench/response.py --write        # calibrate anew, and keep that for the tests
 
-Machines are drawn from a seed (tests/control/foreign/machine.py: dead time 20-150 ms, lags 30-300 ms, one or two,
-LuGre friction of
-0.5-4 N, noise). Each is calibrated by the product's quick ladder, in virtual time, starting with the demo's calibration; then
-the same course with the numbers of the demo rig's file (`fixed`) and with what was measured, trim on and off. "settled" is the
-median time until the force stays within 0.5 N; "of bound" the median of that over what the plant's physics allows
-(tests/control/foreign/course.py says which bound). Never run on hardware.
+Machines are drawn from a seed (tests/control/foreign/machine.py: dead time 20-150 ms, lags 30-300 ms, one or two, LuGre
+friction of 0.5-4 N, noise). Each is calibrated by the product's quick ladder, in virtual time, starting with the demo's
+calibration; then the same course with the numbers of the demo rig's file (`fixed`) and with what was measured, trim on and
+off. "settled" is the median time until the force stays within 0.5 N; "of bound" the median of that over what the plant's
+physics allows (tests/control/foreign/course.py says which bound). Never run on hardware.
 """
 
 import argparse
