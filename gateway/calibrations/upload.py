@@ -46,6 +46,7 @@ class UploadRules:
 
     @classmethod
     def of(cls, rig_name: str, register_map: RegisterMap, today: Callable[[], str]) -> "UploadRules":
+        """Return the rules of a rig whose map has these addresses."""
         commit, select = register_map.find("commit").address, register_map.find("slot_select").address
         return cls(rig_name=rig_name, commit_address=commit, select_address=select, today=today)
 

@@ -99,6 +99,7 @@ class Connection(asyncio.BufferedProtocol):
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)
 
     def get_buffer(self, _size_hint: int) -> memoryview:
+        """Lend the transport this connection's own buffer."""
         return self._view
 
     def buffer_updated(self, size: int) -> None:

@@ -102,6 +102,7 @@ class SerialPort:
         self._reopen()
 
     def write(self, data: bytes) -> bool:
+        """Hand over bytes without waiting. False while the port is lost: nothing of before a loss is sent after it."""
         if not self.is_open:
             return False
         if self._unsent:

@@ -85,6 +85,7 @@ class EventReader:
         self._rest = b""
 
     def read_stored(self) -> Iterator[EventRecord]:
+        """Yield every event that is stored, oldest first."""
         old = _open_files(self._path)
         self._stream = old.pop() if old else None
         with contextlib.ExitStack() as stack:

@@ -41,8 +41,10 @@ class Ending:
         return f"{self.text} ({code})" if code else self.text
 
     def to_json(self) -> dict[str, str]:
+        """Return it as the fields of a message."""
         return {"cause": self.cause.value, "text": self.text}
 
     @classmethod
     def from_json(cls, body: dict[str, Any] | None) -> "Ending | None":
+        """Return what `to_json` was made from; None for None."""
         return cls(EndCause(body["cause"]), str(body["text"])) if body else None

@@ -51,6 +51,7 @@ class Message:
 
 
 def create_link() -> tuple[socket.socket, socket.socket]:
+    """Return both ends of a new line."""
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 

@@ -55,6 +55,7 @@ class SchedulerCounters:
         return ProcessorTime(int(on_cpu_ns) * 1e-9, int(waited_ns) * 1e-9)
 
     def waited_s(self) -> float | None:
+        """Return for how long it has waited for a processor, s; None where the kernel does not count that."""
         turns = self.read()
         return turns.waited_s if turns else None
 
@@ -72,6 +73,7 @@ class SchedulerCounters:
 
 
 def time_between(before: ProcessorTime | None, now: ProcessorTime | None) -> ProcessorTime | None:
+    """Return what a process had between two readings, s; None where one of them is missing."""
     if before is None or now is None:
         return None
     return ProcessorTime(now.on_cpu_s - before.on_cpu_s, now.waited_s - before.waited_s)

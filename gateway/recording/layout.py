@@ -27,6 +27,7 @@ def header_bytes(document: bytes) -> bytes:
 
 
 def batch_crc(number: int, rows: int, payload: bytes | memoryview) -> int:
+    """Return the CRC-32 of a batch: of its number, its row count and its rows."""
     return crc32(payload, crc32(COUNTS.pack(number, rows)))
 
 

@@ -24,11 +24,13 @@ class Axis:
     whole: bool = False
 
     def share(self, value: float) -> float:
+        """Return where a value lies on the axis, 0 at its low end and 1 at its high one."""
         if self.logarithmic:
             return (log10(value) - log10(self.low)) / (log10(self.high) - log10(self.low))
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self) -> list[float]:
+        """Return round values to mark on the axis."""
         if self.logarithmic:
             steps = [m * 10.0**e for e in range(floor(log10(self.low)), ceil(log10(self.high)) + 1) for m in (1, 2, 5)]
             return [step for step in steps if self.low <= step * (1 + 1e-9) and step <= self.high * (1 + 1e-9)]
@@ -73,6 +75,7 @@ class Chart:
     _legend: list[tuple[str, str, str]] = field(default_factory=list)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
+        """Return the place of a point in the picture, px from its left and upper edge."""
         across, down = self.width - LEFT - RIGHT, self.height - TOP - BOTTOM
         return LEFT + across * self.x.share(x), TOP + down * (1.0 - self.y.share(y))
 
@@ -103,6 +106,7 @@ class Chart:
         self._parts.append(f'<path class="level" d="M{LEFT} {self.at(self.x.low, y)[1]:.1f}H{self.width - RIGHT}"/>')
 
     def svg(self) -> str:
+        """Return the whole chart as an SVG element."""
         head = f'<svg viewBox="0 0 {self.width} {self.height}" role="img" aria-label="{escape(self.title)}">'
         return head + self._axes() + "".join(self._parts) + self._key() + "</svg>"
 

@@ -37,6 +37,7 @@ def ready_fields(ready: Ready) -> dict[str, Any]:
 
 
 def format_banner(ready: Ready) -> str:
+    """Return what a person reads when the gateway is ready."""
     rig, (host, port) = ready.rig, ready.modbus
     calibration = rig.calibration
     what = f"simulated, seed {rig.seed}" if rig.simulated else "real devices"

@@ -33,6 +33,7 @@ EXIT_DEFECT, EXIT_DEVICE, EXIT_CONFIGURATION = 1, 69, 78
 
 
 def main(arguments: list[str]) -> int:
+    """Run the control process; return its exit code. arguments: descriptor of the link, options as JSON."""
     link = socket.socket(fileno=int(arguments[0]))
     link.setblocking(False)
     options = json.loads(arguments[1])
@@ -65,6 +66,7 @@ def prepare(options: dict[str, Any]) -> None:
 
 
 def load(options: dict[str, Any]) -> Rig:
+    """Return the rig of these options. ProfileError with every fault of its files."""
     return load_rig(options["rig"], simulated=options["simulate"])
 
 

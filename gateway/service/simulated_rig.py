@@ -214,6 +214,7 @@ async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> No
 
 
 def main(arguments: list[str]) -> int:
+    """Run the simulated rig; return its exit code. arguments: descriptor of the link, options as JSON."""
     link = socket.socket(fileno=int(arguments[0]))
     options = json.loads(arguments[1])
     state = Path(options["state"])

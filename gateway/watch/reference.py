@@ -53,6 +53,7 @@ class WatchReference:
         return self.floors_n.get(_octave(window.excitation_v))
 
     def is_exceeded(self, window: Window, rms_n: float) -> bool:
+        """Return whether the residual is above the floor of such windows, or no floor is known."""
         floor_n = self.floor_n(window)
         return floor_n is None or rms_n > _EXCESS * floor_n
 

@@ -77,6 +77,7 @@ def make_watch(ring: RingReader, options: dict[str, Any]) -> "Watch":
 
 
 def diagnose_window(measurements: "Sequence[Measurement]", plant: "Plant") -> "Diagnosis":
+    """Return the diagnosis of a window. Imports the search when it is called."""
     from gateway.diagnosis import Options, diagnose
 
     return diagnose(measurements, plant, Options(is_own=True))
@@ -105,6 +106,7 @@ def watch_forever(options: dict[str, Any]) -> None:
 
 
 def main(arguments: list[str]) -> int:
+    """Watch until the guardian ends. arguments: descriptor of the link, options as JSON."""
     yield_to_others()
     exit_with_guardian(socket.socket(fileno=int(arguments[0])))
     watch_forever(json.loads(arguments[1]))

@@ -58,10 +58,12 @@ class CsvDialect:
 
 
 def split_cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line; quotes are heeded where there are any."""
     return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
 
 
 def parse_number(cell: str, decimal: str) -> float | None:
+    """Return the value of a cell, NaN where nothing was taken; None when it is no number. decimal: its decimal sign."""
     text = cell.strip()
     if text.lower() in MISSING:
         return float("nan")

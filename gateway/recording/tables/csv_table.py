@@ -160,6 +160,7 @@ class _LineReader:
         self._first_wrong: dict[int, str] = {}
 
     def read(self) -> NumberTable:
+        """Return the whole table. RecordingError, where strict, names row and column of what cannot be read."""
         import numpy as np
 
         facts: dict[str, str] = {}

@@ -81,6 +81,7 @@ def force_over_time(
 
 
 def residual_over_time(trace: Trace) -> Drawing:
+    """Return the chart of the residual over time, before and after."""
     left = TraceResiduals.of(trace)
     chart = SeriesChart(
         Axis(0.0, max(trace.measurement.duration_s, 1e-9), "time (s)"),

@@ -69,6 +69,7 @@ class TraceResiduals:
 
     @classmethod
     def of(cls, trace: Trace) -> "TraceResiduals":
+        """Return those of one recording, before and after."""
         measurement = trace.measurement
         usable = measurement.usable
         measured_n = measurement.force_n[usable]
@@ -171,6 +172,7 @@ class BinMeans:
 
 
 def bin_means(x: Floats, y: Floats, bins: int = 30, least: int = 5) -> BinMeans:
+    """Return the means of y over equal bins of x that hold at least so many rows; NaN is left out."""
     held = np.isfinite(x) & np.isfinite(y)
     x, y = x[held], y[held]
     if x.size == 0 or is_constant(x):

@@ -57,6 +57,7 @@ class SeriesChart(Chart):
         self._note(name, "line", style)
 
     def svg(self) -> str:
+        """Return the whole chart as an SVG element, without its legend."""
         head = f'<svg viewBox="0 0 {self.width} {self.height}" role="img" aria-label="{escape(self.title)}">'
         return head + self._axes() + "".join(self._parts) + "</svg>"
 

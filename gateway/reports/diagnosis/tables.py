@@ -60,6 +60,7 @@ def _name(cause: Cause, about: Mapping[str, str]) -> str:
 
 
 def leftover_table(diagnosis: Diagnosis) -> str:
+    """Return the table of what no cause explains; empty where nothing is left."""
     rows = ((escape(rest.depends_on), escape(rest.shape), words.percent(rest.share)) for rest in diagnosis.leftover)
     return table(("depends on", "shape", "of the excess"), rows) if diagnosis.leftover else ""
 
@@ -77,6 +78,7 @@ def rejected_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
 
 
 def unseen_table(diagnosis: Diagnosis) -> str:
+    """Return the table of effects that the recordings cannot show; empty where there is none."""
     rows = ((escape(item.name), escape(item.why), escape(item.experiment)) for item in diagnosis.not_identifiable)
     heads = ("effect", "why it cannot be seen here", "what would show it")
     return table(heads, rows, "unseen") if diagnosis.not_identifiable else ""

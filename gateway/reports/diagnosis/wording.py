@@ -80,6 +80,7 @@ def label(cause: Cause) -> str:
 
 
 def others(cause: Cause) -> list[str]:
+    """Return the names that the recording cannot tell from this cause."""
     return [name for name in cause.group if name != cause.name]
 
 
@@ -113,6 +114,7 @@ def percent(share: float) -> str:
 
 
 def interval(ends: Interval) -> str:
+    """Return `[0.029, 0.033]`, with so many digits that the ends differ."""
     low, high = ends
     digits = 3 if low == high or not isfinite(high - low) else _digits(max(abs(low), abs(high)), abs(high - low))
     return f"[{number(low, digits)}, {number(high, digits)}]"

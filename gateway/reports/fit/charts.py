@@ -34,6 +34,7 @@ def loop(evaluation: Evaluation) -> str:
 
 
 def residuals(evaluation: Evaluation) -> str:
+    """Return the chart of measured minus model against the command, by branch."""
     ladder, left_n = evaluation.checked.ladder, residual_of(evaluation)
     low_v, high_v = float(ladder.voltage_v.min()), float(ladder.voltage_v.max())
     chart = Chart(

@@ -85,6 +85,7 @@ def _chosen_facts(evaluation: Evaluation) -> Document:
 
 
 def coefficients_of(branches: Branches) -> Document:
+    """Return the coefficients of both branches: handles in N, voltages in V."""
     rising, falling = branches.rising, branches.falling
     return {
         "x0_v": rising.x0,

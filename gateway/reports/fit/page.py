@@ -21,7 +21,7 @@ _FRAME: Final = """<!doctype html>
 
 
 def fit_page(evaluation: Evaluation, document: Document) -> str:
-    """Return the whole page. document: `document_of` the evaluation, with `calibration` where one was stored."""
+    """Return the whole page. document: `fit_document` of the evaluation, with `calibration` where one was stored."""
     parts = [
         _heading(document),
         _figures(document),

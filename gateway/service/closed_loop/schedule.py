@@ -53,6 +53,7 @@ class SetpointSegment:
         return self.from_n == self.to_n
 
     def force_n(self, time_s: float) -> float:
+        """Return the commanded force at a time within the segment, N."""
         share = min(1.0, (time_s - self.start_s) / self.hold_s)
         return self.from_n + share * (self.to_n - self.from_n)
 

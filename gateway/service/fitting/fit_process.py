@@ -71,10 +71,12 @@ def _describe_result(
 
 
 def rejected_sentence(number: int, why: str) -> str:
+    """Return what a person is told of a calibration that is stored as rejected."""
     return f"E435 calibration {number} is stored as rejected and not offered: {why}"
 
 
 def main(arguments: list[str]) -> int:
+    """Fit, store and print the result; return the exit code. arguments: the request as JSON."""
     priority.lower_priority()
     asked = json.loads(arguments[0])
     result = fit_and_store(Path(asked["recording"]), asked["rig"], Path(asked["state"]))

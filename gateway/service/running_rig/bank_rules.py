@@ -6,6 +6,7 @@ from gateway.registers import BankRules
 
 
 def bank_rules(rig: Rig) -> BankRules:
+    """Return the rules that the register bank holds masters to."""
     limits = rig.control.limits
     return BankRules(
         rig_name=rig.name,
@@ -21,6 +22,7 @@ def bank_rules(rig: Rig) -> BankRules:
 
 
 def server_settings(rig: Rig) -> ServerSettings:
+    """Return what the rig says about its Modbus TCP server."""
     network = rig.network
     return ServerSettings(
         units=network.units,

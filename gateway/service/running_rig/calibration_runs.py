@@ -100,6 +100,7 @@ class CalibrationRuns:
         self._continues, self._ended, self._result = continues, "", {}
 
     def status(self) -> Answer:
+        """Return how the run is: phase, progress, time left, and the result of the last one."""
         calibrating, decision = self._calibrating, self._decision
         run = calibrating.run
         return {

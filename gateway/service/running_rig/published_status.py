@@ -41,6 +41,7 @@ class BackgroundStatus:
 
 
 def status_of(output: Output, health: LoopHealth, pressure_pa: float, known: BackgroundStatus) -> Status:
+    """Return the status that the registers show. pressure_pa: of the output device, nan where it measures none."""
     return Status(
         state=output.state,
         status_word=int(output.status),

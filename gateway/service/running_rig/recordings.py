@@ -37,6 +37,7 @@ class Recordings:
         return self.status()
 
     def stop(self) -> dict[str, Any]:
+        """End the recording, if there is one; return where it is and how many rows it has."""
         if not self._current:
             return {"recording": None}
         ended, self._current = self._current, None
@@ -44,6 +45,7 @@ class Recordings:
         return {"recording": None, "written": str(ended.recorder.path), "rows": ended.rows}
 
     def status(self) -> dict[str, Any]:
+        """Return where the current recording is and how many rows it has."""
         if not self._current:
             return {"recording": None}
         return {"recording": str(self._current.recorder.path), "rows": self._current.rows}

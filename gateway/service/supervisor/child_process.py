@@ -77,6 +77,7 @@ class Child:
 
 
 def describe_exit(code: int) -> str:
+    """Return an exit code in words: `exit 1`, `SIGKILL`."""
     if code == LOST:
         return "no exit code"
     if code >= 0:

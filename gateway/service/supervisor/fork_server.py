@@ -128,7 +128,7 @@ def _run_child(message: guardian_link.Message, parent: int) -> int:
 
 
 def is_adopted(line: socket.socket) -> bool:
-    """Return the child's side: tell of its birth, and wait until the guardian follows it. False when it has been given up."""
+    """Tell of the child's birth, and return whether the guardian follows it; False when it has been given up."""
     answered = select.poll()
     answered.register(line, select.POLLIN)
     try:
@@ -158,6 +158,7 @@ def show_command(command: list[str]) -> None:
 
 
 def main(arguments: list[str]) -> int:
+    """Prepare, then fork for the guardian until it is gone. arguments: descriptor of the link, options as JSON."""
     priority.set_nice(0)
     prepare(json.loads(arguments[1]))
     serve(socket.socket(fileno=int(arguments[0])))

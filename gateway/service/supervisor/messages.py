@@ -33,10 +33,12 @@ def print_ready(what: str | dict[str, Any]) -> None:
 
 
 def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str:
+    """Return what the log says of a restart. how: the exit in words."""
     return f"A401 {ending.sentence}; {how}; safe voltage {describe_acknowledgement(acknowledged)}: restarted in OFF"
 
 
 def leaving_sentence(pid: int) -> str:
+    """Return what the log says of a killed process that does not end."""
     return (
         f"A410 the killed control process (pid {pid}) does not go: the kernel holds it, for a disk or a driver; the next one "
         "is started as soon as it is gone, for there are never two"
@@ -49,6 +51,7 @@ def describe_acknowledgement(acknowledged: bool | None) -> str:
 
 
 def too_many_sentence(causes: Counter[EndCause]) -> str:
+    """Return what the log says when the guardian gives up."""
     counted = ", ".join(f"{count} {cause.value}" for cause, count in causes.most_common())
     sentence = f"A402 five restarts in {WINDOW_S:.0f} s ({counted}): the safe voltage is held, the gateway stops"
     if causes.most_common(1)[0][0] is EndCause.MACHINE_BUSY:
