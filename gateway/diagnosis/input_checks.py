@@ -39,7 +39,7 @@ class Suspect:
 
     factor: of `what` (the force, or a pressure beside a command) over what the plant gives for one of the drive's numbers;
     unit: what the column is probably in, `-n` for a turned sign, empty for exchanged columns; is_sure: no cause is looked for;
-    option: what mends it, as --columns is spelled by whoever knows how the table was read.
+    option: what corrects it, as --columns is spelled by whoever knows how the table was read.
     """
 
     code: str
@@ -62,8 +62,8 @@ class Suspect:
 
     @property
     def sentence(self) -> str:
-        """What was seen, what it probably is, and what mends it."""
-        return f"{self._seen}; {self.option} mends it" if self.option else self._seen
+        """What was seen, what it probably is, and what corrects it."""
+        return f"{self._seen}; {self.option} corrects it" if self.option else self._seen
 
     @property
     def _seen(self) -> str:
@@ -104,12 +104,12 @@ def find_suspects(measurements: Sequence[Measurement], plant: Plant, *, is_own: 
 
 
 def name_options(found: Sequence[Suspect], given: str = "") -> tuple[Suspect, ...]:
-    """Return the same with the option that mends each. given: what --columns said."""
+    """Return the same with the option that corrects each. given: what --columns said."""
     return tuple(replace(each, option=columns_option(each, given)) for each in found)
 
 
 def columns_option(suspect: Suspect, given: str = "") -> str:
-    """`--columns ...` that mends it. given: what --columns said, NAME=SOURCE[:UNIT] with commas: sources stay."""
+    """`--columns ...` that corrects it. given: what --columns said, NAME=SOURCE[:UNIT] with commas: sources stay."""
     entries = dict(part.strip().split("=", 1) for part in given.split(",") if "=" in part)
     sources = {name: entry.rpartition(":")[0] or entry for name, entry in entries.items()}
     for name, source in suspect.mapping.items():

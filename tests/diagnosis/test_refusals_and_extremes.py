@@ -144,7 +144,7 @@ def test_a_force_of_a_thousand_times_the_piston_s_asks_for_its_unit(tmp_path: Pa
     path = str(written(tmp_path / "mn.csv", {**columns(), "force_n": columns()["force_n"] * 1.0e3}))
     text = said(path)
     assert text.index("E520 mn.csv: the force is ") < text.index("Unknown")
-    assert "force_n is probably in mn; --columns force_n=force_n:mn mends it" in text
+    assert "force_n is probably in mn; --columns force_n=force_n:mn corrects it" in text
     assert "E52" not in said(path, "--columns", "time_s=1,command_v=2,force_n=3:mn")
 
 
