@@ -14,21 +14,21 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
-from gateway.control.decision import ControllerStatus, StepOutcome, output_of, safe_output, warning_bits
+from gateway.control.decision import ControllerStatus, output_of, safe_output, warning_bits
 from gateway.control.demand import Demand, ramp_down_demand
 from gateway.control.edge_checks import EdgeCheck, Situation
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.inputs import LineStatus, LoopInputs, Output
-from gateway.control.messages import fault_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, Reading, SampleConditioner, at_time
-from gateway.control.settings import ControlSettings, LeaseAction
-from gateway.control.state_table import StateEvent, StateMachine
+from gateway.control.settings import ControlSettings
+from gateway.control.state_table import StateEvent
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
+from gateway.control.transitions import Parts, Transitions
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
@@ -56,7 +56,6 @@ class Controller:
         self._settings = settings = timing_of(response, self._rig_settings)
         self._compensation, self._outside_n = compensation, 0.0
         self.calibration_id = calibration_id
-        self._machine = StateMachine()
         self._commands = CommandTracker(settings)
         self._commands.use(model)
         self.active_run = ActiveRun(settings, model)
@@ -69,9 +68,9 @@ class Controller:
         self._reading = NO_READING
         self._last_s: float | None = None
         self._line = LineStatus()
-        self._restarted = unclean_restart
-        self._stopping = self._ramping_down = self._master_lost = False
-        self._outcome = StepOutcome()
+        self._stopping = False
+        parts = Parts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
+        self._machine = Transitions(parts, is_restarted=unclean_restart)
 
     # -- for the service
 
@@ -104,7 +103,7 @@ class Controller:
 
     def refusal_of(self, now_s: float, asked: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
-        is_busy = self.state is State.CALIBRATING or self._ramping_down or self._stopping
+        is_busy = self.state is State.CALIBRATING or self._machine.is_ramping_down or self._stopping
         if not is_busy and not self._commands.edges_of(asked.command).rises:
             return None  # most writes: a setpoint, a heartbeat
         return self._edge_check.refusal(asked, self._situation(now_s, line))
@@ -124,10 +123,7 @@ class Controller:
         try:
             return self._step(now_s, command, sample, line)
         except Exception:
-            self._rest()
-            if self.state is not State.FAULT:
-                self._machine.fail(now_s, FaultCode.INTERNAL)
-            self._commands.expect_clearing()
+            self._machine.fail_internally(now_s)
             raise
 
     # -- the order of a step
@@ -135,7 +131,7 @@ class Controller:
     def _step(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> Output:
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
         self._last_s, self._line = now_s, line
-        self._outcome = StepOutcome()
+        self._machine.begin_step()
         self._loop.elapse(dt_s, line)
         edges = self._commands.take(now_s, command)
         self._outside_n = self._compensation.outside_n(command.tilt_angle_rad, line.feed_mm_s)
@@ -145,7 +141,7 @@ class Controller:
             self._supervise(now_s, line)
         if self._machine.is_enabled:
             self._move(now_s, dt_s)
-        return output_of(command, self._status(now_s, line), self._loop, self._reading, self._outcome)
+        return output_of(command, self._status(now_s, line), self._loop, self._reading, self._machine.outcome)
 
     @property
     def _given_n(self) -> float:
@@ -162,7 +158,7 @@ class Controller:
         self._faults.observe(reading, self._loop.expected, self._loop.branch_share, touching)
         if not self._machine.is_enabled:
             self._faults.observe_rest(reading)
-            self._outcome.tell(self._one_shot.stuck_event(self._faults.is_stuck, reading))
+            self._machine.tell(self._one_shot.stuck_event(self._faults.is_stuck, reading))
 
     def _situation(self, now_s: float, line: LineStatus) -> Situation:
         later_s = now_s - (now_s if self._last_s is None else self._last_s)
@@ -178,25 +174,25 @@ class Controller:
             voltage_v=self._loop.voltage_v,
             applied_n=self._loop.applied_n,
             expected_n=self._loop.expected_rise_n,
-            ramps_down=self._ramping_down or self._stopping,
+            ramps_down=self._machine.is_ramping_down or self._stopping,
         )
 
     def _obey(self, now_s: float, edges: Edges) -> None:
         """What the bank has let through, in the order in which it was judged."""
         if edges.stops and self._machine.is_enabled:
-            self._disable(f"disabled by {self._commands.who}")
+            self._machine.disable(f"disabled by {self._commands.who}")
         elif edges.falls & _CALIBRATE and self.active_run.running:
-            self._end_run(f"calibration stopped by {self._commands.who}")
+            self._machine.end_run(f"calibration stopped by {self._commands.who}", self._given_n)
         if edges.rises & _RESET:
-            self._reset()
+            self._machine.reset()
         if edges.rises & _TARE:
             self._tare()
         if edges.rises & _ENABLE and not self._machine.is_enabled:
-            self._enable(now_s)
+            self._machine.enable(now_s)
         if edges.rises & _CALIBRATE:
-            self._begin_run(now_s, CalibrationPlan(), f"calibration begun by {self._commands.who}")
+            self._machine.begin_run(now_s, CalibrationPlan(), self._commands.who)
         self._obey_this_machine(now_s)
-        self._ramping_down = self._ramping_down or self._stopping
+        self._machine.is_ramping_down = self._machine.is_ramping_down or self._stopping
 
     def _obey_this_machine(self, now_s: float) -> None:
         """A run that was asked for at this machine; refused, it leaves everything as it is."""
@@ -205,63 +201,15 @@ class Controller:
             return
         self.active_run.refused = self.refusal_of_run(now_s, asked)
         if self.active_run.refused:
-            self._outcome.tell(self.active_run.refused)
+            self._machine.tell(self.active_run.refused)
             return
         if asked.tare:
             self._tare()
-        self._begin_run(now_s, asked, "calibration begun by this machine", is_local=True)
-
-    # -- edges of the command
-
-    def _disable(self, sentence: str) -> None:
-        self._machine.fire(StateEvent.DISABLE)
-        self._let_go(sentence)
-
-    def _let_go(self, sentence: str) -> None:
-        """The output goes to the safe voltage, and the command with it."""
-        self._rest()
-        self._one_shot.disable()
-        self._ramping_down = self._master_lost = False
-        self._outcome.tell(sentence)
-        self._outcome.clear_command = True
-        self._commands.expect_clearing()
-
-    def _rest(self) -> None:
-        """The safe voltage at once; a run ends with it."""
-        self._loop.rest()
-        self.active_run.rest()
-
-    def _reset(self) -> None:
-        if self.state is State.OFF:
-            return
-        self._outcome.tell(f"fault {self._machine.reset().name} reset by {self._commands.who}")
-        self._restarted = False
+        self._machine.begin_run(now_s, asked, "this machine", is_local=True)
 
     def _tare(self) -> None:
         self._faults.shift_zero(self._conditioner.take_zero(self._commands.gravity_n))
-        self._outcome.tell(f"tare: zero at {self.zero_n:.2f} N")
-
-    def _enable(self, now_s: float) -> None:
-        self._machine.fire(StateEvent.ENABLE)
-        self._start(now_s, f"enabled by {self._commands.who}")
-
-    def _start(self, now_s: float, sentence: str) -> None:
-        self._restarted = False
-        self._faults.start()
-        self._one_shot.start()
-        self._commands.start_lease(now_s)
-        self._outcome.tell(sentence)
-
-    def _begin_run(self, now_s: float, plan: AnyPlan, sentence: str, *, is_local: bool = False) -> None:
-        self._machine.fire(StateEvent.CALIBRATE)
-        self.active_run.begin(plan, is_local=is_local)
-        self._start(now_s, sentence)
-
-    def _end_run(self, sentence: str) -> None:
-        """However it ended, but by a fault or a disable: the force goes to 0 along the rig's ramp, then the output off."""
-        self.active_run.leave(self._loop, self._given_n)
-        self._ramping_down = True
-        self._outcome.tell(sentence)
+        self._machine.tell(f"tare: zero at {self.zero_n:.2f} N")
 
     def _block(self, now_s: float, line: LineStatus) -> RefusalReason:
         """Why an enable would be refused now."""
@@ -283,10 +231,10 @@ class Controller:
         found = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
         found = found or self._faults.first_cause(now_s, self._reading, line, self._loop.expected_rise_n)
         if found:
-            self._fail(now_s, found)
+            self._machine.fail(now_s, found)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
-            self._master_lost = self._master_lost and self._ramping_down
-        elif not self._master_lost:
+            self._machine.is_master_lost = self._machine.is_master_lost and self._machine.is_ramping_down
+        elif not self._machine.is_master_lost:
             self._lose_master(now_s, line.owner_connected)
 
     @property
@@ -294,29 +242,17 @@ class Controller:
         """No master is needed: a run of this machine, or the way to 0 after any run."""
         return self.active_run.is_local or (self.state is State.CALIBRATING and not self.active_run.running)
 
-    def _fail(self, now_s: float, found: StopCause) -> None:
-        self._machine.fail(now_s, found.fault)
-        self._let_go(found.sentence)
-
     def _lose_master(self, now_s: float, connected: bool) -> None:
         age_ms = self._commands.lease_age_s(now_s) * 1e3
         seen = f"master lost: {'' if connected else 'connection closed, '}heartbeat unchanged for {age_ms:.0f} ms"
-        action = self._settings.supervision.lease_action
-        self._outcome.release_owner = True
-        if action is LeaseAction.FAULT:
-            self._fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
-            return
-        self._master_lost = True
-        self._ramping_down = self._ramping_down or action is LeaseAction.RAMP or self.active_run.running
-        words = "ramping to 0 N" if self._ramping_down else "holding the last setpoint"
-        self._outcome.tell(fault_sentence(FaultCode.MASTER_LOST, f"{seen}, {words}"))
+        self._machine.lose_master(now_s, seen, self._settings.supervision.lease_action)
 
     # -- movement
 
     def _target(self) -> Demand:
         """What to go for now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
         demand = self._commands.demand
-        return ramp_down_demand(demand, self._settings) if self._ramping_down else demand
+        return ramp_down_demand(demand, self._settings) if self._machine.is_ramping_down else demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
         if self.state is State.CALIBRATING:
@@ -326,24 +262,24 @@ class Controller:
         inputs = self._inputs(now_s, dt_s)
         self._follow(now_s, self._loop.step(self._target(), inputs))
         measured_n = self._faults.measured_n + self._commands.gravity_n
-        self._outcome.tell(
+        self._machine.tell(
             self._one_shot.unreachable_event(self._loop, measured_n, inputs), self._one_shot.hunting_event(self._loop)
         )
 
     def _step_run(self, now_s: float) -> bool:
         """One step of the run; True when it has just ended, and the ramp down begins."""
-        if self._ramping_down:
-            self._end_run("calibration stopped: ramping down")
+        if self._machine.is_ramping_down:
+            self._machine.end_run("calibration stopped: ramping down", self._given_n)
             return True
         stop = self.active_run.step(now_s, self._reading, self._loop)
-        self._outcome.tell(self.active_run.take_said())
+        self._machine.tell(self.active_run.take_said())
         if stop is None:
             self._machine.fire(StateEvent.MOVE)
         elif stop.fault:
-            self._fail(now_s, stop)
+            self._machine.fail(now_s, stop)
         else:
-            self._end_run(stop.sentence)
-            self._outcome.tell(self._faults.slow_words)
+            self._machine.end_run(stop.sentence, self._given_n)
+            self._machine.tell(self._faults.slow_words)
             return True
         return False
 
@@ -355,9 +291,9 @@ class Controller:
     def _follow(self, now_s: float, moved: Moved) -> None:
         """The state goes along with what has moved, or could not; a ramp down ends at 0 N."""
         if isinstance(moved, StopCause):
-            self._fail(now_s, moved)
-        elif self._ramping_down and self._loop.applied_n <= 0.0:
-            self._disable("force ramped to 0, output disabled")
+            self._machine.fail(now_s, moved)
+        elif self._machine.is_ramping_down and self._loop.applied_n <= 0.0:
+            self._machine.disable("force ramped to 0, output disabled")
         else:
             self._machine.fire(moved)
 
@@ -369,7 +305,9 @@ class Controller:
             state=self.state,
             fault=self._machine.fault,
             block=self._block(now_s, line),
-            warnings=warning_bits(int(line.warnings), self._loop, self._restarted, self._master_lost),
+            warnings=warning_bits(
+                int(line.warnings), self._loop, self._machine.is_restarted, self._machine.is_master_lost
+            ),
             touching=self._contact.touching,
             accepted_n=run.target_n or self._target().force_n if self._machine.is_enabled else 0.0,
             expected_cell_n=self._loop.expected_n + self._outside_n,

@@ -8,10 +8,8 @@ has exactly one first cause.
 """
 
 from enum import Enum
-from math import inf
 from typing import Final
 
-from gateway.codes.faults import FaultCode
 from gateway.registers.words import State
 
 
@@ -70,31 +68,3 @@ def next_state(state: State, event: StateEvent) -> State:
         return TRANSITIONS[state, event]
     except KeyError:
         raise TransitionError(f"state {state.name} has no event {event.name}") from None
-
-
-class StateMachine:
-    """The present state; the latched fault, and when it came (monotonic s, -inf before the first)."""
-
-    def __init__(self) -> None:
-        self.state = State.OFF
-        self.fault = FaultCode.NONE
-        self.faulted_s = -inf
-
-    @property
-    def is_enabled(self) -> bool:
-        return self.state in ENABLED_STATES
-
-    def fire(self, event: StateEvent) -> None:
-        """Go where the table leads. TransitionError for a pair that is not in it."""
-        self.state = next_state(self.state, event)
-
-    def fail(self, now_s: float, fault: FaultCode) -> None:
-        """Latch a first cause."""
-        self.fire(StateEvent.FAILED)
-        self.fault, self.faulted_s = fault, now_s
-
-    def reset(self) -> FaultCode:
-        """Leave FAULT; the fault that was latched."""
-        self.fire(StateEvent.RESET)
-        fault, self.fault = self.fault, FaultCode.NONE
-        return fault

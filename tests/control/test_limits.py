@@ -6,15 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.control.force_loop.voltage_limits import VoltageLimiter, strongest
 from gateway.control.limits import (
     TICK_S,
     NotFiniteError,
     RateBudget,
+    VoltageLimiter,
     force_limited,
     is_below_usable,
     ramp_limited,
     slew_limited,
+    strongest,
     trim_limited,
     voltage_limited,
 )

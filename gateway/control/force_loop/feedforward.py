@@ -7,12 +7,12 @@ whose noise would chatter; a vented tool starts where the calibration ladder sta
 rising branch, because it slides outwards.
 """
 
+from collections import deque
 from math import isfinite
 from typing import Final
 
 from gateway.bsfm import RISING, Bsfm, InverseStatus
 from gateway.control.demand import Demand
-from gateway.control.force_loop.transport_delay import TransportDelay
 from gateway.control.limits import TICK_S, RateBudget, is_below_usable, narrow_limits, ramp_limited
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
@@ -25,6 +25,31 @@ _OK: Final = InverseStatus.OK
 
 class ModelError(Exception):
     """The model gave no usable voltage for a finite force."""
+
+
+class TransportDelay:
+    """A value as it was a transport delay ago: what the force can have heard of it by now. delay_s 0: the value itself. Time
+    passes in `advance`, in steps of any size."""
+
+    def __init__(self, delay_s: float) -> None:
+        self._delay_s = delay_s
+        self.restart(0.0)
+
+    def restart(self, value: float) -> None:
+        """It has been this value for long."""
+        self._past: deque[tuple[float, float]] = deque()
+        self._now_s, self._value = 0.0, value
+
+    def advance(self, value: float, dt_s: float) -> float:
+        """dt_s has passed and the value is this from now on; returns what it was delay_s ago."""
+        if self._delay_s <= 0.0:
+            return value
+        self._now_s += dt_s
+        past, heard_s = self._past, self._now_s - self._delay_s
+        past.append((self._now_s, value))
+        while past and past[0][0] <= heard_s:
+            self._value = past.popleft()[1]
+        return self._value
 
 
 class Approach:

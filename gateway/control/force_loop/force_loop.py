@@ -16,15 +16,13 @@ from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.compensation.compensation import TimingCompensation
 from gateway.control.demand import Demand
-from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
+from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError, TransportDelay
 from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
-from gateway.control.force_loop.transport_delay import TransportDelay
 from gateway.control.force_loop.trim import TrimIntegral
-from gateway.control.force_loop.voltage_limits import VoltageLimiter, strongest
 from gateway.control.inputs import LineStatus, LoopInputs
-from gateway.control.limits import TICK_S, NotFiniteError
+from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, strongest
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.control import LeadSettings, Limits
 from gateway.control.force_loop.lag_inverse import LagInverse
-from gateway.control.force_loop.voltage_limits import VoltageLimiter
+from gateway.control.limits import VoltageLimiter
 from tests.control.foreign.course import _settled_s
 from tests.control.foreign.machine import Machine
 

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.control import ControlSettings, LeadSettings, Limits, Trim
 from gateway.control.force_loop.lead_compensator import LeadCompensator
-from gateway.control.force_loop.voltage_limits import VoltageLimiter
+from gateway.control.limits import VoltageLimiter
 from gateway.control.settings import ResponseSource
 from gateway.registers.words import LimitedBy
 from tests.control.bench import Bench, settings

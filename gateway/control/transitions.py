@@ -1,0 +1,137 @@
+"""Change the state, with all that a change does: to the output, to what was learned, to the command, and in the log.
+
+Where each event leads says gateway.control.state_table; whether a command may ask for it, gateway.control.edge_checks.
+"""
+
+from dataclasses import dataclass
+from math import inf
+
+from gateway.codes.faults import FaultCode
+from gateway.control.command_edges import CommandTracker
+from gateway.control.decision import StepOutcome
+from gateway.control.force_loop.force_loop import ForceLoop
+from gateway.control.messages import fault_sentence
+from gateway.control.runs.active_run import ActiveRun, AnyPlan
+from gateway.control.settings import LeaseAction
+from gateway.control.state_table import ENABLED_STATES, StateEvent, next_state
+from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
+from gateway.control.supervision.one_shot_events import OneShotEvents
+from gateway.registers.words import State
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a change of state acts on."""
+
+    commands: CommandTracker
+    faults: FaultDetector
+    one_shot: OneShotEvents
+    loop: ForceLoop
+    run: ActiveRun
+
+
+class Transitions:
+    """Holds the present state; the latched fault, and when it came (monotonic s, -inf before the first); whether the force is
+    on its way to 0 and then off; whether the master is lost; whether nobody has acknowledged a restart; and what the
+    present step wants besides the voltage."""
+
+    def __init__(self, parts: Parts, *, is_restarted: bool) -> None:
+        self.state = State.OFF
+        self.fault = FaultCode.NONE
+        self.faulted_s = -inf
+        self.is_ramping_down = self.is_master_lost = False
+        self.is_restarted = is_restarted
+        self.outcome = StepOutcome()
+        self._parts = parts
+
+    @property
+    def is_enabled(self) -> bool:
+        return self.state in ENABLED_STATES
+
+    def begin_step(self) -> None:
+        self.outcome = StepOutcome()
+
+    def tell(self, *sentences: str) -> None:
+        """Sentences for the log; empty ones are none."""
+        self.outcome.tell(*sentences)
+
+    def fire(self, event: StateEvent) -> None:
+        """Go where the table leads. TransitionError for a pair that is not in it."""
+        self.state = next_state(self.state, event)
+
+    def enable(self, now_s: float) -> None:
+        self.fire(StateEvent.ENABLE)
+        self._start(now_s, f"enabled by {self._parts.commands.who}")
+
+    def begin_run(self, now_s: float, plan: AnyPlan, asked_by: str, *, is_local: bool = False) -> None:
+        """Begin a calibration or an experiment. ValueError for a plan that the rig does not allow."""
+        self.fire(StateEvent.CALIBRATE)
+        self._parts.run.begin(plan, is_local=is_local)
+        self._start(now_s, f"calibration begun by {asked_by}")
+
+    def _start(self, now_s: float, sentence: str) -> None:
+        self.is_restarted = False
+        self._parts.faults.start()
+        self._parts.one_shot.start()
+        self._parts.commands.start_lease(now_s)
+        self.tell(sentence)
+
+    def end_run(self, sentence: str, given_n: float) -> None:
+        """However it ended, but by a fault or a disable: the force goes to 0 along the rig's ramp, then the output off.
+        given_n: contact force that the slide need not give."""
+        self._parts.run.leave(self._parts.loop, given_n)
+        self.is_ramping_down = True
+        self.tell(sentence)
+
+    def disable(self, sentence: str) -> None:
+        """The output off: the safe voltage at once, and the command with it."""
+        self.fire(StateEvent.DISABLE)
+        self._let_go(sentence)
+
+    def fail(self, now_s: float, cause: StopCause) -> None:
+        """Latch a first cause: the safe voltage at once, and the command with it."""
+        self._latch(now_s, cause.fault)
+        self._let_go(cause.sentence)
+
+    def fail_internally(self, now_s: float) -> None:
+        """After an exception: the safe voltage and INTERNAL, unless another fault is latched already."""
+        self._rest()
+        if self.state is not State.FAULT:
+            self._latch(now_s, FaultCode.INTERNAL)
+        self._parts.commands.expect_clearing()
+
+    def reset(self) -> None:
+        """Leave FAULT; nothing to do in OFF."""
+        if self.state is State.OFF:
+            return
+        self.fire(StateEvent.RESET)
+        self.tell(f"fault {self.fault.name} reset by {self._parts.commands.who}")
+        self.fault, self.is_restarted = FaultCode.NONE, False
+
+    def lose_master(self, now_s: float, seen: str, action: LeaseAction) -> None:
+        """The lease is over: what the rig says about it. seen: how it was noticed."""
+        self.outcome.release_owner = True
+        if action is LeaseAction.FAULT:
+            self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
+            return
+        self.is_master_lost = True
+        self.is_ramping_down = self.is_ramping_down or action is LeaseAction.RAMP or self._parts.run.running
+        words = "ramping to 0 N" if self.is_ramping_down else "holding the last setpoint"
+        self.tell(fault_sentence(FaultCode.MASTER_LOST, f"{seen}, {words}"))
+
+    def _latch(self, now_s: float, fault: FaultCode) -> None:
+        self.fire(StateEvent.FAILED)
+        self.fault, self.faulted_s = fault, now_s
+
+    def _let_go(self, sentence: str) -> None:
+        self._rest()
+        self._parts.one_shot.disable()
+        self.is_ramping_down = self.is_master_lost = False
+        self.tell(sentence)
+        self.outcome.clear_command = True
+        self._parts.commands.expect_clearing()
+
+    def _rest(self) -> None:
+        """The safe voltage at once; a run ends with it."""
+        self._parts.loop.rest()
+        self._parts.run.rest()
