@@ -28,7 +28,7 @@ from gateway.control.state_table import StateEvent
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
-from gateway.control.transitions import Parts, Transitions
+from gateway.control.transitions import ControllerParts, Transitions
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
@@ -69,7 +69,7 @@ class Controller:
         self._last_s: float | None = None
         self._line = LineStatus()
         self._stopping = False
-        parts = Parts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
+        parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
 
     # -- for the service

@@ -20,7 +20,7 @@ from gateway.registers.words import State
 
 
 @dataclass(frozen=True, slots=True)
-class Parts:
+class ControllerParts:
     """What a change of state acts on."""
 
     commands: CommandTracker
@@ -35,7 +35,7 @@ class Transitions:
     on its way to 0 and then off; whether the master is lost; whether nobody has acknowledged a restart; and what the
     present step wants besides the voltage."""
 
-    def __init__(self, parts: Parts, *, is_restarted: bool) -> None:
+    def __init__(self, parts: ControllerParts, *, is_restarted: bool) -> None:
         self.state = State.OFF
         self.fault = FaultCode.NONE
         self.faulted_s = -inf

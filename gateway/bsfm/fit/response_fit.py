@@ -80,7 +80,7 @@ class MeasuredResponse:
     why_not: str = ""
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """What was found, or why nothing was."""
         return f"response: {self.response.source}" if self.response else self.why_not
 
@@ -103,16 +103,16 @@ def measure_response(
             f"{FEWEST_STAIRS} are needed",
         )
     ratios = RATIOS[1:] if _is_better(stairs) else (0.0,)
-    found = _fitted(stairs, ratios)
+    found = _fit_lags(stairs, ratios)
     again = _stairs(time_s, command_v, force_n, model, slew_v_per_s, found)  # whose ends had not quite settled
     stairs = [_linearize(stair, scale) for stair in again]
-    found = _fitted(stairs, ratios)
+    found = _fit_lags(stairs, ratios)
     if not (0.0 <= found.dead_time_s < LONGEST_S and SHORTEST_LAG_S < found.lags_s < LONGEST_S):
         said = f"dead time {found.dead_time_s * 1e3:.0f} ms and lags of {found.lags_s * 1e3:.0f} ms in sum"
         return MeasuredResponse(
             None, f"the response was not measured: the steps give {said}, which no plant of this kind has"
         )
-    return MeasuredResponse(_told(found, stairs, when))
+    return MeasuredResponse(_response_of(found, stairs, when))
 
 
 def _linearize(stair: Stair, scale: DriveMap) -> Stair:
@@ -127,7 +127,7 @@ def _linearize(stair: Stair, scale: DriveMap) -> Stair:
     return replace(stair, changes=tuple(reversed(changes)), end_v=scale.linear_v(stair.end_v), path_v=path_v)
 
 
-def _told(found: "_Fit", stairs: Sequence[Stair], when: str) -> Response:
+def _response_of(found: "_Fit", stairs: Sequence[Stair], when: str) -> Response:
     low_s, high_s = _interval(found, stairs)
     sizes = [abs(float(stair.path_n[-1] - stair.path_n[0])) for stair in stairs]
     both = f" and {found.second_s * 1e3:.0f}" if found.second_s else ""
@@ -174,7 +174,7 @@ def _loss(residual_n: Floats, scale_n: float) -> float:
     return float(np.sum(np.where(size < HUBER, 0.5 * size**2, HUBER * (size - 0.5 * HUBER))))
 
 
-def _fitted(stairs: Sequence[Stair], ratios: Sequence[float]) -> _Fit:
+def _fit_lags(stairs: Sequence[Stair], ratios: Sequence[float]) -> _Fit:
     """The best of these ratios, refined between its neighbours."""
     scale_n = _scale_n(stairs)
     guess = _guess(stairs)
@@ -184,11 +184,11 @@ def _fitted(stairs: Sequence[Stair], ratios: Sequence[float]) -> _Fit:
         guess = (found[-1].dead_time_s, found[-1].lags_s)
     best = min(found, key=lambda fit: fit.loss)
     if len(ratios) > 1:
-        best = _refined(stairs, ratios, best, scale_n)
+        best = _refine(stairs, ratios, best, scale_n)
     return best
 
 
-def _refined(stairs: Sequence[Stair], ratios: Sequence[float], best: _Fit, scale_n: float) -> _Fit:
+def _refine(stairs: Sequence[Stair], ratios: Sequence[float], best: _Fit, scale_n: float) -> _Fit:
     at = list(ratios).index(best.ratio)
     near = (ratios[max(0, at - 1)], ratios[min(len(ratios) - 1, at + 1)])
     for ratio in (0.5 * (near[0] + best.ratio), 0.5 * (near[1] + best.ratio)):
@@ -261,7 +261,7 @@ def _is_better(stairs: Sequence[Stair]) -> bool:
     for fold in range(2):
         seen, held_out = stairs[fold::2], stairs[1 - fold :: 2]
         for ratios in ((0.0,), RATIOS[1:]):
-            fit = _fitted(seen, ratios)
+            fit = _fit_lags(seen, ratios)
             loss = _loss(np.concatenate(_residuals(held_out, fit.dead_time_s, fit.lags_s, fit.ratio)), scale_n)
             single, double = (single + loss, double) if ratios == (0.0,) else (single, double + loss)
     return double < BETTER * single
@@ -304,9 +304,9 @@ def _stairs(
     """known: lags by which the ends of the stairs are told that had not settled."""
     plateaus = _plateaus(time_s, command_v)
     found, memory = [], model.reversal.start()
-    settled_n = [_settled(force_n, plateau) for plateau in plateaus]
+    settled_n = [_mean_settled_n(force_n, plateau) for plateau in plateaus]
     if known:
-        settled_n = _ended(settled_n, plateaus, time_s, known)
+        settled_n = _correct_ends(settled_n, plateaus, time_s, known)
     earlier: tuple[tuple[float, float], ...] = ()
     for k in range(1, len(plateaus)):
         before, now = plateaus[k - 1], plateaus[k]
@@ -346,12 +346,12 @@ def _plateaus(time_s: Floats, command_v: Floats) -> list[_Plateau]:
     return found
 
 
-def _settled(force_n: Floats, plateau: _Plateau) -> float:
+def _mean_settled_n(force_n: Floats, plateau: _Plateau) -> float:
     rows = force_n[plateau.first + 1 : plateau.end + 1]
     return float(np.mean(rows[-_tail(len(rows)) :])) if len(rows) else float(force_n[plateau.last])
 
 
-def _ended(settled_n: list[float], plateaus: list[_Plateau], time_s: Floats, known: _Fit) -> list[float]:
+def _correct_ends(settled_n: list[float], plateaus: list[_Plateau], time_s: Floats, known: _Fit) -> list[float]:
     """Where each stair would have ended: its tail, and what was missing then."""
     found = settled_n[:1]
     for k in range(1, len(plateaus)):

@@ -22,7 +22,7 @@ _WIDER_LOOP: Final = 0.5  # friction may have grown by this share of the loop si
 
 
 class StuckSensorCheck:
-    """Fed with every reading; `is_frozen` after each."""
+    """Fed with every reading; ask for `words` after each."""
 
     def __init__(self, supervision: Supervision) -> None:
         self._frozen_s = supervision.frozen_s
@@ -59,10 +59,6 @@ class StuckSensorCheck:
         self._slack_n = _WIDER_LOOP * response.width_n
         self._least_n = max(self._least_n, response.rising_n)
         self._most_n = min(self._most_n, response.falling_n)
-
-    @property
-    def is_frozen(self) -> bool:
-        return bool(self.words)
 
     @property
     def words(self) -> str:

@@ -44,7 +44,7 @@ def fit_recording(recording: Recording, request: FitRequest, context: RigContext
     document["data_sha256"] = data_sha256(evaluation.checked)
     response = measure_recorded_response(recording, evaluation)
     document["response"] = asdict(response.response) if response.response else None
-    document["notes"].append(response.told)
+    document["notes"].append(response.description)
     document["name"] = name or str(recording.header.get("name") or "") or default_name(document)
     document["measured"] = verdict.facts()
     return LadderFit(recording, evaluation, document, verdict, response)

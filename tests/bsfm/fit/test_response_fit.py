@@ -114,7 +114,7 @@ def test_a_record_without_large_steps_gives_no_response_but_a_sentence():
     command_v = 2.0 + 0.1 * (time_s % 4.0 > 2.0)
     found = measure_response(time_s, command_v, 15.0 + command_v, model())
     assert found.response is None
-    assert "not measured: 0 steps" in found.told
+    assert "not measured: 0 steps" in found.description
 
 
 def test_a_force_that_does_not_follow_gives_no_response():

@@ -68,7 +68,7 @@ class Watched:
             value_n = cell.value_n()
             reading = Reading(value_n, value_n, 0.0, interval_s, True, True, True, False, value_n)
             self.watch.observe(reading, self._response, touching)
-            if self.watch.is_frozen:
+            if self.watch.words:
                 return (k + 1) * interval_s
         return inf
 
@@ -198,7 +198,7 @@ def test_what_was_frozen_teaches_nothing() -> None:
         cell.frozen = True
         assert watched.after(cell, 3.0) <= 2.0
         watched.watch.tripped()
-        assert watched.watch.is_frozen
+        assert watched.watch.words
         for _ in range(1000):
             watched.after(cell, 0.01)
         cell.frozen = False
