@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from gateway.profiles import Report, check_report
 from gateway.profiles.strict_yaml.text import parse
 
-DEMO = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+DEMO = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
 STEADY = settings(derandomize=True, deadline=None, max_examples=60)
 VALUE: dict[str, Any] = parse(DEMO.encode(), "demo.yaml").value
 

@@ -6,7 +6,7 @@ import pytest
 
 from gateway.profiles import ProfileError, load_calibration
 
-SHIPPED = (Path(__file__).parents[2] / "profiles" / "calibrations" / "demo.yaml").read_text(encoding="utf-8")
+SHIPPED = (Path(__file__).parents[3] / "profiles" / "calibrations" / "demo.yaml").read_text(encoding="utf-8")
 
 
 def told(folder: Path, *edits: tuple[str, str]) -> list[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from gateway.profiles import check_report, load_plant, load_rig
 from gateway.registers.words import ControlBit
 
-CELL = (Path(__file__).parents[2] / "profiles" / "rigs" / "irc5-cell.yaml").read_text(encoding="utf-8")
+CELL = (Path(__file__).parents[3] / "profiles" / "rigs" / "irc5-cell.yaml").read_text(encoding="utf-8")
 
 
 def test_the_demo_rig_has_no_lease_and_is_simulated_on_loopback() -> None:

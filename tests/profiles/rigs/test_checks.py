@@ -6,7 +6,7 @@ import pytest
 
 from gateway.profiles import Report, check_report
 
-RIGS = Path(__file__).parents[2] / "profiles" / "rigs"
+RIGS = Path(__file__).parents[3] / "profiles" / "rigs"
 DEMO = (RIGS / "demo.yaml").read_text(encoding="utf-8")
 CELL = (RIGS / "irc5-cell.yaml").read_text(encoding="utf-8")
 

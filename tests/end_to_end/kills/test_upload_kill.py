@@ -51,9 +51,9 @@ class Uploads:
 
 @pytest.fixture
 def uploads() -> Iterator[Uploads]:
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.end_to_end.commit_forks"],
+        [sys.executable, "-m", "tests.end_to_end.kills.commit_forks"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -21,7 +21,7 @@ from gateway.twin import Plant
 from gateway.twin.plant import with_value
 
 BASE = load_plant("paper-slide")
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def rig_with(folder: Path, line: str, **numbers: float) -> Path:

@@ -8,7 +8,7 @@ from gateway.profiles.rigs.rig_file import RigFile
 from gateway.profiles.strict_yaml.text import parse
 from gateway.profiles.strict_yaml.typed import build
 
-DEMO = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+DEMO = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
 
 
 def told(*edits: tuple[str, str]) -> list[str]:

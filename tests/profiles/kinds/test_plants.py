@@ -7,7 +7,7 @@ import pytest
 from gateway.profiles import PlantProfile, ProfileError, load_plant
 from gateway.twin import Plant
 
-SHIPPED = Path(__file__).parents[2] / "profiles" / "plants" / "paper-slide.yaml"
+SHIPPED = Path(__file__).parents[3] / "profiles" / "plants" / "paper-slide.yaml"
 
 
 def load(folder: Path, text: str) -> PlantProfile:

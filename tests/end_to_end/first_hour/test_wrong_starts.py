@@ -24,7 +24,7 @@ def ended(rig: str | Path, state: Path, *options: str, bind: str = "127.0.0.1:0"
 
 def own_rig(directory: Path, **changes: str) -> Path:
     """The demo rig with other lines."""
-    text = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text()
+    text = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text()
     for old, new in changes.values():
         assert old in text
         text = text.replace(old, new, 1)

@@ -10,7 +10,7 @@ from gateway.cli.main import command
 from gateway.profiles import load_device, load_register_map
 from gateway.registers import render_block
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
