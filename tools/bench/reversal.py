@@ -1,5 +1,5 @@
 # ruff: noqa: E402  tools/paper must be found before it is imported
-"""What each reversal policy gets wrong on the twin: full loop, partial reversals, chatter, beside METHOD's table.
+"""What each reversal policy gets wrong on the twin: full loop, partial reversals, chatter, beside a first study of it.
 
     .venv/bin/python tools/bench/reversal.py                # copies 0..4 of the paper's rig, virtual time, half a minute
     .venv/bin/python tools/bench/reversal.py --seeds 0      # the rig itself
@@ -8,7 +8,8 @@
 Each copy is calibrated with its cell's noise: ladder 0-5-0 V, ten groups, order 2, and a minor-loop walk of some 150
 points. Then every policy commands the same setpoints without any feedback, each until the twin has settled; errors are true
 force minus setpoint, over all copies. The walk of partial reversals is not the one that was fitted. "largest step" is of the
-voltage between two setpoints, which are 1 N apart, or 0.1 N in chatter. METHOD's plant was another one, and without noise.
+voltage between two setpoints, which are 1 N apart, or 0.1 N in chatter. The first study (figures written
+here as it gave them; it is not in this repository) had another plant, without noise.
 The twin's friction is Maxwell slip on the travel, which is kin to the model: a real rig will not fit it as well.
 """
 
@@ -48,7 +49,7 @@ PARTIAL_TURNS_N: Final = (2.0, 30.0, 12.0, 22.0, 8.0, 18.0, 14.0, 26.0, 4.0, 11.
 CHATTER_N: Final = tuple(20.0 + 0.05 * (-1) ** k for k in range(40))
 APPROACH_N: Final = tuple(float(n) for n in range(1, 21))
 EXERCISES: Final = ("full 1-33 N", "partial reversals", "chatter 20 +- 0.05 N")
-METHOD: Final = {
+FIRST_STUDY: Final = {
     "branches switched": ((0.32, 1.44), (1.11, 2.82), (1.45, 2.87), 0.9),
     "linear blend": ((0.23, 0.87), (0.46, 1.24), (0.05, 0.13), 0.17),
     "slip, branches kept": None,
@@ -58,12 +59,12 @@ METHOD: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """One policy: (RMS, max) in N per exercise, the largest voltage step, and METHOD's row."""
+    """One policy: (RMS, max) in N per exercise, the largest voltage step, and the first study's row."""
 
     policy: str
     errors_n: tuple[tuple[float, float], ...]
     largest_step_v: float
-    method: tuple[tuple[tuple[float, float], ...], float] | None
+    first_study: tuple[tuple[tuple[float, float], ...], float] | None
 
 
 def calibrated(plant: Plant, seed: int) -> dict[str, Bsfm]:
@@ -78,7 +79,7 @@ def calibrated(plant: Plant, seed: int) -> dict[str, Bsfm]:
     fits = [fit_stops(branches, [minor]), fit_joint(branches, [walk_of(ladder), minor])]
     if not fits[1].joint:
         raise SystemExit(f"copy {seed}: the joint fit led to no usable model")
-    return dict(zip(METHOD, (row.model for row in compare_policies(branches, fits, minor, minor)), strict=True))
+    return dict(zip(FIRST_STUDY, (row.model for row in compare_policies(branches, fits, minor, minor)), strict=True))
 
 
 def between(turns_n: Sequence[float]) -> list[float]:
@@ -113,21 +114,21 @@ def run(model: Bsfm, plant: Plant) -> tuple[list[Floats], float]:
 
 
 def scores(seeds: Sequence[int]) -> list[Score]:
-    errors: dict[str, list[list[Floats]]] = {policy: [] for policy in METHOD}
-    steps_v = dict.fromkeys(METHOD, 0.0)
+    errors: dict[str, list[list[Floats]]] = {policy: [] for policy in FIRST_STUDY}
+    steps_v = dict.fromkeys(FIRST_STUDY, 0.0)
     for seed in seeds:
         plant = copy_of(seed)
         for policy, model in calibrated(plant, seed).items():
             found, step_v = run(model, plant)
             errors[policy].append(found)
             steps_v[policy] = max(steps_v[policy], step_v)
-    return [_score(policy, errors[policy], steps_v[policy]) for policy in METHOD]
+    return [_score(policy, errors[policy], steps_v[policy]) for policy in FIRST_STUDY]
 
 
 def _score(policy: str, copies: list[list[Floats]], step_v: float) -> Score:
     pooled = [np.concatenate(parts) for parts in zip(*copies, strict=True)]
     figures = tuple((float(np.sqrt(np.mean(e**2))), float(np.abs(e).max())) for e in pooled)
-    row = METHOD[policy]
+    row = FIRST_STUDY[policy]
     return Score(policy, figures, step_v, (row[:3], row[3]) if row else None)
 
 
@@ -135,8 +136,8 @@ def table(rows: Sequence[Score]) -> str:
     lines = [f"{'RMS / max error in N':24}" + "".join(f"{name:>22}" for name in EXERCISES) + f"{'largest step':>16}"]
     for score in rows:
         lines.append(_line(score.policy, score.errors_n, score.largest_step_v))
-        if score.method:
-            lines.append(_line("  METHOD's plant", *score.method))
+        if score.first_study:
+            lines.append(_line("  first study", *score.first_study))
     return "\n".join(lines)
 
 

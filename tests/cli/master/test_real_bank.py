@@ -39,10 +39,16 @@ def test_a_force_is_commanded_and_read_back(bank: RegisterBank, gateway: str, ca
 
 
 def test_shares_weights_and_short_times_are_shown_with_their_digits(bank: RegisterBank, gateway: str, call) -> None:
-    bank.set_active_model(replace(load_calibration("demo"), response=Response(dead_time_s=0.0803, lag_s=0.1)))
+    demo = load_calibration("demo")
+    bank.set_active_model(replace(demo, response=Response(dead_time_s=0.0803, lag_s=0.1)))
     names = ("slip_share_2@active", "rising_w_1@active", "dead_time@active", "slip_stops@active")
     facts = json.loads(call("read", *names, "--json", "--gateway", gateway).output)
-    assert [facts[name]["text"] for name in names] == ["0.265977", "9.67112", "0.0803 s", "7"]
+    assert [facts[name]["text"] for name in names] == [
+        f"{demo.slip_shares[2]:.6g}",
+        f"{demo.rising_weights[1]:.6g}",
+        "0.0803 s",
+        "7",
+    ]
 
 
 @pytest.mark.parametrize(
