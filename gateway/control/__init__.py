@@ -18,9 +18,9 @@ rest            the safe voltage on the output; rest force: what the cell then m
 run             a calibration ladder or an experiment
 """
 
+from gateway.control.compensation.cell_map import CellMap
 from gateway.control.compensation.command_map import CommandMap, apply_command_map
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation, OutsideForce, TimingCompensation
-from gateway.control.compensation.load_cell import CellMap
 from gateway.control.controller import Controller
 from gateway.control.decision import safe_output
 from gateway.control.inputs import NO_COMMAND, LineStatus, Output

@@ -7,8 +7,8 @@ from typing import Final
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
+from gateway.control.blame_for_silence import NOT_HELD, Held
 from gateway.control.sample_conditioning import Reading
-from gateway.control.silence import NOT_HELD, Held
 from gateway.registers.command import Command
 from gateway.registers.words import LimitedBy, State, StatusBit
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Final
 
-from gateway.control.compensation.load_cell import CellMap
+from gateway.control.compensation.cell_map import CellMap
 from gateway.control.settings import Supervision
 from gateway.control.tare import Zero
 from gateway.devices.messages import ForceSample, Quality

@@ -8,7 +8,7 @@ noise, residual_tests and residual_regressors (what is left), noise_floor, exper
 what to record next), verdict and notes, diagnose (the whole), result (the answer). Pure: time and chance are arguments.
 """
 
-from gateway.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.diagnose import Options, diagnose
 from gateway.diagnosis.measurement import Measurement

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.cylinder import COULOMB, DRAG_ASYMMETRY
 from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.catalogue.catalogue import BY_NAME, EFFECTS
+from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.experiments.identifiability import find_invisible_effects
 from gateway.diagnosis.noise import Whitener

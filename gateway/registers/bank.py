@@ -17,10 +17,8 @@ written; it proves the order of one host.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Final
 
-from gateway import VERSION
 from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, RequestError, ServerId
@@ -31,6 +29,7 @@ from gateway.registers.command import Command, Status
 from gateway.registers.command_block import CONTROL_WORD, FORCE_SETPOINT, VOLTAGE_SETPOINT, CommandBlock, check_zeros
 from gateway.registers.echo import ByteOrderEcho
 from gateway.registers.edge_questions import Decide
+from gateway.registers.identity import SERVER_ID, build_identity
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.addresses import no_such_address
 from gateway.registers.map.register_map import Block, RegisterMap
@@ -42,7 +41,6 @@ from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, State, StatusBit
 
 BITS: Final = 16
-SERVER_ID: Final = 0x46  # "F"
 
 
 class RegisterBank:
@@ -60,7 +58,7 @@ class RegisterBank:
         self.on_accepted: Callable[[str, Peer], None] | None = None
         self.last_writer: dict[str, tuple[Peer, float]] = {}
         self.last_refusal: Refusal | None = None
-        self.identity: Mapping[int, bytes] = _identity(register_map, rules)
+        self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
         self._now = now
         self._blocks = register_map.blocks
         self._image = RegisterImage(register_map)
@@ -283,9 +281,3 @@ class RegisterBank:
     def _tell(self, sentence: str, peer: Peer) -> None:
         if self.on_accepted is not None and sentence:
             self.on_accepted(sentence, peer)
-
-
-def _identity(register_map: RegisterMap, rules: BankRules) -> Mapping[int, bytes]:
-    """Objects of FC43/14: vendor, product code, revision, product, model (the map), application (the rig)."""
-    texts = {0: "force-gateway", 1: "FG", 2: VERSION, 4: "force-gateway", 5: register_map.name, 6: rules.rig_name}
-    return MappingProxyType({number: text.encode("ascii", "replace") for number, text in texts.items()})

@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.all_effects import EFFECTS
 
 
 class ResidualCause(IntEnum):

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.all_effects import EFFECTS
 from gateway.catalogue.effect import By
 from gateway.registers.residual_cause import ResidualCause
 

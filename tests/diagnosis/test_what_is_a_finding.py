@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.catalogue.catalogue import BY_NAME
+from gateway.catalogue.all_effects import BY_NAME
 from gateway.diagnosis import Options, Verdict, diagnose
 from gateway.diagnosis.result import Gain
 from gateway.diagnosis.search.model_comparison import ModelComparison, RefinedEffect

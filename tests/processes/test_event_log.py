@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.codes.catalogue import CATALOGUE
+from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.processes import event_file

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.codes.catalogue import CATALOGUE
+from gateway.codes.all_codes import CATALOGUE
 from gateway.control.settings import Supervision
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from gateway.cli.live_monitor.parts import big, chart, chart_top_n
 from gateway.cli.live_monitor.table import View, register_table
 from gateway.cli.live_monitor.track import Track, buckets
 from gateway.cli.master.value_text import format_value
-from gateway.codes.catalogue import CATALOGUE
+from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import State, StatusBit

@@ -17,7 +17,7 @@ def command(*, code: str | None, as_json: bool) -> None:
 
     A name in the registers, such as over_force, does too; without CODE all are listed.
     """
-    from gateway.codes.catalogue import CATALOGUE
+    from gateway.codes.all_codes import CATALOGUE
 
     if code is not None:
         _one(code, as_json=as_json)
@@ -29,7 +29,7 @@ def command(*, code: str | None, as_json: bool) -> None:
 
 
 def _one(code: str, *, as_json: bool) -> None:
-    from gateway.codes.catalogue import find_codes
+    from gateway.codes.all_codes import find_codes
 
     entries = find_codes(code)
     if not entries:
@@ -44,7 +44,7 @@ def _one(code: str, *, as_json: bool) -> None:
 
 
 def _unknown(code: str) -> str:
-    from gateway.codes.catalogue import CATALOGUE
+    from gateway.codes.all_codes import CATALOGUE
 
     known = [*CATALOGUE, *(entry.name for entry in CATALOGUE.values() if entry.name)]
     near = get_close_matches(code.upper().replace("-", "_"), known, n=2, cutoff=0.6)

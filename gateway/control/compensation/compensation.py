@@ -15,8 +15,8 @@ from dataclasses import dataclass, field, replace
 from math import cos, isfinite
 from typing import Final
 
+from gateway.control.compensation.cell_map import CellMap
 from gateway.control.compensation.command_map import CommandMap
-from gateway.control.compensation.load_cell import CellMap
 from gateway.control.settings import ControlSettings
 
 

@@ -10,11 +10,11 @@ from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
+from gateway.control.blame_for_silence import cause_of_silence
 from gateway.control.inputs import LineStatus
 from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
-from gateway.control.silence import cause_of_silence
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Final
 
-from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.all_effects import EFFECTS
 from gateway.catalogue.effect import RECORDED, Effect
 from gateway.control.runs.experiment_plan import ExperimentPlan, Part
 from gateway.diagnosis.experiments.blocks import BLOCKS

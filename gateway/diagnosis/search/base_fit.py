@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.all_effects import EFFECTS
 from gateway.catalogue.cylinder import AREA, COULOMB
 from gateway.catalogue.effect import Parameter
 from gateway.catalogue.regulator import LAG

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.random import default_rng
 
-from gateway.catalogue.catalogue import BY_NAME
+from gateway.catalogue.all_effects import BY_NAME
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.random import default_rng
 from numpy.typing import NDArray
 
-from gateway.catalogue.catalogue import BY_NAME
+from gateway.catalogue.all_effects import BY_NAME
 from gateway.catalogue.cylinder import AREA
 from gateway.diagnosis.noise import Whitener, white_whitener
 from gateway.diagnosis.result import Gain

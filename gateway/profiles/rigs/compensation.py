@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import Any, Final
 
-from gateway.catalogue.catalogue import EFFECTS
+from gateway.catalogue.all_effects import EFFECTS
 from gateway.catalogue.effect import By, Effect
+from gateway.control.compensation.cell_map import CellMap
 from gateway.control.compensation.command_map import CommandMap
 from gateway.control.compensation.compensation import Compensation, OutsideForce, TimingCompensation
-from gateway.control.compensation.load_cell import CellMap
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 

@@ -16,8 +16,8 @@ from typing import Final
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
+from gateway.control.blame_for_silence import NOT_HELD, Held
 from gateway.control.inputs import LineStatus, Output
-from gateway.control.silence import NOT_HELD, Held
 from gateway.devices.messages import ForceSample
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank

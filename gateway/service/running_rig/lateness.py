@@ -7,7 +7,7 @@ no counter: a process whose counters stand still is runnable or stopped by its s
 from collections import deque
 from typing import Final
 
-from gateway.control.silence import Held
+from gateway.control.blame_for_silence import Held
 from gateway.processes.scheduler_counters import STOPPED_STATES, ProcessorTime, SchedulerCounters
 
 _WORTH_S: Final = 0.005  # shorter pauses explain nothing

@@ -12,7 +12,7 @@ from gateway.calibrations.activation import ActiveCalibration
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
-from gateway.control.silence import cause_of_silence
+from gateway.control.blame_for_silence import cause_of_silence
 from gateway.devices import cell_host, output_host
 from gateway.fieldbus import ModbusTcpServer
 from gateway.modbus import Peer

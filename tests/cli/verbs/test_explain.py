@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from gateway.codes.catalogue import CATALOGUE
+from gateway.codes.all_codes import CATALOGUE
 
 
 @pytest.mark.parametrize("code", "E101 E102 E103 E110 E111 E120 W201 W202 W203 W204 A301 A302 A303 A310 E401".split())

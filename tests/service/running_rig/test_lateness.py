@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.control.silence import Held
+from gateway.control.blame_for_silence import Held
 from gateway.processes.scheduler_counters import SchedulerCounters
 from gateway.service.running_rig.lateness import Lateness
 

@@ -10,7 +10,7 @@ import pytest
 
 import gateway
 from gateway.codes import alarms, errors, notices, refusals
-from gateway.codes.catalogue import CATALOGUE, find_codes
+from gateway.codes.all_codes import CATALOGUE, find_codes
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason, SpecialRefusal
 from gateway.codes.warning_bits import WarningBit

@@ -7,8 +7,8 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
+from gateway.control.blame_for_silence import Held, cause_of_silence
 from gateway.control.inputs import LineStatus
-from gateway.control.silence import Held, cause_of_silence
 from gateway.registers.words import ControlBit, State
 from tests.control.bench import Bench, has_fault
 
