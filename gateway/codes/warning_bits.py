@@ -63,7 +63,7 @@ class WarningBit(IntFlag):
         Explanation(
             "A341",
             "noise on a serial line",
-            "Bytes that form no message keep arriving; they are dropped and counted.",
+            "Bytes that form no message keep arriving, over 1 % of the messages of 10 s; they are dropped and counted.",
             "A motor cable beside the serial one, a missing ground, or a marginal baud rate.",
             "Separate the cables and connect the shield at one end.",
             is_warning=True,
@@ -74,8 +74,8 @@ class WarningBit(IntFlag):
         Explanation(
             "A342",
             "loop is slow",
-            "Ticks of the control loop are missed.",
-            "Other programs on this machine, or a CPU that sleeps deeply.",
+            "Over 1 % of the control loop's ticks of 10 s are missed, or more than half a period late.",
+            "Other programs on this machine, or a CPU that sleeps deeply; the sentence says where the time went.",
             "Compare missed_ticks over a minute; `run --realtime` gives the loop priority.",
             is_warning=True,
         ),

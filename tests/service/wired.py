@@ -91,6 +91,8 @@ class Wired:
         self.observer = Observer()
         self.is_plugged = True
         self.is_cell_plugged = True
+        self.lateness: Callable[[int], tuple[int, float]] = lambda tick: (1, 0.0)
+        """Of each tick: periods since the one before, and how late it is, as the clock would say."""
         self._steps = 0
         self._down = wire_of(rig.output)
         self._stream, self._asks = wire_of(rig.load_cell), wire_of(rig.load_cell)
@@ -167,7 +169,7 @@ class Wired:
         if (frame := self._stream.bytes_through(self.now_s)) and self.is_cell_plugged:
             self.loop.on_cell_bytes(frame, self.now_s)
         if self._steps % 10 == 0:
-            self.loop.on_tick(1, 0.0)
+            self.loop.on_tick(*self.lateness(self._steps // 10))
 
     def _wire_has_time(self) -> bool:
         """An amplifier leaves out the readings that its wire cannot carry."""

@@ -98,6 +98,11 @@ class Rig:
         enabled = self.residual_watch.enabled
         return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
 
+    @property
+    def lacks_device_watchdog(self) -> bool:
+        """Whether a real output device would hold its last voltage when nobody talks to it any more."""
+        return not self.simulated and self.output.device.watchdog == "none"
+
     def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
         """Return the calibration's model as control uses it here: a bent command map is straightened, but for a
         calibration that was made on this very rig, for that has measured it."""

@@ -13,12 +13,14 @@ from dataclasses import replace
 from math import nan
 from typing import Final
 
+from gateway import defaults
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.control.blame_for_silence import NOT_HELD, Held
 from gateway.control.inputs import LineStatus, Output
 from gateway.devices.messages import ForceSample
+from gateway.processes.scheduler_counters import ProcessorTime, time_between
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command
@@ -29,6 +31,7 @@ from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
+from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
 from gateway.service.running_rig.recorded_row import row_of
 from gateway.service.running_rig.recordings import Recordings
 
@@ -43,7 +46,7 @@ class ControlLoop:
     """Runs one step of control at each event: reads the bank's command and the newest sample, lets the controller decide, hands
     the voltage to the output line, publishes the status in the bank and the row to recordings. Owns no file and no socket.
 
-    clock: monotonic seconds; log(cause, sentence): for people.
+    clock: monotonic seconds; log(cause, sentence): for people; period_s: of the tick.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class ControlLoop:
         *,
         clock: Callable[[], float],
         log: Log,
+        period_s: float = 1.0 / defaults.LOOP_HZ,
     ) -> None:
         self.bank = bank
         self.controller = controller
@@ -77,11 +81,13 @@ class ControlLoop:
         self._cell = cell
         self._clock = clock
         self._log = log
-        self.waited_s: Callable[[], float | None] = lambda: None
-        """Seconds that this process has waited for a processor until now, where the machine counts that."""
+        self.processor_time: Callable[[], ProcessorTime | None] = lambda: None
+        """What this process has had of a processor until now, where the machine counts that."""
         self.lateness: Lateness | None = None
         self._last_tick_s: float | None = None
-        self._last_waited_s: float | None = None
+        self._last_processor_time: ProcessorTime | None = None
+        self._slow_loop = SlowLoop(period_s)
+        self._cell_noise, self._output_noise = LineNoise("load cell's line"), LineNoise("output's line")
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
 
@@ -96,7 +102,9 @@ class ControlLoop:
 
     def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
         fresh = False
-        for message in self._cell.receive(chunk, now_s):
+        messages = self._cell.receive(chunk, now_s)
+        self._begin(WarningBit.SERIAL_NOISE, self._cell_noise.hear(messages, now_s))
+        for message in messages:
             if isinstance(message, ForceSample):
                 self.sample, fresh = message, True
                 self.samples += 1
@@ -107,18 +115,34 @@ class ControlLoop:
             self._record()
 
     def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
-        self.output.on_bytes(chunk, now_s)
+        replies = self.output.on_bytes(chunk, now_s)
+        self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s))
 
     def on_tick(self, expirations: int, late_s: float) -> None:
         """expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
         self.health.count(expirations, late_s)
         now_s = self._clock()
+        self._begin(WarningBit.SLOW_LOOP, self._slow_loop.tick(now_s, expirations, late_s, self._used_since_tick))
+        self._end_warnings(now_s)
         self.output.tick(now_s)
         self._cell.tick(now_s)
         self._step(now_s)
-        self._last_tick_s, self._last_waited_s = now_s, self.waited_s()
+        self._last_tick_s, self._last_processor_time = now_s, self.processor_time()
         if self.lateness:
-            self.lateness.tick(now_s, self._last_waited_s)
+            self.lateness.tick(now_s, _waited_s(self._last_processor_time))
+
+    def _begin(self, bit: WarningBit, sentence: str) -> None:
+        if sentence:
+            self.warnings |= bit
+            self._log("rate", sentence)
+
+    def _end_warnings(self, now_s: float) -> None:
+        if self.warnings & WarningBit.SERIAL_NOISE:
+            lasts = [line.lasts(now_s) for line in (self._cell_noise, self._output_noise)]
+            if not any(lasts):
+                self.warnings &= ~WarningBit.SERIAL_NOISE
+        if self.warnings & WarningBit.SLOW_LOOP and not self._slow_loop.lasts(now_s):
+            self.warnings &= ~WarningBit.SLOW_LOOP
 
     def on_output_opened(self) -> None:
         self.output.reset()
@@ -142,17 +166,17 @@ class ControlLoop:
         """Return the time since the last tick, s: what arrived during a stall is executed late, and control judges by it."""
         return 0.0 if self._last_tick_s is None else now_s - self._last_tick_s
 
-    def _waited_s(self) -> float | None:
-        """Of the lateness: so much the machine is to blame for."""
-        if self._last_waited_s is None or (waited_s := self.waited_s()) is None:
+    def _used_since_tick(self) -> ProcessorTime | None:
+        """Return what this process has had of a processor since the last tick."""
+        if self._last_processor_time is None:
             return None
-        return waited_s - self._last_waited_s
+        return time_between(self._last_processor_time, self.processor_time())
 
     def _processor_held(self, since_s: float | None, now_s: float) -> Held:
         """Asked of the kernel only once a device has not been heard for a while."""
         if self.lateness is None or since_s is None or not _LONG_SILENCE_S <= now_s - since_s <= _LONGEST_SILENCE_S:
             return NOT_HELD
-        return self.lateness.since(since_s, now_s, self.waited_s())
+        return self.lateness.since(since_s, now_s, _waited_s(self.processor_time()))
 
     def _line(self, now_s: float) -> LineStatus:
         return LineStatus(
@@ -164,7 +188,7 @@ class ControlLoop:
             pressure_pa_per_v=self.pressure_pa_per_v,
             owner_connected=self.owner_connected,
             late_s=self._late_s(now_s),
-            waited_s=self._waited_s(),
+            waited_s=_waited_s(self._used_since_tick()),  # so much of the lateness the machine is to blame for
             warnings=self.warnings,
             sent_v=self.output.sent_v,
             wire_s=self.output.round_trip_s,
@@ -208,3 +232,8 @@ class ControlLoop:
             self.calibration_runs.append(self.sample, self.decision, self.output.line)
         if self.ring and self.sample and self.decision:
             self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.line))
+
+
+def _waited_s(used: ProcessorTime | None) -> float | None:
+    """Return how long a processor was waited for, s; None where the kernel does not count that."""
+    return used.waited_s if used else None

@@ -11,7 +11,7 @@ an honest device would look like one that alters its settings. So after a time-o
 asked last is believed by nobody: the line is left alone for one reply time, then asked anew. A falling voltage never waits.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 
@@ -88,10 +88,13 @@ class OutputExchange:
         self._wanted_v = voltage_v
         self._send_next(now_s)
 
-    def on_bytes(self, chunk: bytes, now_s: float) -> None:
-        for reply in self._host.receive(chunk, now_s):
+    def on_bytes(self, chunk: bytes, now_s: float) -> Sequence[OutputReply]:
+        """Return what these bytes complete, once it is acted on; what waits goes out."""
+        replies = self._host.receive(chunk, now_s)
+        for reply in replies:
             self._on_reply(reply, now_s)
         self._send_next(now_s)
+        return replies
 
     def tick(self, now_s: float) -> None:
         """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""

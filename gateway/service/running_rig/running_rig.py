@@ -10,7 +10,6 @@ from typing import Any
 
 from gateway.calibrations.activation import ActiveCalibration
 from gateway.codes.faults import FaultCode
-from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.control.blame_for_silence import cause_of_silence
 from gateway.devices import cell_host, output_host
@@ -37,7 +36,7 @@ from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.recordings import Recordings
-from gateway.service.running_rig.starting import cause_of_restart, listen, open_again
+from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, listen, open_again, warning_notes
 from gateway.service.watch_reports import WatchReports
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
@@ -145,15 +144,15 @@ class RunningRig:
             self._cell_line,
             clock=time.monotonic,
             log=self._log,
+            period_s=self._tick.period_s,
         )
         self.loop.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
         self.loop.recordings = self._recordings
         self.loop.ring = self.ring
         self.loop.restart_cause = cause
-        self.loop.waited_s = self._counters.waited_s
+        self.loop.processor_time = self._counters.read
         self.loop.lateness = self._lateness
-        if self._tick.is_fallback:
-            self.loop.warnings |= WarningBit.CLOCK_FALLBACK
+        self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
         """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
@@ -207,6 +206,8 @@ class RunningRig:
         notes = [*self._rig.notes, *self._calibrations.notes]
         if restarted:
             notes.append(f"restarted in OFF after: {restarted.sentence}")
+        else:
+            notes += warning_notes(self._rig)
         if self._line.acknowledged_v is None:
             notes.append(await self._why_silent(self._output_port, self._rig.output, restarted))
         if self.loop.sample is None:

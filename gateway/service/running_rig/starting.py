@@ -6,9 +6,11 @@ from typing import Final
 
 from gateway import defaults
 from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.ports import PortError, SerialPort
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.profiles import Rig
 
 _HELD_BOUND_S: Final = 0.5  # how long a restart waits for a port that somebody holds who is about to end
 _HELD_AGAIN_S: Final = 0.05
@@ -35,6 +37,20 @@ def cause_of_restart(restarted: Ending | None, *, was_unclean: bool) -> FaultCod
     if restarted:
         return _FAULTS.get(restarted.cause, FaultCode.INTERNAL)
     return FaultCode.INTERNAL if was_unclean else FaultCode.NONE
+
+
+def lasting_warnings(rig: Rig, *, is_coarse_clock: bool) -> WarningBit:
+    """Return the warnings that a run begins and ends with: what this rig and this machine do not have."""
+    coarse = WarningBit.CLOCK_FALLBACK if is_coarse_clock else WarningBit(0)
+    return coarse | (WarningBit.NO_WATCHDOG if rig.lacks_device_watchdog else WarningBit(0))
+
+
+def warning_notes(rig: Rig) -> tuple[str, ...]:
+    """Return what a start says of them, once: a restart does not repeat it."""
+    if not rig.lacks_device_watchdog:
+        return ()
+    held = f"{rig.output.device.name} has no watchdog: it holds its last voltage when this machine loses power"
+    return (f"A343 {held}; the rig accepts that; an air dump valve on the E-stop circuit helps",)
 
 
 async def open_again(port: SerialPort) -> PortError | None:

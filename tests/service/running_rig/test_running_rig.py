@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.devices import SerialSettings
 from gateway.modbus import Peer
 from gateway.ports import PortError
@@ -80,6 +81,7 @@ def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         assert rig.loop.restart_cause is FaultCode.MACHINE_BUSY
+        assert rig.loop.warnings & WarningBit.NO_WATCHDOG, "after a restart too"
 
     began_s = time.monotonic()
     with_running_rig(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))

@@ -1,0 +1,138 @@
+"""Warnings of a rate: noise on a serial line (A341), a loop whose ticks come late (A342).
+
+One broken message or one late tick is judged elsewhere (a stale sample, a failed echo, `stall_s`); what keeps happening
+deserves a look before it becomes a fault. It is counted over 10 s, told once when it begins, and over after 10 s without any.
+
+From three on: opening a port in the middle of a message breaks one, a burst on the wire two, and one stall is one event. Above
+1 %: losses at that rate, each by itself, make the five in a row that stale a 100 Hz sample (50 ms) once in three years, at 10 %
+every quarter of an hour. So the warning comes long before the fault, and a line or loop that is well stays far below it.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from gateway.devices.messages import Garbage
+from gateway.processes.scheduler_counters import ProcessorTime
+
+WINDOW_S: Final = 10.0
+LEAST: Final = 3
+SHARE: Final = 0.01
+LATE_PERIODS: Final = 0.5  # a tick this late is nearer to the next one's time than to its own
+_BIN_S: Final = 1.0
+_HALF: Final = 0.5
+
+
+class _RecentSums:
+    """Sums of several amounts over the last 10 s, in bins of 1 s."""
+
+    def __init__(self, amounts: int) -> None:
+        self._bins: deque[tuple[float, list[float]]] = deque()
+        self._none = [0.0] * amounts
+
+    def add(self, now_s: float, *amounts: float) -> None:
+        if not self._bins or now_s - self._bins[-1][0] >= _BIN_S:
+            self._bins.append((now_s, self._none.copy()))
+        while now_s - self._bins[0][0] >= WINDOW_S:
+            self._bins.popleft()
+        sums = self._bins[-1][1]
+        for k, amount in enumerate(amounts):
+            sums[k] += amount
+
+    def totals(self) -> list[float]:
+        return [sum(column) for column in zip(*(sums for _, sums in self._bins), strict=True)]
+
+
+class _RateWarning:
+    """Begins in its subclasses; ends here."""
+
+    def __init__(self) -> None:
+        self.is_on = False
+        self._last_s = 0.0
+
+    def lasts(self, now_s: float) -> bool:
+        """Whether it is on; it goes off after 10 s without anything to warn of."""
+        if self.is_on and now_s - self._last_s >= WINDOW_S:
+            self.is_on = False
+        return self.is_on
+
+
+class LineNoise(_RateWarning):
+    """Messages of one serial line, and those of them that nobody can read. line: as sentences name it."""
+
+    def __init__(self, line: str) -> None:
+        super().__init__()
+        self._line = line
+        self._recent = _RecentSums(3)
+
+    def hear(self, messages: Sequence[object], now_s: float) -> str:
+        """Return a sentence where noise begins with these messages, else an empty one."""
+        dropped = [len(one.data) for one in messages if isinstance(one, Garbage)]
+        if messages:
+            self._recent.add(now_s, len(dropped), len(messages), sum(dropped))
+        if not dropped:
+            return ""
+        self._last_s = now_s
+        count, heard, size = self._recent.totals()
+        if self.is_on or count < LEAST or count <= SHARE * heard:
+            return ""
+        self.is_on = True
+        seen = f"{count:.0f} of {heard:.0f} messages ({size:.0f} bytes) within {WINDOW_S:g} s could not be read"
+        return f"A341 {self._line}: {seen} and were dropped; {_cause_of_noise(heard - count)}"
+
+
+def _cause_of_noise(whole: float) -> str:
+    if not whole:
+        return "none could be read: another speed, another device or profile? force-gateway check the rig"
+    return "a motor cable beside it, no ground, a marginal baud rate? separate the cables, ground the shield at one end"
+
+
+class SlowLoop(_RateWarning):
+    """Ticks of the loop, and those of them that were missed or late. period_s: of the tick."""
+
+    def __init__(self, period_s: float) -> None:
+        super().__init__()
+        self._period_s = period_s
+        self._recent = _RecentSums(6)
+
+    def tick(
+        self, now_s: float, expirations: int, late_s: float, processor_time: Callable[[], ProcessorTime | None]
+    ) -> str:
+        """Return a sentence where the loop becomes slow with this tick, else an empty one.
+
+        expirations, late_s: as of `ClockTick`. processor_time: what this process has had since the tick before; None where
+        the kernel does not count that. Asked only for a late tick.
+        """
+        bad = expirations - 1 + (late_s > LATE_PERIODS * self._period_s)
+        if not bad:
+            self._recent.add(now_s, 0, expirations)
+            return ""
+        self._last_s = now_s
+        behind_s, used = (expirations - 1) * self._period_s + late_s, processor_time()
+        waited_s, ran_s = (used.waited_s, used.on_cpu_s) if used else (0.0, 0.0)
+        self._recent.add(now_s, bad, expirations, 1, behind_s, min(waited_s, behind_s), min(ran_s, behind_s))
+        missed, ticks, stalls, *spent_s = self._recent.totals()
+        if self.is_on or stalls < LEAST or missed <= SHARE * WINDOW_S / self._period_s:
+            return ""
+        self.is_on = True
+        bound = _ms(LATE_PERIODS * self._period_s)
+        seen = f"{missed:.0f} of {ticks:.0f} ticks within {WINDOW_S:g} s were missed or over {bound} late"
+        return f"A342 {seen}, {_cause_of_lateness(*spent_s, is_counted=used is not None)}"
+
+
+def _cause_of_lateness(late_s: float, waited_s: float, ran_s: float, *, is_counted: bool) -> str:
+    """The machine or the program, by what took most of the lateness; all in seconds."""
+    if not is_counted:
+        return f"{_ms(late_s)} in all, not counted why: end other programs, or `run --realtime`"
+    seen = f"{_ms(late_s)} in all, {_ms(waited_s)} of them waiting for a processor, {_ms(ran_s)} at work"
+    if waited_s >= _HALF * late_s:
+        return f"{seen}: the machine is too busy; end other programs, or `run --realtime`"
+    if ran_s >= _HALF * late_s:
+        return (
+            f"{seen}: the gateway's own work takes too long here; a slower loop_hz, fewer clients, or a faster machine"
+        )
+    return f"{seen}: this machine stood still or slept (a virtual one on a busy host, a CPU in deep sleep)"
+
+
+def _ms(seconds: float) -> str:
+    return f"{seconds * 1e3:.0f} ms"
