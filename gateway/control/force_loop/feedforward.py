@@ -13,6 +13,7 @@ from typing import Final
 
 from gateway.bsfm import RISING, Bsfm, InverseStatus
 from gateway.control.demand import Demand
+from gateway.control.force_loop.setpoint_trend import SetpointTrend
 from gateway.control.limits import TICK_S, RateBudget, is_below_usable, narrow_limits, ramp_limited
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
@@ -87,6 +88,7 @@ class Feedforward:
         self._lag_s = response_lag_s
         self._delayed = TransportDelay(delay_s)
         self._ahead_s = ahead_s
+        self._trend = SetpointTrend()
         self.reset()
 
     def retime(self, response_lag_s: float, delay_s: float, ahead_s: float) -> None:
@@ -99,6 +101,7 @@ class Feedforward:
         """Vented: nothing applied, nothing remembered."""
         self.applied_n = self.aimed_n = self.reference_n = 0.0
         self._delayed.restart(0.0)
+        self._trend.restart()
         self._memory = self._slide = self.model.reversal.start()
         self._slid_n = 0.0
         self._pace = RateBudget()
@@ -128,18 +131,28 @@ class Feedforward:
 
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
         """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what does not come from
-        the slide: the payload's weight, forces from outside."""
+        the slide: the payload's weight, forces from outside. The aim is where the target will be ahead_s later: on its ramp,
+        and where the goal itself moves steadily, on the goal's way."""
+        self._trend.advance(goal_n, dt_s)
         self._pace.earn(dt_s)
         last_n = self.applied_n
         self.applied_n = ramp_limited(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
         self._pace.spend(moved_n, rate_n_per_s)
-        aimed_n, self.aimed_n = self.aimed_n, ramp_limited(goal_n, self.applied_n, rate_n_per_s, self._ahead_s)
+        coming_n = self._coming_n(goal_n)
+        aimed_n, self.aimed_n = self.aimed_n, ramp_limited(coming_n, self.applied_n, rate_n_per_s, self._ahead_s)
         self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
         heard_n = self._delayed.advance(self.applied_n, dt_s)
         self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
         return moved_n
+
+    def _coming_n(self, goal_n: float) -> float:
+        """Where the goal will be ahead_s later; never outside what may be commanded, nor where nothing is."""
+        moved_n = self._trend.ahead_n(self._ahead_s) if self._ahead_s > 0.0 else 0.0
+        if moved_n == 0.0 or goal_n <= 0.0 or is_below_usable(goal_n + moved_n, self._limits):
+            return goal_n
+        return min(max(goal_n, self._limits.force_max_n), goal_n + moved_n)
 
     def _turn(self, from_n: float, to_n: float) -> None:
         """What the slide, whose thrust the model knows, remembers of this movement."""

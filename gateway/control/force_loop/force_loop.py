@@ -34,6 +34,9 @@ Moved: TypeAlias = StateEvent | StopCause
 
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
+LANDING_SHARE: Final = (
+    0.2  # of what a step's landing takes, by which the lags' inverse is late on a ramp: seen on drawn machines
+)
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
@@ -92,7 +95,8 @@ class ForceLoop:
         """How the force follows the target: lag, dead time before it, and how far the aim runs ahead on a ramp."""
         measured, timing = settings.timing, self._timing
         if measured:
-            return max(TICK_S, measured.landing_s), measured.dead_time_s, measured.landing_s
+            ahead_s = measured.dead_time_s + LANDING_SHARE * measured.landing_s
+            return max(TICK_S, measured.landing_s), measured.dead_time_s, ahead_s
         delay_s, lags_s = (timing.delay_s, timing.lags_s) if timing else (0.0, settings.supervision.response_lag_s)
         # the trim compares with a force that comes as much sooner as the lead makes it: it must not learn the push
         gained_s = self._lead.gained_s if isinstance(self._lead, LeadCompensator) else 0.0

@@ -1,0 +1,65 @@
+"""A setpoint that moves steadily is continued; one that jumps, stands or comes seldom is taken as it is."""
+
+from collections.abc import Callable
+from math import pi, sin
+
+import pytest
+
+from gateway.control.force_loop.setpoint_trend import JUMP_N, LONGEST_S, MOST_N, SetpointTrend
+
+TICK_S = 0.01
+AHEAD_S = 0.15
+
+
+def trend_after(setpoint: Callable[[float], float], every_s: float, until_s: float) -> SetpointTrend:
+    """A master writes every every_s, control steps every tick."""
+    trend, written_n = SetpointTrend(), setpoint(0.0)
+    ticks_per_write = round(every_s / TICK_S)
+    for tick in range(round(until_s / TICK_S) + 1):
+        if tick % ticks_per_write == 0:
+            written_n = setpoint(tick * TICK_S)
+        trend.advance(written_n, TICK_S)
+    return trend
+
+
+@pytest.mark.parametrize("every_s", [0.01, 0.02, 0.04, 0.05])
+@pytest.mark.parametrize("at_s", [0.6, 1.1, 1.6, 2.1])
+def test_a_sine_is_foreseen_three_times_better_than_it_is_awaited(every_s: float, at_s: float) -> None:
+    def wanted_n(now_s: float) -> float:
+        return round(20.0 + 8.0 * sin(pi * now_s), 2)
+
+    trend = trend_after(wanted_n, every_s, at_s)
+    last_s = at_s - round(at_s / TICK_S) % round(every_s / TICK_S) * TICK_S
+    error_n = wanted_n(last_s) + trend.ahead_n(AHEAD_S) - wanted_n(at_s + AHEAD_S)
+    awaited_n = max(abs(wanted_n(last_s) - wanted_n(at_s + AHEAD_S)), 1.5)
+    assert abs(error_n) < 0.35 * awaited_n
+
+
+def test_a_steady_ramp_is_continued_exactly() -> None:
+    assert trend_after(lambda now_s: 10.0 * now_s, 0.02, 1.0).ahead_n(AHEAD_S) == pytest.approx(1.5, abs=0.01)
+
+
+@pytest.mark.parametrize("size_n", [0.5, 3.0, 20.0])
+def test_a_step_is_taken_as_it_is(size_n: float) -> None:
+    assert trend_after(lambda now_s: 10.0 + size_n * (now_s >= 0.5), 0.02, 0.5).ahead_n(AHEAD_S) == 0.0
+
+
+def test_values_that_come_seldom_are_steps() -> None:
+    assert trend_after(lambda now_s: 5.0 * now_s, LONGEST_S + 0.04, 2.0).ahead_n(AHEAD_S) == 0.0
+
+
+def test_a_path_that_stops_is_followed_no_further_once_a_value_is_overdue() -> None:
+    moving = trend_after(lambda now_s: 10.0 * min(now_s, 1.0), 0.02, 1.0)
+    stopped = trend_after(lambda now_s: 10.0 * min(now_s, 1.0), 0.02, 1.06)
+    assert moving.ahead_n(AHEAD_S) > 1.0
+    assert stopped.ahead_n(AHEAD_S) == 0.0
+
+
+def test_what_is_added_is_bounded() -> None:
+    assert trend_after(lambda now_s: 49.0 * JUMP_N * now_s, 0.02, 0.5).ahead_n(1.0) == MOST_N
+
+
+def test_a_restart_forgets_the_path() -> None:
+    trend = trend_after(lambda now_s: 10.0 * now_s, 0.02, 1.0)
+    trend.restart()
+    assert trend.ahead_n(AHEAD_S) == 0.0
