@@ -5,6 +5,9 @@ A default that only one dataclass states (the bounds of control, for one) stands
 
 from typing import Final
 
+STRICT: Final = {"extra": "forbid"}
+"""Of every dataclass that is built from a file: unknown keys are refused (`__pydantic_config__`, read in gateway.profiles)."""
+
 RIG: Final = "demo"
 """The shipped rig that verbs mean where none is named."""
 REGISTER_MAP: Final = "force-v1"
@@ -28,10 +31,16 @@ OUTPUT_BAUD: Final = 9600
 CELL_BAUD: Final = 115200
 VOLTAGE_MAX_V: Final = 10.0
 """End of the usual range of DACs and regulators, 0 .. 10 V."""
+UNLIMITED: Final = 1.0e12
+"""A bound of the simulated machine that is never met, in any unit; infinity cannot be said in JSON."""
+PAD_STIFFNESS_N_PER_M: Final = 4.1e4
+"""Pad and workpiece together, of the simulated machine where nobody says another."""
 CELL_RANGE_N: Final = 100.0
 LARGEST_CELL_N: Final = 5000.0
 """Of any rig: no calibration may need more, and no rig file may name more."""
 LOOP_HZ: Final = 100.0
+TICK_S: Final = 1.0 / LOOP_HZ
+"""Nominal tick of the control loop."""
 STALL_S: Final = 0.1
 """Silence of the control loop after which the guardian replaces it."""
 COMMIT_PATIENCE_S: Final = 10.0

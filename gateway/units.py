@@ -1,4 +1,4 @@
-"""Unit conversions and constants, nothing else. Inside the program everything is SI; names end with the unit."""
+"""Unit conversions, constants, and how sentences write them. Inside the program everything is SI; names end with the unit."""
 
 from typing import Final
 
@@ -16,16 +16,8 @@ NEWTON_PER_UNIT: Final = {
 """Newtons in one unit of what load-cell amplifiers print."""
 
 
-def pascal_from_bar(pressure_bar: float) -> float:
-    return pressure_bar * PASCAL_PER_BAR
-
-
 def kilopascal_from_pascal(pressure_pa: float) -> float:
     return pressure_pa / PASCAL_PER_KILOPASCAL
-
-
-def newton_from_kilogram_force(force_kgf: float) -> float:
-    return force_kgf * STANDARD_GRAVITY_M_PER_S2
 
 
 LINEAR: Final[dict[str, dict[str, tuple[float, float]]]] = {
@@ -65,3 +57,8 @@ def linear_conversion(quantity: str, given: str, wanted: str) -> tuple[float, fl
     """Return (factor, offset) with wanted = factor x given + offset; (1, 0) exactly when both are one. KeyError if unknown."""
     (factor, offset), (factor_to, offset_to) = LINEAR[quantity][given], LINEAR[quantity][wanted]
     return factor / factor_to, (offset - offset_to) / factor_to
+
+
+def format_ms(seconds: float) -> str:
+    """Return seconds as whole milliseconds for a sentence, such as `120 ms`."""
+    return f"{seconds * 1e3:.0f} ms"

@@ -27,7 +27,7 @@ from gateway.bsfm.inverse import InverseStatus
 from gateway.bsfm.model import Bsfm, Calibration, Response
 from gateway.bsfm.slip.reversal import FALLING, RISING, LinearBlend, Memory, Reversal
 from gateway.bsfm.slip.slip_stops import SlipStops
-from gateway.bsfm.validate import validate, validate_coefficients
+from gateway.bsfm.validate import validate_coefficients
 
 __all__ = [
     "FALLING",
@@ -48,6 +48,5 @@ __all__ = [
     "Response",
     "Reversal",
     "SlipStops",
-    "validate",
     "validate_coefficients",
 ]

@@ -15,7 +15,8 @@ from typing import Final
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.model import Calibration, Response
 
-STRIDE: Final = 16
+STRIDE: Final = 16  # numbers of an array as carried, whatever the order
+SLOPE_FLOOR_N_PER_V: Final = 0.5  # on a flatter branch a small error of force asks for a large voltage
 WHOLE: Final = -1
 RADII_FROM: Final = 4 * STRIDE
 SHARES_FROM: Final = 5 * STRIDE
@@ -63,7 +64,7 @@ class CoefficientLimits:
     voltage_max_v: float = 10.0
     weight_min: float = 1.0e-3
     weight_max: float = 1.0e3
-    slope_floor_n_per_v: float = 0.5
+    slope_floor_n_per_v: float = SLOPE_FLOOR_N_PER_V
     blend_span_max_n: float = 100.0
     slip_radius_min_v: float = 1.0e-4
     slip_radius_max_v: float = 100.0

@@ -21,19 +21,12 @@ from gateway.bsfm.curve import ORDER_MAX, RationalBezier
 from gateway.bsfm.validate_dynamics import response_faults, stiffness_faults, stop_faults
 
 __all__ = [
-    "STRIDE",
     "CoefficientFault",
     "CoefficientLimits",
     "CoefficientReason",
     "Coefficients",
-    "validate",
     "validate_coefficients",
 ]
-
-
-def validate(branches: Branches, limits: CoefficientLimits) -> list[CoefficientFault]:
-    """All faults of two branches, or [] if they may drive the plant."""
-    return validate_coefficients(Coefficients.of(branches), limits)
 
 
 def validate_coefficients(raw: Coefficients, limits: CoefficientLimits) -> list[CoefficientFault]:

@@ -12,8 +12,9 @@ the experiment that shows it, and what control does about it or why not. Everyth
     the tables of `effects` and of the reports             gateway/cli, gateway/reports
 
 So the catalogue stands below the registers and not within the diagnosis that uses most of it: a register must know the
-numbers, and imports run one way. It is data without arithmetic and imports nothing of the project, so that reading it costs no
-numpy; parts of experiments stand here by name, and diagnosis/experiments/blocks.py says what each does.
+numbers, and imports run one way. It is data without arithmetic and imports no more of the project than gateway.defaults, so
+that reading it costs no numpy; parts of experiments stand here by name, and diagnosis/experiments/blocks.py says what each
+does.
 
 To add an effect: its term in gateway/twin, one entry in the file of its family, an example in tests/diagnosis/hidden.py.
 """

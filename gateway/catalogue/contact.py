@@ -17,13 +17,14 @@ from gateway.catalogue.effect import (
     fixed_starts,
 )
 from gateway.catalogue.regulator import LIMITS, TOO_FAST, TRIM, limits
+from gateway.defaults import PAD_STIFFNESS_N_PER_M, UNLIMITED
 
 CREEP: Final = Parameter("contact", "creep_share", "1", 0.0, -1.0, 1.0, 0.002)
 CREEP_TIME: Final = Parameter("contact", "creep_s", "s", 10.0, 0.3, 1.0e4, 0.2, shape=True)
 HARDENING: Final = Parameter("contact", "hardening", "1", 0.0, -1.0, 1.0, 0.002)
-STROKE: Final = Parameter("cylinder", "stroke_m", "m", 1.0e12, 1.0e-6, 1.0e12, 2.0e-6)
+STROKE: Final = Parameter("cylinder", "stroke_m", "m", UNLIMITED, 1.0e-6, UNLIMITED, 2.0e-6)
 STOP_STIFFNESS: Final = Parameter("contact", "stop_stiffness_n_per_mm", "N/mm", 0.0, 0.0, 1.0e3, 0.02)
-STOP: Final = Parameter("contact", "stop_mm", "mm", 1.0e12, -1.0e4, 1.0e12, 0.02, shape=True)
+STOP: Final = Parameter("contact", "stop_mm", "mm", UNLIMITED, -1.0e4, UNLIMITED, 0.02, shape=True)
 TILT: Final = Parameter("contact", "tilt_n", "N", 0.0, 0.0, 200.0, 0.1)
 TILT_ZERO: Final = Parameter("contact", "tilt_zero_deg", "deg", 0.0, -400.0, 400.0, 0.5, shape=True)
 FEED_DRAG: Final = Parameter("contact", "feed_drag_n_s_per_mm", "N s/mm", 0.0, -50.0, 50.0, 0.005)
@@ -56,7 +57,9 @@ _NO_PLACE: Final = "the command block carries no place along the path; what is s
 
 def _stroke(hints: SearchHints) -> tuple[Start, ...]:
     """Travel at which the pad carries a force that was nearly reached; the pad's stiffness is the default plant's."""
-    return tuple((force_n / 4.1e4 - STROKE.null,) for force_n in limits(hints.forces_n) if force_n > 1.0)
+    return tuple(
+        (force_n / PAD_STIFFNESS_N_PER_M - STROKE.null,) for force_n in limits(hints.forces_n) if force_n > 1.0
+    )
 
 
 def _stop(hints: SearchHints) -> tuple[Start, ...]:

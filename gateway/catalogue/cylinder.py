@@ -26,11 +26,16 @@ ASYMMETRY: Final = Parameter("friction", "asymmetry_n", "N", 0.0, -50.0, 50.0, 0
 DRAG_ASYMMETRY: Final = Parameter("friction", "asymmetry_n_s_per_m", "N s/m", 0.0, -1.0e5, 1.0e5, 20.0)
 STICTION: Final = Parameter("friction", "dwell_stiction_n", "N", 0.0, 0.0, 50.0, 0.1)
 STICTION_TIME: Final = Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.8, 100.0, 0.2, shape=True)
-AT_ONCE: Final = Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.02, 0.8, 0.01, shape=True)
+STICTION_TIME_SHORT: Final = Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.02, 0.8, 0.01, shape=True)
 SIDE_FEED: Final = Parameter("friction", "side_load_n_s_per_mm", "N s/mm", 0.0, 0.0, 20.0, 0.005)
-SIDE_GRIP: Final = Parameter("friction", "side_load_n_per_n", "N/N", 0.0, 0.0, 0.9, 0.003)
+SIDE_FORCE: Final = Parameter("friction", "side_load_n_per_n", "N/N", 0.0, 0.0, 0.9, 0.003)
 SIDE_TILT: Final = Parameter("friction", "side_load_tilt_n", "N", 0.0, 0.0, 100.0, 0.1)
 SIDE_POSITION: Final = Parameter("friction", "side_load_n_per_mm", "N/mm", 0.0, 0.0, 20.0, 0.002)
+
+LEAST_DRAG: Final = 25.0
+"""N s/m: 1 N at 40 mm/s; less is no finding."""
+LEAST_PRESLIDING_M: Final = 3.0e-6
+"""Less is part of every seal, and within one step of the fit."""
 
 _ONE_SPEED: Final = ("coulomb-friction", "viscous-friction", "presliding")
 _AT_THREE_SPEEDS: Final = Recipe(parts=(PartName.RAMPS, PartName.STROKES), columns=PRESSURE)
@@ -67,7 +72,7 @@ CYLINDER: Final = (
                 parameters=(STRIBECK, STRIBECK_SPEED), probes=fixed_starts((0.3, 1.0e-4), (0.3, 1.0e-3), (0.3, 6.0e-3))
             ),
             EffectForm(
-                parameters=(STICTION, AT_ONCE), probes=fixed_starts((0.15, 0.1), (0.15, 0.3))
+                parameters=(STICTION, STICTION_TIME_SHORT), probes=fixed_starts((0.15, 0.1), (0.15, 0.3))
             ),  # of a slide that sticks and slips
         ),
         group=("coulomb-friction", "dwell-stiction"),
@@ -82,7 +87,7 @@ CYLINDER: Final = (
         experiment="strokes at three speeds with position_mm recorded",
         recipe=_AT_THREE_SPEEDS,
         treatments=(Treatment(why_not=_SPEED),),
-        least=25.0,
+        least=LEAST_DRAG,
         forms=(EffectForm(parameters=(VISCOUS,), probes=fixed_starts((50.0,), (500.0,))),),
         group=tuple(dict.fromkeys((*SLOW_LAGS, *_ONE_SPEED))),
     ),
@@ -96,7 +101,7 @@ CYLINDER: Final = (
         experiment="a ladder with minor loops: reversals of 0.1, 0.3 and 1 V around three levels",
         recipe=_LOOPS,
         treatments=(Treatment(by=By.MODEL),),
-        least=3.0e-6,
+        least=LEAST_PRESLIDING_M,
         forms=(EffectForm(parameters=(PRESLIDING,), probes=fixed_starts((3.0e-5,), (1.0e-4,), (4.0e-4,))),),
         group=_ONE_SPEED,
     ),
@@ -133,7 +138,9 @@ CYLINDER: Final = (
         forms=(
             EffectForm(parameters=(ASYMMETRY,), probes=fixed_starts((0.2,)), proportional=True),
             EffectForm(
-                parameters=(DRAG_ASYMMETRY,), probes=fixed_starts((40.0,), (-40.0,), (300.0,), (-300.0,)), least=25.0
+                parameters=(DRAG_ASYMMETRY,),
+                probes=fixed_starts((40.0,), (-40.0,), (300.0,), (-300.0,)),
+                least=LEAST_DRAG,
             ),
         ),
         group=("coulomb-friction", "viscous-friction"),
@@ -169,7 +176,7 @@ SIDE_LOAD: Final = Effect(
     treatments=(Treatment(why_not="the model's loop has one width, whatever presses from the side"),),
     forms=(
         EffectForm(parameters=(SIDE_FEED,), probes=fixed_starts((0.003,), (0.02,)), needs=("feed_mm_s",)),
-        EffectForm(parameters=(SIDE_GRIP,), probes=fixed_starts((0.003,), (0.02,)), needs=("feed_mm_s",)),
+        EffectForm(parameters=(SIDE_FORCE,), probes=fixed_starts((0.003,), (0.02,)), needs=("feed_mm_s",)),
         EffectForm(parameters=(SIDE_TILT,), probes=fixed_starts((0.05,), (0.4,)), needs=("tilt_deg",)),
         EffectForm(parameters=(SIDE_POSITION,), probes=fixed_starts((0.002,), (0.02,)), needs=("position_mm",)),
     ),

@@ -18,8 +18,6 @@ RECORDED: Final = frozenset({"time_s", "command_v", "force_n", "pressure_kpa"})
 """What a gateway records by itself, pressure where its output device measures it."""
 PRESSURE: Final = ("pressure_kpa",)
 
-ANY: Final = 1.0e12
-
 
 @dataclass(frozen=True, slots=True)
 class Parameter:

@@ -15,6 +15,7 @@ from gateway.catalogue.effect import (
     Treatment,
     fixed_starts,
 )
+from gateway.defaults import UNLIMITED
 
 DELAY: Final = Parameter("regulator", "delay_s", "s", 0.0, 0.0, 1.0, 0.001)
 LAG: Final = Parameter("regulator", "lag_s", "s", 0.0, 0.0, 2.0, 0.002)
@@ -24,8 +25,8 @@ HYSTERESIS: Final = Parameter("regulator", "hysteresis_pa", "Pa", 0.0, 0.0, 2.0e
 COMMAND_STEP: Final = Parameter("regulator", "command_step_v", "V", 0.0, 0.0, 2.0, 0.0001)
 BOW: Final = Parameter("regulator", "command_bow", "1", 0.0, -0.25, 0.25, 0.002)
 S_SHAPE: Final = Parameter("regulator", "command_s", "1", 0.0, -0.12, 0.12, 0.002)
-SUPPLY: Final = Parameter("regulator", "supply_pa", "Pa", 1.0e12, 1.0e4, 1.0e12, 1000.0)
-CEILING: Final = Parameter("regulator", "ceiling_pa", "Pa", 1.0e12, 1.0e4, 1.0e12, 1000.0)
+SUPPLY: Final = Parameter("regulator", "supply_pa", "Pa", UNLIMITED, 1.0e4, UNLIMITED, 1000.0)
+CEILING: Final = Parameter("regulator", "ceiling_pa", "Pa", UNLIMITED, 1.0e4, UNLIMITED, 1000.0)
 DROOP: Final = Parameter("regulator", "droop_pa_per_pa", "Pa/Pa", 0.0, -2.0, 2.0, 0.01)
 DROOP_SHARE: Final = Parameter("regulator", "droop_share_per_pa", "1/Pa", 0.0, -2.0e-5, 2.0e-5, 1.0e-8)
 LEAK: Final = Parameter("regulator", "leak_per_s", "1/s", 0.0, 0.0, 1.0, 0.001)
@@ -33,7 +34,7 @@ LEAK_FLOW: Final = Parameter("regulator", "leak_flow_pa", "Pa", 0.0, 0.0, 5.0e5,
 HUNTING: Final = Parameter("regulator", "hunting_pa", "Pa", 0.0, 0.0, 1.0e5, 300.0)
 HUNTING_HZ: Final = Parameter("regulator", "hunting_hz", "Hz", 5.0, 0.1, 40.0, 0.001, shape=True)
 HUNTING_PHASE: Final = Parameter("regulator", "hunting_phase_rad", "rad", 0.0, -10.0, 10.0, 0.02, shape=True)
-SLEW: Final = Parameter("regulator", "slew_pa_per_s", "Pa/s", 1.0e12, 1.0e4, 1.0e12, 1.0e4)
+SLEW: Final = Parameter("regulator", "slew_pa_per_s", "Pa/s", UNLIMITED, 1.0e4, UNLIMITED, 1.0e4)
 
 NEAR: Final = (0.93, 0.96, 0.985)
 SLOW_LAGS: Final = ("transport-delay", "clock-offset", "extra-lag", "viscous-friction")

@@ -18,5 +18,8 @@ class Explanation:
     is_warning: bool = False
 
 
+BUSY_CURE = "the machine is too busy: end other programs, or `run --realtime`"
+"""Ends the sentences whose cause is a machine with too much to do (MACHINE_BUSY, A403)."""
+
 NO_CODE = Explanation("", "none", "", "", "")
 """Of the number 0 in the registers."""

@@ -4,15 +4,18 @@ What is late is late, and the force goes; only the cause that is told differs. W
 of the process behind a simulated rig), no wire is to blame: MACHINE_BUSY where the kernel counts so much waiting for a
 processor, else the fault of the line with what was seen, for a machine that stands still as a whole (a virtual one on a
 busy host) counts nothing.
+
+Bounds: Supervision.sample_timeout_s and output_timeout_s in control/settings.py.
 """
 
 from dataclasses import dataclass
 from typing import Final
 
+from gateway.codes.explanation import BUSY_CURE
 from gateway.codes.faults import FaultCode
+from gateway.units import format_ms
 
 _SHARE: Final = 0.5
-_CURE: Final = "the machine is too busy: end other programs, or `run --realtime`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,22 +40,18 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
     """The fault and what is to blame, in words. suspects: what it is where the machine did let us run; nan s: never heard."""
     enough_s = _SHARE * silent_s
     waited_s = held.loop_waited_s
-    ours = f"our own loop came {_ms(held.loop_late_s)} late in that time"
+    ours = f"our own loop came {format_ms(held.loop_late_s)} late in that time"
     if held.rig_stopped_s >= enough_s:
         return (
             fault,
-            f"the simulated rig's process was stopped for {_ms(held.rig_stopped_s)} of them (a signal, a debugger)",
+            f"the simulated rig's process was stopped for {format_ms(held.rig_stopped_s)} of them (a signal, a debugger)",
         )
     if held.rig_waited_s >= enough_s:
-        seen = f"the simulated rig's process waited {_ms(held.rig_waited_s)} of them for a processor"
-        return FaultCode.MACHINE_BUSY, f"{seen}: {_CURE}"
+        seen = f"the simulated rig's process waited {format_ms(held.rig_waited_s)} of them for a processor"
+        return FaultCode.MACHINE_BUSY, f"{seen}: {BUSY_CURE}"
     if not held.loop_late_s >= enough_s:  # nor where silent_s is nan
         return fault, f"{ours}: {suspects}" if held.loop_late_s > 0.0 and suspects else suspects
     if waited_s is not None and waited_s >= _SHARE * held.loop_late_s:
-        return FaultCode.MACHINE_BUSY, f"{ours}, {_ms(waited_s)} of them waiting for a processor: {_CURE}"
-    counted = "not counted why" if waited_s is None else f"only {_ms(waited_s)} of them waiting for a processor"
+        return FaultCode.MACHINE_BUSY, f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {BUSY_CURE}"
+    counted = "not counted why" if waited_s is None else f"only {format_ms(waited_s)} of them waiting for a processor"
     return fault, f"{ours}, {counted}: this machine stood still (a virtual one on a busy host, a stop), not the device"
-
-
-def _ms(seconds: float) -> str:
-    return f"{seconds * 1e3:.0f} ms"

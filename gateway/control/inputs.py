@@ -9,7 +9,6 @@ from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control.blame_for_silence import NOT_HELD, Held
 from gateway.control.sample_conditioning import Reading
-from gateway.registers.command import Command
 from gateway.registers.words import LimitedBy, State, StatusBit
 
 _NO_WARNING: Final = WarningBit(0)
@@ -90,6 +89,3 @@ class Output:
     clear_command: bool = False  # service: bank.clear_command(): the output went off
     release_owner: bool = False  # service: bank.release_owner(): the lease is over
     events: tuple[str, ...] = ()  # sentences for the log, each starting with its code where it has one
-
-
-NO_COMMAND = Command()

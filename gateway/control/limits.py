@@ -11,10 +11,11 @@ from dataclasses import replace
 from math import isfinite
 from typing import Final
 
+from gateway import defaults
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
-TICK_S: Final = 0.01  # nominal tick: what a movement may claim at once after rest
+TICK_S: Final = defaults.TICK_S  # nominal tick: what a movement may claim at once after rest
 LONGEST_STEP_S: Final = 0.02  # a later step catches up no more than this
 
 Limited = tuple[float, LimitedBy]

@@ -8,8 +8,7 @@ from typing import Annotated
 from annotated_types import Ge, Gt, Le
 
 from gateway import defaults
-
-STRICT = {"extra": "forbid"}  # read by pydantic in gateway.profiles
+from gateway.defaults import STRICT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,8 +10,8 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Ge, Le, MinLen
 
+from gateway.defaults import STRICT
 from gateway.devices.fields import Choice, Decimals, TemplateError, WholeNumber
-from gateway.devices.line_settings import STRICT
 from gateway.devices.messages import Quality
 from gateway.devices.template import Template, compile_template
 from gateway.units import NEWTON_PER_UNIT

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Final, Literal, cast
 
-STRICT: Final = {"extra": "forbid"}  # read by pydantic in gateway.profiles
+from gateway.defaults import STRICT
 
 Baud = Literal[
     300, 600, 1200, 2400, 4800, 9600, 14400, 19200, 28800, 38400, 56000, 57600, 76800, 115200, 128000, 230400, 250000,

@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Gt, MinLen
 
+from gateway.defaults import STRICT
 from gateway.devices.checksum import ChecksumName
 from gateway.devices.exchange import (
     ForceReading,
@@ -22,7 +23,7 @@ from gateway.devices.exchange import (
     VoltageExchange,
 )
 from gateway.devices.fields import Choice, Decimals, Field, TemplateError, WholeNumber
-from gateway.devices.line_settings import STRICT, SerialSettings
+from gateway.devices.line_settings import SerialSettings
 from gateway.devices.template import compile_template
 
 

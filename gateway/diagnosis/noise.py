@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench, Channel
+from gateway.robust import noise_from_second_differences
 
 _LEAST_LEFT: Final = 0.15
 _BINS: Final = 64
@@ -27,8 +28,7 @@ _MEDIAN_OF_EXPONENTIAL: Final = float(np.log(2.0))
 class Noise:
     """Spectrum of one segment. weights: 1/sqrt(S) at the lines of the real FFT of its rows."""
 
-    white_n: float
-    total_n: float
+    total_n: float  # standard deviation
     weights: Floats
 
 
@@ -76,7 +76,7 @@ def white_whitener(bench: Bench, residual_n: Floats, weights: Floats | None = No
     for channel in bench.channels:
         sigma = fast_noise_n(residual_n[channel.rows][bench.usable[channel.rows]])
         lines = (channel.rows.stop - channel.rows.start) // 2 + 1
-        noises.append(Noise(sigma, sigma, np.full(lines, 1.0 / sigma)))
+        noises.append(Noise(sigma, np.full(lines, 1.0 / sigma)))
     return Whitener(bench.channels, tuple(noises), np.ones(bench.rows) if weights is None else weights)
 
 
@@ -93,8 +93,7 @@ def fast_noise_n(values: Floats) -> float:
     """Return the standard deviation of white noise from second differences, robust; never 0."""
     if values.size < 8:
         return max(float(np.std(values)) if values.size else 0.0, 1.0e-9)
-    spread = float(np.median(np.abs(np.diff(values, n=2)))) * 1.4826 / np.sqrt(6.0)
-    return float(max(spread, 1.0e-3 * float(np.std(values)), 1.0e-9))
+    return float(max(noise_from_second_differences(values), 1.0e-3 * float(np.std(values)), 1.0e-9))
 
 
 def coloured_whitener(bench: Bench, remainder_n: Floats, basis: Floats, weights: Floats) -> Whitener:
@@ -122,7 +121,7 @@ def _fit_spectrum(part: Floats, left: Floats) -> Noise:
     one_sided = np.ones(power.size)
     one_sided[1 : (rows + 1) // 2] = 2.0
     total = float(np.sqrt(np.sum(model * one_sided) / rows))
-    return Noise(float(np.sqrt(model[-1])), total, 1.0 / np.sqrt(model))
+    return Noise(total, 1.0 / np.sqrt(model))
 
 
 def _bin_spectrum(lines: NDArray[np.int64], power: Floats, left: Floats) -> tuple[Floats, Floats, Floats]:

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from gateway.codes.explanation import BUSY_CURE
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.units import format_ms
 
 STOPPED_STATES: Final = "Tt"
-_CURE: Final = ": the machine is too busy; end other programs, `run --realtime`, or a longer stall_s in the rig"
+_CURE: Final = f": {BUSY_CURE}, or a longer stall_s in the rig"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +83,8 @@ def time_between(before: ProcessorTime | None, now: ProcessorTime | None) -> Pro
 
 def explain_silence(silence: Silence, load: str) -> Ending:
     """Return the cause of a silence: what took the largest part of it. load: of the machine, in words."""
-    seen = f"control process stalled: {_ms(silence.silent_s)} without a tick, allowed {_ms(silence.bound_s)} (stall_s)"
+    allowed = f"allowed {format_ms(silence.bound_s)} (stall_s)"
+    seen = f"control process stalled: {format_ms(silence.silent_s)} without a tick, {allowed}"
     if silence.state and silence.state in STOPPED_STATES:
         return Ending(EndCause.STOPPED, f"{seen}; it was stopped by a signal or a debugger")
     if silence.used is None:
@@ -89,7 +92,7 @@ def explain_silence(silence: Silence, load: str) -> Ending:
         return Ending(cause, f"{seen}; this kernel does not count why; {load}{_CURE if silence.was_late else ''}")
     ran_s, waited_s = silence.used.on_cpu_s, silence.used.waited_s
     slept_s = max(0.0, silence.silent_s - ran_s - waited_s)
-    parts = f"it waited {_ms(waited_s)} for a processor, ran {_ms(ran_s)} and slept {_ms(slept_s)}; {load}"
+    parts = f"it waited {format_ms(waited_s)} for a processor, ran {format_ms(ran_s)} and slept {format_ms(slept_s)}; {load}"
     if waited_s >= max(ran_s, slept_s):
         return Ending(EndCause.MACHINE_BUSY, f"{seen}; {parts}{_CURE}")
     where = ", in the kernel, for a disk or a driver" if silence.state == "D" else ""
@@ -113,7 +116,3 @@ def _cores() -> int:
         return len(os.sched_getaffinity(0))
     except (OSError, AttributeError):
         return os.cpu_count() or 1
-
-
-def _ms(seconds: float) -> str:
-    return f"{seconds * 1e3:.0f} ms"

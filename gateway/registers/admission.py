@@ -62,8 +62,8 @@ class AdmittedWrite(NamedTuple):
     is_held: bool
 
 
-class _Wish(NamedTuple):
-    """What a write wants, as far as its host may want it."""
+class _PermittedWrite(NamedTuple):
+    """What a write asks for, as far as its host may ask for it. written: its control word; is_stop: the output goes off."""
 
     values: Values
     written: int
@@ -87,10 +87,10 @@ class Admission:
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
         commands, before = self._commands, self._commands.values
-        wish = self._wish(write)
-        if wish is None:
+        permitted = self._permit(write)
+        if permitted is None:
             return None
-        values, written, is_stop = wish
+        values, written, is_stop = permitted
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
         command = commands.command(values, written, number, now_s, write.host)
@@ -106,14 +106,15 @@ class Admission:
         kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, kept, command, is_stop, bool(written & TAKE), self._held_by(write, written))
 
-    def took(self, admitted: AdmittedWrite) -> None:
-        """The write has been stored."""
+    def note_stored(self, admitted: AdmittedWrite) -> None:
+        """Remember what a write that was stored has held and lowered."""
         self._is_held = admitted.is_held
         self.lowered_from_n = admitted.command.lowered_from_n
 
-    # -- what the write wants
+    # -- what the write asks for
 
-    def _wish(self, write: Write) -> _Wish | None:
+    def _permit(self, write: Write) -> _PermittedWrite | None:
+        """Return what the owner may ask for, or anybody: a stop, the end of a run. None: nothing to stop. Raises Refusal."""
         commands = self._commands
         values = commands.decode(write.block, write.address, write.data)
         commands.check_known(values, write.block)
@@ -121,12 +122,12 @@ class Admission:
         falls = before & ~written
         is_stop = bool(falls & ENABLE and not written & ~before & CALIBRATE) or self._is_bare_stop(write, written)
         if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
-            return _Wish(values, written, is_stop)
+            return _PermittedWrite(values, written, is_stop)
         if is_stop:
-            return _Wish(commands.values.copy(), 0, True)
+            return _PermittedWrite(commands.values.copy(), 0, True)
         asks_for_more = written & ~before & ENABLE  # than the end of a run, which anybody may ask for
         if falls & CALIBRATE and not asks_for_more:
-            return _Wish(commands.values.copy(), before & ~CALIBRATE, False)
+            return _PermittedWrite(commands.values.copy(), before & ~CALIBRATE, False)
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
         raise self._not_owner(write.address, write.host)

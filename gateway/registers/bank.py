@@ -242,7 +242,7 @@ class RegisterBank:
             return
         before, owner = self._commands.values, self._ownership.owner
         self._commands.store(admitted.values, admitted.kept)
-        self._admission.took(admitted)
+        self._admission.note_stored(admitted)
         self._settle_owner(admitted, write.host)
         for name in self._commands.names(write.block, write.address, len(write.data) // 2):
             self.last_writer[name] = peer, now_s

@@ -26,21 +26,22 @@ class Ownership:
         return self.owner is None or self.owner == host
 
     def may_take_over(self, host: str) -> bool:
+        """Return whether a takeover by this host is allowed: not where the rig configures another."""
         return self._configured is None or self._configured == host
 
     def take(self, host: str, *, explicitly: bool = False) -> None:
-        """A configured owner stays."""
+        """Make this host the owner, unless the rig configures one."""
         if self._configured is None:
             self.is_explicit = explicitly or (self.is_explicit and self.owner == host)
             self.owner = host
 
     def rest(self) -> None:
-        """Nothing is commanded any more. Who took over explicitly stays."""
+        """Release the ownership of a host that commands nothing any more, unless it took over explicitly."""
         if not self.is_explicit:
             self.release()
 
     def release(self) -> None:
-        """Disabled, or the lease is over. A configured owner stays."""
+        """Make nobody the owner, after a disable or the lease's end, unless the rig configures one."""
         self.is_explicit = False
         self.owner = self._configured
 

@@ -11,7 +11,8 @@ scipy when it runs: the real-time twin knows neither.
 
 from typing import TYPE_CHECKING, Any
 
-from gateway.twin.plant import UNLIMITED, Contact, Cylinder, Friction, LoadCell, Plant, Regulator, stack
+from gateway.defaults import UNLIMITED
+from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, stack
 from gateway.twin.simulation import STEP_S, Twin
 from gateway.twin.surroundings import Surroundings
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gateway.twin.effects.contact import SLOW, SPINDLE
-from gateway.twin.effects.term import active_formulas, is_switched_on
+from gateway.twin.effects.term import active_formulas
 from gateway.twin.elementwise import Real
 from gateway.twin.regulator import apply_play, lag_factor
 from gateway.twin.sections import Contact
@@ -21,10 +21,10 @@ class ContactState:
         self._late_n: Real = zero
         self.force_n: Real = zero
         self.is_on = False
-        self.look(zero)
+        self.select_active_effects(zero)
 
-    def look(self, force_n: Real) -> None:
-        """Which effects are on follows from what is known of the surroundings. force_n: of the slide now."""
+    def select_active_effects(self, force_n: Real) -> None:
+        """Choose the effects that act, from what is known of the surroundings now. force_n: of the slide."""
         if not self.is_on:
             self.force_n = force_n
         self._terms = active_formulas((*SLOW, SPINDLE), self._contact, self._conditions)
@@ -42,8 +42,3 @@ class ContactState:
             force_n = term(contact, force_n, conditions)
         self.force_n = force_n
         return force_n
-
-
-def is_dynamic(contact: Contact) -> bool:
-    """Has the contact a memory?"""
-    return is_switched_on(contact, ("backlash_n", "creep_share"))

@@ -76,8 +76,8 @@ class LoadCellState:
         self.filtered_n: Real = zero
         self.sign = 1.0
 
-    def look(self, conditions: TwinConditions) -> None:
-        """Which effects are on follows from what is known of the surroundings."""
+    def select_active_effects(self, conditions: TwinConditions) -> None:
+        """Choose the effects that act, from what is known of the surroundings now."""
         self._terms = active_formulas(TERMS, self._cell, conditions)
 
     def step(self, force_n: Real) -> None:

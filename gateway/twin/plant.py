@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from gateway.defaults import STRICT, UNLIMITED
 from gateway.twin.elementwise import Real
-from gateway.twin.sections import STRICT, UNLIMITED, Contact, Cylinder, Friction, LoadCell, Regulator
+from gateway.twin.sections import Contact, Cylinder, Friction, LoadCell, Regulator
 
 __all__ = [
     "UNLIMITED",

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from gateway.defaults import UNLIMITED
 from gateway.twin.effects.regulator import add_droop, add_hunting, apply_leak, bend_command
 from gateway.twin.effects.term import is_switched_on
 from gateway.twin.elementwise import Real, choose, clip, exponential, larger, quantise, smaller, where
-from gateway.twin.sections import UNLIMITED, Regulator
+from gateway.twin.sections import Regulator
 
 
 def lag_factor(lag_s: Real, step_s: float) -> Real:

@@ -6,12 +6,11 @@ so the schema for editors) cannot say. The functions of the effects stand in gat
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated
 
 from annotated_types import Ge, Gt, Le
 
-UNLIMITED: Final = 1.0e12
-STRICT: Final = {"extra": "forbid"}  # read by pydantic in gateway.profiles
+from gateway.defaults import PAD_STIFFNESS_N_PER_M, STRICT, UNLIMITED
 
 NotNegative = Annotated[float, Ge(0)]
 Positive = Annotated[float, Gt(0)]
@@ -27,7 +26,9 @@ class Regulator:
     full_scale_pa: Positive = 0.9e6  # gauge pressure at full scale
     command_step_v: NotNegative = 0.0  # one step of the command input; 10/1023 V for SMC's 10 bits
     command_bow: Annotated[float, Ge(-0.25), Le(0.25)] = 0.0  # command too high in mid scale, share of full scale
-    command_s: Annotated[float, Ge(-0.125), Le(0.125)] = 0.0  # command too low at 1/4, too high at 3/4 of full scale
+    command_s: Annotated[float, Ge(-0.125), Le(0.125)] = (
+        0.0  # S-shaped error, no seconds: too low at 1/4, too high at 3/4
+    )
     dead_band_pa: NotNegative = 0.0  # a change of the target smaller than this is not noticed
     hysteresis_pa: NotNegative = 0.0  # full width of the loop target -> pressure (play)
     supply_pa: NotNegative = UNLIMITED  # the air line: no pressure above it
@@ -82,7 +83,7 @@ class Contact:
     """End effector and pad against the workpiece. The pad pushes, it never pulls."""
 
     __pydantic_config__ = STRICT
-    pad_stiffness_n_per_m: Positive = 4.1e4  # pad and workpiece together
+    pad_stiffness_n_per_m: Positive = PAD_STIFFNESS_N_PER_M  # pad and workpiece together
     pad_damping_n_s_per_m: NotNegative = 0.0  # of the same
     gap_m: NotNegative = 0.0  # travel from the back stop to the workpiece
     mass_kg: NotNegative = 0.0  # what moves: end effector and slide

@@ -41,7 +41,7 @@ class Twin:
         self._slide = SlideState(self.plant, STEP_S, zero)
         self._contact = ContactState(self.plant.contact, STEP_S, self._conditions, zero)
         self._cell = LoadCellState(self.plant.cell, STEP_S, zero)
-        self._cell.look(self._conditions)
+        self._cell.select_active_effects(self._conditions)
         self._rng = default_rng(self._seed)
         self._steps = 0
         self._owed_steps = 0.0
@@ -135,12 +135,12 @@ class Twin:
 
         The position is taken from where its effects are nothing. ValueError when a value is not finite.
         """
-        self._conditions.look(around)
+        self._conditions.update(around)
         self._regulator.supply_kpa = self._conditions.supply_kpa
         friction = self.plant.friction
         self._slide.set_side_load(side_load_n(friction, self._conditions), side_share(friction, self._conditions))
-        self._contact.look(self._slide.force_n)
-        self._cell.look(self._conditions)
+        self._contact.select_active_effects(self._slide.force_n)
+        self._cell.select_active_effects(self._conditions)
 
     def set_disturbance(self, force_n: Real) -> None:
         """Input: an outside force on the slide, N towards the workpiece (a spindle's vibration); 0 is null.

@@ -49,7 +49,7 @@ class TwinConditions:
     aside_mm: Real = None
     spindle_rad: Real = 0.0
 
-    def look(self, around: Surroundings) -> None:
+    def update(self, around: Surroundings) -> None:
         """Take over what is around now. ValueError when a known value is not finite."""
         for name in COLUMNS:
             value = getattr(around, name)

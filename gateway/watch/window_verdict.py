@@ -16,6 +16,7 @@ import numpy as np
 from gateway.diagnosis import Diagnosis, Measurement
 from gateway.diagnosis.result import Gain
 from gateway.registers.residual_cause import ResidualCause
+from gateway.robust import noise_from_second_differences
 from gateway.twin.plant import Plant, with_value
 from gateway.watch.reference import WatchReference, residuals, rms_of
 from gateway.watch.warning_filter import WindowVerdict
@@ -62,7 +63,7 @@ def excess_of(window: Window, reference: WatchReference) -> float:
     """Return what of the residual is neither usual nor the readings' own noise, N: that is seen in their second differences."""
     rms_n, usual_n = reference.rms_n(window), reference.floor_n(window) or 0.0
     force_n = window.measurement.force_n[window.measurement.usable]
-    noise_n = 1.4826 * float(np.median(np.abs(np.diff(force_n, n=2)))) / np.sqrt(6.0)
+    noise_n = noise_from_second_differences(force_n)
     return sqrt(max(rms_n**2 - max(noise_n, usual_n) ** 2, 0.0))
 
 

@@ -12,7 +12,6 @@ from gateway.bsfm import (
     CoefficientReason,
     Coefficients,
     RationalBezier,
-    validate,
     validate_coefficients,
 )
 
@@ -31,7 +30,7 @@ def branches(rising: tuple[float, ...], falling: tuple[float, ...]) -> Branches:
 
 def test_a_good_set_has_no_fault():
     assert validate_coefficients(GOOD, LIMITS) == []
-    assert validate(branches((0.0, 10.0, 20.0), (0.0, 12.0, 20.0)), LIMITS) == []
+    assert validate_coefficients(Coefficients.of(branches((0.0, 10.0, 20.0), (0.0, 12.0, 20.0))), LIMITS) == []
 
 
 @pytest.mark.parametrize(
@@ -77,10 +76,12 @@ def test_what_is_checked_is_what_float32_stores():
     assert double.rising.is_increasing()
     stored = Coefficients.of(double).round_to_float32()
     assert stored.rising_handles_n == (0.0, 10.0, 20.0, 20.0)
-    assert validate(double, limits) == []  # still increasing inside: the end may be flat
+    assert validate_coefficients(Coefficients.of(double), limits) == []  # still increasing inside: the end may be flat
     flat = branches((0.0, math.nextafter(0.0, 1.0)), (0.0, math.nextafter(0.0, 1.0)))
     assert flat.rising.is_increasing()
-    assert {fault.reason for fault in validate(flat, limits)} == {CoefficientReason.NOT_INCREASING}
+    assert {fault.reason for fault in validate_coefficients(Coefficients.of(flat), limits)} == {
+        CoefficientReason.NOT_INCREASING
+    }
 
 
 def test_a_weight_limit_is_met_exactly():

@@ -16,10 +16,11 @@ import pytest
 import yaml
 
 from gateway.bsfm.branches import Branches
+from gateway.bsfm.coefficients import CoefficientLimits, Coefficients
 from gateway.bsfm.fit.branch_fit import fit
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 from gateway.bsfm.model import Calibration
-from gateway.bsfm.validate import CoefficientLimits, validate
+from gateway.bsfm.validate import validate_coefficients
 from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin
 from gateway.twin.experiment import Dwell, Floats, settling_time_s, staircase, step_response
 from gateway.twin.plant import with_value
@@ -142,7 +143,7 @@ def test_in_contact_every_setpoint_up_to_sixty_newtons_is_reached_within_a_newto
 def test_the_demo_calibration_may_drive_the_plant() -> None:
     calibration = demo_calibration()
     model = calibration.model()
-    assert validate(model.branches, CoefficientLimits(cell_range_n=98.0665)) == []
+    assert validate_coefficients(Coefficients.of(model.branches), CoefficientLimits(cell_range_n=98.0665)) == []
     assert model.branches.rising.handles[0] == model.branches.falling.handles[0]
     assert model.force_range_n[1] > 63.0
     assert 0.1 < calibration.rms_n < 0.3

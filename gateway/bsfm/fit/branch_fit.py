@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.branches import Branches
+from gateway.bsfm.coefficients import SLOPE_FLOOR_N_PER_V
 from gateway.bsfm.curve import ORDER_MAX
 from gateway.bsfm.fit.levenberg_marquardt import Effort
 from gateway.bsfm.fit.outliers import huber_weight, inlier_mask
 from gateway.bsfm.fit.projected_problem import Floats, Samples, merge_samples
 from gateway.bsfm.fit.result import NOT_IDENTIFIABLE, FitResult, ModelForm, ModelName, Ties, verdicts_of
 from gateway.bsfm.fit.solution import Solution, explore_starts, refine_solution
-from gateway.bsfm.fit.statistics import covariance_of, paper_norm, residuals_of
+from gateway.bsfm.fit.statistics import estimate_covariance, paper_norm, summarize_residuals
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 
 HUBER_ROUNDS = 8  # of reweighting, each from the solution before
@@ -31,7 +32,7 @@ class FitSettings:
 
     outliers: Literal["keep", "reject", "huber"] = "keep"
     voltage_range_v: tuple[float, float] | None = None
-    slope_floor_n_per_v: float = 0.5
+    slope_floor_n_per_v: float = SLOPE_FLOOR_N_PER_V
     effort: Effort = field(default_factory=Effort)
 
 
@@ -64,7 +65,7 @@ def fit_orders(
         lower = solution.log_weights
         result = result_of(used, form, branches_of(solution, *voltage_range(used, chosen)), lower, chosen)
         rows, residual = curve_rows(used, form), residual_n(used, result.branches)
-        covariance = covariance_of(solution, rows, residual, weight, chosen.effort.log_weight_max)
+        covariance = estimate_covariance(solution, rows, residual, weight, chosen.effort.log_weight_max)
         results.append(replace(result, covariance=covariance, rejected=len(ladder) - len(used)))
     return results
 
@@ -147,12 +148,11 @@ def result_of(
     return FitResult(
         form=form,
         branches=branches,
-        overall=residuals_of(residual),
-        rising=residuals_of(residual[ladder.direction == RISING]),
-        falling=residuals_of(residual[ladder.direction == FALLING]),
+        overall=summarize_residuals(residual),
+        rising=summarize_residuals(residual[ladder.direction == RISING]),
+        falling=summarize_residuals(residual[ladder.direction == FALLING]),
         rejected=0,
         covariance=NOT_IDENTIFIABLE,
-        on_box=bool(np.any(np.abs(log_weights) >= settings.effort.log_weight_max)),
         verdicts=verdicts_of(branches, settings.slope_floor_n_per_v),
         paper_norm=paper_norm(ladder, residual, form.model.per_direction),
         log_weights=log_weights,

@@ -1,4 +1,4 @@
-"""Which order? Leave one group out, then the fewest coefficients of which it is not certain that they are worse than the best.
+"""Choose the order: leave one group out, then take the fewest coefficients that are not certainly worse than the best.
 
 Certain: by two standard errors (Breiman et al. 1984 take one) of the difference to the best, group by group. What a group has
 of its own (it was warmer, the tool had moved) is in all fits' errors alike; with two or three groups it would make the error of
@@ -7,6 +7,8 @@ one fit so uncertain that a straight line passed for as good as the best.
 A group is one way up and down, so what is left out is a whole loop: samples of one loop are correlated, single ones
 would flatter high orders. The order by residual alone always grows, the order by held-out error stops where the loop
 does.
+
+The orders that are tried by default stand in evaluation.py.
 """
 
 from collections.abc import Iterable, Sequence
@@ -45,12 +47,12 @@ class Score:
 
 def score_orders(
     ladder: Ladder,
-    models: Iterable[ModelName | str] = (ModelName.BSFM,),
-    orders: Iterable[int] = range(1, 6),
+    models: Iterable[ModelName | str],
+    orders: Iterable[int],
     ties: Ties | str = Ties.TIED,
     settings: FitSettings | None = None,
 ) -> list[Score]:
-    """Every model and order, fitted to all and to all but each group. ValueError with less than two groups."""
+    """Fit every model and order to all groups and to all but each. ValueError with less than two groups."""
     if len(ladder.groups) < 2:
         raise ValueError("leaving a group out needs at least two groups: repeat the ladder")
     chosen, wanted = settings or FitSettings(), sorted(orders)
@@ -60,7 +62,7 @@ def score_orders(
 
 
 def choose(scores: Sequence[Score], usable_only: bool = True) -> Score:
-    """The fewest coefficients that are not certainly worse than the best; usable_only: of fits that may drive a plant.
+    """Return the fewest coefficients that are not certainly worse than the best; usable_only: of fits that may drive a plant.
 
     If none is usable the choice is among all: its verdicts say why it must not be activated.
     """
@@ -76,7 +78,7 @@ def choose(scores: Sequence[Score], usable_only: bool = True) -> Score:
 
 
 def _difference_error_n2(score: Score, best: Score) -> float:
-    """Standard error of the mean difference of two fits' mean squares on the same groups."""
+    """Return the standard error of the mean difference of two fits' mean squares on the same groups."""
     gaps = np.array(score.groups_n2) - np.array(best.groups_n2)
     return float(gaps.std(ddof=1) / np.sqrt(len(gaps))) if len(gaps) > 1 else 0.0
 
@@ -89,7 +91,7 @@ def _score(ladder: Ladder, result: FitResult, settings: FitSettings) -> Score:
 
 
 def _heldout_n2(ladder: Ladder, group: int, result: FitResult, settings: FitSettings) -> float:
-    """Mean square on one group of the fit to the others, found from the full fit's weights."""
+    """Return the mean square on one group of the fit to the others, found from the full fit's weights."""
     inside = ladder.group == group
     rest, form = ladder.part(~inside), result.form
     solution = refine_solution(

@@ -20,18 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.drive_map import DriveMap
+from gateway.bsfm.ladder.settled_points import SAME_V, TAIL_SHARE
 from gateway.bsfm.model import Bsfm, Response
+from gateway.defaults import TICK_S
 
 Floats = NDArray[np.float64]
 
-SAME_V: Final = 2.0e-3
 LEAST_STEP_N: Final = 3.0  # smaller ones tell more of friction than of lags
 NOISE_AT: Final = 12.0  # a step must be so many sigmas
 FEWEST_STAIRS: Final = 6
 FEWEST_ROWS: Final = 4
-TAIL_SHARE: Final = 0.25
 PATH_POINTS: Final = 25
-TICK_S: Final = 0.01
 RATIOS: Final = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0)  # second lag over first
 HUBER: Final = 1.5
 LONGEST_S: Final = 2.0  # a lag or dead time beyond it is no response but drift

@@ -113,7 +113,7 @@ class Verdicts:
 class FitResult:
     """A fit of one form. Pooled models have the same curve on both branches.
 
-    covariance: Covariance, or NOT_IDENTIFIABLE. on_box: a weight ended on its bound. rejected: samples left out as
+    covariance: Covariance, or NOT_IDENTIFIABLE. rejected: samples left out as
     outliers, not counted elsewhere. paper_norm: the paper's normalised figure (per data set 2-norm of the group means'
     residuals / number of points, data sets added), an extra for comparison with its tables: not newtons of anything.
     """
@@ -125,7 +125,6 @@ class FitResult:
     falling: Residuals
     rejected: int
     covariance: Covariance | str
-    on_box: bool
     verdicts: Verdicts
     paper_norm: float
     log_weights: Floats  # (curves, order): where a fit of other data may start

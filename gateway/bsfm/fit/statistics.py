@@ -1,4 +1,9 @@
-"""Numbers about a finished fit: residuals, covariance where the data identify the parameters, the paper's own norm."""
+"""Numbers about a finished fit: residuals, covariance where the data identify the parameters, the paper's own norm.
+
+Covariance is the estimate of linearised least squares,  s^2 (J' W J)^-1  with  s^2 = sum(w r^2) / (sum(w) (n - p))  (Seber and
+Wild, Nonlinear Regression, 1989, chapter 2), J the Jacobian by handles and log weights; its columns are scaled to length 1
+before the inverse, for their units differ.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +18,7 @@ LOG_WEIGHT_ERROR_MAX = 0.5  # a standard error beyond it: the data leave the wei
 CONDITION_MAX = 1.0e10  # of the scaled normal matrix, whose inverse is wanted
 
 
-def residuals_of(residual_n: Floats) -> Residuals:
+def summarize_residuals(residual_n: Floats) -> Residuals:
     """Return RMS, largest, mean and count of errors in N, (N,)."""
     if not len(residual_n):
         return Residuals(0.0, 0.0, 0.0, 0)
@@ -21,10 +26,13 @@ def residuals_of(residual_n: Floats) -> Residuals:
     return Residuals(rms_n, float(np.max(np.abs(residual_n))), float(np.mean(residual_n)), len(residual_n))
 
 
-def covariance_of(
+def estimate_covariance(
     solution: Solution, rows: list[NDArray[np.bool_]], residual_n: Floats, weight: Floats, box: float
 ) -> Covariance | str:
-    """Gauss-Markov covariance at the optimum, or NOT_IDENTIFIABLE. rows: the samples of each curve."""
+    """Return the covariance at the optimum, or NOT_IDENTIFIABLE.
+
+    rows: the samples of each curve, masks (N,); residual_n, weight: (N,); box: bound of the log weights.
+    """
     blocks: list[Floats] = []
     names: list[str] = []
     first = 0
@@ -35,19 +43,20 @@ def covariance_of(
         if block is None:
             return NOT_IDENTIFIABLE
         blocks.append(block)
-        names += _names(problem, list(curves), solution)
+        names += parameter_names(problem, list(curves), solution)
         first += len(problem.curves)
-    return Covariance(tuple(names), _diagonal(blocks))
+    return Covariance(tuple(names), block_diagonal(blocks))
 
 
 def _variance(problem: ProjectedProblem, residual_n: Floats, weight: Floats, solution: Solution) -> float:
-    """Variance of one sample over the sum of weights, in the problem's normalisation."""
+    """Return the variance of one sample over the sum of weights, in the problem's normalisation."""
     free = problem.handle_count + (problem.unknowns if solution.form.model.rational else 0)
     spare = max(len(residual_n) - free, 1)
     return float(np.sum(weight * residual_n * residual_n) / weight.sum() / spare)
 
 
 def _block(problem: ProjectedProblem, at: FitLanes, variance: float, solution: Solution, box: float) -> Floats | None:
+    """Return the covariance of the parameters of one problem, (p, p), or None where the data leave one open."""
     jacobian = at.q[0] @ at.r[0]
     if solution.form.model.rational:
         jacobian = np.concatenate([jacobian, problem.sensitivity(at.shares, at.handles)[0]], axis=1)
@@ -62,7 +71,8 @@ def _block(problem: ProjectedProblem, at: FitLanes, variance: float, solution: S
     return None if np.any(errors > LOG_WEIGHT_ERROR_MAX) else block
 
 
-def _names(problem: ProjectedProblem, curves: list[int], solution: Solution) -> list[str]:
+def parameter_names(problem: ProjectedProblem, curves: list[int], solution: Solution) -> list[str]:
+    """Return a name for each row of the covariance: handles (`rising b1`, `both b0` where shared), then log weights."""
     branch = ["rising", "falling"] if solution.form.model.per_direction else ["pooled"]
     handles = {}
     for c, columns in zip(curves, problem.columns, strict=True):
@@ -73,7 +83,8 @@ def _names(problem: ProjectedProblem, curves: list[int], solution: Solution) -> 
     return [handles[column] for column in sorted(handles)] + (weights if solution.form.model.rational else [])
 
 
-def _diagonal(blocks: list[Floats]) -> Floats:
+def block_diagonal(blocks: list[Floats]) -> Floats:
+    """Return square matrices along the diagonal of one, zeros elsewhere."""
     size = sum(len(block) for block in blocks)
     matrix, at = np.zeros((size, size)), 0
     for block in blocks:
@@ -83,7 +94,7 @@ def _diagonal(blocks: list[Floats]) -> Floats:
 
 
 def paper_norm(ladder: Ladder, residual_n: Floats, split: bool) -> float:
-    """Per data set, 2-norm of the residuals of the stair means / number of stairs; the data sets of a split model are added."""
+    """Return the paper's figure: 2-norm of the stair means' residuals / number of stairs, the sets of a split model added."""
     index, count = stair_index(ladder)
     readings = np.bincount(index, minlength=count)
     means = np.bincount(index, residual_n, minlength=count) / readings

@@ -21,9 +21,9 @@ from gateway.bsfm.ladder.rows import Rows, usable_rows
 from gateway.bsfm.ladder.settled_points import Points, find_settled_points
 from gateway.bsfm.ladder.sweeps import SweepSplit, split_by_sweeps
 from gateway.bsfm.model import Bsfm
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
 LEAST_FORCE_SPAN_N: Final = 1.0
-KGF_RATIO: Final = 9.80665
 KGF_SLACK: Final = 1.35  # plants of one kind differ by this much, not by 9.81
 FAR_RATIO: Final = 2.0
 CLIPPED_N: Final = 0.02  # stairs of a saturated cell agree to a count
@@ -203,7 +203,8 @@ def _pressure_ratio(rows: Rows, area_mm2: float | None) -> float | None:
 
 
 def _judge_ratio(ratio: float, against: str, unit_known: bool) -> list[str]:
-    for factor, words, unit in ((1.0 / KGF_RATIO, "a tenth", "kgf"), (KGF_RATIO, "ten times", "N read as kgf")):
+    gravity = STANDARD_GRAVITY_M_PER_S2
+    for factor, words, unit in ((1.0 / gravity, "a tenth", "kgf"), (gravity, "ten times", "N read as kgf")):
         if factor / KGF_SLACK <= ratio <= factor * KGF_SLACK and not unit_known:
             raise LadderError(
                 LadderFlaw.UNIT,

@@ -1,4 +1,7 @@
-"""Which voltages a calibration staircase visits, in order. No numpy: control walks it."""
+"""Which voltages a calibration staircase visits, in order. No numpy: control walks it.
+
+Defaults: LADDER_STEP_V and LADDER_GROUPS in gateway/defaults.py, by CalibrationPlan in control/runs/ladder_stairs.py.
+"""
 
 from dataclasses import dataclass
 from math import ceil, isfinite

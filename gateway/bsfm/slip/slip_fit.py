@@ -21,6 +21,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.branches import Branches
+from gateway.bsfm.coefficients import SLOPE_FLOOR_N_PER_V
 from gateway.bsfm.curve import elevate_order
 from gateway.bsfm.fit.blend_span import choose_span, command_error_n
 from gateway.bsfm.fit.projected_problem import Floats
@@ -32,14 +33,12 @@ from gateway.bsfm.slip.problem import SlipProblem, Walk
 from gateway.bsfm.slip.reversal import LinearBlend
 from gateway.bsfm.slip.search import SlipSearch
 from gateway.bsfm.slip.slip_stops import STOPS_CARRIED, SlipStops, half_width_bound_v
+from gateway.robust import HUBER_AT, SIGMA_PER_MAD
 
 RADII: Final = 12
 SMALLEST_HALF_WIDTHS, LARGEST_RANGE_SHARE = 0.5, 0.4
 SMALLEST_SHARE: Final = 0.01
-HUBER: Final = 1.345
-SIGMA_OF_MAD: Final = 1.4826
 SMALLEST_SIGMA_N: Final = 1.0e-6
-SLOPE_FLOOR_N_PER_V: Final = 0.5
 MARGINS: Final = (0.0, 0.2, 0.8)
 HIGHEST_ORDER: Final = 4  # to which one more is tried
 NUMBERS_OF_AN_ORDER: Final = 4  # a handle and a weight on each branch
@@ -127,14 +126,6 @@ def _elevated(branches: Branches) -> Branches:
     return Branches(elevate_order(branches.rising), elevate_order(branches.falling))
 
 
-def residuals_n(model: Bsfm, walk: Walk) -> Floats:
-    """Model minus walk in N at each point, the stops moved by the voltages. ValueError unless the model has slip stops."""
-    if not isinstance(model.reversal, SlipStops):
-        raise ValueError("the model has no slip stops")
-    problem = SlipProblem([walk], np.array(model.reversal.radii_v))
-    return problem.errors_n(model.branches, np.array(model.reversal.shares))
-
-
 def compare_policies(branches: Branches, fits: Sequence[SlipFit], training: Walk, held_out: Walk) -> list[PolicyError]:
     """Switched branches, the blend with its best span on `training`, and each slip fit, all on `held_out`.
 
@@ -167,7 +158,7 @@ def _huber(problem: SlipProblem, error_n: Floats) -> Floats:
     trusted = np.abs(error_n[problem.weight > 0.0])
     if trusted.size == 0:
         raise ValueError("no point to fit slip stops to")
-    limit_n = HUBER * max(SIGMA_OF_MAD * float(np.median(trusted)), SMALLEST_SIGMA_N)
+    limit_n = HUBER_AT * max(SIGMA_PER_MAD * float(np.median(trusted)), SMALLEST_SIGMA_N)
     weights: Floats = np.sqrt(np.minimum(1.0, limit_n / np.maximum(np.abs(error_n), limit_n)))
     return weights
 

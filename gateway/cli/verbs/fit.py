@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from gateway.service.fitting.ladder_fit import LadderFit
 
 MODELS: Final = ("pfm", "psfm", "bfm", "bsfm")
-_ORDER_MAX: Final = 15
 
 
 def _models(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, ...]:
@@ -33,8 +32,10 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
         if not first.isdecimal() or (dash and not last.isdecimal()):
             raise click.BadParameter(f"{value} is not a list of orders such as 1-5 or 2,3")
         orders |= set(range(int(first), int(last or first) + 1))
-    if not orders or not 1 <= min(orders) <= max(orders) <= _ORDER_MAX:
-        raise click.BadParameter(f"{value}: orders are 1 .. {_ORDER_MAX}")
+    from gateway.bsfm.curve import ORDER_MAX
+
+    if not orders or not 1 <= min(orders) <= max(orders) <= ORDER_MAX:
+        raise click.BadParameter(f"{value}: orders are 1 .. {ORDER_MAX}")
     return tuple(sorted(orders))
 
 

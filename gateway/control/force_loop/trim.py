@@ -5,6 +5,8 @@ is not integrated. Anti-windup is conditional: the controller calls `integrate` 
 no limit acting and the target not far ahead. What was learned at one force fades as the target travels away (memory_n),
 and is kept over small steps. Errors within the dead zone are left to stiction: integrating them makes a limit cycle of
 the width of the friction.
+
+Bounds: Trim.gain_v_per_n_s, limit_v, dead_zone_n and memory_n in control/settings.py.
 """
 
 from math import exp

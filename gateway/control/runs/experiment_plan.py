@@ -14,7 +14,7 @@ from typing import Annotated, Final
 
 from annotated_types import Ge, Gt, Le, MinLen
 
-from gateway.control.settings import STRICT
+from gateway.defaults import STRICT
 
 LONGEST_S: Final = 7200.0
 MOST_SEGMENTS: Final = 20_000

@@ -3,6 +3,8 @@
 The check is a coarse cycle: it settles the friction, so that every group starts from the same history, and its first stair
 is small. Turns of the minor-loop walk are shares of the top, of all sizes and on both sides; none
 comes near both ends, so that no fit takes them for a group.
+
+Defaults: LADDER_STEP_V, LADDER_GROUPS, LADDER_MINOR_POINTS and LADDER_RESPONSE_STEPS in gateway/defaults.py.
 """
 
 from dataclasses import dataclass
@@ -13,7 +15,8 @@ from typing import Final
 from gateway import defaults
 from gateway.bsfm import Bsfm
 from gateway.bsfm.ladder.plan import FALLING, RISING, ladder_plan
-from gateway.control.settings import STRICT, Limits
+from gateway.control.settings import Limits
+from gateway.defaults import STRICT
 from gateway.registers.words import CalibrationPhase
 
 TURNS: Final = (0.0, 0.875, 0.25, 0.625, 0.375, 0.5625, 0.125, 0.75, 0.4375, 0.6875, 0.0625, 0.3125, 0.1875, 0.375)

@@ -8,6 +8,7 @@ refuse an enable.
 from dataclasses import dataclass
 from typing import Final
 
+from gateway.codes.explanation import BUSY_CURE
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.blame_for_silence import cause_of_silence
@@ -43,7 +44,7 @@ def stop_cause(fault: FaultCode, detail: str) -> StopCause:
 
 
 def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
-    """Our defect, or the machine's load: the larger part of the lateness tells."""
+    """Return the cause of a late loop: internal error or machine load, whichever made the larger part of the lateness."""
     seen = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
     dropped = "what arrived meanwhile was dropped"
     if line.waited_s is None:
@@ -53,8 +54,7 @@ def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
         return stop_cause(
             FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or an internal error (please report); {dropped}"
         )
-    cure = "the machine is too busy: end other programs, or `run --realtime`"
-    return stop_cause(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {cure}; {dropped}")
+    return stop_cause(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {BUSY_CURE}; {dropped}")
 
 
 class FaultDetector:

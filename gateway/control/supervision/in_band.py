@@ -3,6 +3,8 @@
 In band means: target at its goal, contact, and the measured force within the tolerance, for the in-band time without a
 break. Without contact there is no band: a reading of 0.2 N in free air is not a held force. Target-unreachable means
 the same wait in vain, longer.
+
+Bounds: Supervision.unreachable_s, Defaults.in_band_time_s and Defaults.in_band_tolerance_n in control/settings.py.
 """
 
 from math import inf

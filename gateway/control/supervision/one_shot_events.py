@@ -18,29 +18,30 @@ _LEAST_V: Final = 0.2  # below it the ratio is offset and noise
 
 
 class OneShotEvents:
-    """stuck_n: measured at the safe voltage, from which a force counts as stuck."""
+    """Remembers what has been told. stuck_n: measured at the safe voltage, from which a force counts as stuck."""
 
     def __init__(self, stuck_n: float) -> None:
         self._said_unreachable = False
         self._said_stuck = self._said_hunting = False
         self._stuck_n = stuck_n
-        self._was_right = False
+        self._was_in_band = False
         self._pressure_pa = self._profile_pa_per_v = self._learned_pa_per_v = nan
 
     def start(self) -> None:
-        """At enable."""
-        self._was_right = False
+        """Begin a new enable: nothing has been in band since."""
+        self._was_in_band = False
 
-    def disable(self) -> None:
-        """The output went off: an unreachable target may be told anew."""
+    def forget_unreachable(self) -> None:
+        """Let an unreachable target be told anew, after the output went off."""
         self._said_unreachable = False
 
     def observe_line(self, line: LineStatus) -> None:
-        """What the output device measures."""
+        """Take over the pressure that the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
 
     def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
-        """Ask after each step in force or voltage mode. measured_n: contact force, smoothed."""
+        """Return a sentence where the target has just become unreachable, else nothing. Ask after each step in force or
+        voltage mode. measured_n: contact force, smoothed."""
         is_first = loop.unreachable and not self._said_unreachable
         evidence = self._evidence(loop.voltage_v, measured_n, inputs.expected_n)
         self._said_unreachable = loop.unreachable
@@ -49,8 +50,8 @@ class OneShotEvents:
         return unreachable_sentence(evidence) if is_first else ""
 
     def _learn(self, voltage_v: float) -> None:
-        """The force is right, so the pressure at this voltage is, too."""
-        self._was_right = True
+        """Learn the pressure per volt: the force is in band, so the pressure at this voltage is right, too."""
+        self._was_in_band = True
         if isfinite(self._pressure_pa) and voltage_v >= _LEAST_V:
             ratio, known = self._pressure_pa / voltage_v, self._learned_pa_per_v
             self._learned_pa_per_v = known + _LEARNING * (ratio - known) if isfinite(known) else ratio
@@ -64,15 +65,15 @@ class OneShotEvents:
             pressure_pa=self._pressure_pa,
             expected_pa=voltage_v * (self._learned_pa_per_v if learned else self._profile_pa_per_v),
             learned=learned,
-            was_right=self._was_right,
+            was_in_band=self._was_in_band,
         )
 
     def hunting_event(self, loop: ForceLoop) -> str:
-        """Ask after each step in force or voltage mode."""
+        """Return a sentence where the trim has just begun to hunt. Ask after each step in force or voltage mode."""
         is_first, self._said_hunting = loop.is_hunting and not self._said_hunting, loop.is_hunting
         return hunting_sentence(loop.applied_n, MOST_TURNS) if is_first else ""
 
     def stuck_event(self, is_stuck: bool, reading: Reading) -> str:
-        """Ask on each sample while the output is off."""
+        """Return a sentence where a force has just been found stuck at the safe voltage. Ask while the output is off."""
         is_first, self._said_stuck = is_stuck and not self._said_stuck, is_stuck
         return stuck_sentence(reading.contact_n, self._stuck_n) if is_first else ""

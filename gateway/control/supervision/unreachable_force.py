@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Final
 
-KGF: Final = 9.80665
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
+
 _UNIT_SLACK: Final = 1.15  # trim and calibration move the ratio by so much
 _FRICTION_N: Final = 2.0  # what friction may hold beside it, where the true force is small
 _TIMES: Final = 3.0
@@ -25,7 +26,7 @@ _LEAST_EXPECTED_PA: Final = 5.0e3
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """What is seen. pressure_pa: measured, expected_pa: at this voltage; nan: nobody knows. learned: expected_pa was seen while
-    the force was right; was_right: it has been so since the last enable."""
+    the force was right; was_in_band: the force has been in band since the last enable."""
 
     voltage_v: float
     measured_n: float
@@ -33,7 +34,7 @@ class Evidence:
     pressure_pa: float = nan
     expected_pa: float = nan
     learned: bool = False
-    was_right: bool = False
+    was_in_band: bool = False
 
     @property
     def _pressure_share(self) -> float:
@@ -60,8 +61,10 @@ class Evidence:
     @property
     def looks_like_another_unit(self) -> bool:
         if self.factor < 1.0:
-            return self.measured_n > _LEAST_N and 1.0 / _UNIT_SLACK < self.factor * KGF < _UNIT_SLACK
-        off_n = abs(self.measured_n / KGF - self.expected_n)
+            return (
+                self.measured_n > _LEAST_N and 1.0 / _UNIT_SLACK < self.factor * STANDARD_GRAVITY_M_PER_S2 < _UNIT_SLACK
+            )
+        off_n = abs(self.measured_n / STANDARD_GRAVITY_M_PER_S2 - self.expected_n)
         return self.factor > _TIMES and off_n < (_UNIT_SLACK - 1.0) * self.expected_n + _FRICTION_N
 
 
@@ -93,7 +96,7 @@ def _unit_words(seen: Evidence, pressure: str) -> str:
     told = f"factor {seen.factor:.3g} is what {unit} looks like (A303)"
     if seen.has_air:
         return f"{pressure}: air is there, and {told}: check the unit on the amplifier against the rig file"
-    since = ", though the force was right before in this enable" if seen.was_right else ""
+    since = ", though the force was right before in this enable" if seen.was_in_band else ""
     other = "; else no air, valve closed or no contact" if seen.factor < 1.0 else ""
     return f"{f'{pressure}: ' if pressure else ''}{told}{since}: check the unit on the amplifier against the rig file{other}"
 
@@ -102,6 +105,6 @@ def _silent_words(seen: Evidence, pressure: str) -> str:
     if seen.has_air:
         return f"{pressure}: air is there, so no contact with the workpiece"
     said = f"{pressure}; " if pressure else ""
-    if seen.was_right:
+    if seen.was_in_band:
         return f"{said}the force was right before in this enable: contact lost or air gone; look at the gauge and at the tool"
     return f"{said}no air, valve closed or no contact"

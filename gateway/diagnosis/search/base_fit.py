@@ -16,19 +16,20 @@ from gateway.catalogue.cylinder import AREA, COULOMB
 from gateway.catalogue.effect import Parameter
 from gateway.catalogue.regulator import LAG
 from gateway.catalogue.sensing import CLOCK_OFFSET
+from gateway.defaults import UNLIMITED
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.initial_friction import start_parameters, try_initial_strains
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.search.parameters import ModelParameters
-from gateway.twin.plant import UNLIMITED, Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
+from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
 DEFAULT_PLANT: Final = Plant(
     regulator=Regulator(lag_s=0.072),
     cylinder=Cylinder(area_m2=95.0e-6),
     friction=Friction(coulomb_n=1.0),
-    contact=Contact(pad_stiffness_n_per_m=4.1e4),
+    contact=Contact(),
     cell=LoadCell(),
 )
 _LAGS_S: Final = (0.005, 0.02, 0.05, 0.1, 0.2)  # from a fast valve to a regulator with long hoses

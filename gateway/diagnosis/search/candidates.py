@@ -7,7 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.catalogue.effect import ANY, Effect, EffectForm, SearchHints, Start
+from gateway.catalogue.effect import Effect, EffectForm, SearchHints, Start
+from gateway.defaults import UNLIMITED
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel, Whiten
@@ -65,7 +66,7 @@ def _starts(form: EffectForm, parameters: ModelParameters, hints: SearchHints) -
     """The form's own, and the way back to nothing where the plant already has the effect."""
     starts, size = form.probes(hints), form.parameters[0]
     there = parameters.value(size) - size.null
-    if not starts or there == 0.0 or size.null >= ANY or form.quadrature:
+    if not starts or there == 0.0 or size.null >= UNLIMITED or form.quadrature:
         return starts
     return (*starts, (-there, *starts[0][1:]))
 
@@ -127,7 +128,7 @@ def _score_bounded(
 ) -> CandidateScore:
     """A response that is no straight line: the size counts as far as it is believed."""
     column = candidate.columns[0]
-    limit = candidate.form.exact or candidate.form.parameters[0].null >= ANY  # a fall from UNLIMITED has one size
+    limit = candidate.form.exact or candidate.form.parameters[0].null >= UNLIMITED  # a fall from UNLIMITED has one size
     kept = min(max(size, 0.0 if _is_at_limit(candidate, parameters) else -1.0), 1.0 if limit else _LARGEST_STRETCH)
     kept = 1.0 if candidate.form.exact else kept
     gain = float(2.0 * kept * normal.slope[column] - kept**2 * normal.power[column])

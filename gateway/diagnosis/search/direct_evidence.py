@@ -14,6 +14,7 @@ from gateway.catalogue.sensing import OUTLIER, OUTLIER_SHARE, QUANTUM, REPEATED
 from gateway.diagnosis.measurement import Flags, Floats
 from gateway.diagnosis.noise import fast_noise_n
 from gateway.diagnosis.search.bench import Bench
+from gateway.robust import SIGMA_PER_MAD
 
 _SPIKE: Final = 7.5  # robust standard deviations: one chance in 10^13 rows
 _FEWEST_SPIKES: Final = 3
@@ -60,7 +61,9 @@ def _stands_out(residual_n: Floats, simulated_n: Floats, usable: Flags, quantum_
     padded = np.pad(residual_n, 2, mode="edge")
     around = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
     apart = residual_n - around
-    spread = max(1.4826 * float(np.median(np.abs(apart[usable]))), 0.5 * fast_noise_n(residual_n[usable]), 1.0e-9)
+    spread = max(
+        SIGMA_PER_MAD * float(np.median(np.abs(apart[usable]))), 0.5 * fast_noise_n(residual_n[usable]), 1.0e-9
+    )
     moves_n = np.abs(np.gradient(simulated_n)) * 2.0
     aside = np.abs(np.gradient(residual_n))  # half of what the neighbours differ: a spike returns to where it came from
     return (np.abs(apart) > _SPIKE * spread + moves_n + quantum_n) & (np.abs(apart) > 4.0 * aside) & usable

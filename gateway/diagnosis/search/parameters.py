@@ -1,4 +1,4 @@
-"""A point of the search: a plant, and an offset for each recording. Parameters are read and moved by name."""
+"""The parameters of one model in the search: a plant, and an offset for each recording. They are read and moved by name."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -40,10 +40,11 @@ class ModelParameters:
     starts: tuple[Strains | None, ...] = ()
 
     def start(self, recording: int) -> Strains | None:
+        """Return what friction remembers at the beginning of one recording; None: rest without pressure."""
         return self.starts[recording] if self.starts else None
 
     def value(self, parameter: Parameter) -> float:
-        """Of the zero: the first recording's offset, which stands for it."""
+        """Return what a parameter is now; of the zero, the first recording's offset, which stands for it."""
         if isinstance(parameter, InitialStrain):
             strains = self.start(parameter.recording) or _UNSTRAINED
             return sum(strains[element] for element in parameter.elements) / len(parameter.elements)
@@ -52,7 +53,7 @@ class ModelParameters:
         return float(getattr(getattr(self.plant, parameter.section), parameter.name))
 
     def with_value(self, parameter: Parameter, value: float) -> "ModelParameters":
-        """Return the same point with one parameter at `value`, kept within its bounds."""
+        """Return the same model with one parameter at `value`, kept within its bounds."""
         kept = min(max(float(value), parameter.low), parameter.high)
         if isinstance(parameter, InitialStrain):
             return self._with_strain(parameter, kept)
@@ -70,11 +71,12 @@ class ModelParameters:
         return replace(self, starts=tuple(starts))
 
     def with_offsets(self, offsets_n: Sequence[float]) -> "ModelParameters":
+        """Return the same model with these offsets, N, one for each recording."""
         return replace(self, offsets_n=tuple(float(offset) for offset in offsets_n))
 
 
 def apply_start(parameters: ModelParameters, form: EffectForm, start: Start) -> ModelParameters:
-    """Where a form's start leads: sizes are added to the present values, shapes are taken as they stand."""
+    """Return the model where a form's start leads: sizes are added to the present values, shapes are taken as they stand."""
     for parameter, number in zip(form.parameters, start, strict=True):
         parameters = parameters.with_value(
             parameter, number if parameter.shape else parameters.value(parameter) + number
@@ -85,7 +87,7 @@ def apply_start(parameters: ModelParameters, form: EffectForm, start: Start) -> 
 def reset_parameters(
     parameters: ModelParameters, before: ModelParameters, chosen: Sequence[Parameter]
 ) -> ModelParameters:
-    """Return the same point with these parameters where they were before."""
+    """Return the same model with these parameters where they were before."""
     for parameter in chosen:
         parameters = parameters.with_value(parameter, before.value(parameter))
     return parameters

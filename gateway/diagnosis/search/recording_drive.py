@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.measurement import Measurement
+from gateway.robust import noise_from_second_differences
 from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Drive, Replay
 from gateway.twin.surroundings import COLUMNS, Surroundings
@@ -56,7 +57,7 @@ def drive_of(measurement: Measurement, motion: Motion) -> Drive:
     """Return what drives the twin in a replay."""
     noise_m = 0.0
     if measurement.position_m is not None:
-        noise_m = float(1.4826 * np.median(np.abs(np.diff(measurement.position_m, n=2))) / np.sqrt(6.0))
+        noise_m = noise_from_second_differences(measurement.position_m)
     columns = dict(measurement.covariates)
     if measurement.position_m is not None:
         columns["position_mm"] = measurement.position_m * 1.0e3

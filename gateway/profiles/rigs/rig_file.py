@@ -11,7 +11,8 @@ from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import AfterValidator, Field, PlainValidator, WithJsonSchema
 
 from gateway import defaults
-from gateway.control.settings import STRICT, Defaults, LeadSettings, Limits, ResponseSource, Supervision, Trim
+from gateway.control.settings import Defaults, LeadSettings, Limits, ResponseSource, Supervision, Trim
+from gateway.defaults import STRICT
 from gateway.devices.line_settings import Baud
 
 

@@ -86,6 +86,7 @@ class Block:
 
     @property
     def words(self) -> int:
+        """Number of registers, both ends included."""
         return self.last - self.first + 1
 
 
@@ -123,14 +124,14 @@ class RegisterMap:
     text: str = ""
 
     def block(self, name: str) -> Block:
-        """LookupError for a block that is not there."""
+        """Return the block of this name. Raises LookupError where there is none."""
         for block in self.blocks:
             if block.name == name:
                 return block
         raise LookupError(f"map {self.name} has no block {name}")
 
     def registers_of(self, block: str) -> tuple[Register, ...]:
-        """By address."""
+        """Return the registers of one block, by address."""
         return tuple(register for register in self.registers if register.block == block)
 
     def find(self, name: str) -> Register:
@@ -160,13 +161,14 @@ class RegisterMap:
 
     @cached_property
     def map_hash(self) -> int:
-        """CRC-32 of everything that a master relies on; texts may be improved without a change of it."""
+        """Return the CRC-32 of everything that a master relies on; texts may be improved without a change of it."""
         content = [self.name, self.version, *([b.name, b.first, b.last] for b in self.blocks)]
-        content += [_essence(register) for register in self.registers]
+        content += [_hashed_fields(register) for register in self.registers]
         return crc32(dumps(content, sort_keys=True, separators=(",", ":")).encode())
 
 
-def _essence(register: Register) -> list[Any]:
+def _hashed_fields(register: Register) -> list[Any]:
+    """Return what a master relies on of one register: everything but its text."""
     limits = [register.minimum, register.maximum, register.constant]
     names = [{str(number): name for number, name in group.items()} for group in (register.values, register.bits)]
     place = [register.name, register.block, register.address, register.words, register.type, str(register.word_order)]

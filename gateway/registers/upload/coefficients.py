@@ -15,11 +15,11 @@ from struct import Struct
 from typing import Final
 from zlib import crc32
 
+from gateway.bsfm.coefficients import STRIDE
 from gateway.bsfm.model import Calibration, Response
 from gateway.bsfm.slip.slip_stops import STOPS_CARRIED
 from gateway.registers.values import decimal
 
-STRIDE: Final = 16
 _HEAD: Final = Struct(f">H2x2f{4 * STRIDE}f3f")
 _TAIL: Final = Struct(f">H2x3f4x{2 * STOPS_CARRIED}f")
 HEAD_BYTES: Final = _HEAD.size

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from struct import Struct
 from typing import Final, NamedTuple
 
-from gateway.bsfm.coefficients import RADII_FROM, SHARES_FROM, WHOLE
+from gateway.bsfm.coefficients import RADII_FROM, SHARES_FROM, STRIDE, WHOLE
 from gateway.bsfm.curve import ORDER_MAX
 from gateway.bsfm.slip.slip_stops import STOPS_CARRIED, STOPS_MAX
 from gateway.bsfm.validate import CoefficientLimits, CoefficientReason, Coefficients, validate_coefficients
@@ -19,7 +19,6 @@ from gateway.registers.upload.coefficients import (
     HEAD_BYTES,
     HEAD_WORDS,
     SET_WORDS,
-    STRIDE,
     UNUSED_WORDS,
     CoefficientSet,
     set_crc,

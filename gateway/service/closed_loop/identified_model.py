@@ -20,6 +20,7 @@ from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
 from gateway.bsfm.slip.reversal_choice import choose_reversal
 from gateway.control.compensation.compensation import Compensation
+from gateway.control.runs.ladder_stairs import TURNS
 from gateway.twin import Contact, Friction, LoadCell, Plant, Regulator, Twin
 from gateway.twin.experiment import Dwell, staircase
 
@@ -28,8 +29,6 @@ ORDER_TOLERANCE: Final = 2.0  # of the best order's error: a lower order within 
 TURN_STAIRS: Final = 8  # that may be left out after each turn
 STAIRS: Final = 40
 MINOR_STAIRS: Final = 32  # of the whole range, per way
-TURNS: Final = (0.0, 0.88, 0.25, 0.62, 0.38, 0.56, 0.12, 0.75, 0.44, 0.69, 0.06, 0.31, 0.19, 0.38)
-"""Partial reversals of all sizes, as shares of the range."""
 
 REGULATOR: Final = (
     "full_scale_v",

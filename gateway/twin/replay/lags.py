@@ -14,9 +14,10 @@ from itertools import repeat
 
 import numpy as np
 
+from gateway.defaults import UNLIMITED
 from gateway.twin.elementwise import Real
 from gateway.twin.replay.drive import Floats
-from gateway.twin.sections import UNLIMITED, Regulator
+from gateway.twin.sections import Regulator
 
 
 def has_lags(regulator: Regulator) -> bool:

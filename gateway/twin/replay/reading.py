@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.defaults import UNLIMITED
 from gateway.twin.effects.contact import SPINDLE, spindle_amplitude_n
 from gateway.twin.effects.load_cell import TERMS, convert_reading, lose_sign
 from gateway.twin.effects.term import active_formulas, is_switched_on
@@ -18,7 +19,7 @@ from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import Drive, Flags, Floats
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.lags import follow_lag
-from gateway.twin.sections import UNLIMITED, Contact, LoadCell
+from gateway.twin.sections import Contact, LoadCell
 from gateway.twin.surroundings import TwinConditions
 
 _RADIAN_PER_TURN = 2.0 * math.pi

@@ -13,6 +13,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.defaults import UNLIMITED
 from gateway.twin.effects.regulator import add_droop, add_hunting, apply_leak
 from gateway.twin.effects.term import is_switched_on
 from gateway.twin.regulator import target_pa
@@ -20,7 +21,7 @@ from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats
 from gateway.twin.replay.grid import Grid, common_step_s
 from gateway.twin.replay.lags import filter_even_rows, has_lags, is_linear, pressure_after, states_at_commands
-from gateway.twin.sections import UNLIMITED, Regulator
+from gateway.twin.sections import Regulator
 
 _LAGGING = ("slew_pa_per_s", "lag_s", "second_lag_s", "fill_slowdown")
 _AFTERWARDS = ("delay_s", "ceiling_pa", "leak_flow_pa", "hunting_pa", "hunting_hz", "hunting_phase_rad")

@@ -64,4 +64,4 @@ def test_a_shaken_group_does_not_make_a_straight_line_as_good_as_the_best(loops)
 def test_one_group_cannot_be_left_out(loops):
     ladder = loops["smooth"](1)
     with pytest.raises(ValueError, match="two groups"):
-        score_orders(ladder.part(ladder.group == 0))
+        score_orders(ladder.part(ladder.group == 0), ["bsfm"], range(1, 3))

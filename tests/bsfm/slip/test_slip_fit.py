@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier, SlipStops
+from gateway.bsfm.coefficients import SLOPE_FLOOR_N_PER_V
 from gateway.bsfm.fit.branch_fit import fit
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.fit.result import verdicts_of
@@ -16,12 +17,10 @@ from gateway.bsfm.slip import slip_fit
 from gateway.bsfm.slip.problem import SlipProblem, branches_of, free_numbers, inverses, places
 from gateway.bsfm.slip.search import SlipSearch
 from gateway.bsfm.slip.slip_fit import (
-    SLOPE_FLOOR_N_PER_V,
     Walk,
     compare_policies,
     fit_joint,
     fit_stops,
-    residuals_n,
     walk_of,
 )
 
@@ -46,6 +45,13 @@ def walk(turns_v: tuple[float, ...], seed: int, noise_n: float = NOISE_N) -> Wal
     ways = [np.linspace(a, b, max(2, round(abs(b - a) / 0.2)))[1:] for a, b in pairwise(turns_v)]
     voltage_v = np.concatenate([np.array(turns_v[:1]), *ways])
     return Walk(voltage_v, forces_n(voltage_v, seed, noise_n))
+
+
+def residuals_n(model: Bsfm, other: Walk) -> Floats:
+    """Model minus walk at each point, the stops moved by the voltages."""
+    assert isinstance(model.reversal, SlipStops)
+    problem = SlipProblem([other], np.array(model.reversal.radii_v))
+    return problem.errors_n(model.branches, np.array(model.reversal.shares))
 
 
 @cache
@@ -145,8 +151,6 @@ def test_no_trust_at_all_and_no_loop_are_refused() -> None:
         fit_stops(Branches(RISING, RISING), [nothing])
     with pytest.raises(ValueError, match="one length"):
         Walk(np.zeros(3), np.zeros(4))
-    with pytest.raises(ValueError, match="no slip stops"):
-        residuals_n(Bsfm(TRUTH.branches, LinearBlend(3.0)), nothing)
 
 
 def test_a_staircase_is_walked_once_with_the_mean_of_its_groups() -> None:
