@@ -19,6 +19,7 @@ from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
 _CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
+AHEAD_N: Final = 4.0  # how far the aim may run ahead of the target, or what the lags' inverse needs on a fast ramp
 APPROACH_N: Final = 1.0  # above what friction keeps: a vented tool moves
 LEAST_SLOPE_N_PER_V: Final = 1.0  # a flatter model is a model's end, not a plant's
 _OK: Final = InverseStatus.OK
@@ -132,15 +133,16 @@ class Feedforward:
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
         """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what does not come from
         the slide: the payload's weight, forces from outside. The aim is where the target will be ahead_s later: on its ramp,
-        and where the goal itself moves steadily, on the goal's way."""
+        and where the goal itself moves steadily, on the goal's way; on a fast ramp it stays nearer, so that it remains one."""
         self._trend.advance(goal_n, dt_s)
         self._pace.earn(dt_s)
         last_n = self.applied_n
         self.applied_n = ramp_limited(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
         self._pace.spend(moved_n, rate_n_per_s)
-        coming_n = self._coming_n(goal_n)
-        aimed_n, self.aimed_n = self.aimed_n, ramp_limited(coming_n, self.applied_n, rate_n_per_s, self._ahead_s)
+        ahead_s = min(self._ahead_s, max(AHEAD_N / rate_n_per_s, self._lag_s)) if rate_n_per_s > 0.0 else 0.0
+        aimed_n = self.aimed_n
+        self.aimed_n = ramp_limited(self._coming_n(goal_n), self.applied_n, rate_n_per_s, ahead_s)
         self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
         heard_n = self._delayed.advance(self.applied_n, dt_s)
         self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)

@@ -34,9 +34,7 @@ Moved: TypeAlias = StateEvent | StopCause
 
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
-LANDING_SHARE: Final = (
-    0.2  # of what a step's landing takes, by which the lags' inverse is late on a ramp: seen on drawn machines
-)
+LANDING_SHARE: Final = 0.2  # of a step's landing time: so late is the lags' inverse on a ramp, on the drawn machines
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
