@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.bsfm.model import Calibration, Response
-from gateway.calibrations.selection import BUILT_IN, OWN, Selection, SelectionState, read_selection, write_selection
+from gateway.calibrations.selection import BUILT_IN, Selection, SelectionState, read_selection, write_selection
 from gateway.processes.durable_file import add_checksum, lock_directory, make_directory, verify_checksum, write_durably
 from gateway.profiles import ProfileError
 from gateway.profiles.kinds.calibrations import read_calibration
@@ -69,7 +69,7 @@ class CalibrationStore:
         self.built_in = built_in
 
     def add(self, calibration: Calibration) -> int:
-        """Store it under the next number, whatever number it has; that number. StoreError, and nothing has changed, for
+        """Store it under the next number, whatever number it has; return that number. StoreError, and nothing has changed, for
         one that could not be read back or when the disk refuses."""
         try:
             make_directory(self.directory)
@@ -84,9 +84,9 @@ class CalibrationStore:
         """Return every calibration of the store by number, damaged ones with their fault."""
         return [self._entry(number) for number in self._numbers()]
 
-    def glances(self) -> Iterator[tuple[int, Calibration]]:
-        """Every calibration, the last one first, as its file reads at a glance: a search through hundreds of them must not
-        keep the loop waiting. Nothing is checked, so `load` what is found; what cannot be read is passed over."""
+    def iterate_unchecked(self) -> Iterator[tuple[int, Calibration]]:
+        """Yield every calibration, the last one first, without checking any: a search through hundreds of them must not
+        keep the loop waiting. So `load` what is found; files that cannot be read are left out."""
         for number in reversed(self._numbers()):
             with contextlib.suppress(OSError, ValueError, TypeError):
                 yield number, _parse_unchecked((self.directory / _file_name(number)).read_text(encoding="utf-8"))
@@ -109,8 +109,10 @@ class CalibrationStore:
         return next((e.number for e in self.list() if e.calibration and e.calibration.data_sha256 == data_sha256), None)
 
     def find_selected(self, why_unusable: Callable[[Calibration], str] = lambda calibration: "") -> SelectedCalibration:
-        """What is in use: the active one, else the previous, else the built-in. why_unusable: a sentence for one that is not
-        fit for this rig, empty for one that is."""
+        """Return the calibration in use: the active one, else the previous, else the built-in.
+
+        why_unusable: a sentence for one that is not fit for this rig, empty for one that is.
+        """
         pointer, notes = self._pointer()
         for selection in (pointer.active, pointer.previous):
             if selection.number is None:
@@ -126,18 +128,13 @@ class CalibrationStore:
         return SelectedCalibration(self.built_in, BUILT_IN, pointer, notes)
 
     def use(self, number: int | None, slot: int | None = None) -> SelectionState:
-        """From now on this calibration is in use, None: the built-in one; a slot given is filled with it. StoreError, and
-        nothing has changed, for one that cannot be loaded or when the disk refuses."""
+        """Put this calibration in use, None: the built-in one; a slot given is filled with it. StoreError, and nothing has
+        changed, for one that cannot be loaded or when the disk refuses."""
         if number is not None and self.load(number) is self.built_in:
             number = None
         if slot is not None and not 0 <= slot < SLOTS:
             raise StoreError("E433", f"slot {slot}: there are 0 .. {SLOTS - 1}")
         return self._change(Selection(number, slot))
-
-    def rollback(self) -> SelectionState:
-        """Back to what was in use before the last change; a second one goes forth again. StoreError as `use`."""
-        previous = self.previous()
-        return self.use(previous.number, previous.slot)
 
     def previous(self) -> Selection:
         """Return what a rollback brings back. StoreError where nothing was ever changed."""
@@ -147,11 +144,6 @@ class CalibrationStore:
         previous = pointer.previous
         kept = previous.slot is not None and pointer.in_slot(previous.slot) == previous
         return previous if kept else Selection(previous.number)
-
-    def slot(self, slot: int) -> int | None:
-        """Return the number of the calibration in a slot (0 .. 7), that of the built-in one included; None when it is empty."""
-        number = self._pointer()[0].slots[slot]
-        return self.built_in.number if number == OWN and self.built_in else number
 
     def _change(self, selection: Selection) -> SelectionState:
         try:

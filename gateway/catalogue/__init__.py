@@ -7,7 +7,7 @@ the experiment that shows it, and what control does about it or why not. Everyth
     numbers and names of the register and of the map       gateway/registers/residual_cause.py
     the search, its groups, what a recording cannot show   gateway/diagnosis
     experiments and plans                                  gateway/diagnosis/experiments
-    what control compensates, and why not                  gateway/profiles/rigs/compensation.py
+    what control compensates, and why not                  gateway/profiles/rigs/compensated_effects.py
     what moves around the tool in the closed loop          gateway/service/closed_loop/schedule.py
     the tables of `effects` and of the reports             gateway/cli, gateway/reports
 

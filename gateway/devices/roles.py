@@ -42,7 +42,7 @@ class OutputHost(Protocol):
         """The bytes to write; their answer is expected from now on. ValueRefused when the device cannot be told that."""
 
     def safe_frame(self, voltage_v: float) -> bytes:
-        """The bytes that set this voltage, without expecting anything: for the guardian and the last word."""
+        """The bytes that set this voltage, without expecting anything: for the final safe-voltage write."""
 
     def receive(self, chunk: bytes, now_s: float) -> list[OutputReply]:
         """What these bytes complete. Never raises."""

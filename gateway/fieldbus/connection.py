@@ -18,8 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Protocol, cast
 
-from gateway.fieldbus.limits import LogLimiter
 from gateway.fieldbus.peers import Peers, address_of
+from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.fieldbus.settings import ServerSettings
 from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode

@@ -7,7 +7,7 @@ Loopback is exempt from the limits per address, because our own tools and tests 
 
 from ipaddress import IPv4Address, IPv6Address, ip_address
 
-from gateway.fieldbus.limits import RequestRate
+from gateway.fieldbus.rate_limits import RequestRate
 from gateway.fieldbus.settings import ServerSettings
 
 Address = IPv4Address | IPv6Address

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.fieldbus.connection import Clock, Connection, ServerState, Timer
-from gateway.fieldbus.limits import LogLimiter
 from gateway.fieldbus.peers import Peers, is_loopback
+from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.fieldbus.settings import ServerSettings
 from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank

@@ -11,6 +11,8 @@ OnLost = Callable[[PortError], None]
 OnOpen = Callable[[int], None]  # descriptor
 
 WRITE_DEADLINE_S: Final = 0.5
+"""Longest time for a write to leave the machine: a setting is a few dozen bytes, some 30 ms at 9600 baud, so a port that
+takes longer is blocked (flow control, a dead adapter) and counts as lost."""
 
 
 def monotonic_s() -> float:

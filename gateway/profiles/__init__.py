@@ -7,7 +7,7 @@ name or path; schema stands apart, for editors. How to write a profile is told i
 Nothing here imports scipy: `check` answers at once.
 """
 
-from gateway.profiles.find import list_shipped, root
+from gateway.profiles.find import list_shipped, shipped_profiles_folder
 from gateway.profiles.kinds.any_file import Checked, check_file
 from gateway.profiles.kinds.kinds import CALLED
 from gateway.profiles.kinds.plants import Origin, PlantProfile
@@ -39,6 +39,6 @@ __all__ = [
     "load_plant",
     "load_register_map",
     "load_rig",
-    "root",
     "schema",
+    "shipped_profiles_folder",
 ]

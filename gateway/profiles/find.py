@@ -19,8 +19,8 @@ FOLDERS: Final = {
 _SUFFIXES: Final = (".yaml", ".yml")
 
 
-def root() -> Path:
-    """Return the shipped profiles: gateway/_profiles in an installed wheel, else the checkout's profiles/."""
+def shipped_profiles_folder() -> Path:
+    """Return the folder of the shipped profiles: gateway/_profiles in an installed wheel, else the checkout's profiles/."""
     package = Path(gateway.__file__).parent
     installed = package / "_profiles"
     return installed if installed.is_dir() else package.parent / "profiles"
@@ -28,7 +28,7 @@ def root() -> Path:
 
 def list_shipped(kind: str) -> list[str]:
     """Return names of the shipped profiles of a kind (rig, device, plant, calibration, registers, plan)."""
-    return sorted(path.stem for path in (root() / FOLDERS[kind]).glob("*.yaml"))
+    return sorted(path.stem for path in (shipped_profiles_folder() / FOLDERS[kind]).glob("*.yaml"))
 
 
 def locate(kind: str, name: str, beside: Path | None = None) -> Path:
@@ -40,7 +40,7 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
     """
     known = list_shipped(kind)
     if name in known:
-        return root() / FOLDERS[kind] / f"{name}.yaml"
+        return shipped_profiles_folder() / FOLDERS[kind] / f"{name}.yaml"
     folder = beside or Path()
     path = folder / Path(name).expanduser()
     for candidate in (path, folder / f"{name}.yaml", folder / FOLDERS[kind] / f"{name}.yaml"):

@@ -1,4 +1,4 @@
-"""Writes a recording: one os.write per 0.1 s, nothing else that could wait, so that it may live inside the control loop.
+"""Writes a recording from inside the control loop: one os.write per 0.1 s, and no other call that could block.
 
 Decisions
 - Rows go into one buffer that is reused; a batch is complete, with its CRC, before its single write. A kill -9 at any
@@ -50,6 +50,7 @@ class Recorder:
 
     @property
     def is_open(self) -> bool:
+        """Whether rows are still written."""
         return self._descriptor is not None
 
     def append(self, values: tuple[float, ...]) -> None:

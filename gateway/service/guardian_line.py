@@ -43,7 +43,8 @@ class GuardianLine:
             guardian_link.send(self._link, guardian_link.HEARTBEAT)
 
     def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes) -> None:
-        """Before the first non-safe write, and after each reopen: the guardian can then speak the last word itself."""
+        """Give the guardian the line, before the first non-safe write and after each reopen: it can then do the final
+        safe-voltage write itself."""
         self._tell(guardian_link.LINE, {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex()}, descriptor)
 
     def first_cause(self, cause: str) -> None:

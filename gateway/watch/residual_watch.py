@@ -21,13 +21,14 @@ from gateway.watch.window_verdict import Diagnose, judge_window
 _LEAST_EXCITATION_V: Final = 0.2
 _LEAST_MOVES: Final = 4
 """What the first window that is judged must have: later ones are compared with it."""
-_FRESH: Final = 0.6
+_FRESH_SHARE: Final = 0.6
 """Share of a window that must be younger than the last healthy one: half old and half new has a wrong name."""
-_ALL: Final = 1 << 30
-_LONGEST_PAUSE_S: Final = 600.0
-_CERTAIN: Final = 2
-"""So many windows in a row that say the same: more of them add nothing."""
-_OF_TOLERANCE: Final = 0.25
+_ALL_ROWS: Final = 1 << 30
+_LONGEST_PAUSE_S: Final = 600.0  # between searches: a cause that has stood for long is looked at every ten minutes
+_WINDOWS_TO_BE_SURE: Final = 2
+"""Windows in a row that show the same cause, from which on the search pauses longer and longer: more add nothing."""
+_TOLERANCE_SHARE: Final = 0.25
+"""Share of the rig's band: a smaller change of the force does not matter to whoever holds it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ class Watch:
 
     @property
     def published(self) -> WindowVerdict:
-        """What is to be published."""
+        """The verdict to publish."""
         return self._filter.published
 
     def check_newest_window(self) -> None:
@@ -84,7 +85,7 @@ class Watch:
             self.counters["floor_n"] = floor_n
 
     def _window(self, window_s: float) -> Window | str:
-        return window_of(self._ring.newest(_ALL), self._ring.columns, window_s)
+        return window_of(self._ring.newest(_ALL_ROWS), self._ring.columns, window_s)
 
     def _note_healthy(self, window: Window) -> None:
         self._healthy_s = window.end_s
@@ -93,7 +94,7 @@ class Watch:
     def _search(self, window: Window) -> None:
         """In what is younger than the last healthy window, once that is half a window."""
         fresh_s = min(self._setup.window_s, window.end_s - self._healthy_s)
-        if fresh_s < _FRESH * self._setup.window_s:
+        if fresh_s < _FRESH_SHARE * self._setup.window_s:
             return
         fresh = window if fresh_s == self._setup.window_s else self._window(fresh_s)
         if not isinstance(fresh, str):
@@ -109,11 +110,11 @@ class Watch:
         found = self._diagnose([window.measurement], self._reference.plant)
         if not self._reference.is_settled:
             self._reference.take_line_delays(found)
-        finding = judge_window(window, found, self._reference, _OF_TOLERANCE * self._setup.tolerance_n)
+        finding = judge_window(window, found, self._reference, _TOLERANCE_SHARE * self._setup.tolerance_n)
         if finding.cause is ResidualCause.NONE:
             self._reference.raise_floor(window, self._reference.rms_n(window))
             self._healthy_s = window.end_s
         self._filter.add(finding)
-        if self._filter.agreeing_windows > _CERTAIN:
-            pause_s = self._setup.every_s * 2.0 ** (self._filter.agreeing_windows - _CERTAIN)
+        if self._filter.agreeing_windows > _WINDOWS_TO_BE_SURE:
+            pause_s = self._setup.every_s * 2.0 ** (self._filter.agreeing_windows - _WINDOWS_TO_BE_SURE)
             self._search_s = self._clock() + min(_LONGEST_PAUSE_S, pause_s)

@@ -1,4 +1,4 @@
-"""What stands after several windows: the warning rises slowly and falls when a window that could have seen it shows none.
+"""Publish a warning when two windows in a row agree; clear it when a window that could have shown it does not.
 
 A window in which a change happened is half old and half new, and its cause may be misnamed. So two windows in a row must
 show a cause, and it has a name only where both give the same one. Pure.
@@ -9,12 +9,15 @@ from typing import Final
 
 from gateway.registers.residual_cause import ResidualCause
 
-_AS_GOOD: Final = 0.5  # of the excitation of the window that named a cause; from this share on a window may clear it
+_EXCITATION_TO_CLEAR: Final = (
+    0.5  # share of the excitation of the window that named the cause, by which another may clear it
+)
 
 
 @dataclass(frozen=True, slots=True)
 class WindowVerdict:
-    """What one window says. excitation_v: how much the command moved in it; others: names it could not tell apart."""
+    """The cause that one window shows. excitation_v: how much the command moved in it; others: effects that it could not
+    tell from the cause."""
 
     cause: ResidualCause = ResidualCause.NONE
     sentence: str = ""
@@ -31,14 +34,14 @@ NO_CHANGE: Final = WindowVerdict()
 
 @dataclass(slots=True)
 class WarningFilter:
-    """published: what is published. agreeing_windows: how many windows in a row have said the same."""
+    """Decides what is published. agreeing_windows: how many windows in a row have shown the same cause."""
 
     published: WindowVerdict = NO_CHANGE
     agreeing_windows: int = 0
     _last: WindowVerdict = NO_CHANGE
 
     def add(self, finding: WindowVerdict) -> None:
-        """One judged window."""
+        """Take in the verdict of one window; `published` changes where two in a row agree or one clears it."""
         if finding.cause is ResidualCause.NONE:
             self._clear_if_visible(finding)
             return
@@ -55,5 +58,5 @@ class WarningFilter:
                 self.published = WindowVerdict(ResidualCause.UNKNOWN, finding.sentence, finding.excitation_v)
 
     def _clear_if_visible(self, finding: WindowVerdict) -> None:
-        if finding.excitation_v >= _AS_GOOD * self._last.excitation_v:
+        if finding.excitation_v >= _EXCITATION_TO_CLEAR * self._last.excitation_v:
             self.published, self._last, self.agreeing_windows = NO_CHANGE, NO_CHANGE, 0

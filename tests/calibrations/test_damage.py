@@ -11,6 +11,7 @@ from gateway.calibrations.selection import BUILT_IN
 from gateway.calibrations.store import CalibrationStore, StoreError
 from gateway.processes.durable_file import add_checksum, verify_checksum
 from tests.calibrations.coefficients import calibration, mark_of
+from tests.calibrations.slots import go_back
 from tests.calibrations.store_bench import OWN, active_mark, used_store
 
 
@@ -58,7 +59,7 @@ def test_both_damaged_is_the_built_in_one(used):
     assert selected.selection == BUILT_IN
     assert len(selected.notes) == 2
     with pytest.raises(StoreError, match="0002"):
-        used.rollback()
+        go_back(used)
 
 
 def test_a_damaged_selection_gives_way_to_the_generation_before_it(used):
@@ -85,7 +86,7 @@ def test_after_damage_a_rollback_does_not_lead_to_the_damaged_one(used):
     used.use(used.add(calibration(4)))
     (used.directory / "0004.yaml").write_bytes(b"")
     used.use(2)
-    assert used.rollback().active.number == 3
+    assert go_back(used).active.number == 3
 
 
 def test_a_calibration_that_does_not_fit_the_rig_gives_way_too(used):

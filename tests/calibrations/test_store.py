@@ -14,6 +14,7 @@ from gateway.calibrations.store import CalibrationStore, StoreError
 from gateway.profiles import load_calibration
 from tests.calibrations.coefficients import calibration, mark_of
 from tests.calibrations.failing_disk import disk
+from tests.calibrations.slots import go_back, slot_number
 from tests.calibrations.store_bench import OWN, active_mark, used_store
 
 
@@ -86,25 +87,25 @@ def test_an_unknown_number_is_told_with_those_that_there_are(used):
 def test_nothing_stored_is_the_built_in_calibration(store):
     selected = store.find_selected()
     assert (selected.calibration, selected.selection, selected.notes) == (OWN, BUILT_IN, ())
-    assert store.slot(0) is None
+    assert slot_number(store, 0) is None
     with pytest.raises(StoreError, match="nothing to go back to"):
-        store.rollback()
+        go_back(store)
     assert not store.directory.exists()
 
 
 def test_use_and_rollback_go_to_and_fro(used):
     assert active_mark(used) == 3
-    assert used.rollback().active == Selection(2, 0)
+    assert go_back(used).active == Selection(2, 0)
     assert active_mark(used) == 2
-    assert used.rollback().active == Selection(3, 1)
+    assert go_back(used).active == Selection(3, 1)
     assert active_mark(used) == 3
 
 
 def test_the_first_rollback_leads_to_the_built_in_one(store):
     store.use(store.add(calibration(2)))
-    assert store.rollback().active == BUILT_IN
+    assert go_back(store).active == BUILT_IN
     assert active_mark(store) == 1000
-    store.rollback()
+    go_back(store)
     assert active_mark(store) == 2
 
 
@@ -112,19 +113,19 @@ def test_the_built_in_one_is_used_by_its_number_or_by_none(used):
     assert used.use(1).active == BUILT_IN
     used.use(3)
     assert used.use(None).active == BUILT_IN
-    assert used.rollback().active.number == 3
+    assert go_back(used).active.number == 3
 
 
 def test_using_the_same_again_keeps_what_could_be_gone_back_to(used):
     used.use(3, 1)
     used.use(3)
-    assert used.rollback().active.number == 2
+    assert go_back(used).active.number == 2
 
 
 def test_slots_hold_what_was_put_there_last(used):
-    assert [used.slot(slot) for slot in range(8)] == [2, 3, None, None, None, None, None, None]
+    assert [slot_number(used, slot) for slot in range(8)] == [2, 3, None, None, None, None, None, None]
     used.use(3, 0)
-    assert used.slot(0) == 3
+    assert slot_number(used, 0) == 3
     assert used.previous() == Selection(2, None), "slot 0 holds another one now"
     for slot in (-1, 8):
         with pytest.raises(StoreError, match="slot"):
@@ -173,7 +174,7 @@ def test_whatever_call_fails_the_set_is_the_old_one_or_the_new_one(tmp_path, err
                 refused += 1
                 assert str(failure).startswith(f"E431 calibration not stored: {os.strerror(error)}")
         assert active_mark(store) == (4 if acknowledged else old), (n, there.calls[-1])
-        assert store.slot(2) == (store.find_selected().selection.number if acknowledged else None)
+        assert slot_number(store, 2) == (store.find_selected().selection.number if acknowledged else None)
         assert not any(entry.fault for entry in store.list()) and not store.find_selected().notes
         commit(store, 5)
         assert active_mark(store) == 5

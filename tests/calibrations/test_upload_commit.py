@@ -14,6 +14,7 @@ from gateway.registers.upload.coefficients import CoefficientSet, model_hash, wo
 from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
 from tests.calibrations.coefficients import calibration, staged, swapped
 from tests.calibrations.failing_disk import disk
+from tests.calibrations.slots import slot_number
 from tests.calibrations.upload_bench import COMMIT, DRY_RUN, OWN, PEER
 
 GOOD = CoefficientSet.of_calibration(calibration(16))
@@ -262,9 +263,9 @@ def test_force_limits_stay_with_their_set_and_the_smaller_of_them_and_the_rigs_h
         given.write(1, 0)
     assert bench.used[-1].model.limits_n == (2.5, 25.3)
     assert bench.upload_of(narrow, 4) == COMMITTED
-    assert bench.store.slot(4) == 2, "the very same set"
+    assert slot_number(bench.store, 4) == 2, "the very same set"
     assert bench.upload_of(calibration(16), 4) == COMMITTED
-    assert bench.store.slot(4) == 3, "without the limits it is another one"
+    assert slot_number(bench.store, 4) == 3, "without the limits it is another one"
     bench.write(1, 6000)
     assert bench.refused(1, 6001).sentence.startswith("W204 force_setpoint = 60.01 N, allowed 0 .. 60 N (rig demo)")
 

@@ -5,6 +5,7 @@ import pytest
 from gateway.codes.refusals import RefusalReason
 from gateway.registers.words import CommitStatus, UploadReason
 from tests.calibrations.coefficients import calibration
+from tests.calibrations.slots import slot_number
 from tests.calibrations.upload_bench import OWN, PEER, Bench
 
 COMMITTED = (CommitStatus.COMMITTED, 0, 0)
@@ -59,7 +60,7 @@ def test_a_slot_whose_file_is_damaged_fails_and_the_active_set_stays(filled):
 
 def test_a_slot_filled_again_holds_the_new_set_and_the_old_one_is_kept_for_going_back(filled):
     filled.upload_of(calibration(40), 1)
-    assert (filled.active_slot, top_n(filled), filled.store.slot(1)) == (1, 55.0, 5)
+    assert (filled.active_slot, top_n(filled), slot_number(filled.store, 1)) == (1, 55.0, 5)
     assert filled.store.load(2).rising_handles_n[-1] == 51.25
     filled.upload.rollback()
     filled.run()
@@ -72,14 +73,14 @@ def test_the_same_set_again_keeps_its_number_and_fills_no_disk(filled):
             assert filled.upload_of(calibration(10 * slot), slot) == COMMITTED
     assert [entry.number for entry in filled.store.list()] == [2, 3, 4]
     filled.upload_of(calibration(10), 6)
-    assert (filled.store.slot(6), filled.active_slot) == (2, 6)
+    assert (slot_number(filled.store, 6), filled.active_slot) == (2, 6)
     filled.upload_of(calibration(50), 3)
-    assert filled.store.slot(3) == 5
+    assert slot_number(filled.store, 3) == 5
 
 
 def test_a_slot_may_hold_the_built_in_set_under_its_own_number(filled):
     assert filled.upload_of(OWN, 6) == COMMITTED
-    assert (filled.store.slot(6), filled.active_slot, filled.used[-1].calibration) == (1, 6, OWN)
+    assert (slot_number(filled.store, 6), filled.active_slot, filled.used[-1].calibration) == (1, 6, OWN)
     assert filled.upload.status()["built_in"]
     filled.write(1149, 3)
     filled.run()

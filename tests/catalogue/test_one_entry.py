@@ -32,7 +32,7 @@ sensing.SENSING = (*sensing.SENSING, made_up)
 from gateway.cli.verbs import effects, registers
 from gateway.diagnosis.experiments.experiments import plan_for
 from gateway.profiles import load_plant, load_register_map
-from gateway.profiles.rigs.compensation import compensation_of, compensation_words
+from gateway.profiles.rigs.compensated_effects import compensation_of, compensation_words
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.closed_loop.schedule import COLUMNS
 from gateway.twin.plant import with_value

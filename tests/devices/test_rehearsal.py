@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from gateway.profiles import ProfileError, load_device, root
+from gateway.profiles import ProfileError, load_device, shipped_profiles_folder
 from gateway.profiles.strict_yaml.text import parse
 
 
 def loaded(folder: Path, name: str, **changes: Any) -> list[str]:
     """Faults of a shipped profile with other words; a dotted key changes a group, None leaves it out."""
-    value = parse((root() / "devices" / f"{name}.yaml").read_bytes(), name).value
+    value = parse((shipped_profiles_folder() / "devices" / f"{name}.yaml").read_bytes(), name).value
     for key, new in changes.items():
         *groups, last = key.split("__")
         group = value

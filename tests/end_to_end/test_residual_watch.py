@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from gateway.codes.warning_bits import WarningBit
-from gateway.profiles import root
+from gateway.profiles import shipped_profiles_folder
 from gateway.registers.residual_cause import ResidualCause
 from tests.end_to_end.conftest import RunningGateway, start, stop
 from tests.end_to_end.test_lean_processes import HEAVY, mapped
@@ -44,7 +44,11 @@ def shown(running: RunningGateway) -> tuple[bool, ResidualCause]:
 def watched_rig(directory: Path, watch: str) -> Path:
     """The demo rig with other settings of its watch."""
     rig = directory / "watched.yaml"
-    text = (root() / "rigs" / "demo.yaml").read_text(encoding="utf-8").replace("name: demo", "name: watched")
+    text = (
+        (shipped_profiles_folder() / "rigs" / "demo.yaml")
+        .read_text(encoding="utf-8")
+        .replace("name: demo", "name: watched")
+    )
     rig.write_text(text + f"\nresidual_watch: {watch}\n", encoding="utf-8")
     return rig
 

@@ -10,8 +10,8 @@ import pytest
 
 from gateway.fieldbus import ModbusTcpServer, ServerSettings
 from gateway.fieldbus.connection import Connection, ServerState
-from gateway.fieldbus.limits import LogLimiter
 from gateway.fieldbus.peers import Peers
+from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.modbus import Peer
 from tests.modbus.memory_bank import MemoryBank
 

@@ -24,11 +24,11 @@ def test_what_the_first_issue_ships() -> None:
 def test_an_installed_wheel_carries_its_profiles_a_checkout_has_them_beside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert find.root() == PROFILES
+    assert find.shipped_profiles_folder() == PROFILES
     package = tmp_path / "site-packages" / "gateway"
     (package / "_profiles").mkdir(parents=True)
     monkeypatch.setattr(gateway, "__file__", str(package / "__init__.py"))
-    assert find.root() == package / "_profiles"
+    assert find.shipped_profiles_folder() == package / "_profiles"
 
 
 def test_a_name_that_is_neither_shipped_nor_a_file_is_told_with_what_is_there() -> None:

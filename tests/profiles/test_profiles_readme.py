@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from gateway.profiles import check_file
-from gateway.profiles.find import FOLDERS, root
+from gateway.profiles.find import FOLDERS, shipped_profiles_folder
 from gateway.registers.map.value_names import BIT_NAMES, VALUE_NAMES
 
-TEXT = (root() / "README.md").read_text(encoding="utf-8")
+TEXT = (shipped_profiles_folder() / "README.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```yaml\n# (\S+\.yaml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 EXAMPLES = dict(BLOCK.findall(TEXT))
 
@@ -41,7 +41,7 @@ def test_an_example_is_checked_without_a_fault(name: str, folder: Path) -> None:
 
 def test_each_folder_is_in_the_table() -> None:
     told = set(re.findall(r"^\| `(\w+)/`", TEXT, re.MULTILINE))
-    here = {path.name for path in root().iterdir() if path.is_dir()}
+    here = {path.name for path in shipped_profiles_folder().iterdir() if path.is_dir()}
     assert told == here
     assert here - {"schemas"} <= set(FOLDERS.values())
 
@@ -51,4 +51,4 @@ def test_enumerations_and_shipped_files_that_the_page_names_are_there() -> None:
     assert named
     assert set(re.findall(r"`(\w+)`", named[1])) <= {*VALUE_NAMES, *BIT_NAMES}
     for link in re.findall(r"\]\(([^)]+)\)", TEXT):
-        assert (root() / link).is_file(), link
+        assert (shipped_profiles_folder() / link).is_file(), link

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from gateway.profiles import Report, check_report, root, schema
+from gateway.profiles import Report, check_report, schema, shipped_profiles_folder
 from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.words import State
 from tests.service.drawn_devices import Profile, drawn_cell, drawn_output
@@ -36,7 +36,7 @@ RIG: dict[str, Any] = {
 
 
 def shipped_device(name: str) -> Profile:
-    value: Profile = parse((root() / "devices" / f"{name}.yaml").read_bytes(), name).value
+    value: Profile = parse((shipped_profiles_folder() / "devices" / f"{name}.yaml").read_bytes(), name).value
     return value
 
 

@@ -92,7 +92,7 @@ def _path(name: str, rig: str | None, state: Path | None) -> Path:
 def _of_rig(rig: Rig) -> tuple[str, PlantProfile, tuple[str, ...]]:
     if rig.plant_profile:
         return rig.name, rig.plant_profile, ()
-    plant = rig.stand_in or load_plant(START_PLANT)
+    plant = rig.fallback_plant or load_plant(START_PLANT)
     return rig.name, plant, (f"rig {rig.name} names no plant: {plant.name} is the start",)
 
 

@@ -2,13 +2,16 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError
 from gateway.cli.live_monitor.table import View, Writer
 from gateway.cli.live_monitor.track import Track
 from gateway.cli.master.client import GatewayClient, RefusedError
+
+POLL_S: Final = 0.1
+"""Refresh period of the live page: ten frames a second look continuous and are two requests each."""
 
 
 class Poller:
@@ -28,7 +31,7 @@ class Poller:
         self.trouble = ""
 
     def poll_or_note(self) -> None:
-        """The same, with trouble noted for the page instead of raised; the next poll connects again."""
+        """Poll, with trouble noted for the page instead of raised; the next poll connects again."""
         try:
             self.poll()
         except (CliError, RefusedError) as error:

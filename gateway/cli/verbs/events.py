@@ -16,10 +16,10 @@ from gateway.processes.event import SEVERITIES, EventRecord, format_event, utc_t
 from gateway.processes.event_file import EventReader
 
 _UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
-_LOOK_S: Final = 0.25  # how often --follow looks for more
+_POLL_S: Final = 0.25  # how often --follow reads the event file
 
 
-def since(context: click.Context, parameter: click.Parameter, value: str | None) -> str:
+def parse_since(context: click.Context, parameter: click.Parameter, value: str | None) -> str:
     """10m, 2h, 1.5d or an ISO 8601 time (without a zone: UTC) as events write it; empty for none."""
     if value is None:
         return ""
@@ -38,7 +38,7 @@ def since(context: click.Context, parameter: click.Parameter, value: str | None)
 @click.option(
     "--since",
     "after",
-    callback=since,
+    callback=parse_since,
     metavar="10m|TIME",
     help="Only what is younger: 90s, 10m, 2h, 1d, or a time (UTC unless it says otherwise).",
 )
@@ -78,7 +78,7 @@ def _show(reader: EventReader, wanted: Callable[[EventRecord], bool], follow: bo
                 click.echo(json.dumps(event._asdict()) if as_json else format_event(event))
             if not follow:
                 return
-            time.sleep(_LOOK_S)
+            time.sleep(_POLL_S)
             events = reader.read_new()
     except KeyboardInterrupt:
         return

@@ -20,7 +20,7 @@ def command(*, code: str | None, as_json: bool) -> None:
     from gateway.codes.all_codes import CATALOGUE
 
     if code is not None:
-        _one(code, as_json=as_json)
+        _explain_code(code, as_json=as_json)
     elif as_json:
         click.echo(json.dumps([asdict(entry) for entry in CATALOGUE.values()], indent=2))
     else:
@@ -28,12 +28,13 @@ def command(*, code: str | None, as_json: bool) -> None:
             click.echo(f"{entry.code}  {entry.title}" + (f"  ({entry.name})" if entry.name else ""))
 
 
-def _one(code: str, *, as_json: bool) -> None:
+def _explain_code(code: str, *, as_json: bool) -> None:
+    """Print the entries of one code or name; UsageError where there is none."""
     from gateway.codes.all_codes import find_codes
 
     entries = find_codes(code)
     if not entries:
-        raise click.UsageError(_unknown(code))
+        raise click.UsageError(_describe_unknown_code(code))
     if as_json:
         click.echo(json.dumps([asdict(entry) for entry in entries], indent=2))
         return
@@ -43,7 +44,8 @@ def _one(code: str, *, as_json: bool) -> None:
             click.echo(click.wrap_text(text, width=100, initial_indent=f"  {heading:<10}", subsequent_indent=" " * 12))
 
 
-def _unknown(code: str) -> str:
+def _describe_unknown_code(code: str) -> str:
+    """Return the sentence about a code that does not exist, with those that are near."""
     from gateway.codes.all_codes import CATALOGUE
 
     known = [*CATALOGUE, *(entry.name for entry in CATALOGUE.values() if entry.name)]

@@ -1,4 +1,4 @@
-"""`hold`: a force, kept by this terminal: enable, a heartbeat, one line of state, and a ramp to 0 when it is told to stop."""
+"""`hold`: hold a force from this terminal: enable, heartbeat, one line of state, and a ramp to 0 when told to stop."""
 
 import json
 import re
@@ -44,8 +44,8 @@ def command(
 
     Sets the force, enables, and keeps the heartbeat that a rig with a lease wants. A second Ctrl-C skips the ramp.
 
-    A gateway of this machine tells its lease, unless it runs with a --state of its own; no register has it, so of one
-    elsewhere name the rig with --rig, or the heartbeat takes 200 ms for its lease.
+    The lease is read from a gateway on this machine (unless it runs with a --state of its own); for a remote one give
+    --rig, else 200 ms is assumed.
 
     Example: force-gateway hold 12 --for 10s
     """
@@ -57,19 +57,19 @@ def command(
 
     if not (isfinite(newton) and newton >= 0.0):
         raise click.UsageError(f"{newton:g} N is no force to hold")
-    lease = _lease(rig) if rig is not None else _told_lease(*endpoint)
+    lease = _read_rig_lease(rig) if rig is not None else _find_gateway_lease(*endpoint)
     register_map = load_register_map(options["map_name"])
     with GatewayClient(*endpoint, options["unit"], register_map) as client:
         with explain_refusals(client):
             (heartbeat,) = client.read_values([register_map.find("heartbeat")])
         run = HoldRun(_check_force(register_map, newton), heartbeat=int(heartbeat.value), resets=options["resets"])
         beat = HeartbeatThread(client, run, lease, time.monotonic)
-        _follow(beat, for_s, as_json=as_json)
-    _tell(beat, client.where, as_json=as_json)
+        _show_until_end(beat, for_s, as_json=as_json)
+    _report_end(beat, client.where, as_json=as_json)
 
 
-def _lease(rig: str) -> "KnownLease":
-    """Return what the rig file says."""
+def _read_rig_lease(rig: str) -> "KnownLease":
+    """Return the lease that the rig file gives."""
     from gateway.cli.force_hold.heartbeat import KnownLease
     from gateway.profiles import load_rig
 
@@ -77,8 +77,8 @@ def _lease(rig: str) -> "KnownLease":
     return KnownLease(supervision.lease_s, supervision.lease_action.value)
 
 
-def _told_lease(host: str, port: int) -> "KnownLease | None":
-    """Return what the gateway that serves this port says, where it runs on this machine; None where nobody says."""
+def _find_gateway_lease(host: str, port: int) -> "KnownLease | None":
+    """Return the lease of the gateway that serves this port, where it runs on this machine; None where it is not known."""
     from gateway.cli.force_hold.heartbeat import KnownLease
     from gateway.cli.master.nearby import running_at
     from gateway.service.supervisor.run_options import default_state_root
@@ -98,12 +98,12 @@ def _check_force(register_map: Any, newton: float) -> float:
     return newton
 
 
-def _follow(beat: "HeartbeatThread", for_s: float | None, *, as_json: bool) -> None:
+def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bool) -> None:
     """Show the line until the beat ends; what stops it comes as a signal, as the end of its time, or as a closed pipe."""
     from gateway.cli.force_hold.state_line import StateLine
 
     shown, began_s = StateLine(as_json=as_json), time.monotonic()
-    with _signals(beat):
+    with _handle_signals(beat):
         beat.start()
         while beat.is_alive():
             beat.join(_SHOW_S)
@@ -122,7 +122,7 @@ def _follow(beat: "HeartbeatThread", for_s: float | None, *, as_json: bool) -> N
 
 
 @contextmanager
-def _signals(beat: "HeartbeatThread") -> Iterator[None]:
+def _handle_signals(beat: "HeartbeatThread") -> Iterator[None]:
     """The first of Ctrl-C, SIGTERM and a closed terminal ramps down, the second drops the force at once."""
 
     def on_signal(number: int, frame: object) -> None:
@@ -136,8 +136,8 @@ def _signals(beat: "HeartbeatThread") -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _tell(beat: "HeartbeatThread", where: str, *, as_json: bool) -> None:
-    """How it ended; CliError when not as asked."""
+def _report_end(beat: "HeartbeatThread", where: str, *, as_json: bool) -> None:
+    """Print how it ended; CliError when not as asked."""
     from gateway.cli.force_hold.sequence import HoldEnd
 
     end = beat.hold.end
@@ -146,14 +146,14 @@ def _tell(beat: "HeartbeatThread", where: str, *, as_json: bool) -> None:
     if beat.failure:
         raise beat.failure
     if end is HoldEnd.FAULT:
-        raise CliError(_fault_words(beat))
+        raise CliError(_describe_fault(beat))
     if end is HoldEnd.DISABLED:
-        raise CliError(f"{_disabled_words(beat)} ({where})")
+        raise CliError(f"{_describe_disabled(beat)} ({where})")
     if not as_json:
         click.echo("0 N, disabled: the output is at the safe voltage", err=True)
 
 
-def _disabled_words(beat: "HeartbeatThread") -> str:
+def _describe_disabled(beat: "HeartbeatThread") -> str:
     """Return why the output is off although nobody here has asked for it."""
     from gateway.codes.warning_bits import WarningBit
 
@@ -164,7 +164,7 @@ def _disabled_words(beat: "HeartbeatThread") -> str:
     return "W336 somebody else has cleared enable; the output is at the safe voltage"
 
 
-def _fault_words(beat: "HeartbeatThread") -> str:
+def _describe_fault(beat: "HeartbeatThread") -> str:
     """Return the fault's sentence, and how to go on."""
     assert beat.seen
     entry = beat.seen.fault.explanation

@@ -11,7 +11,6 @@ from gateway.cli.options import Endpoint, gateway_options
 if TYPE_CHECKING:
     from gateway.cli.live_monitor.poll import Poller
 
-_POLL_S: Final = 0.1
 _PICTURE_SIZE: Final = (112, 34)
 _TEXT_SIZE: Final = (80, 24)
 
@@ -49,9 +48,11 @@ def command(*, svg: Path | None, seconds: float | None, endpoint: Endpoint, **op
 
 
 def _watch(poller: "Poller", seconds: float) -> None:
+    from gateway.cli.live_monitor.poll import POLL_S
+
     end_s = time.monotonic() + seconds
     while time.monotonic() < end_s:
-        time.sleep(_POLL_S)
+        time.sleep(POLL_S)
         poller.poll_or_note()
 
 
@@ -60,6 +61,7 @@ def _live(poller: "Poller", seconds: float | None) -> None:
     from rich.live import Live
 
     from gateway.cli.live_monitor.page import page
+    from gateway.cli.live_monitor.poll import POLL_S
 
     console = Console()
     end_s = time.monotonic() + seconds if seconds else float("inf")
@@ -67,7 +69,7 @@ def _live(poller: "Poller", seconds: float | None) -> None:
         with Live(console=console, screen=True, auto_refresh=False) as live:
             while time.monotonic() < end_s:
                 live.update(page(poller.view(*console.size)), refresh=True)
-                time.sleep(_POLL_S)
+                time.sleep(POLL_S)
                 poller.poll_or_note()
     except KeyboardInterrupt:
         pass

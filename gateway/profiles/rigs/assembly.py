@@ -10,7 +10,7 @@ from gateway import defaults
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.settings import ControlSettings, Defaults, Limits, Supervision, Trim
 from gateway.devices import DeviceProfile
-from gateway.profiles.find import display, root
+from gateway.profiles.find import display, shipped_profiles_folder
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
@@ -18,7 +18,12 @@ from gateway.profiles.kinds.registers import read_registers
 from gateway.profiles.load import load_plant, open_profile, read_named, refer_at, refer_to
 from gateway.profiles.rigs import checks, line_checks, network_checks, wire_checks
 from gateway.profiles.rigs.checks import Check, Parts
-from gateway.profiles.rigs.compensation import compensation_of, compensation_words, in_simulation, without_compensable
+from gateway.profiles.rigs.compensated_effects import (
+    compensation_of,
+    compensation_words,
+    in_simulation,
+    without_compensable,
+)
 from gateway.profiles.rigs.edit_marks import find_edit_marks
 from gateway.profiles.rigs.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, RigFile
@@ -29,7 +34,7 @@ from gateway.registers.map.register_map import RegisterMap
 
 T = TypeVar("T")
 
-STAND_IN_PLANT: Final = defaults.PLANT
+FALLBACK_PLANT: Final = defaults.PLANT
 """What `run --sim` simulates for a real rig that names no plant."""
 
 FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *wire_checks.FAULTS, *network_checks.FAULTS)
@@ -107,7 +112,7 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
 
 def _marks(document: Document, path: Path, findings: Findings) -> list[ProfileFault]:
     """Marks of a rig of the user's own; a placeholder is told already, and a shipped file is there to be copied."""
-    if path.is_relative_to(root()):
+    if path.is_relative_to(shipped_profiles_folder()):
         return []
     known_paths = {fault.path for fault in (*findings.faults, *findings.hardware)}
     text = findings.texts[display(path)].decode("utf-8-sig", "replace")
@@ -164,7 +169,7 @@ def _compensation(plant: PlantProfile | None, extended: PlantProfile | None) -> 
     """Of what differs from the rig's plant, and of what control could take back of that one, too."""
     if extended is None:
         return None
-    base = (plant or load_plant(STAND_IN_PLANT)).plant
+    base = (plant or load_plant(FALLBACK_PLANT)).plant
     return compensation_of(without_compensable(base), extended.plant)
 
 
@@ -193,7 +198,7 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
         output=OutputLine(device=parts.output_device, port=file.output.port, baud=file.output.baud),
         load_cell=_cell_line(file.load_cell, parts.cell_device),
         plant_profile=parts.plant,
-        stand_in=None if parts.plant else load_plant(STAND_IN_PLANT),
+        fallback_plant=None if parts.plant else load_plant(FALLBACK_PLANT),
         calibration=parts.calibration,
         control=ControlSettings(
             limits=file.limits,

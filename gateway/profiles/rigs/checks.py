@@ -1,8 +1,8 @@
-"""What no single field can know: whether the parts of a rig fit together.
+"""Checks that need more than one field: whether the parts of a rig fit together.
 
 Each check is a generator of (path, sentence) and looks at the parts that were read; a part with a fault of its own is None,
 and its checks wait until it is fixed. FAULTS keep a rig from starting, WARNINGS do not. The checks of the two serial
-lines are in line_checks, those of the Modbus face in network_checks.
+lines are in line_checks and wire_checks, those of the Modbus server in network_checks.
 """
 
 from collections.abc import Callable, Iterator
@@ -48,8 +48,12 @@ class Parts:
 
 Check = Callable[[Parts], Found]
 
+_SATURATION_SHARE: Final = 0.98  # of the cell's range: what is suggested; an amplifier may clip a little below its end
+_LEAST_TICKS: Final = 2.0  # within a timeout, so that one late tick is no fault
 
-def voltages_fit(parts: Parts) -> Found:
+
+def check_voltages(parts: Parts) -> Found:
+    """Yield a fault for voltage limits that are not in order, and for a safe voltage outside them."""
     if (limits := parts.limits) is None:
         return
     low, high, safe = limits.voltage_min_v, limits.voltage_max_v, limits.safe_voltage_v
@@ -60,7 +64,8 @@ def voltages_fit(parts: Parts) -> Found:
         yield "limits.safe_voltage_v", f"{volt(safe)} is outside {allowed}"
 
 
-def forces_fit(parts: Parts) -> Found:
+def check_forces(parts: Parts) -> Found:
+    """Yield a fault for force limits that are not in order, or beyond the load cell."""
     if (limits := parts.limits) is None:
         return
     most, trip, least = limits.force_max_n, limits.over_force_n, limits.smallest_force_n
@@ -76,22 +81,22 @@ def forces_fit(parts: Parts) -> Found:
         yield "limits.over_force_n", f"{newton(trip)} is beyond the load cell: {cell}"
 
 
-def saturation_fits(parts: Parts) -> Found:
+def check_saturation(parts: Parts) -> Found:
+    """Yield a fault for a saturation_n beyond the load cell, or within the forces of normal work."""
     if (supervision := parts.supervision) is None:
         return
     path, seen = "supervision.saturation_n", supervision.saturation_n
     if parts.load_cell and seen > parts.load_cell.range_n:
         cell = parts.load_cell.range_n
-        yield (
-            path,
-            f"{newton(seen)} is beyond load_cell.range_n = {newton(cell)}; 98 % of it is {newton(round(0.98 * cell, 1))}",
-        )
+        suggested = f"{100.0 * _SATURATION_SHARE:.0f} % of it is {newton(round(_SATURATION_SHARE * cell, 1))}"
+        yield path, f"{newton(seen)} is beyond load_cell.range_n = {newton(cell)}; {suggested}"
     elif parts.limits and seen <= parts.limits.force_max_n:
         most = newton(parts.limits.force_max_n)
         yield path, f"{newton(seen)} is not above force_max_n = {most}: it would trip in normal work"
 
 
-def defaults_fit(parts: Parts) -> Found:
+def check_defaults(parts: Parts) -> Found:
+    """Yield a fault for a default force outside the limits."""
     if (defaults := parts.defaults) is None or (limits := parts.limits) is None:
         return
     most, least, precontact = limits.force_max_n, limits.smallest_force_n, defaults.precontact_force_n
@@ -107,7 +112,7 @@ def defaults_fit(parts: Parts) -> Found:
         )
 
 
-def calibration_reaches(parts: Parts) -> Found:
+def check_calibration_range(parts: Parts) -> Found:
     """Yield a fault where the maximum force exceeds the calibration, or leaves the trim no room above it."""
     if (limits := parts.limits) is None or (calibration := parts.calibration) is None:
         return
@@ -129,7 +134,9 @@ def calibration_reaches(parts: Parts) -> Found:
         )
 
 
-def calibration_fits_the_cell(parts: Parts) -> Found:
+def check_calibration_against_cell(parts: Parts) -> Found:
+    """Yield a fault for a calibration that the load cell cannot have measured, or whose force at the safe voltage counts
+    as stuck."""
     if (calibration := parts.calibration) is None:
         return
     largest = max(map(abs, (*calibration.rising_handles_n, *calibration.falling_handles_n)))
@@ -150,10 +157,11 @@ def _within(calibration: Calibration, voltage_v: float) -> float:
     return min(max(voltage_v, calibration.x0_v), calibration.x1_v)
 
 
-def times_fit(parts: Parts) -> Found:
+def check_times(parts: Parts) -> Found:
+    """Yield a fault for a timeout shorter than two ticks of the loop."""
     if (supervision := parts.supervision) is None or not parts.loop_hz:
         return
-    ticks_s = 2.0 / parts.loop_hz
+    ticks_s = _LEAST_TICKS / parts.loop_hz
     for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s"):
         value = getattr(supervision, key)
         if value is not None and value < ticks_s:
@@ -161,12 +169,14 @@ def times_fit(parts: Parts) -> Found:
             yield f"supervision.{key}", f"{second(value)} is shorter than {told}"
 
 
-def a_simulated_rig_has_a_plant(parts: Parts) -> Found:
+def check_simulated_plant(parts: Parts) -> Found:
+    """Yield a fault for a simulated rig without a plant."""
     if parts.simulated and not parts.names_plant:
         yield "plant", f"is missing: a simulated rig needs something to simulate, such as `plant: {defaults.PLANT}`"
 
 
-def a_real_rig_is_wise(parts: Parts) -> Found:
+def check_real_rig(parts: Parts) -> Found:
+    """Yield a warning for a real rig without a lease, or with a calibration of another rig."""
     if parts.simulated:
         return
     if parts.supervision and parts.supervision.lease_s is None:
@@ -176,7 +186,8 @@ def a_real_rig_is_wise(parts: Parts) -> Found:
         yield "calibration", f"{made}: its forces are a guess until you run `force-gateway calibrate`"
 
 
-def contact_can_be_felt(parts: Parts) -> Found:
+def check_contact_threshold(parts: Parts) -> Found:
+    """Yield a warning for a precontact force that is too small to feel contact with."""
     if (defaults := parts.defaults) is None:
         return
     threshold = defaults.contact_threshold_n
@@ -185,7 +196,8 @@ def contact_can_be_felt(parts: Parts) -> Found:
         yield "defaults.precontact_force_n", f"{newton(defaults.precontact_force_n)} is not above {told}"
 
 
-def plant_has_air(parts: Parts) -> Found:
+def check_plant_supply(parts: Parts) -> Found:
+    """Yield a warning for a maximum voltage that asks for more pressure than the plant's supply has."""
     if parts.plant is None or parts.limits is None:
         return
     regulator, most_v = parts.plant.plant.regulator, parts.limits.voltage_max_v
@@ -196,7 +208,8 @@ def plant_has_air(parts: Parts) -> Found:
         yield "limits.voltage_max_v", f"{volt(most_v)} asks for {asked}, the plant's supply has {there}: {end}"
 
 
-def compensation_compensates(parts: Parts) -> Found:
+def check_compensation(parts: Parts) -> Found:
+    """Yield a fault for a compensation that has nothing to compensate."""
     if parts.extended is None or parts.compensation is None or not parts.compensation.is_null:
         return
     limited = parts.compensation.limited
@@ -205,14 +218,14 @@ def compensation_compensates(parts: Parts) -> Found:
 
 
 FAULTS: Final[tuple[Check, ...]] = (
-    voltages_fit,
-    forces_fit,
-    saturation_fits,
-    defaults_fit,
-    calibration_reaches,
-    calibration_fits_the_cell,
-    times_fit,
-    a_simulated_rig_has_a_plant,
-    compensation_compensates,
+    check_voltages,
+    check_forces,
+    check_saturation,
+    check_defaults,
+    check_calibration_range,
+    check_calibration_against_cell,
+    check_times,
+    check_simulated_plant,
+    check_compensation,
 )
-WARNINGS: Final[tuple[Check, ...]] = (a_real_rig_is_wise, contact_can_be_felt, plant_has_air)
+WARNINGS: Final[tuple[Check, ...]] = (check_real_rig, check_contact_threshold, check_plant_supply)

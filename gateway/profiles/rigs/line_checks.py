@@ -9,7 +9,7 @@ from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.rig_file import CellFile, OutputFile
 from gateway.profiles.strict_yaml.sentences import number, volt
 
-_BY_CHANCE: Final = ("/dev/ttyUSB", "/dev/ttyACM")  # numbered in the order of plugging
+_UNSTABLE_PATHS: Final = ("/dev/ttyUSB", "/dev/ttyACM")  # numbered in the order of plugging
 _ROLES: Final = {"output": Role.OUTPUT, "load_cell": Role.LOAD_CELL}
 _ARTICLE: Final = {Role.OUTPUT: "an output", Role.LOAD_CELL: "a load cell"}
 
@@ -27,19 +27,22 @@ def of_role(device: DeviceProfile | None, role: Role) -> DeviceProfile | None:
     return device if device and device.role is role else None
 
 
-def devices_have_their_role(parts: Parts) -> Found:
+def check_device_roles(parts: Parts) -> Found:
+    """Yield a fault for a device at the wrong end: an output named as load cell, or the reverse."""
     for key, _, device in lines_of(parts):
         if device and device.role is not _ROLES[key]:
             yield f"{key}.device", f"{device.name} is {_ARTICLE[device.role]}, {_ARTICLE[_ROLES[key]]} is needed here"
 
 
-def simulated_lines_have_no_port(parts: Parts) -> Found:
+def check_simulated_ports(parts: Parts) -> Found:
+    """Yield a fault for a port in a simulated rig."""
     for key, line, _ in lines_of(parts):
         if parts.simulated and line.port is not None:
             yield f"{key}.port", "a simulated rig has no ports: delete this line, or write `simulated: false`"
 
 
-def ports_are_given(parts: Parts) -> Found:
+def check_ports_given(parts: Parts) -> Found:
+    """Yield a fault for a real rig's line without a port, or with one that is no path of a device."""
     for key, line, _ in [] if parts.simulated else lines_of(parts):
         if line.port is None:
             yield (
@@ -55,13 +58,14 @@ def ports_are_given(parts: Parts) -> Found:
             yield f"{key}.port", f'"{line.port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
 
 
-def ports_differ(parts: Parts) -> Found:
+def check_ports_differ(parts: Parts) -> Found:
+    """Yield a fault for a port that both lines name."""
     output, cell = parts.output, parts.load_cell
     if output and cell and output.port is not None and output.port == cell.port:
         yield "load_cell.port", "is the output's port too: each device has its own"
 
 
-def the_unit_is_known(parts: Parts) -> Found:
+def check_unit(parts: Parts) -> Found:
     """Yield a fault for a frame without a unit where the rig names none, and for one that gets a second."""
     device, line = of_role(parts.cell_device, Role.LOAD_CELL), parts.load_cell
     if device and line:
@@ -71,7 +75,8 @@ def the_unit_is_known(parts: Parts) -> Found:
             yield "load_cell.unit", str(error)
 
 
-def the_output_reaches(parts: Parts) -> Found:
+def check_output_range(parts: Parts) -> Found:
+    """Yield a fault for a voltage limit outside the output's range."""
     device, limits = of_role(parts.output_device, Role.OUTPUT), parts.limits
     if not device or not limits:
         return
@@ -82,8 +87,8 @@ def the_output_reaches(parts: Parts) -> Found:
             yield f"limits.{key}", f"{volt(value)} is outside {number(low)} .. {volt(high)}, the range of {device.name}"
 
 
-def silence_is_accepted(parts: Parts) -> Found:
-    """Without a watchdog in the device, nothing but the rig's own word lets it be enabled."""
+def check_device_watchdog(parts: Parts) -> Found:
+    """Yield a fault for an output without a watchdog, until the rig accepts that it has none."""
     device = of_role(parts.output_device, Role.OUTPUT)
     if device and device.watchdog == "none" and not parts.accept_no_device_watchdog:
         risk = f"{device.name} has no watchdog and keeps its last output when this machine loses power"
@@ -93,31 +98,33 @@ def silence_is_accepted(parts: Parts) -> Found:
         )
 
 
-def ports_are_stable(parts: Parts) -> Found:
+def check_ports_stable(parts: Parts) -> Found:
+    """Yield a warning for a port whose name depends on the order of plugging."""
     for key, line, _ in lines_of(parts):
-        if line.port is not None and line.port.startswith(_BY_CHANCE):
+        if line.port is not None and line.port.startswith(_UNSTABLE_PATHS):
             reason = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
             yield f"{key}.port", f"{line.port} {reason}"
 
 
-def speeds_agree(parts: Parts) -> Found:
+def check_baud(parts: Parts) -> Found:
+    """Yield a warning for a speed that differs from the device profile's."""
     for key, line, device in lines_of(parts):
         if device and line.baud != device.serial.baud:
             end = "the simulated device speaks" if parts.simulated else f"profile {device.name} says"
             yield f"{key}.baud", f"{line.baud} differs from the other end: {end} {device.serial}"
 
 
-HARDWARE: Final[tuple[Check, ...]] = (ports_are_given, ports_differ)
+HARDWARE: Final[tuple[Check, ...]] = (check_ports_given, check_ports_differ)
 """Faults that a run with simulated devices does not mind."""
 
 FAULTS: Final[tuple[Check, ...]] = (
-    devices_have_their_role,
-    simulated_lines_have_no_port,
-    the_unit_is_known,
-    the_output_reaches,
-    silence_is_accepted,
+    check_device_roles,
+    check_simulated_ports,
+    check_unit,
+    check_output_range,
+    check_device_watchdog,
 )
 WARNINGS: Final[tuple[Check, ...]] = (
-    ports_are_stable,
-    speeds_agree,
+    check_ports_stable,
+    check_baud,
 )

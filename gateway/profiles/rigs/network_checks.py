@@ -1,4 +1,4 @@
-"""Whether the Modbus face of a rig is closed to those who have no business with it."""
+"""Checks of who may reach the Modbus server of a rig: addresses, allow-list, unit ids, port."""
 
 from ipaddress import ip_address
 from typing import Final
@@ -7,8 +7,8 @@ from gateway import defaults
 from gateway.profiles.rigs.checks import Check, Found, Parts
 
 
-def others_are_named(parts: Parts) -> Found:
-    """Another address than loopback needs an allow-list of networks."""
+def check_allow_list(parts: Parts) -> Found:
+    """Yield a fault for a server beyond loopback without an allow-list, and for an owner that the list leaves out."""
     if (network := parts.network) is None:
         return
     if not is_loopback(network.bind) and not network.allow:
@@ -19,17 +19,20 @@ def others_are_named(parts: Parts) -> Found:
 
 
 def is_loopback(address: str) -> bool:
+    """Return whether only this machine can reach the address."""
     return ip_address(address).is_loopback
 
 
-def unit_ids_differ(parts: Parts) -> Found:
+def check_unit_ids(parts: Parts) -> Found:
+    """Yield a fault for a unit id that is given twice."""
     units = parts.network.units if parts.network else ()
     for index, unit in enumerate(units):
         if unit in units[:index]:
             yield f"network.units.{index}", f"{unit} is there twice"
 
 
-def the_face_is_wise(parts: Parts) -> Found:
+def check_network_exposure(parts: Parts) -> Found:
+    """Yield a warning for a port that needs a privilege, and for an allow-list that lets everybody connect."""
     if (network := parts.network) is None:
         return
     if 0 < network.port < 1024:
@@ -41,5 +44,5 @@ def the_face_is_wise(parts: Parts) -> Found:
         yield "network.allow", "lets every address in the world connect"
 
 
-FAULTS: Final[tuple[Check, ...]] = (others_are_named, unit_ids_differ)
-WARNINGS: Final[tuple[Check, ...]] = (the_face_is_wise,)
+FAULTS: Final[tuple[Check, ...]] = (check_allow_list, check_unit_ids)
+WARNINGS: Final[tuple[Check, ...]] = (check_network_exposure,)

@@ -13,7 +13,7 @@ from gateway.control.compensation.compensation import NO_COMPENSATION, Compensat
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.profiles.kinds.plants import PlantProfile
-from gateway.profiles.rigs.compensation import in_simulation
+from gateway.profiles.rigs.compensated_effects import in_simulation
 from gateway.profiles.rigs.rig_file import Network, ResidualWatch
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.words import ControlBit
@@ -39,7 +39,7 @@ class OutputLine:
 
     @property
     def settings(self) -> SerialSettings:
-        """The device's frame at the rig's speed."""
+        """The device's serial settings at the rig's baud."""
         return self.device.serial.at(self.baud)
 
 
@@ -56,14 +56,14 @@ class CellLine:
 
     @property
     def settings(self) -> SerialSettings:
-        """The device's frame at the rig's speed."""
+        """The device's serial settings at the rig's baud."""
         return self.device.serial.at(self.baud)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rig:
-    """One cell. texts: every file it was read from, as it was; fingerprint: their SHA-256; notes: what was decided in the
-    user's stead."""
+    """One cell. texts: every file it was read from, as it was; fingerprint: their SHA-256; notes: what was decided because
+    the file leaves it open."""
 
     name: str
     description: str
@@ -75,7 +75,7 @@ class Rig:
     output: OutputLine
     load_cell: CellLine
     plant_profile: PlantProfile | None
-    stand_in: PlantProfile | None  # what `run --sim` simulates where the rig names no plant
+    fallback_plant: PlantProfile | None  # what `run --sim` simulates where the rig names no plant
     calibration: Calibration
     control: ControlSettings
     network: Network
@@ -94,7 +94,7 @@ class Rig:
 
     @property
     def is_watched(self) -> bool:
-        """Whether a residual watch runs beside the gateway: there is a plant, and it is (said to be) this machine's."""
+        """Whether a residual watch runs: the rig names a plant, and is simulated or enables the watch."""
         enabled = self.residual_watch.enabled
         return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
 
@@ -110,11 +110,11 @@ class Rig:
 
     def response_of(self, calibration: Calibration) -> Response | None:
         """Return how this rig follows, as the calibration measured it; None for one that another rig was measured with."""
-        here = [
+        own_names = [
             self.name,
             *([f"twin of plant {self.plant_profile.name}"] if self.simulated and self.plant_profile else []),
         ]
-        return calibration.response if calibration.rig in here else None
+        return calibration.response if calibration.rig in own_names else None
 
     def ports(self) -> dict[str, str]:
         """Return the serial ports of a real rig, by line; empty for a simulated one."""
@@ -123,12 +123,12 @@ class Rig:
 
     def as_simulated(self) -> "Rig":
         """Return the same rig with its devices simulated, set as the rig says that the real ones are, on loopback. What
-        was decided in the user's stead is in `notes`."""
+        the file leaves open, and how it was decided, is in `notes`."""
         if self.simulated:
             return self
         notes, network = self.notes, self.network
-        if self.plant_profile is None and self.stand_in is not None:
-            notes = (*notes, f"rig {self.name} names no plant: {self.stand_in.name} is simulated in its place")
+        if self.plant_profile is None and self.fallback_plant is not None:
+            notes = (*notes, f"rig {self.name} names no plant: {self.fallback_plant.name} is simulated in its place")
         compensation = in_simulation(self.compensation)
         if compensation.outside is not self.compensation.outside:
             notes = (*notes, "no force from outside is simulated, so none is compensated")
@@ -141,14 +141,15 @@ class Rig:
         return replace(
             self,
             simulated=True,
-            output=replace(self.output, port=None, device=_set_to(self.output.device, self.output.baud)),
-            load_cell=replace(self.load_cell, port=None, device=_set_to(self.load_cell.device, self.load_cell.baud)),
-            plant_profile=self.plant_profile or self.stand_in,
+            output=replace(self.output, port=None, device=_with_baud(self.output.device, self.output.baud)),
+            load_cell=replace(self.load_cell, port=None, device=_with_baud(self.load_cell.device, self.load_cell.baud)),
+            plant_profile=self.plant_profile or self.fallback_plant,
             network=network,
             notes=notes,
             compensation=compensation,
         )
 
 
-def _set_to(device: DeviceProfile, baud: int) -> DeviceProfile:
+def _with_baud(device: DeviceProfile, baud: int) -> DeviceProfile:
+    """Return the device set to this speed."""
     return replace(device, serial=device.serial.at(baud))

@@ -1,7 +1,7 @@
 """Whether the wires of a rig are fast enough, and their numbers fine enough, for what the rig asks of them.
 
-Bytes and bits are counted, so each finding says what is possible at this speed; the device's own time to think comes on top
-and is nowhere known.
+Bytes and bits are counted, so each finding says what is possible at this speed; the time that the device itself takes to
+answer comes on top and is not known.
 """
 
 from collections.abc import Iterator
@@ -25,7 +25,11 @@ from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.line_checks import of_role
 from gateway.profiles.strict_yaml.sentences import newton, number, second
 
-_COUNTS_OF_NOISE: Final = 0.7  # a rate that needs more than this to tell is worth a word
+_COUNTS_OF_NOISE: Final = 0.7  # a rate that needs more noise than this to find a frozen cell gets a warning
+_LEAST_QUANTUM_COUNTS: Final = 0.5  # below half a count every repeated reading looks frozen; rounding stays above it
+_MOST_QUANTUM_COUNTS: Final = 2.0  # above two counts the quantum was probably written for another amplifier
+_LEAST_CYCLES: Final = 3  # exchanges within output_timeout_s, so that one that is late or lost is no fault
+_LEAST_SAMPLES: Final = 2.0  # readings within sample_timeout_s, so that one that is late is no fault
 _SLOWEST_HZ: Final = 20.0  # the pneumatics of the paper's rig settle in 0.27-0.49 s and need 20-50 Hz
 
 
@@ -85,8 +89,8 @@ def _talks(parts: Parts) -> Iterator[tuple[str, float]]:
         yield from _output_talks_s(device, device.serial.at(line.baud).character_s).items()
 
 
-def answers_fit_into_their_time(parts: Parts) -> Found:
-    """Yield a fault for a device that is given up before its answer can be through the wire."""
+def check_reply_timeout(parts: Parts) -> Found:
+    """Yield a fault for a device whose reply_timeout_s is over before its answer can be through the wire."""
     if parts.output_device and parts.output:
         for name, took_s in _talks(parts):
             yield from _given_up("output.baud", parts.output_device, parts.output.baud, (name, took_s))
@@ -102,7 +106,8 @@ def _given_up(path: str, device: DeviceProfile, baud: int, talk: tuple[str, floa
         yield path, f"{baud}: {reason}, {bound}: raise it in the profile, or set the device to a higher speed"
 
 
-def output_faults_are_no_accident(parts: Parts) -> Found:
+def check_output_timeout(parts: Parts) -> Found:
+    """Yield a fault for a supervision.output_timeout_s that is shorter than one exchange with the output on the wire."""
     took_s = max((took_s for _, took_s in _talks(parts)), default=0.0)
     if parts.supervision and parts.supervision.output_timeout_s <= took_s:
         timeout = second(parts.supervision.output_timeout_s)
@@ -112,8 +117,9 @@ def output_faults_are_no_accident(parts: Parts) -> Found:
         )
 
 
-def the_wires_follow_the_rig(parts: Parts) -> Found:
-    """Beyond the rig's own lag a wire decides when a force is seen, and supervision would take it for a wrong gain."""
+def check_wire_delay(parts: Parts) -> Found:
+    """Yield a fault for a wire that is slower than supervision.response_lag_s: supervision would take the late force for a
+    wrong gain."""
     if parts.supervision is None:
         return
     bound_s = parts.supervision.response_lag_s
@@ -131,18 +137,19 @@ def _cycle_s(parts: Parts) -> float:
     return took_s.get("set_voltage", 0.0) + took_s.get("read_pressure", took_s.get("read_voltage", 0.0))
 
 
-def samples_come_in_time(parts: Parts) -> Found:
+def check_sample_timeout(parts: Parts) -> Found:
+    """Yield a fault for a supervision.sample_timeout_s that is shorter than two readings of the load cell."""
     for reading in _readings(parts):
-        if parts.supervision and parts.supervision.sample_timeout_s < 2.0 * reading.period_s:
+        if parts.supervision and parts.supervision.sample_timeout_s < _LEAST_SAMPLES * reading.period_s:
             bound, rate = second(parts.supervision.sample_timeout_s), f"{1.0 / reading.period_s:.3g} readings/s"
-            talk = f"{2.0 * reading.period_s:.3g} s ({rate} at {reading.baud} baud)"
+            talk = f"{_LEAST_SAMPLES * reading.period_s:.3g} s ({rate} at {reading.baud} baud)"
             yield (
                 "supervision.sample_timeout_s",
                 f"{bound} is too short: two readings of {reading.device.name} take {talk}",
             )
 
 
-def the_display_shows_enough(parts: Parts) -> Found:
+def check_display_range(parts: Parts) -> Found:
     """Yield a fault for a display that ends below the bound on force: it would show its last number for ever."""
     if (limits := parts.limits) is None or parts.load_cell is None:
         return
@@ -156,12 +163,15 @@ def the_display_shows_enough(parts: Parts) -> Found:
             yield f"limits.{key}", f"{newton(wanted_n)} is beyond what {reading.device.name} can show: {end_n:.4g} N"
 
 
-def counts_are_fine_enough(parts: Parts) -> Found:
-    """supervision.sample_quantum_n decides when a reading counts as frozen, the band whether the force is held."""
+def check_reading_resolution(parts: Parts) -> Found:
+    """Yield a fault for a sample_quantum_n or an in_band_tolerance_n that is finer than the load cell's counts.
+
+    sample_quantum_n decides when a reading counts as frozen, the band whether the force is held.
+    """
     for reading in _readings(parts):
         count_n = reading.host.resolution_n
         one = f"one count of {reading.device.name}, {count_n:.3g} N"
-        if parts.supervision and parts.supervision.sample_quantum_n < 0.5 * count_n:
+        if parts.supervision and parts.supervision.sample_quantum_n < _LEAST_QUANTUM_COUNTS * count_n:
             quantum = newton(parts.supervision.sample_quantum_n)
             yield (
                 "supervision.sample_quantum_n",
@@ -175,9 +185,11 @@ def counts_are_fine_enough(parts: Parts) -> Found:
             )
 
 
-def a_frozen_cell_is_found(parts: Parts) -> Found:
-    """Yield a warning where the rate alone makes a frozen cell slow to find; the noise shows when the cell is read
-    (W234 at a calibration's end)."""
+def check_frozen_detection(parts: Parts) -> Found:
+    """Yield a warning for a rate of readings at which a frozen cell is slow to find.
+
+    The noise itself shows when the cell is read (W234 at a calibration's end).
+    """
     if parts.supervision and parts.supervision.frozen_equal_samples is not None:
         return
     for reading in _readings(parts):
@@ -190,15 +202,18 @@ def a_frozen_cell_is_found(parts: Parts) -> Found:
             yield "load_cell.device", f"{seen}: {found}"
 
 
-def settings_are_fine_enough(parts: Parts) -> Found:
-    """Half a step of the output, as the calibration's mean slope makes newtons of it, must fit into the band."""
+def check_output_resolution(parts: Parts) -> Found:
+    """Yield a fault for an output whose steps are too coarse for the band.
+
+    Half a step, as the calibration's mean slope makes newtons of it, must fit into the band.
+    """
     device, calibration, defaults = of_role(parts.output_device, Role.OUTPUT), parts.calibration, parts.defaults
     if not device or not calibration or not defaults:
         return
     low_n, high_n = calibration.model().force_range_n
     step_v = output_host(device).resolution_v
     step_n = step_v * (high_n - low_n) / (calibration.x1_v - calibration.x0_v)
-    if 0.5 * step_n > defaults.in_band_tolerance_n:
+    if step_n / 2.0 > defaults.in_band_tolerance_n:
         reason = f"sets in steps of {step_v:.3g} V, about {step_n:.2g} N"
         band = f"defaults.in_band_tolerance_n = {newton(defaults.in_band_tolerance_n)}"
         yield (
@@ -207,20 +222,22 @@ def settings_are_fine_enough(parts: Parts) -> Found:
         )
 
 
-def the_output_wire_is_fast_enough(parts: Parts) -> Found:
+def check_output_speed(parts: Parts) -> Found:
+    """Yield a warning for an output wire that is too slow for the pneumatics, or for its timeout."""
     cycle_s = _cycle_s(parts)
     if cycle_s > 1.0 / _SLOWEST_HZ:
         reason = f"a setting and a reading take {cycle_s * 1e3:.0f} ms on the wire, {1 / cycle_s:.0f} Hz"
         yield "output.baud", f"{reason}; the pneumatics need {number(_SLOWEST_HZ)} Hz"
-    if parts.supervision and parts.supervision.output_timeout_s < 3 * cycle_s:
+    if parts.supervision and parts.supervision.output_timeout_s < _LEAST_CYCLES * cycle_s:
         timeout = second(parts.supervision.output_timeout_s)
         yield (
             "supervision.output_timeout_s",
-            f"{timeout} is less than three settings with readings on the wire: {3 * cycle_s:.2f} s",
+            f"{timeout} is less than three settings with readings on the wire: {_LEAST_CYCLES * cycle_s:.2f} s",
         )
 
 
-def the_cell_wire_is_fast_enough(parts: Parts) -> Found:
+def check_sample_rate(parts: Parts) -> Found:
+    """Yield a warning for a load-cell wire that carries fewer readings than the device sends, or than the pneumatics need."""
     for reading in _readings(parts):
         rate_hz, possible_hz = reading.device.rate_hz, 1.0 / reading.wire_s
         if rate_hz > possible_hz:
@@ -233,7 +250,8 @@ def the_cell_wire_is_fast_enough(parts: Parts) -> Found:
             yield "load_cell.baud", f"{reading.baud}: {reason}; the pneumatics need {number(_SLOWEST_HZ)}"
 
 
-def a_lost_answer_is_survived(parts: Parts) -> Found:
+def check_lost_answer(parts: Parts) -> Found:
+    """Yield a warning for a supervision.sample_timeout_s that one lost answer of the load cell uses up."""
     for reading in _readings(parts):
         gap_s = reading.device.reply_timeout_s + reading.period_s
         if reading.is_asked and parts.supervision and parts.supervision.sample_timeout_s < gap_s:
@@ -244,27 +262,28 @@ def a_lost_answer_is_survived(parts: Parts) -> Found:
             yield "supervision.sample_timeout_s", f"{bound}: {reason}, and that is a fault"
 
 
-def the_quantum_is_the_amplifiers(parts: Parts) -> Found:
+def check_sample_quantum(parts: Parts) -> Found:
+    """Yield a warning for a supervision.sample_quantum_n far above one count of the load cell."""
     for reading in _readings(parts):
         count_n = reading.host.resolution_n
-        if parts.supervision and parts.supervision.sample_quantum_n > 2.0 * count_n:
+        if parts.supervision and parts.supervision.sample_quantum_n > _MOST_QUANTUM_COUNTS * count_n:
             reason = f"is far from one count of {reading.device.name}, {count_n:.3g} N"
             yield "supervision.sample_quantum_n", f"{newton(parts.supervision.sample_quantum_n)} {reason}"
 
 
 FAULTS: Final[tuple[Check, ...]] = (
-    answers_fit_into_their_time,
-    output_faults_are_no_accident,
-    the_wires_follow_the_rig,
-    samples_come_in_time,
-    the_display_shows_enough,
-    counts_are_fine_enough,
-    settings_are_fine_enough,
+    check_reply_timeout,
+    check_output_timeout,
+    check_wire_delay,
+    check_sample_timeout,
+    check_display_range,
+    check_reading_resolution,
+    check_output_resolution,
 )
 WARNINGS: Final[tuple[Check, ...]] = (
-    the_output_wire_is_fast_enough,
-    the_cell_wire_is_fast_enough,
-    a_lost_answer_is_survived,
-    the_quantum_is_the_amplifiers,
-    a_frozen_cell_is_found,
+    check_output_speed,
+    check_sample_rate,
+    check_lost_answer,
+    check_sample_quantum,
+    check_frozen_detection,
 )

@@ -1,4 +1,5 @@
-"""Reads a Parquet table, ours or anybody's: numbers as float64, null as NaN, facts from the schema's metadata.
+"""Reads a Parquet table, written by `recordings export` or by another program: numbers as float64, null as NaN, facts from
+the schema's metadata.
 
 Time stamps and durations are seconds from the table's first (float64 seconds since 1970 would keep a quarter of a
 microsecond, and a recording counts from its first row anyhow).
@@ -24,7 +25,10 @@ _TICKS_PER_S: Final = {"s": 1.0, "ms": 1.0e3, "us": 1.0e6, "ns": 1.0e9}
 
 
 def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
-    """Columns and facts; RecordingError when the file is damaged or a contract column holds no numbers."""
+    """Return the columns and facts of a Parquet file.
+
+    RecordingError when the file is damaged or a contract column holds no numbers.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -64,7 +68,7 @@ def _columns(
 
 
 def _numbers(column: Any) -> "NDArray[np.float64] | None":
-    """float64 with NaN for null; None where the type has no numbers."""
+    """Return the column as float64 with NaN for null; None where its type holds no numbers."""
     import numpy as np
     import pyarrow as pa
 
@@ -86,7 +90,8 @@ def _is_castable(kind: Any) -> bool:
 
 
 def _facts(metadata: dict[bytes, bytes]) -> dict[str, Any]:
-    """Return the schema's metadata without what writers leave there for themselves; JSON where it is some."""
+    """Return the schema's metadata as facts, without the keys that pandas and Arrow keep there; values that are JSON are
+    parsed."""
     texts = {key.decode(errors="replace"): value.decode(errors="replace") for key, value in metadata.items()}
     return {key: _fact(text) for key, text in texts.items() if key not in _NOT_FACTS}
 

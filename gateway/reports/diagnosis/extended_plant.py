@@ -9,12 +9,15 @@ from gateway.profiles.kinds.plant_writer import with_origins
 from gateway.reports.diagnosis.wording import join_words
 from gateway.twin.plant import values, with_value
 
-_OF_WIRES: Final = "cell.clock_offset_s"
-_LEAST_SURE: Final = 0.5  # width of an interval over the number, from which the recording does not determine it
+_DETERMINED_BY_LINES: Final = "cell.clock_offset_s"
+"""Known from how a gateway reads its lines, so never from a refit."""
+_LARGEST_RELATIVE_WIDTH: Final = 0.5
+"""Width of an interval over its number, from which the recording does not determine the number (a choice)."""
 
 
 def extended_plant(diagnosis: Diagnosis, start: PlantProfile, recording: str, date: str) -> PlantProfile:
-    """start: the plant that the base model was refitted from; recording: what was diagnosed; date: YYYY-MM-DD.
+    """Return the extended model as a profile. start: the plant that the base model was refitted from; recording: what was
+    diagnosed; date: YYYY-MM-DD.
 
     Only what was found is written: a refitted number whose interval holds the start's, or that the recording hardly
     determines, stays as it was, and so does what the wires of a gateway add to its readings. A refitted number carries no
@@ -37,10 +40,10 @@ def extended_plant(diagnosis: Diagnosis, start: PlantProfile, recording: str, da
 
 
 def _is_new_value(path: str, refitted: Estimate, before: float) -> bool:
-    """Is a refitted number another one than before, and sure enough to be written down?"""
+    """Return whether a refitted number differs from the one before and is certain enough to be written down."""
     low, high = refitted.ci95
-    is_sure = high - low < _LEAST_SURE * max(abs(refitted.value), abs(before))
-    return path != _OF_WIRES and is_sure and not low <= before <= high
+    is_sure = high - low < _LARGEST_RELATIVE_WIDTH * max(abs(refitted.value), abs(before))
+    return path != _DETERMINED_BY_LINES and is_sure and not low <= before <= high
 
 
 def _source_of_diagnosed(found: Estimate, recording: str, date: str) -> str:

@@ -15,7 +15,7 @@ _WAYS = ((RISING, "rising"), (FALLING, "falling"))
 _CURVE_POINTS = 200
 
 
-def loop(evaluation: Evaluation) -> str:
+def draw_loop(evaluation: Evaluation) -> str:
     """Measured dots over the chosen model's two branches."""
     ladder, result = evaluation.checked.ladder, evaluation.chosen.result
     rising, falling = result.branches.rising, result.branches.falling
@@ -33,7 +33,7 @@ def loop(evaluation: Evaluation) -> str:
     return chart.svg()
 
 
-def residuals(evaluation: Evaluation) -> str:
+def draw_residuals(evaluation: Evaluation) -> str:
     """Return the chart of measured minus model against the command, by branch."""
     ladder, left_n = evaluation.checked.ladder, residual_of(evaluation)
     low_v, high_v = float(ladder.voltage_v.min()), float(ladder.voltage_v.max())
@@ -49,7 +49,7 @@ def residuals(evaluation: Evaluation) -> str:
     return chart.svg()
 
 
-def order_sweep(document: Document) -> str:
+def draw_order_sweep(document: Document) -> str:
     """Held-out RMS by order, one line per model; a hollow mark is a fit that may not drive a plant."""
     fits = [fit for fit in document["fits"] if fit["heldout_rms_n"]]
     orders = sorted({fit["order"] for fit in fits})
@@ -63,11 +63,11 @@ def order_sweep(document: Document) -> str:
     for model, same in groupby(fits, key=lambda fit: str(fit["model"])):
         line = list(same)
         chart.line([fit["order"] for fit in line], [fit["heldout_rms_n"] for fit in line], model, model.upper())
-        _marks(chart, line, model)
+        _draw_marks(chart, line, model)
     return chart.svg()
 
 
-def _marks(chart: Chart, fits: list[Document], model: str) -> None:
+def _draw_marks(chart: Chart, fits: list[Document], model: str) -> None:
     for fit in fits:
         height, error = fit["heldout_rms_n"], fit["heldout_error_n"] or 0.0
         if error > 0.01 * height:
@@ -77,7 +77,7 @@ def _marks(chart: Chart, fits: list[Document], model: str) -> None:
             chart.ring(fit["order"], height)
 
 
-def minor_loops(evaluation: Evaluation) -> str:
+def draw_minor_loops(evaluation: Evaluation) -> str:
     """Return the walk of partial reversals within the loop; empty where there was none."""
     volts, newtons = evaluation.checked.minor_v, evaluation.checked.minor_n
     if len(volts) < 2:
@@ -96,7 +96,7 @@ def minor_loops(evaluation: Evaluation) -> str:
     return chart.svg()
 
 
-def minor_errors(evaluation: Evaluation) -> str:
+def draw_minor_errors(evaluation: Evaluation) -> str:
     """Return what control would get wrong along the walk: with the chosen reversal, and with branches switched at once."""
     checked, reversal = evaluation.checked, evaluation.reversal
     if reversal is None:

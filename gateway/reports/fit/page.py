@@ -27,14 +27,16 @@ def fit_page(evaluation: Evaluation, document: Document) -> str:
         _figures(document),
         _notes(document["notes"]),
         _pair(
-            _figure("The loop", charts.loop(evaluation), "Settled readings over the two branches of the chosen model."),
-            _figure("What is left", charts.residuals(evaluation), "Measured minus model at each stair."),
+            _figure(
+                "The loop", charts.draw_loop(evaluation), "Settled readings over the two branches of the chosen model."
+            ),
+            _figure("What is left", charts.draw_residuals(evaluation), "Measured minus model at each stair."),
         ),
         "<h2>Which model, which order</h2>",
         _pair(
             _figure(
                 "Order sweep",
-                charts.order_sweep(document),
+                charts.draw_order_sweep(document),
                 "Error on a group that the fit has not seen. Hollow: may not drive a plant. Ring: chosen.",
             ),
             f"<div>{_why(document)}</div>",
@@ -189,7 +191,7 @@ def _row(fit: Document) -> str:
 
 
 def _reversal(evaluation: Evaluation, document: Document) -> str:
-    walk = charts.minor_loops(evaluation)
+    walk = charts.draw_minor_loops(evaluation)
     if not walk:
         return ""
     points = document["ladder"]["minor_points"]
@@ -197,7 +199,7 @@ def _reversal(evaluation: Evaluation, document: Document) -> str:
         _figure("The walk", walk, f"{points} points of partial reversals; two branches alone cannot describe them."),
         _figure(
             "What a command gets wrong",
-            charts.minor_errors(evaluation),
+            charts.draw_minor_errors(evaluation),
             _why_reversal(document["reversal"]),
         ),
     )

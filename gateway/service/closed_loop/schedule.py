@@ -13,7 +13,7 @@ from typing import Final
 from numpy.random import default_rng
 
 from gateway.catalogue.all_effects import EFFECTS
-from gateway.profiles.rigs.compensation import differing_treatments
+from gateway.profiles.rigs.compensated_effects import differing_treatments
 from gateway.twin import Plant, surroundings
 from gateway.twin.surroundings import Surroundings
 

@@ -18,7 +18,7 @@ from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.control import NO_COMPENSATION, Compensation, ControlSettings
 from gateway.profiles import Rig, load_rig
-from gateway.profiles.rigs.compensation import ALL_INPUTS, CALIBRATE, compensation_of
+from gateway.profiles.rigs.compensated_effects import ALL_INPUTS, CALIBRATE, compensation_of
 from gateway.service.closed_loop.identified_model import identify_model, remove_compensated
 from gateway.service.closed_loop.schedule import LARGEST_N, draw_schedule
 from gateway.service.closed_loop.simulated_run import ControlSetup, SimulatedRun, simulate_run

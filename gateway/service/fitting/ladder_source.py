@@ -79,11 +79,13 @@ def expectation(recording: Recording, context: RigContext) -> tuple[Expectation,
     fingerprint = recording.header.get("rig_fingerprint")
     if rig is not None and fingerprint and fingerprint != rig.fingerprint and recorded == rig.name:
         said.append(f"the files of rig {rig.name} have changed since the recording was made")
-    stand_in = rig or load_rig(_DEFAULT_RIG)
+    fallback_rig = rig or load_rig(_DEFAULT_RIG)
     plant = rig.plant if rig else None
     expected = Expectation(
-        reference=reference.model() if reference else stand_in.calibration.model(),
-        named=f"{reference.number} ({reference.name})" if reference else f"{stand_in.calibration.name} (a stand-in)",
+        reference=reference.model() if reference else fallback_rig.calibration.model(),
+        named=f"{reference.number} ({reference.name})"
+        if reference
+        else f"{fallback_rig.calibration.name} (a stand-in)",
         area_mm2=plant.cylinder.area_m2 * _MM2_PER_M2 if plant else None,
         rig=rig.name if rig and asked else asked,
         saturation_n=rig.control.supervision.saturation_n if rig else None,

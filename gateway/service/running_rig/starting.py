@@ -13,7 +13,7 @@ from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import Rig
 
 _HELD_BOUND_S: Final = 0.5  # how long a restart waits for a port that somebody holds who is about to end
-_HELD_AGAIN_S: Final = 0.05
+_RETRY_S: Final = 0.05  # between two attempts within that time
 _NO_PERMISSION, _WRONG_CONFIGURATION, _NO_DEVICE = 77, 78, 69  # exit codes, as in sysexits.h
 
 
@@ -65,12 +65,12 @@ async def open_again(port: SerialPort) -> PortError | None:
             await port.open()
             return None
         except PortError as error:
-            if error.code == "E101":  # no time will mend a permission
+            if error.code == "E101":  # waiting does not change a permission
                 raise
             if error.code != "E103" or time.monotonic() >= deadline_s:
                 port.begin_lost(error)
                 return error
-        await asyncio.sleep(_HELD_AGAIN_S)
+        await asyncio.sleep(_RETRY_S)
 
 
 async def listen(server: ModbusTcpServer, host: str, port: int) -> tuple[str, int]:

@@ -1,4 +1,4 @@
-"""How the guardian comes by its children: forked from a prepared process where that serves, else started from nothing.
+"""Starts the guardian's children: forked from a prepared process where there is one, else as new processes.
 
 Nothing here may cost a restart: a fork server that dies, hangs or cannot fork is dropped and the child is started the long
 way; it is started again after a while, and given up when it keeps dying. Standard library only.
@@ -14,8 +14,8 @@ from gateway.service.supervisor.child_process import Child, describe_exit, spawn
 
 PAUSES_S: Final = (5.0, 30.0, 120.0)
 """Before the fork server is started again; it dies once more, and that is it."""
-_BIRTH_S: Final = 5.0  # from asking a prepared server: a busy machine is no reason to import everything again
-_FIRST_BIRTH_S: Final = 30.0  # imports on a slow machine
+_START_TIMEOUT_S: Final = 5.0  # from asking a prepared server: a busy machine is no reason to import everything again
+_FIRST_START_TIMEOUT_S: Final = 30.0  # imports on a slow machine
 _COMMAND_ROOM: Final = 1024
 WATCH: Final = "gateway.watch.watch_process"
 
@@ -46,9 +46,9 @@ class ChildStarter:
         return self._server.pid if self._server else None
 
     @property
-    def birth_bound_s(self) -> float:
-        """How long a child that was asked for may take to be attach."""
-        return _BIRTH_S if self._is_proven else _FIRST_BIRTH_S
+    def start_timeout_s(self) -> float:
+        """How long a requested child may take until it reports its birth: longer from a server that never gave one."""
+        return _START_TIMEOUT_S if self._is_proven else _FIRST_START_TIMEOUT_S
 
     def open(self) -> None:
         """Start the fork server; without one everything works, and takes longer."""
@@ -61,11 +61,11 @@ class ChildStarter:
             self._server = None
 
     def control(self, arguments: dict[str, Any]) -> Child:
-        """OSError when there is no process for it. So the two below."""
+        """Start the control process. OSError where no process can be started; so do the two below."""
         return self._child(fork_server.CONTROL, arguments)
 
     def rig(self, *, prepared: bool) -> Child:
-        """Return the simulated rig outlives a kill of control, as a real rig does; it ends when its link does.
+        """Start the simulated rig; it outlives a kill of control, as a real rig does, and ends when its link does.
 
         prepared: not for a second try, which avoids whatever went wrong with the first.
         """
@@ -73,18 +73,19 @@ class ChildStarter:
         return self._child(fork_server.RIG, arguments) if prepared else spawn_child(fork_server.RIG, arguments)
 
     def watch(self, arguments: dict[str, Any]) -> Child:
-        """Return the residual watch: what it finds it tells control, through the control socket."""
+        """Start the residual watch; it reports to control through the control socket."""
         return spawn_child(WATCH, arguments, arguments["ring"])
 
     def on_born(self) -> None:
+        """Note that the server has given a child: later ones need less time."""
         self._is_proven = True
 
     def on_not_born(self) -> None:
-        """A child that was asked for ended before its first word."""
+        """Note that a requested child ended before its first message: the next one is started as a new process."""
         self._is_doubted = True
 
     def drop_server(self, how: str, now_s: float) -> None:
-        """It does not do its work: children are started the long way until it has been started again."""
+        """Kill a server that failed; children are started as new processes until it runs again. how: for the log."""
         if self._server is None:
             return
         self._server.kill()

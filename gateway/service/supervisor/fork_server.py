@@ -35,7 +35,9 @@ from gateway.processes import priority
 CONTROL: Final = "gateway.service.control_process"
 RIG: Final = "gateway.service.simulated_rig"
 _SUBREAPER: Final = 36
-_MOMENT_S: Final = 0.0002
+_PARENT_POLL_S: Final = (
+    0.0002  # how often a new child looks whether its first parent has ended, which takes microseconds
+)
 _ONE_THREAD: Final = "OPENBLAS_NUM_THREADS"  # a process with threads must not fork
 _NAME_BYTES: Final = 15  # of a process's name, which top and ps -c show
 
@@ -111,7 +113,7 @@ def _fork(link: socket.socket, message: guardian_link.Message) -> None:
 def _run_child(message: guardian_link.Message, parent: int) -> int:
     """Return the new process: a session of its own, its name, its first word, and then as if it had been started by itself."""
     while os.getppid() == parent:  # it ends at once; from then on we are the guardian's, who may ask for our end
-        time.sleep(_MOMENT_S)
+        time.sleep(_PARENT_POLL_S)
     os.setsid()
     module, arguments = str(message.body["module"]), message.body["arguments"]
     theirs, *shared = message.descriptors

@@ -1,4 +1,4 @@
-"""The guardian: a tiny parent that outlives the control process and has the last word on the wire.
+"""The guardian: a tiny parent that outlives the control process and does the final safe-voltage write.
 
 It starts the control process (and, when that asks for it, the simulated rig), watches the heartbeat that the control loop
 itself feeds, and when the child dies or stalls it kills it, writes the safe voltage and starts it again in OFF. It alone
@@ -140,7 +140,7 @@ class Guardian:
             return inf if self.leaving else self.asked_s
         if self.heartbeat.is_up:
             return self.heartbeat.due_s
-        return self.asked_s + (_START_GRACE_S if self.control.pid else self.starter.birth_bound_s)
+        return self.asked_s + (_START_GRACE_S if self.control.pid else self.starter.start_timeout_s)
 
     def _follow_others(self, readable: set[int]) -> None:
         if self.leaving and self.leaving.died in readable:
@@ -264,7 +264,7 @@ class Guardian:
 
     def _on_death(self, cause: Ending | Callable[[], Ending]) -> int | None:
         """Safe voltage first, questions later. cause: or how to find it, once nothing is urgent any more."""
-        acknowledged = self._last_word()
+        acknowledged = self._write_final_voltage()
         control, self.control = self.control, None
         if control is None:
             return EXIT_OK  # told to stop while there was none
@@ -284,8 +284,11 @@ class Guardian:
             return code  # it told the user why
         return self._restart(ending, describe_exit(code) if is_gone else "it does not go", acknowledged)
 
-    def _last_word(self) -> bool | None:
-        """Return the safe voltage, through the newest line that control has handed over; None where there was none."""
+    def _write_final_voltage(self) -> bool | None:
+        """Kill control and write the safe voltage through the newest line that it has handed over.
+
+        Return whether the device acknowledged it; None where there was no line.
+        """
         if self.control:
             self.control.kill()
             if not self.link_ended:
@@ -335,7 +338,7 @@ class Guardian:
 
     def _close(self) -> None:
         """Whatever ends us, the safe voltage goes first: control would die of the signal without a word."""
-        self._last_word()
+        self._write_final_voltage()
         if self.control:
             self.control.end()
         self.others.end()

@@ -46,7 +46,7 @@ def leaving_sentence(pid: int) -> str:
 
 
 def describe_acknowledgement(acknowledged: bool | None) -> str:
-    """Return how the last word on the wire went; None: there was no line."""
+    """Return how the final safe-voltage write went; None: there was no line."""
     return {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]
 
 

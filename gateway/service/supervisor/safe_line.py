@@ -1,4 +1,4 @@
-"""The guardian's last word on the wire: the safe voltage, until the device has acknowledged it.
+"""The guardian's final safe-voltage write, repeated until the device has acknowledged it.
 
 A dead process may leave half a command behind, so the first safe frame can be swallowed into an unknown command: it is
 repeated until the acknowledgement comes, at most three times, and output is never flushed. What the device said before the

@@ -26,7 +26,7 @@ def told(monkeypatch, tmp_path: Path, host: str, answers: dict[str, dict[str, An
         return answer
 
     monkeypatch.setattr("gateway.cli.control_socket.ask", ask)
-    return hold._told_lease(host, 5020)
+    return hold._find_gateway_lease(host, 5020)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1"])

@@ -21,6 +21,7 @@ from gateway.registers.upload.coefficients import CoefficientSet
 from gateway.registers.words import CommitStatus
 from tests.calibrations.coefficients import calibration
 from tests.calibrations.failing_disk import disk
+from tests.calibrations.slots import slot_number
 
 OWN = calibration(8, number=1)
 
@@ -88,7 +89,7 @@ def test_an_upload_is_stored_used_and_read_back(gateway, address, call, tmp_path
         f"mark {order} is in use as calibration 2, slot 5: {given.reversal_kind}, durable, and read back word by word\n"
     )
     assert done.output == told
-    assert gateway.store.slot(5) == 2
+    assert slot_number(gateway.store, 5) == 2
     assert (
         CoefficientSet.of_calibration(gateway.store.load(2)).to_words()
         == CoefficientSet.of_calibration(given).to_words()
@@ -210,7 +211,7 @@ def test_printed_frames_played_by_anybody_make_the_upload(gateway, call, file, f
         answers.append(answer(adu.pdu, gateway.bank, Peer("10.0.0.9")))
     assert all(told[0] < 0x80 for told in answers)
     assert struct.unpack(">HHH", answers[-1][2:]) == (CommitStatus.COMMITTED, 0, 0)
-    assert gateway.store.slot(6) == 2
+    assert slot_number(gateway.store, 6) == 2
     assert gateway.store.load(2).slip_radii_v == (0.25, 0.5, 1.0)
     assert gateway.words(1500, 100) == CoefficientSet.of_calibration(calibration(16)).to_words()[:200]
     assert len(frames) == (192 if fc06 else 6)
@@ -234,7 +235,7 @@ def test_printing_alone_sends_as_well(gateway, address, call, file):
     done = call("upload", file, "--print-frames", "--gateway", address)
     assert done.output.startswith("frame 1 of 6")
     assert done.output.endswith("durable, and read back word by word\n")
-    assert gateway.store.slot(0) == 2
+    assert slot_number(gateway.store, 0) == 2
 
 
 def test_no_request_is_longer_than_modbus_allows(call, file):

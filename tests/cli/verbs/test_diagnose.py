@@ -19,7 +19,7 @@ from click.testing import Result
 import gateway.diagnosis
 from gateway.cli.diagnosis.outputs import write_all
 from gateway.diagnosis.result import Diagnosis, Verdict
-from gateway.profiles import load_plant, root
+from gateway.profiles import load_plant, shipped_profiles_folder
 from gateway.recording import Recorder
 from gateway.service.closed_loop.study import ClosedLoopGain
 from gateway.twin import Plant
@@ -136,7 +136,7 @@ def test_foreign_columns_are_mapped(tmp_path: Path, call: Call, engine: Engine) 
 
 
 def test_a_recording_of_the_gateway_brings_its_own_plant(tmp_path: Path, call: Call, engine: Engine) -> None:
-    rig, plant = (root() / kind for kind in ("rigs/demo.yaml", "plants/paper-slide.yaml"))
+    rig, plant = (shipped_profiles_folder() / kind for kind in ("rigs/demo.yaml", "plants/paper-slide.yaml"))
     changed = plant.read_text(encoding="utf-8").replace("coulomb_n: {value: 1.0,", "coulomb_n: {value: 3.5,")
     texts = {"rigs/demo.yaml": rig.read_text(encoding="utf-8"), "plants/paper-slide.yaml": changed}
     recorder = Recorder(

@@ -12,7 +12,7 @@ import pytest
 
 from gateway.cli import exit_codes
 from gateway.ports import PortInfo
-from gateway.profiles import ProfileError, load_rig, root
+from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.registers import RegisterMap
 
 
@@ -77,7 +77,7 @@ def test_a_fresh_rig_runs_simulated_and_says_what_is_left_to_edit(here: Path, ca
     ],
 )
 def test_check_says_what_a_file_is_and_checks_it_as_that(file: str, is_one: str, here: Path, call) -> None:
-    text = (root() / f"{file}.yaml").read_text(encoding="utf-8")
+    text = (shipped_profiles_folder() / f"{file}.yaml").read_text(encoding="utf-8")
     (here / "c2.yaml").write_text(text, encoding="utf-8")
     answer = call("check", "c2.yaml")
     assert answer.exit_code == 0, answer.output
@@ -104,14 +104,14 @@ def test_check_takes_plans(text: str, facts: str, here: Path, call) -> None:
 
 
 def test_a_file_of_another_kind_gets_one_sentence(here: Path, call) -> None:
-    shutil.copy(root() / "calibrations" / "demo.yaml", here / "c2.yaml")
+    shutil.copy(shipped_profiles_folder() / "calibrations" / "demo.yaml", here / "c2.yaml")
     with pytest.raises(ProfileError) as refused:
         load_rig("c2.yaml")
     assert str(refused.value) == (
         "c2.yaml: is a calibration, a rig is needed here: `force-gateway check c2.yaml` takes it as one"
     )
     (here / "rig.yaml").write_text(
-        (root() / "rigs" / "demo.yaml").read_text().replace("plant: paper-slide", "plant: c2.yaml")
+        (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text().replace("plant: paper-slide", "plant: c2.yaml")
     )
     answer = call("check", "rig.yaml")
     assert re.search(r"^rig\.yaml:\d+:8 plant: c2\.yaml is a calibration, a plant is needed here", answer.stderr), (
@@ -151,7 +151,7 @@ def test_check_tells_every_fault_with_its_place(here: Path, call) -> None:
 
 
 def test_check_takes_a_plant_file_for_what_it_is(here: Path, call) -> None:
-    text = (root() / "plants" / "paper-slide.yaml").read_text(encoding="utf-8")
+    text = (shipped_profiles_folder() / "plants" / "paper-slide.yaml").read_text(encoding="utf-8")
     (here / "plant.yaml").write_text(text, encoding="utf-8")
     done = call("check", "plant.yaml")
     assert done.exit_code == 0

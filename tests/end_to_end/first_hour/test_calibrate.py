@@ -12,7 +12,7 @@ import pytest
 
 from gateway.bsfm import Bsfm
 from gateway.calibrations.store import CalibrationStore
-from gateway.profiles import load_calibration, load_rig, root
+from gateway.profiles import load_calibration, load_rig, shipped_profiles_folder
 from gateway.recording import read_recording
 from tests.end_to_end.conftest import RunningGateway, start, stop
 
@@ -25,7 +25,7 @@ START_CALIBRATION = 1 << 5
 def patient(tmp_path: Path) -> Iterator[RunningGateway]:
     """The demo rig with bounds that a machine which is busy with other things keeps: its simulation is a process like any
     other, and a sample that comes 0.27 s late is a fault (A311) that ends a ladder before its person can go away."""
-    text = (root() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
     for key in ("sample_timeout_s", "output_timeout_s", "stall_s"):
         text, count = re.subn(rf"{key}: \S+", f"{key}: 3.0", text)
         assert count == 1

@@ -20,6 +20,7 @@ from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import load_calibration
 from gateway.registers.upload.coefficients import CoefficientSet, words_of_block
 from tests.calibrations.coefficients import calibration, mark_of, requests_of, staged
+from tests.calibrations.slots import slot_number
 from tests.end_to_end.conftest import RunningGateway, start, stop
 
 KILLS = 50
@@ -75,7 +76,7 @@ def active_mark(state: Path) -> int:
     assert selected.calibration is not None
     mark = mark_of(selected.calibration)
     assert selected.selection.slot == mark % 8
-    assert store.slot(mark % 8) == selected.selection.number
+    assert slot_number(store, mark % 8) == selected.selection.number
     return mark
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gateway.profiles import check_report, root
+from gateway.profiles import check_report, shipped_profiles_folder
 from gateway.profiles.strict_yaml.text import parse
 
 POLLED = {"ask": "W?", "frame": "W {force:+08.2f}", "unit": "N"}
@@ -16,7 +16,10 @@ def told(folder: Path, **changes: Any) -> tuple[dict[str, str], dict[str, str]]:
     """(faults, warnings) by path, of the demo as a real rig with devices of its own. changes: `rig__output__baud=9600`, and so
     with `dac` and `cell`; None leaves a key out."""
     shipped = {"rig": "rigs/demo", "dac": "devices/smc-itv-rc", "cell": "devices/stream-st-gs"}
-    files = {name: parse((root() / f"{file}.yaml").read_bytes(), name).value for name, file in shipped.items()}
+    files = {
+        name: parse((shipped_profiles_folder() / f"{file}.yaml").read_bytes(), name).value
+        for name, file in shipped.items()
+    }
     files["rig"] |= {"simulated": False, "name": "own"}
     files["rig"]["output"] |= {"device": "dac.yaml", "port": "/dev/serial/by-id/a"}
     files["rig"]["load_cell"] |= {"device": "cell.yaml", "port": "/dev/serial/by-id/b"}

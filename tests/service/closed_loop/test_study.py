@@ -10,7 +10,7 @@ import pytest
 
 from gateway.control import NO_COMPENSATION, CellMap
 from gateway.profiles import load_plant, load_rig
-from gateway.profiles.rigs.compensation import ALL_INPUTS, compensation_of
+from gateway.profiles.rigs.compensated_effects import ALL_INPUTS, compensation_of
 from gateway.service.closed_loop.identified_model import identify_model, quasi_static
 from gateway.service.closed_loop.study import ClosedLoopGain, closed_loop_gain, format_gain
 from gateway.twin import Plant, Twin

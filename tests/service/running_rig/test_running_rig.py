@@ -161,7 +161,7 @@ def test_a_defect_anywhere_in_the_loop_ends_with_the_safe_voltage(devices: OwnDe
 
 
 def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevices, monkeypatch) -> None:
-    """Whatever hangs in closing the rest, the wire has its last word already."""
+    """Whatever hangs in closing the rest, the final safe-voltage write is on the wire already."""
     seen_v: list[float] = []
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:

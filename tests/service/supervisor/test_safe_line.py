@@ -1,4 +1,5 @@
-"""The guardian's last word: repeated until acknowledged, at most three times, whatever a dead process left on the wire."""
+"""The guardian's final safe-voltage write: repeated until acknowledged, at most three times, whatever a dead process
+left on the wire."""
 
 import os
 import threading

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.fieldbus import ServerSettings
-from gateway.fieldbus.limits import LogLimiter, RequestRate
 from gateway.fieldbus.peers import Peers, address_of, is_loopback
+from gateway.fieldbus.rate_limits import LogLimiter, RequestRate
 
 
 @given(st.floats(1.0, 1000.0), st.lists(st.floats(0.0, 0.5), max_size=100))

@@ -9,7 +9,7 @@ from gateway.control import NO_COMPENSATION, CommandMap
 from gateway.diagnosis import EFFECTS
 from gateway.profiles import check_report, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import plant_text, with_origins
-from gateway.profiles.rigs.compensation import (
+from gateway.profiles.rigs.compensated_effects import (
     ALL_INPUTS,
     TREATMENTS,
     By,

@@ -1,4 +1,7 @@
-"""Two limits over time, as arithmetic: requests of one client, log lines of one cause. Time is an argument."""
+"""Limits over time: requests of one client, log lines of one cause. Pure: time is an argument.
+
+The limit on connections per peer is in peers.py.
+"""
 
 from collections.abc import Callable
 from typing import Final
@@ -27,17 +30,17 @@ class RequestRate:
         return missing / self._rate_per_s if missing > _ROUNDING else 0.0
 
     def spend(self) -> None:
-        """One request runs."""
+        """Take one request out of the bucket."""
         self._tokens -= 1.0
 
     def is_full(self, now_s: float) -> bool:
-        """Return whether a new bucket would be no different."""
+        """Return whether the bucket is as full as a new one."""
         self.wait_s(now_s)
         return self._tokens >= self._most
 
 
 class LogLimiter:
-    """At most ten lines a second of each cause reach the sink; the next line that does tells how many did not."""
+    """Passes at most ten lines a second of each cause to the sink; the next line that passes tells how many were left out."""
 
     __slots__ = ("_sink", "_windows")
 
