@@ -140,7 +140,8 @@ class Feedforward:
         self.applied_n = ramp_limited(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
         self._pace.spend(moved_n, rate_n_per_s)
-        ahead_s = min(self._ahead_s, max(AHEAD_N / rate_n_per_s, self._lag_s)) if rate_n_per_s > 0.0 else 0.0
+        is_led = goal_n > 0.0 and rate_n_per_s > 0.0
+        ahead_s = min(self._ahead_s, max(AHEAD_N / rate_n_per_s, self._lag_s)) if is_led else 0.0
         aimed_n = self.aimed_n
         self.aimed_n = ramp_limited(self._coming_n(goal_n), self.applied_n, rate_n_per_s, ahead_s)
         self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)

@@ -221,6 +221,8 @@ class ForceLoop:
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
         wanted_v = model_v + self._trim.value_v
         push_v = self._led_v(wanted_v) - wanted_v if has_model else 0.0
+        if demand.force_n <= 0.0:
+            push_v = 0.0  # a release goes along its ramp in volts, too: pushing it would vent the tool at once
         self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
         by_stage = self._limiter.drive(wanted_v + push_v if has_model else 0.0)
         self.limited_by = strongest(by_stage, self._trim.limited_by, by_model, demand.force_limited_by)

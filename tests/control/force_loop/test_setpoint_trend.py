@@ -69,11 +69,13 @@ def test_a_restart_forgets_the_path() -> None:
 
 @pytest.mark.parametrize("rate_n_per_s", [5.0, 20.0, 100.0, 200.0])
 def test_a_ramp_of_ours_runs_ahead_and_remains_a_ramp(rate_n_per_s: float) -> None:
-    """The aim leads by what the force is late, and no fast ramp becomes a jump: 26 N to 0 takes most of its time."""
+    """The aim leads by what the force is late, and no fast ramp becomes a jump; a release is not led at all."""
     dead_s, lag_s = 0.1, 0.05
     law = Feedforward(load_calibration("demo").model(), load_rig("demo").control.limits, lag_s, dead_s, dead_s + 0.01)
     law.take_over(26.0)
-    law.advance(0.0, rate_n_per_s, TICK_S)
+    law.advance(2.0, rate_n_per_s, TICK_S)
     led_n = law.applied_n - law.aimed_n
     assert led_n == pytest.approx(min(rate_n_per_s * (dead_s + 0.01), max(AHEAD_N, rate_n_per_s * lag_s)))
     assert led_n <= 0.4 * 26.0
+    law.advance(0.0, rate_n_per_s, TICK_S)
+    assert law.aimed_n == law.applied_n
