@@ -5,8 +5,8 @@ import socket
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
+from gateway.processes import exit_codes
 
 _TIMEOUT_S: Final = 2.0
 _LONGEST_ANSWER: Final = 1 << 20

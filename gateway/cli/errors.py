@@ -12,7 +12,7 @@ from typing import IO, Any
 
 import click
 
-from gateway.cli import exit_codes
+from gateway.processes import exit_codes
 
 
 class CliError(click.ClickException):

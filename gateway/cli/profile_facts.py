@@ -35,7 +35,7 @@ def _device(device: "DeviceProfile") -> str:
     if device.set_voltage:
         low_v, high_v = device.voltage_range_v
         said = f"{low_v:g} .. {high_v:g} V"
-    return f"{device.name}: {device.role}, {device.serial}, {said}; {device.hardware}"
+    return f"{device.name}: {device.role}, {device.serial}, {said}; {device.hardware} ({device.certainty})"
 
 
 def _plant(plant: "PlantProfile") -> str:

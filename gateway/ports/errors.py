@@ -15,7 +15,8 @@ from typing import Final, Literal
 
 from serial import SerialException
 
-from gateway.ports.holders import holders_of
+from gateway.ports.holders import describe_holders
+from gateway.processes import exit_codes
 
 PortCode = Literal["E101", "E102", "E103", "E110", "E111"]
 
@@ -37,8 +38,8 @@ class PortError(Exception):
 
     @property
     def exit_code(self) -> int:
-        """What a program ends with: 77 permission, 69 device."""
-        return 77 if self.code == "E101" else 69
+        """The exit code of a program that ends because of this."""
+        return exit_codes.PERMISSION if self.code == "E101" else exit_codes.DEVICE
 
 
 def errno_of(error: Exception) -> int | None:
@@ -57,7 +58,7 @@ def explain_open_failure(path: str, error: Exception, present: Sequence[str]) ->
     if number in _ABSENT:
         return PortError("E102", _missing(path, present))
     if number in _HELD:
-        return PortError("E103", _held_by_other(path))
+        return PortError("E103", describe_holders(path))
     return PortError("E102", f"{path} does not open as a serial port: {error}")
 
 
@@ -89,13 +90,6 @@ def _missing(path: str, present: Sequence[str]) -> str:
     near = difflib.get_close_matches(path, present, n=1, cutoff=0.6)
     meant = f"; did you mean {near[0]}?" if near else ""
     return f"{path} is not there. Present: {', '.join(present)}{meant}"
-
-
-def _held_by_other(path: str) -> str:
-    holders = [holder for holder in holders_of(path) if holder.is_locking] or holders_of(path)
-    if not holders:
-        return f"{path} is held by another process, of another user (sudo fuser {path} names it); stop that one first"
-    return f"{path} is held by {', '.join(str(holder) for holder in holders)}; stop that one first"
 
 
 def _user() -> str:

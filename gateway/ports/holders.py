@@ -33,18 +33,28 @@ def holders_of(path: str, processes: Path = Path("/proc")) -> list[Holder]:
     return list(found.values())
 
 
-def _descriptors(processes: Path) -> Iterator[tuple[int, Path]]:
-    for process in _entries(processes):
-        if process.name.isdigit():
-            for descriptor in _entries(process / "fd"):
-                yield int(process.name), descriptor
+def describe_holders(path: str) -> str:
+    """Return the sentence about a port that does not open because another process holds it."""
+    holders = holders_of(path)
+    holders = [holder for holder in holders if holder.is_locking] or holders
+    if not holders:
+        return f"{path} is held by another process, of another user (sudo fuser {path} names it); stop that one first"
+    return f"{path} is held by {', '.join(str(holder) for holder in holders)}; stop that one first"
 
 
-def _entries(folder: Path) -> list[Path]:
+def list_folder(folder: Path) -> list[Path]:
+    """Return the entries of a folder of /proc, /sys or /dev; none where it is gone or another user's."""
     try:
         return list(folder.iterdir())
-    except OSError:  # ended meanwhile, or another user's
+    except OSError:
         return []
+
+
+def _descriptors(processes: Path) -> Iterator[tuple[int, Path]]:
+    for process in list_folder(processes):
+        if process.name.isdigit():
+            for descriptor in list_folder(process / "fd"):
+                yield int(process.name), descriptor
 
 
 def _device(descriptor: Path) -> int:

@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from gateway.ports.holders import holders_of
+from gateway.ports.holders import holders_of, list_folder
 from gateway.ports.latency import latency_ms
 
 
@@ -27,20 +27,20 @@ class PortInfo:
 def list_ports(devices: Path = Path("/dev"), system: Path = Path("/sys")) -> list[PortInfo]:
     """Return every serial port of this machine that has hardware behind it."""
     by_id = _by_id(devices)
-    names = sorted({entry.name for entry in _entries(system / "class" / "tty") if _is_real(entry)} | set(by_id))
+    names = sorted({entry.name for entry in list_folder(system / "class" / "tty") if _is_real(entry)} | set(by_id))
     return [_info(name, by_id.get(name), devices, system) for name in names]
 
 
 def present_paths(devices: Path = Path("/dev"), system: Path = Path("/sys")) -> list[str]:
     """Return the paths that could be opened, as a rig file should name them."""
     by_id = _by_id(devices)
-    names = {entry.name for entry in _entries(system / "class" / "tty") if _is_real(entry)} - set(by_id)
+    names = {entry.name for entry in list_folder(system / "class" / "tty") if _is_real(entry)} - set(by_id)
     return sorted(by_id.values()) + sorted(str(devices / name) for name in names)
 
 
 def _by_id(devices: Path) -> dict[str, str]:
     """Device name -> its by-id path."""
-    links = _entries(devices / "serial" / "by-id")
+    links = list_folder(devices / "serial" / "by-id")
     return {Path(os.path.realpath(link)).name: str(link) for link in sorted(links) if link.exists()}
 
 
@@ -70,13 +70,6 @@ def _description(entry: Path) -> str:
         if words:
             return " ".join(words)
     return ""
-
-
-def _entries(folder: Path) -> list[Path]:
-    try:
-        return list(folder.iterdir())
-    except OSError:
-        return []
 
 
 def _text(file: Path) -> str:

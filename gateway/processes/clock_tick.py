@@ -33,11 +33,17 @@ def _create_timerfd(period_s: float) -> int:
 
 class ClockTick:
     """Calls on_tick(expirations, late_s) every period; expirations > 1 means that ticks were missed, late_s is how long
-    after its time the newest one is served."""
+    after its time the newest one is served. is_fallback: use the loop's `call_later`, as off Linux."""
 
-    def __init__(self, period_s: float, on_tick: Callable[[int, float], None]) -> None:
+    def __init__(
+        self,
+        period_s: float,
+        on_tick: Callable[[int, float], None],
+        *,
+        is_fallback: bool = not sys.platform.startswith("linux"),
+    ) -> None:
         self.period_s = period_s
-        self.is_fallback = not sys.platform.startswith("linux")
+        self.is_fallback = is_fallback
         self._on_tick = on_tick
         self._fd = -1
         self._timer: asyncio.TimerHandle | None = None

@@ -17,7 +17,6 @@ from gateway.bsfm.model import Calibration
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.devices import DeviceProfile
-from gateway.profiles.find import FOLDERS, shipped_profiles_folder
 from gateway.profiles.kinds.plants import ABOUT
 from gateway.profiles.kinds.registers_schema import register_map_schema
 from gateway.profiles.rigs.rig_file import RigFile
@@ -145,9 +144,3 @@ _MAKERS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
 def schema_text(kind: str) -> str:
     """Return the schema as a file holds it."""
     return json.dumps(schema(kind), indent=2, ensure_ascii=False) + "\n"
-
-
-def write_schemas() -> None:
-    """Refresh profiles/schemas in the checkout: `python -c "from gateway.profiles.schema import *; write_schemas()"`."""
-    for kind in FOLDERS:
-        (shipped_profiles_folder() / "schemas" / f"{kind}.json").write_text(schema_text(kind), encoding="utf-8")

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.ports import PortError
-from gateway.processes import priority
+from gateway.processes import exit_codes, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
@@ -28,8 +28,6 @@ from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
 from gateway.service.running_rig.starting import StartError
-
-EXIT_DEFECT, EXIT_DEVICE, EXIT_CONFIGURATION = 1, 69, 78
 
 
 def main(arguments: list[str]) -> int:
@@ -46,7 +44,9 @@ def main(arguments: list[str]) -> int:
                 return runner.run(run(rig, options, link, log, notes))
         except ProfileError as error:
             faults = "\n".join(str(fault) for fault in error.faults)
-            return _report_start_failure(log, faults, EXIT_CONFIGURATION, f"E151 the rig file has faults:\n{faults}")
+            return _report_start_failure(
+                log, faults, exit_codes.CONFIGURATION, f"E151 the rig file has faults:\n{faults}"
+            )
         except (StartError, PortError) as error:
             return _report_start_failure(log, str(error), error.exit_code, str(error))
 
@@ -101,7 +101,7 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     guardian = GuardianLine(link)
     ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
     if ports is None:
-        return EXIT_DEVICE
+        return exit_codes.DEVICE
     running = RunningRig(rig, ports, Path(options["state"]), guardian, log)
     running.ring = sample_ring(options["ring"])
     guardian.on_ports = running.move_ports
@@ -120,13 +120,13 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         guardian.ready(announcement, rig.control.supervision.stall_s)
         await _wait_first(guardian.told_to_stop, running.failed)
         if running.failed.is_set():
-            return EXIT_DEFECT
+            return exit_codes.FAILED
         if not guardian.is_gone:
             await running.ramp_down()
     finally:
         await running.close()
         guardian.close()
-    return 0
+    return exit_codes.OK
 
 
 async def _wait_first(*events: asyncio.Event) -> None:

@@ -28,8 +28,7 @@ def ticks(count: int, *, fallback: bool = False, busy_s: float = 0.0) -> list[tu
             if len(seen) >= count:
                 enough.set()
 
-        tick = ClockTick(PERIOD_S, on_tick)
-        tick.is_fallback = fallback
+        tick = ClockTick(PERIOD_S, on_tick, is_fallback=fallback)
         tick.start()
         async with asyncio.timeout(5):
             await enough.wait()
@@ -71,8 +70,7 @@ def test_closing_twice_or_before_the_start_is_no_trouble(fallback: bool) -> None
     seen: list[int] = []
 
     async def scene() -> bytes:
-        tick = ClockTick(PERIOD_S, lambda expirations, late_s: seen.append(expirations))
-        tick.is_fallback = fallback
+        tick = ClockTick(PERIOD_S, lambda expirations, late_s: seen.append(expirations), is_fallback=fallback)
         tick.close()
         tick.start()
         tick.close()

@@ -23,7 +23,7 @@ def as_json(path: Path) -> object:
 @pytest.mark.parametrize("kind", find.FOLDERS)
 def test_the_committed_schema_is_what_the_types_say(kind: str) -> None:
     committed = (ROOT / "schemas" / f"{kind}.json").read_text(encoding="utf-8")
-    assert committed == schema_text(kind), "refresh: python -c 'from gateway.profiles.schema import *; write_schemas()'"
+    assert committed == schema_text(kind), "refresh: python tools/write_schemas"
 
 
 @pytest.mark.parametrize("kind", find.FOLDERS)

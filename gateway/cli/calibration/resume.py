@@ -11,8 +11,8 @@ from typing import Any, Final
 from gateway.bsfm.ladder.check import check_ladder
 from gateway.bsfm.ladder.fault import LadderError
 from gateway.bsfm.ladder.labels import Labels
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
+from gateway.processes import exit_codes
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 
 _NO_PLAN: Final = ("stairs", "top_v")  # what the header says beside the plan's own fields

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from gateway import defaults
-from gateway.cli import exit_codes
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError, disk_hangs
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration

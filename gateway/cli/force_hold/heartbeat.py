@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway import defaults
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.sequence import HoldRun, HoldWrite, SeenStatus, seen_of
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
+from gateway.processes import exit_codes
 
 _ACTIONS: Final = {
     "fault": "safe voltage, fault A310",

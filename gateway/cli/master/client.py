@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
+from gateway.processes import exit_codes
 from gateway.registers import Register, RegisterMap
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from typing import Final
 
 from gateway import defaults
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError, disk_hangs
 from gateway.cli.master.client import Frame, GatewayClient
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.upload_frames import Request, UploadFrames
 from gateway.modbus.pdu import WRITE_REGISTER
+from gateway.processes import exit_codes
 from gateway.registers.upload.coefficients import HEAD_WORDS, TAIL_FROM
 from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
 

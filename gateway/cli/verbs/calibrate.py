@@ -11,9 +11,9 @@ from typing import Any, Final
 import click
 
 from gateway import defaults
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError
 from gateway.cli.options import endpoint, json_option, name_option, state_directory, state_options
+from gateway.processes import exit_codes
 
 _QUESTIONS: Final = (
     "Does the tool press on the workpiece, or on a stop, that takes {force:.0f} N?",

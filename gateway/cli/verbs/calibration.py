@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import json_option, state_directory, state_options
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway import defaults
-from gateway.cli import exit_codes
 from gateway.cli.options import count_of, json_option
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.profiles import Checked, ProfileFault

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from gateway.cli import exit_codes
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.cli.diagnosis.sources import Sources

@@ -1,7 +1,6 @@
 """`events`: what the gateway has said, from its state directory; it need not be running."""
 
 import json
-import re
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -10,22 +9,24 @@ from typing import Final
 
 import click
 
+from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import no_state_directory
 from gateway.cli.options import json_option, state_directory, state_options
 from gateway.processes.event import SEVERITIES, EventRecord, format_event, utc_text
 from gateway.processes.event_file import EventReader
 
-_UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _POLL_S: Final = 0.25  # how often --follow reads the event file
 
 
 def parse_since(context: click.Context, parameter: click.Parameter, value: str | None) -> str:
-    """10m, 2h, 1.5d or an ISO 8601 time (without a zone: UTC) as events write it; empty for none."""
+    """Return the time that the option means, as events write it; empty where it is not given.
+
+    value: a duration before now, such as 10m, 2h or 1.5d, or an ISO 8601 time (without a zone: UTC).
+    """
     if value is None:
         return ""
-    if ago := re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", value.strip()):
-        seconds = time.time() - float(ago[1]) * _UNITS_S[ago[2]]
-        return utc_text(max(0.0, seconds))
+    if not value.strip().isdecimal() and (ago_s := parse_duration_s(value)) is not None:  # a bare number may be a date
+        return utc_text(max(0.0, time.time() - ago_s))
     try:
         moment = datetime.fromisoformat(value.strip())
         moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)

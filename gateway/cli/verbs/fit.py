@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway import defaults
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import json_option, name_option, state_directory
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.service.fitting.ladder_fit import LadderFit

@@ -1,7 +1,6 @@
 """`hold`: hold a force from this terminal: enable, heartbeat, one line of state, and a ramp to 0 when told to stop."""
 
 import json
-import re
 import signal
 import sys
 import time
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import CliError
 from gateway.cli.options import Endpoint, gateway_options, json_option
 
@@ -19,20 +19,19 @@ if TYPE_CHECKING:
     from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
 
 _SHOW_S: Final = 0.1
-_UNITS: Final = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
 
-def _duration(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
-    """Return `10s`, `500ms`, `2min` or a number of seconds."""
-    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+) ?(ms|s|min|h|)", text.strip()) if text is not None else None
-    if text is not None and found is None:
+def _parse_time(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
+    """Return the seconds that the option's text means, None where it is not given; BadParameter for no duration."""
+    seconds = parse_duration_s(text) if text is not None else None
+    if text is not None and seconds is None:
         raise click.BadParameter(f"{text} is no time such as 10s, 500ms or 2min")
-    return float(found[1]) * _UNITS[found[2]] if found else None
+    return seconds
 
 
 @click.command()
 @click.argument("newton", type=float)
-@click.option("--for", "for_s", callback=_duration, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
+@click.option("--for", "for_s", callback=_parse_time, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
 @click.option("--reset", "resets", is_flag=True, help="Reset a latched fault first.")
 @click.option("--rig", metavar="RIG", help="The rig that runs there; its lease sets the pace of the heartbeat.")
 @gateway_options

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from gateway.cli import exit_codes
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import count_of, state_directory, state_options
+from gateway.processes import exit_codes
 
 
 @click.command()

@@ -30,8 +30,8 @@ SUPPORTED_BITS: Final = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OutputLine:
-    """The wire to the DAC or regulator; port None in a simulated rig."""
+class _SerialLine:
+    """The wire to one device; port None in a simulated rig."""
 
     device: DeviceProfile
     port: str | None
@@ -44,20 +44,17 @@ class OutputLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CellLine:
+class OutputLine(_SerialLine):
+    """The wire to the DAC or regulator."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellLine(_SerialLine):
     """The wire from the load-cell amplifier; sign and unit are the rig's, range_n is the cell's rated force."""
 
-    device: DeviceProfile
-    port: str | None
-    baud: int
     sign: int
     unit: str | None
     range_n: float
-
-    @property
-    def settings(self) -> SerialSettings:
-        """The device's serial settings at the rig's baud."""
-        return self.device.serial.at(self.baud)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

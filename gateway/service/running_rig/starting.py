@@ -9,12 +9,12 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.ports import PortError, SerialPort
+from gateway.processes import exit_codes
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import Rig
 
 _HELD_BOUND_S: Final = 0.5  # how long a restart waits for a port that somebody holds who is about to end
 _RETRY_S: Final = 0.05  # between two attempts within that time
-_NO_PERMISSION, _WRONG_CONFIGURATION, _NO_DEVICE = 77, 78, 69  # exit codes, as in sysexits.h
 
 
 class StartError(Exception):
@@ -81,10 +81,10 @@ async def listen(server: ModbusTcpServer, host: str, port: int) -> tuple[str, in
         raise StartError(
             f"E120 port {port} needs the capability net_bind_service; use --bind {host}:{defaults.MODBUS_PORT} "
             "(force-gateway explain E120)",
-            _NO_PERMISSION,
+            exit_codes.PERMISSION,
         ) from error
     except BindError as error:
-        raise StartError(str(error), _WRONG_CONFIGURATION) from error
+        raise StartError(str(error), exit_codes.CONFIGURATION) from error
     except OSError as error:
         sentence = f"E121 cannot listen on {host}:{port}: {error}; another --bind HOST:PORT?"
-        raise StartError(sentence, _NO_DEVICE) from error
+        raise StartError(sentence, exit_codes.DEVICE) from error

@@ -11,9 +11,8 @@ from typing import Any, Final
 
 from gateway.service.supervisor import fork_server
 from gateway.service.supervisor.child_process import Child, describe_exit, spawn_child
+from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
-PAUSES_S: Final = (5.0, 30.0, 120.0)
-"""Before the fork server is started again; it dies once more, and that is it."""
 _START_TIMEOUT_S: Final = 5.0  # from asking a prepared server: a busy machine is no reason to import everything again
 _FIRST_START_TIMEOUT_S: Final = 30.0  # imports on a slow machine
 _COMMAND_ROOM: Final = 1024
@@ -93,13 +92,13 @@ class ChildStarter:
         self._server.close()
         self._server, self._is_proven = None, False
         self._deaths += 1
-        is_last = self._deaths > len(PAUSES_S)
-        self._due_s = inf if is_last else now_s + PAUSES_S[self._deaths - 1]
-        then = "it stays off" if is_last else f"another one in {PAUSES_S[self._deaths - 1]:g} s"
+        is_last = self._deaths > len(HELPER_PAUSES_S)
+        self._due_s = inf if is_last else now_s + HELPER_PAUSES_S[self._deaths - 1]
+        then = "it stays off" if is_last else f"another one in {HELPER_PAUSES_S[self._deaths - 1]:g} s"
         self._say(f"A407 the prepared process {how}: {then}; a restart takes longer without it")
 
-    def follow(self, readable: set[int], now_s: float) -> None:
-        """After each wait: has the server died, is it time for another one?"""
+    def poll_child(self, readable: set[int], now_s: float) -> None:
+        """Drop a fork server that has died, and start another one when it is time; to be called after each wait."""
         if self._server and self._server.died in readable:
             self.drop_server(f"ended ({describe_exit(self._server.wait())})", now_s)
         elif now_s >= self._due_s:

@@ -19,7 +19,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.processes import message_link, priority
+from gateway.processes import exit_codes, message_link, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
@@ -38,8 +38,7 @@ _STOP_BOUND_S: Final = 5.0  # from the first signal; from the end of the line of
 _DEATH_BOUND_S: Final = 2.0  # of a killed process: milliseconds, unless a driver holds it
 _MOST_MESSAGES: Final = 1000  # of one wait: a child that floods its line does not keep us from the rest
 
-EXIT_OK, EXIT_FAILED, EXIT_DEVICE = 0, 1, 69
-_REFUSED: Final = frozenset({65, 77, 78})
+_REFUSED: Final = frozenset({exit_codes.DATA, exit_codes.PERMISSION, exit_codes.CONFIGURATION})
 """Exit codes of a control process that has told the user why it can't work: another start would end the same way."""
 
 
@@ -54,7 +53,7 @@ def run(options: RunOptions) -> int:
             words.print_error(
                 f"E104 another gateway already runs on {state}; stop it, or give this one its own --state DIR"
             )
-            return EXIT_DEVICE
+            return exit_codes.DEVICE
         priority.set_nice(priority.LOOP_NICE)
         with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
             starter = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
@@ -117,7 +116,7 @@ class Guardian:
                 return self._on_death(Ending(EndCause.NOT_STARTED, "control process ended before its first word"))
         if control and control.died >= 0 and control.died in readable:
             return self._on_death(Ending(EndCause.DIED, "control process died"))
-        self._follow_others(readable)
+        self._poll_others(readable)
         return self._on_deadline()
 
     def _sources(self) -> list[int]:
@@ -142,10 +141,10 @@ class Guardian:
             return self.heartbeat.due_s
         return self.asked_s + (_START_GRACE_S if self.control.pid else self.starter.start_timeout_s)
 
-    def _follow_others(self, readable: set[int]) -> None:
+    def _poll_others(self, readable: set[int]) -> None:
         if self.leaving and self.leaving.died in readable:
             self._forget_leaving()
-        self.others.follow(readable, self.clock())
+        self.others.poll_children(readable, self.clock())
 
     # -- what is said to us
 
@@ -267,7 +266,7 @@ class Guardian:
         acknowledged = self._write_final_voltage()
         control, self.control = self.control, None
         if control is None:
-            return EXIT_OK  # told to stop while there was none
+            return exit_codes.OK  # told to stop while there was none
         is_gone = control.died < 0 or bool(self.wait([control.died], _DEATH_BOUND_S))
         ending = self.said_cause or (cause if isinstance(cause, Ending) else cause())
         self.heartbeat.reset()
@@ -279,8 +278,8 @@ class Guardian:
         reap_orphans(set(self._pids().values()))
         if self.stop_deadline_s is not None:
             self.log.note("stop", f"stopped as asked: safe voltage {words.describe_acknowledgement(acknowledged)}")
-            return EXIT_OK
-        if code in _REFUSED or (code == EXIT_DEVICE and not self.announced):
+            return exit_codes.OK
+        if code in _REFUSED or (code == exit_codes.DEVICE and not self.announced):
             return code  # it told the user why
         return self._restart(ending, describe_exit(code) if is_gone else "it does not go", acknowledged)
 
@@ -303,7 +302,7 @@ class Guardian:
         pause_s = self.restarts.count(now_s, ending.cause)
         if pause_s is None:
             self.log("restart", words.too_many_sentence(self.restarts.causes))
-            return EXIT_FAILED
+            return exit_codes.FAILED
         self.next_start, self.asked_s = ending, now_s + pause_s
         if self.leaving:
             self.log("restart", words.leaving_sentence(self.leaving.pid))

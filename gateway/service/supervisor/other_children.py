@@ -29,7 +29,7 @@ class OtherChildren:
 
     @property
     def due_s(self) -> float:
-        """When `follow` has something to do without an event."""
+        """When `poll_children` has something to do without an event."""
         return min(one.due_s for one in self._all)
 
     @property
@@ -41,10 +41,10 @@ class OtherChildren:
             "fork_server": self._starter.server_pid,
         }
 
-    def follow(self, readable: set[int], now_s: float) -> None:
-        """After each wait."""
+    def poll_children(self, readable: set[int], now_s: float) -> None:
+        """Let each look after its process; to be called after each wait."""
         for one in self._all:
-            one.follow(readable, now_s)
+            one.poll_child(readable, now_s)
 
     def provide_rig(self, now_s: float) -> None:
         """Control asks for the simulated rig's ports."""

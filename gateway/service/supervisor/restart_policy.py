@@ -8,6 +8,10 @@ from gateway.processes.exit_cause import EndCause
 
 MOST_RESTARTS: Final = 5
 WINDOW_S: Final = 60.0
+HELPER_PAUSES_S: Final = (5.0, 30.0, 120.0)
+"""Before a child that control can do without is started again (the fork server, the residual watch): it must not cost
+processor time that control needs. One more death, and it stays off. The simulated rig, which control waits for, has
+shorter ones of its own."""
 _FIRST_PAUSE_S: Final = 0.25
 _LONGEST_PAUSE_S: Final = 4.0
 

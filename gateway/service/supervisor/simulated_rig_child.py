@@ -13,7 +13,7 @@ from gateway.processes import message_link
 from gateway.service.supervisor.child_process import Child, describe_exit
 
 PAUSES_S: Final = (0.1, 1.0, 5.0)
-"""Waiting times before it is started again; it dies once more, and that is it."""
+"""Pauses before it is started again, short because control waits for it; one more death, and it stays off."""
 _LONG_LIFE_S: Final = 60.0  # a rig that lived this long begins to count anew
 _START_BOUND_S: Final = 20.0  # imports on a slow machine
 
@@ -57,8 +57,8 @@ class RigSupervisor:
         elif self._child is None and self._due_s == inf:
             self._begin(now_s)
 
-    def follow(self, readable: set[int], now_s: float) -> None:
-        """After each wait: what does it say, has it died, is it time to start it again?"""
+    def poll_child(self, readable: set[int], now_s: float) -> None:
+        """Take its messages, note its death, and start it again when it is time; to be called after each wait."""
         child = self._child
         if child and not self._link_ended and child.link.fileno() in readable:
             self._hear(child, now_s)

@@ -10,9 +10,8 @@ from math import inf
 from typing import Final
 
 from gateway.service.supervisor.child_process import LOST, Child, describe_exit
+from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
-PAUSES_S: Final = (5.0, 30.0, 120.0)
-"""Waiting times before it is started again; it dies once more, and that is it."""
 _LONG_LIFE_S: Final = 900.0  # a watch that lived this long begins to count anew
 
 
@@ -33,7 +32,7 @@ class WatchSupervisor:
 
     @property
     def due_s(self) -> float:
-        """When `follow` has something to do without an event; infinite where nothing is planned."""
+        """When `poll_child` has something to do without an event; infinite where nothing is planned."""
         return self._due_s
 
     @property
@@ -46,8 +45,8 @@ class WatchSupervisor:
         if self._child is None and self._deaths == 0:
             self._begin(now_s)
 
-    def follow(self, readable: set[int], now_s: float) -> None:
-        """After each wait: has it died, is it time to start it again?"""
+    def poll_child(self, readable: set[int], now_s: float) -> None:
+        """Note its death, and start it again when it is time; to be called after each wait."""
         if self._child is not None and self._child.died in readable:
             code = self._child.wait()
             self._child.close()
@@ -72,9 +71,9 @@ class WatchSupervisor:
         if now_s - self._began_s >= _LONG_LIFE_S:
             self._deaths = 0
         self._deaths += 1
-        if self._deaths > len(PAUSES_S):
+        if self._deaths > len(HELPER_PAUSES_S):
             self._say(f"A346 the residual watch {how} {self._deaths} times: it stays off, control goes on without it")
             return
-        pause_s = PAUSES_S[self._deaths - 1]
+        pause_s = HELPER_PAUSES_S[self._deaths - 1]
         self._due_s = now_s + pause_s
         self._say(f"A346 the residual watch {how}: it is started again in {pause_s:g} s, control goes on")

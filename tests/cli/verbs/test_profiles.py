@@ -10,8 +10,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from gateway.cli import exit_codes
 from gateway.ports import PortInfo
+from gateway.processes import exit_codes
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.registers import RegisterMap
 

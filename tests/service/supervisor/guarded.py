@@ -100,7 +100,7 @@ Script = Callable[[FakeChild], None]
 
 
 @dataclass
-class FakeNursery:
+class FakeStarter:
     """Each child plays the next script of its list, and the last one from then on."""
 
     controls: list[Script]
@@ -108,7 +108,7 @@ class FakeNursery:
     due_s: float = inf
     sources: list[int] = field(default_factory=list)
     server_pid: int | None = None
-    birth_bound_s: float = 1.0
+    start_timeout_s: float = 1.0
     started: list[FakeChild] = field(default_factory=list)
     rigs_started: list[FakeChild] = field(default_factory=list)
     arguments: list[dict[str, Any]] = field(default_factory=list)
@@ -149,7 +149,7 @@ class FakeNursery:
     def drop_server(self, how: str, now_s: float) -> None:
         self.calls.append(f"drop {how}")
 
-    def follow(self, readable: set[int], now_s: float) -> None:
+    def poll_child(self, readable: set[int], now_s: float) -> None:
         pass
 
 
@@ -185,7 +185,7 @@ class FakeLog:
 class Scene:
     """step: until something has happened that `until` accepts, or the guardian ends (`code`)."""
 
-    def __init__(self, tmp_path: Path, starter: FakeNursery) -> None:
+    def __init__(self, tmp_path: Path, starter: FakeStarter) -> None:
         self.now_s = 100.0
         self.said: list[str] = []
         self.starter = starter

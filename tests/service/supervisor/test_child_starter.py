@@ -8,7 +8,8 @@ import pytest
 
 from gateway.processes import message_link
 from gateway.service.supervisor import child_starter, fork_server
-from gateway.service.supervisor.child_starter import PAUSES_S, ChildStarter
+from gateway.service.supervisor.child_starter import ChildStarter
+from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 from tests.service.supervisor.guarded import FakeChild
 
 ARGUMENTS = {"rig": "demo", "ring": None}
@@ -80,14 +81,14 @@ def test_a_server_that_is_gone_costs_no_start(kept, spawned):
 def test_a_server_that_keeps_dying_is_given_up_in_the_end(kept, spawned):
     one, said = kept
     now_s = 0.0
-    for pause_s in PAUSES_S:
+    for pause_s in HELPER_PAUSES_S:
         spawned[-1][1].dies(-9)
-        one.follow(set(one.sources), now_s)
+        one.poll_child(set(one.sources), now_s)
         assert one.due_s == now_s + pause_s
         now_s += pause_s
-        one.follow(set(), now_s)
+        one.poll_child(set(), now_s)
     spawned[-1][1].dies(-9)
-    one.follow(set(one.sources), now_s)
+    one.poll_child(set(one.sources), now_s)
     assert (one.due_s, one.sources, one.server_pid) == (inf, [], None)
     assert modules(spawned) == ["fork_server"] * 4
     assert [line[:4] for line in said] == ["A407"] * 4

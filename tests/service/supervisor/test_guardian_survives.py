@@ -17,7 +17,7 @@ from tests.service.supervisor.guarded import (
     READY,
     SAFE_FRAME,
     FakeChild,
-    FakeNursery,
+    FakeStarter,
     FakeTurns,
     Port,
     Scene,
@@ -74,7 +74,7 @@ def scene(tmp_path: Path) -> Iterator[Callable[..., Scene]]:
     scenes: list[Scene] = []
 
     def make(*controls: Script, rigs: tuple[Script, ...] = (rig_lives,)) -> Scene:
-        scenes.append(Scene(tmp_path, FakeNursery(list(controls), list(rigs))))
+        scenes.append(Scene(tmp_path, FakeStarter(list(controls), list(rigs))))
         return scenes[-1]
 
     before = open_descriptors()
@@ -379,7 +379,7 @@ def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, mon
     def broken(*_: object) -> None:
         raise RuntimeError("a defect of the guardian itself")
 
-    monkeypatch.setattr(one.guardian, "_follow_others", broken)
+    monkeypatch.setattr(one.guardian, "_poll_others", broken)
     with pytest.raises(RuntimeError):
         one.run()
     one.guardian._close()

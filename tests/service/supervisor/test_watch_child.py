@@ -6,7 +6,8 @@ from math import inf
 
 import pytest
 
-from gateway.service.supervisor.watch_child import PAUSES_S, WatchSupervisor
+from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
+from gateway.service.supervisor.watch_child import WatchSupervisor
 
 
 @dataclass
@@ -53,21 +54,21 @@ def supervisor(starter: FakeStarter) -> WatchSupervisor:
 
 
 def dies(supervisor: WatchSupervisor, now_s: float) -> None:
-    supervisor.follow([*supervisor.sources], now_s)
+    supervisor.poll_child([*supervisor.sources], now_s)
 
 
 def test_a_dead_watch_is_started_again_later_each_time_and_then_no_more(supervisor, starter):
     now_s = 0.0
     supervisor.start(now_s)
-    for number, pause_s in enumerate(PAUSES_S, 1):
+    for number, pause_s in enumerate(HELPER_PAUSES_S, 1):
         now_s += 1.0
         dies(supervisor, now_s)
         assert supervisor.due_s == now_s + pause_s
         assert supervisor.sources == []
-        supervisor.follow([], now_s + pause_s - 0.01)
+        supervisor.poll_child([], now_s + pause_s - 0.01)
         assert len(starter.children) == number
         now_s += pause_s
-        supervisor.follow([], now_s)
+        supervisor.poll_child([], now_s)
         assert len(starter.children) == number + 1
     dies(supervisor, now_s + 1.0)
     assert supervisor.due_s == inf
@@ -82,7 +83,7 @@ def test_a_long_life_forgives_earlier_deaths(supervisor, starter):
     supervisor.start(0.0)
     for day in range(1, 9):
         dies(supervisor, day * 86400.0)
-        supervisor.follow([], day * 86400.0 + PAUSES_S[0])
+        supervisor.poll_child([], day * 86400.0 + HELPER_PAUSES_S[0])
     assert len(starter.children) == 9
 
 
@@ -90,16 +91,16 @@ def test_a_start_that_fails_is_a_death_and_no_exception(supervisor, starter):
     starter.error = OSError(11, "Resource temporarily unavailable")
     supervisor.start(0.0)
     assert supervisor.pid is None
-    assert supervisor.due_s == PAUSES_S[0]
+    assert supervisor.due_s == HELPER_PAUSES_S[0]
     starter.error = None
-    supervisor.follow([], PAUSES_S[0])
+    supervisor.poll_child([], HELPER_PAUSES_S[0])
     assert supervisor.pid == 4711
 
 
 def test_what_lives_is_left_alone_and_ended_once(supervisor, starter):
     supervisor.start(0.0)
     supervisor.start(1.0)
-    supervisor.follow([os.getpid()], 2.0)
+    supervisor.poll_child([os.getpid()], 2.0)
     assert len(starter.children) == 1
     supervisor.end()
     supervisor.end()

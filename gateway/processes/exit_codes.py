@@ -1,4 +1,4 @@
-"""Exit codes of every verb, those of sysexits.h where it has one."""
+"""Exit codes of every process and verb, those of sysexits.h where it has one."""
 
 from typing import Final
 
