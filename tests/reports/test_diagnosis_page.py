@@ -62,7 +62,7 @@ def test_it_shows_all_that_the_contract_asks_for() -> None:
     html = page(diagnosis())
     titles = re.findall(r"<h[23]>(.*?)</h", html)
     for title in (
-        "Before: the base model, refitted", "After: with the causes", "What is left over time", "By direction, before",
+        "Before: the base model, refitted", "After: with the causes", "Residual over time", "By direction, before",
         "By direction, after", "Against command (V)", "Against temperature (°C)", "Loop, before", "Loop, after",
         "Spectrum of the residual", "What to record next", "Alternatives, ranked", "What no effect explains",
     ):  # fmt: skip

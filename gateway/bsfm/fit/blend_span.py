@@ -58,7 +58,7 @@ def choose_span(
     best = min(range(SPANS), key=lambda k: float(np.mean(errors[k] ** 2)))
     switched = command_error_n(model, voltage_v, force_n)[counts[1:]]
     return SpanChoice(
-        float(spans_n[best]), _rms(errors[best]), float(np.abs(errors[best]).max()), _rms(switched), len(voltage_v)
+        float(spans_n[best]), rms_n(errors[best]), float(np.abs(errors[best]).max()), rms_n(switched), len(voltage_v)
     )
 
 
@@ -66,5 +66,6 @@ def _with(model: Bsfm, span_n: float) -> Bsfm:
     return replace(model, reversal=LinearBlend(span_n))
 
 
-def _rms(values: Floats) -> float:
+def rms_n(values: Floats) -> float:
+    """Return the root mean square of errors, N."""
     return float(np.sqrt(np.mean(values * values)))

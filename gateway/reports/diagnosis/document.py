@@ -1,11 +1,11 @@
 """A diagnosis as plain values: the JSON contract of `diagnose --json`, format 1. Programs read it: no field may change."""
 
-from math import isfinite
 from typing import Any, Final
 
 from gateway.diagnosis.input_checks import Suspect
 from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Interval
 from gateway.reports.diagnosis.wording import all_notes
+from gateway.reports.json_numbers import finite_or_none
 
 FORMAT: Final = 1
 Document = dict[str, Any]
@@ -22,19 +22,19 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
         "baseline": _baseline(diagnosis.baseline),
         "causes": [_cause(cause) for cause in diagnosis.causes],
         "leftover": [
-            {"depends_on": rest.depends_on, "shape": rest.shape, "share": _number(rest.share)}
+            {"depends_on": rest.depends_on, "shape": rest.shape, "share": finite_or_none(rest.share)}
             for rest in diagnosis.leftover
         ],
         "not_identifiable": [
             {"name": unseen.name, "why": unseen.why, "experiment": unseen.experiment}
             for unseen in diagnosis.not_identifiable
         ],
-        "rejected": [{"name": lost.name, "gain": _number(lost.gain)} for lost in diagnosis.rejected],
+        "rejected": [{"name": lost.name, "gain": finite_or_none(lost.gain)} for lost in diagnosis.rejected],
         "extended": {
-            "held_out_rms_n": _number(diagnosis.extended.held_out_rms_n),
+            "held_out_rms_n": finite_or_none(diagnosis.extended.held_out_rms_n),
             "reaches_noise_floor": bool(diagnosis.extended.reaches_noise_floor),
         },
-        "runtime_s": _number(runtime_s),
+        "runtime_s": finite_or_none(runtime_s),
         "suspects": [_suspect(each) for each in diagnosis.suspects],
         "notes": all_notes(diagnosis),
     }
@@ -42,10 +42,10 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
 
 def _baseline(baseline: Baseline) -> Document:
     return {
-        "rms_n": _number(baseline.rms_n),
-        "noise_floor_n": _number(baseline.noise_floor_n),
+        "rms_n": finite_or_none(baseline.rms_n),
+        "noise_floor_n": finite_or_none(baseline.noise_floor_n),
         "samples": int(baseline.samples),
-        "duration_s": _number(baseline.duration_s),
+        "duration_s": finite_or_none(baseline.duration_s),
     }
 
 
@@ -56,7 +56,7 @@ def _suspect(suspect: Suspect) -> Document:
         "column": suspect.column,
         "swapped_with": suspect.other or None,
         "unit": suspect.unit or None,
-        "factor": _number(suspect.factor),
+        "factor": finite_or_none(suspect.factor),
         "is_sure": suspect.is_sure,
         "option": suspect.option,
         "sentence": suspect.sentence,
@@ -68,24 +68,19 @@ def _cause(cause: Cause) -> Document:
     return {
         "name": cause.name,
         "group": list(cause.group),
-        "confidence": _number(cause.confidence),
+        "confidence": finite_or_none(cause.confidence),
         "parameters": {
-            name: {"value": _number(found.value), "unit": found.unit, "ci95": _interval(found.ci95)}
+            name: {"value": finite_or_none(found.value), "unit": found.unit, "ci95": _interval(found.ci95)}
             for name, found in cause.parameters.items()
         },
         "gain": {
-            "held_out_rms_before_n": _number(gain.held_out_rms_before_n),
-            "held_out_rms_after_n": _number(gain.held_out_rms_after_n),
+            "held_out_rms_before_n": finite_or_none(gain.held_out_rms_before_n),
+            "held_out_rms_after_n": finite_or_none(gain.held_out_rms_after_n),
             "ci95": _interval(gain.ci95),
-            "share_of_excess": _number(gain.share_of_excess),
+            "share_of_excess": finite_or_none(gain.share_of_excess),
         },
     }
 
 
 def _interval(interval: Interval) -> list[float | None]:
-    return [_number(end) for end in interval]
-
-
-def _number(value: float) -> float | None:
-    """JSON has no NaN; a numpy scalar becomes a float."""
-    return float(value) if isfinite(value) else None
+    return [finite_or_none(end) for end in interval]

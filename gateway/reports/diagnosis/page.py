@@ -113,7 +113,7 @@ def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
 
 def _notes(notes: Sequence[str]) -> str:
     lines = "".join(f"<li>{escape(note)}</li>" for note in notes)
-    return f"<section class='notes'><h2>What was noticed</h2><ul>{lines}</ul></section>" if notes else ""
+    return f"<section class='notes'><h2>Notes</h2><ul>{lines}</ul></section>" if notes else ""
 
 
 def _section(title: str, content: str) -> str:
@@ -151,7 +151,7 @@ def _over_time(trace: Trace, suffix: str, changed: bool) -> Iterator[str]:
     close = f"Closer, {words.number(window[0])} to {words.number(window[1])} s"
     yield grid(*_before_and_after(close, partial(charts.force_over_time, trace, window=window), changed))
     caption = "Bands reach from the least to the greatest reading of each column of pixels."
-    yield figure("What is left over time", charts.residual_over_time(trace), caption, "full")
+    yield figure("Residual over time", charts.residual_over_time(trace), caption, "full")
 
 
 def _before_and_after(title: str, draw: Callable[..., Drawing], changed: bool) -> list[Panel]:

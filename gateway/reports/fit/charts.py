@@ -1,22 +1,28 @@
 """The charts of a fit: the loop, what it leaves by branch, the order sweep, the minor loops."""
 
 from itertools import groupby
-from typing import Any
+from typing import Final
 
 import numpy as np
 
-from gateway.bsfm.fit.blend_span import command_error_n
+from gateway.bsfm.fit.blend_span import command_error_n, rms_n
 from gateway.bsfm.fit.evaluation import Evaluation
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
 from gateway.reports.fit.document import Document, residual_of
 from gateway.reports.svg import Axis, Chart, spread
 
 _WAYS = ((RISING, "rising"), (FALLING, "falling"))
-_CURVE_POINTS = 200
+_CURVE_POINTS: Final = 200  # of a drawn curve: closer than a pixel's width on screen
+_ORDER_MARGIN: Final = 0.4  # of an order, left and right of the first and last one, so that marks are whole
+_BELOW_LEAST, _ABOVE_MOST = 0.7, 8.0  # the error axis over its data; the room above holds the key
+_KEY_AT: Final = 0.78  # share of the chart's width at which the key begins
+_LEAST_BAR: Final = 0.01  # of its height: a shorter error bar is hidden by its mark
+_MARK_RADIUS_PX: Final = 3.2
+_ERROR_MARGIN: Final = 0.25  # of the spread of the errors along the walk, for the key
 
 
 def draw_loop(evaluation: Evaluation) -> str:
-    """Measured dots over the chosen model's two branches."""
+    """Draw the measured readings over the chosen model's two branches."""
     ladder, result = evaluation.checked.ladder, evaluation.chosen.result
     rising, falling = result.branches.rising, result.branches.falling
     volts = np.linspace(rising.x0, rising.x1, _CURVE_POINTS)
@@ -34,7 +40,7 @@ def draw_loop(evaluation: Evaluation) -> str:
 
 
 def draw_residuals(evaluation: Evaluation) -> str:
-    """Return the chart of measured minus model against the command, by branch."""
+    """Draw measured minus model against the command, by branch."""
     ladder, left_n = evaluation.checked.ladder, residual_of(evaluation)
     low_v, high_v = float(ladder.voltage_v.min()), float(ladder.voltage_v.max())
     chart = Chart(
@@ -50,15 +56,15 @@ def draw_residuals(evaluation: Evaluation) -> str:
 
 
 def draw_order_sweep(document: Document) -> str:
-    """Held-out RMS by order, one line per model; a hollow mark is a fit that may not drive a plant."""
+    """Draw the held-out RMS by order, one line per model; a hollow mark is a fit that may not drive a plant."""
     fits = [fit for fit in document["fits"] if fit["heldout_rms_n"]]
     orders = sorted({fit["order"] for fit in fits})
     heights = [fit["heldout_rms_n"] for fit in fits]
     chart = Chart(
-        Axis(orders[0] - 0.4, orders[-1] + 0.4, "order", whole=True),
-        Axis(0.7 * min(heights), 8.0 * max(heights), "held-out RMS (N)", logarithmic=True),
+        Axis(orders[0] - _ORDER_MARGIN, orders[-1] + _ORDER_MARGIN, "order", whole=True),
+        Axis(_BELOW_LEAST * min(heights), _ABOVE_MOST * max(heights), "held-out RMS (N)", logarithmic=True),
         "Held-out error by model and order",
-        key_at=0.78,
+        key_at=_KEY_AT,
     )
     for model, same in groupby(fits, key=lambda fit: str(fit["model"])):
         line = list(same)
@@ -70,15 +76,15 @@ def draw_order_sweep(document: Document) -> str:
 def _draw_marks(chart: Chart, fits: list[Document], model: str) -> None:
     for fit in fits:
         height, error = fit["heldout_rms_n"], fit["heldout_error_n"] or 0.0
-        if error > 0.01 * height:
+        if error > _LEAST_BAR * height:
             chart.bar(fit["order"], max(chart.y.low, height - error), height + error, model)
-        chart.dots([fit["order"]], [height], model if fit["usable"] else f"{model} hollow", radius=3.2)
+        chart.dots([fit["order"]], [height], model if fit["usable"] else f"{model} hollow", radius=_MARK_RADIUS_PX)
         if fit["chosen"]:
             chart.ring(fit["order"], height)
 
 
 def draw_minor_loops(evaluation: Evaluation) -> str:
-    """Return the walk of partial reversals within the loop; empty where there was none."""
+    """Draw the walk of partial reversals within the loop; empty where there was none."""
     volts, newtons = evaluation.checked.minor_v, evaluation.checked.minor_n
     if len(volts) < 2:
         return ""
@@ -97,7 +103,7 @@ def draw_minor_loops(evaluation: Evaluation) -> str:
 
 
 def draw_minor_errors(evaluation: Evaluation) -> str:
-    """Return what control would get wrong along the walk: with the chosen reversal, and with branches switched at once."""
+    """Draw the error of the command along the walk: with the chosen reversal, and with branches switched at once."""
     checked, reversal = evaluation.checked, evaluation.reversal
     if reversal is None:
         return ""
@@ -109,14 +115,13 @@ def draw_minor_errors(evaluation: Evaluation) -> str:
     steps = list(range(1, len(chosen) + 1))
     chart = Chart(
         Axis(0, len(steps) + 1, "step of the walk"),
-        Axis(*spread([*chosen.tolist(), *switched.tolist()], margin=0.25, around=0.0), "error of the command (N)"),
+        Axis(
+            *spread([*chosen.tolist(), *switched.tolist()], margin=_ERROR_MARGIN, around=0.0),
+            "error of the command (N)",
+        ),
         "Command error along the partial reversals",
     )
     chart.level(0.0)
-    chart.line(steps, switched.tolist(), "faint switched", f"branches switched: {_rms(switched):.2f} N RMS")
-    chart.line(steps, chosen.tolist(), "walk", f"{policy}: {_rms(chosen):.2f} N RMS")
+    chart.line(steps, switched.tolist(), "faint switched", f"branches switched: {rms_n(switched):.2f} N RMS")
+    chart.line(steps, chosen.tolist(), "walk", f"{policy}: {rms_n(chosen):.2f} N RMS")
     return chart.svg()
-
-
-def _rms(values: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
-    return float(np.sqrt(np.mean(values * values)))

@@ -1,16 +1,16 @@
 """A fit as plain values: what `fit --json` prints, what the table and the HTML report are made from."""
 
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gateway.bsfm.branches import Branches
-from gateway.bsfm.fit.blend_span import command_error_n
+from gateway.bsfm.fit.blend_span import command_error_n, rms_n
 from gateway.bsfm.fit.evaluation import Evaluation
 from gateway.bsfm.fit.order_choice import Score
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
+from gateway.reports.json_numbers import finite_or_none
 
 FORMAT = 1
 Document = dict[str, Any]
@@ -43,7 +43,7 @@ def _ladder_facts(evaluation: Evaluation) -> Document:
         "falling": int((ladder.direction == FALLING).sum()),
         "voltage_v": [float(ladder.voltage_v.min()), float(ladder.voltage_v.max())],
         "force_n": [float(ladder.force_n.min()), float(ladder.force_n.max())],
-        "noise_n": _number(evaluation.checked.noise_n),
+        "noise_n": finite_or_none(evaluation.checked.noise_n),
         "minor_points": len(evaluation.checked.minor_v),
     }
 
@@ -51,7 +51,7 @@ def _ladder_facts(evaluation: Evaluation) -> Document:
 def _fit_facts(score: Score, is_chosen: bool) -> Document:
     result = score.result
     verdicts = result.verdicts
-    heldout_n = _number(score.heldout_rms_n)
+    heldout_n = finite_or_none(score.heldout_rms_n)
     return {
         "model": str(result.model),
         "order": result.order,
@@ -61,7 +61,7 @@ def _fit_facts(score: Score, is_chosen: bool) -> Document:
         "rising_rms_n": result.rising.rms_n,
         "falling_rms_n": result.falling.rms_n,
         "heldout_rms_n": heldout_n,
-        "heldout_error_n": _number(score.error_n2 / (2.0 * heldout_n)) if heldout_n else None,
+        "heldout_error_n": finite_or_none(score.error_n2 / (2.0 * heldout_n)) if heldout_n else None,
         "monotone": verdicts.rising_monotone and verdicts.falling_monotone,
         "crossing": str(verdicts.crossing) if verdicts.crossing else None,
         "steep": verdicts.steep,
@@ -110,16 +110,19 @@ def _reversal_facts(evaluation: Evaluation) -> Document:
         "identified": True,
         "span_n": evaluation.span_n,
         "points": reversal.span.points,
-        "rms_n": _rms(error_n),
+        "rms_n": rms_n(error_n),
         "max_n": float(np.abs(error_n).max()),
-        "switched_rms_n": _rms(switched_n),
-        "blend_heldout_n": _number(reversal.blend_heldout_n),
-        "slip_heldout_n": _number(reversal.slip_heldout_n),
+        "switched_rms_n": rms_n(switched_n),
+        "blend_heldout_n": finite_or_none(reversal.blend_heldout_n),
+        "slip_heldout_n": finite_or_none(reversal.slip_heldout_n),
     }
 
 
 def _model_facts(evaluation: Evaluation) -> Document:
-    """What is to be activated: with slip stops the branches are not those of the chosen fit, a joint fit has moved them."""
+    """Return the coefficients to be activated.
+
+    With slip stops the branches are not those of the chosen fit, a joint fit has moved them.
+    """
     slip = evaluation.reversal.slip if evaluation.reversal else None
     stops = slip.stops if slip else None
     return coefficients_of(evaluation.model.branches) | {
@@ -129,17 +132,8 @@ def _model_facts(evaluation: Evaluation) -> Document:
     }
 
 
-def _rms(values: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
-    return float(np.sqrt(np.mean(values * values)))
-
-
-def _number(value: float) -> float | None:
-    """JSON has no NaN."""
-    return float(value) if isfinite(value) else None
-
-
 def residual_of(evaluation: Evaluation) -> "np.ndarray[Any, np.dtype[np.float64]]":
-    """Measured minus the chosen model at each stair of the ladder, N."""
+    """Return measured minus the chosen model at each stair of the ladder, N."""
     ladder, branches = evaluation.checked.ladder, evaluation.chosen.result.branches
     rising, falling = branches.rising.value(ladder.voltage_v), branches.falling.value(ladder.voltage_v)
     return np.asarray(ladder.force_n - np.where(ladder.direction == RISING, rising, falling))

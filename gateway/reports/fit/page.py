@@ -28,11 +28,13 @@ def fit_page(evaluation: Evaluation, document: Document) -> str:
         _notes(document["notes"]),
         _pair(
             _figure(
-                "The loop", charts.draw_loop(evaluation), "Settled readings over the two branches of the chosen model."
+                "Hysteresis loop",
+                charts.draw_loop(evaluation),
+                "Settled readings over the two branches of the chosen model.",
             ),
-            _figure("What is left", charts.draw_residuals(evaluation), "Measured minus model at each stair."),
+            _figure("Residuals", charts.draw_residuals(evaluation), "Measured minus model at each stair."),
         ),
-        "<h2>Which model, which order</h2>",
+        "<h2>Choice of model and order</h2>",
         _pair(
             _figure(
                 "Order sweep",
@@ -110,7 +112,7 @@ def _notes(notes: list[str]) -> str:
     if not notes:
         return ""
     lines = "".join(f"<li>{escape(note)}</li>" for note in notes)
-    return f"<section class='notes'><h2>What was noticed</h2><ul>{lines}</ul></section>"
+    return f"<section class='notes'><h2>Notes</h2><ul>{lines}</ul></section>"
 
 
 def _figure(title: str, svg: str, caption: str) -> str:
@@ -135,9 +137,9 @@ def _why(document: Document) -> str:
         )
     branches = f"Rising branch {chosen['rising_rms_n']:.3f} N RMS, falling {chosen['falling_rms_n']:.3f} N."
     known = (
-        "pinned down"
+        "identifiable"
         if chosen["identifiable"]
-        else "not pinned down by these data, though the curve is: never compare fits by them"
+        else "not identifiable from these data, though the curve is: never compare fits by them"
     )
     return (
         f"<h3>Why {escape(_model(chosen))}</h3><p>{words}</p>"
@@ -196,9 +198,11 @@ def _reversal(evaluation: Evaluation, document: Document) -> str:
         return ""
     points = document["ladder"]["minor_points"]
     return "<h2>Reversals inside the loop</h2>" + _pair(
-        _figure("The walk", walk, f"{points} points of partial reversals; two branches alone cannot describe them."),
         _figure(
-            "What a command gets wrong",
+            "Partial reversals", walk, f"{points} points of partial reversals; two branches alone cannot describe them."
+        ),
+        _figure(
+            "Error of the command",
             charts.draw_minor_errors(evaluation),
             _why_reversal(document["reversal"]),
         ),
@@ -223,4 +227,4 @@ def _provenance(document: Document) -> str:
         "noise of a reading": f"{document['ladder']['noise_n']:.3f} N" if document["ladder"]["noise_n"] else None,
     }
     rows = "".join(f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in facts.items() if value)
-    return f"<h2>Where it comes from</h2><table class='facts'><tbody>{rows}</tbody></table>"
+    return f"<h2>Provenance</h2><table class='facts'><tbody>{rows}</tbody></table>"

@@ -1,4 +1,8 @@
-"""The heartbeat of the control loop: when it is overdue, and what a silence was. Standard library only."""
+"""Watches the heartbeat of the control loop: when it is overdue, and what caused a silence. Standard library only.
+
+What happens then (kill, safe voltage, restart) is decided in guardian.py, from `_on_deadline` on; when a restart is one too
+many in restart_policy.py.
+"""
 
 from collections.abc import Callable
 from typing import Final
