@@ -41,7 +41,7 @@ class Branches:
         return (rising[0], rising[-1]) == (falling[0], falling[-1])
 
     def crossing_fault(self) -> Crossing | None:
-        """Where the branches cross or touch between their ends, or None: exact."""
+        """Return where the branches cross or touch between their ends, or None: exact."""
         gap = self._gap_numerator()
         if not any(gap):
             return None

@@ -108,7 +108,7 @@ class Coefficients:
         )
 
     def round_to_float32(self) -> "Coefficients":
-        """As float32 stores them; what overflows float32 becomes infinite."""
+        """Return the set as float32 stores it; what overflows float32 becomes infinite."""
         return Coefficients(
             float32(self.x0_v),
             float32(self.x1_v),
@@ -149,7 +149,7 @@ class Allowed:
 
 
 def float32(number: float) -> float:
-    """The nearest float32; infinite beyond its range."""
+    """Return the nearest float32; infinite beyond its range."""
     try:
         return float(struct.unpack(">f", struct.pack(">f", number))[0])
     except OverflowError:

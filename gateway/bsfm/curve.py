@@ -85,7 +85,7 @@ class RationalBezier:
     @overload
     def slope(self, x: "NDArray[np.float64]") -> "NDArray[np.float64]": ...
     def slope(self, x: Any) -> Any:
-        """df/dx in N/V at x volts; the one-sided slope at and beyond the ends."""
+        """Return df/dx in N/V at x volts; the one-sided slope at and beyond the ends."""
         if not isinstance(x, (float, int)):
             return self._of_array(x, self.slope, self._slope)
         x = self.x0 if x < self.x0 else self.x1 if x > self.x1 else x
@@ -110,7 +110,7 @@ class RationalBezier:
         return exact.place_negative(rest) is None
 
     def minimum_slope(self) -> float:
-        """A proven lower bound of df/dx in N/V on [x0, x1], within 1e-9 of the mean slope below the true minimum."""
+        """Return a proven lower bound of df/dx in N/V on [x0, x1], within 1e-9 of the mean slope below the true minimum."""
         seen = min(self.slope(self.x0 + (self.x1 - self.x0) * i / 64) for i in range(65))
         tolerance = SLOPE_TOLERANCE * (
             abs(self.handles[-1] - self.handles[0]) / (self.x1 - self.x0) + abs(seen) + 1.0e-300

@@ -16,7 +16,7 @@ DEPTH = 80
 
 
 def whole_numbers(values: Iterable[float]) -> tuple[list[int], int]:
-    """Integers n_i and one scale L (a power of two) with value_i = n_i / L, exactly. Finite values only."""
+    """Return integers n_i and one scale L (a power of two) with value_i = n_i / L, exactly. Finite values only."""
     ratios = [value.as_integer_ratio() for value in values]
     scale = max(denominator for _, denominator in ratios)
     return [numerator * (scale // denominator) for numerator, denominator in ratios], scale
@@ -43,7 +43,7 @@ def difference(a: Sequence[int], b: Sequence[int]) -> list[int]:
 
 
 def raise_degree_by_two(a: Sequence[int]) -> list[int]:
-    """The same polynomial, two degrees higher: multiplied by ((1-t) + t)^2 = 1."""
+    """Return the same polynomial, two degrees higher: multiplied by ((1-t) + t)^2 = 1."""
     return product(a, (1, 2, 1))
 
 
@@ -66,12 +66,12 @@ def _slope_term(weights: Sequence[int], handles: Sequence[int], i: int, j: int) 
 
 
 def place_not_positive(coefficients: Sequence[int]) -> float | None:
-    """Where in [0, 1] the scaled polynomial fails to be > 0 inside (0, 1), or None. Zero at the two ends is allowed."""
+    """Return where in [0, 1] the scaled polynomial fails to be > 0 inside (0, 1), or None. Zero at the two ends is allowed."""
     return _failing_place(_bernstein(coefficients), touch=False)
 
 
 def place_negative(coefficients: Sequence[int]) -> float | None:
-    """Where in [0, 1] the scaled polynomial is < 0, or None. Touching zero is allowed."""
+    """Return where in [0, 1] the scaled polynomial is < 0, or None. Touching zero is allowed."""
     return _failing_place(_bernstein(coefficients), touch=True)
 
 

@@ -34,7 +34,7 @@ PLAIN = 1.0e60  # closed forms square their terms: outside 1e-60..1e60 the Newto
 
 
 def inverse_of(x0: float, x1: float, handles: Sequence[float], weights: Sequence[float]) -> Inverse:
-    """The inverse of an increasing curve. `weights` may be scaled by any common factor."""
+    """Return the inverse of an increasing curve. `weights` may be scaled by any common factor."""
     ratios = tuple(weight / weights[0] for weight in weights)
     sizes = (*ratios, handles[-1] - handles[0], max(map(abs, handles)))
     plain = all(1 / PLAIN < size < PLAIN for size in sizes)
@@ -46,7 +46,7 @@ def inverse_of(x0: float, x1: float, handles: Sequence[float], weights: Sequence
 
 
 def refuse_inverse(_force_n: float) -> tuple[float, InverseStatus]:
-    """The inverse of a curve that has none."""
+    """Raise ValueError: stands for the inverse of a curve that has none."""
     raise ValueError("the curve is not increasing: it has no inverse")
 
 

@@ -172,7 +172,7 @@ class Calibration:
         return max(rising[0], falling[0]), min(rising[-1], falling[-1])
 
     def model(self) -> Bsfm:
-        """The model of these coefficients. ValueError with a sentence if they are none."""
+        """Return the model of these coefficients. ValueError with a sentence if they are none."""
         arrays = (self.rising_handles_n, self.rising_weights, self.falling_handles_n, self.falling_weights)
         if any(len(array) != self.order + 1 for array in arrays):
             raise ValueError(

@@ -30,7 +30,7 @@ __all__ = [
 
 
 def validate_coefficients(raw: Coefficients, limits: CoefficientLimits) -> list[CoefficientFault]:
-    """All faults of numbers that may be anything. Curves are built and proven only
+    """Return all faults of numbers that may be anything. Curves are built and proven only
     from numbers that passed one by one, and stops against curves that passed."""
     stored = raw.round_to_float32()
     faults = [*_frame_faults(stored, limits), *_number_faults(stored, limits)]

@@ -23,7 +23,7 @@ from gateway.bsfm.slip.slip_stops import STOPS_MAX, SUM_TOLERANCE, SlipStops
 
 
 def stop_faults(stored: Coefficients, limits: CoefficientLimits) -> Iterator[CoefficientFault]:
-    """Of the numbers of slip stops, one by one and together."""
+    """Return the faults of the numbers of slip stops, one by one and together."""
     radii, shares = stored.slip_radii_v, stored.slip_shares
     if len(radii) != len(shares) or len(radii) > STOPS_MAX:
         text = f"slip stops: {len(radii)} radii and {len(shares)} shares: as many of each, at most {STOPS_MAX}"
@@ -54,7 +54,7 @@ def _share_faults(shares: tuple[float, ...]) -> Iterator[CoefficientFault]:
 
 
 def stiffness_faults(stored: Coefficients, branches: Branches) -> Iterator[CoefficientFault]:
-    """Of stops whose numbers have passed, on branches that have passed."""
+    """Return the faults of stops whose numbers have passed, on branches that have passed."""
     if not stored.slip_radii_v:
         return
     try:
@@ -64,7 +64,8 @@ def stiffness_faults(stored: Coefficients, branches: Branches) -> Iterator[Coeff
 
 
 def response_faults(response: Response | None, limits: CoefficientLimits) -> Iterator[CoefficientFault]:
-    """Of a measured response. All 0 is how words say that it was not measured, so no measurement may say it."""
+    """Return the faults of a measured response. All 0 is how words say that it was not measured, so no measurement may say
+    it."""
     if response is None:
         return
     bounds = (

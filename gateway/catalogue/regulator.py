@@ -60,7 +60,7 @@ def _supply(hints: SearchHints) -> tuple[Start, ...]:
 
 
 def limits(reached: tuple[float, ...]) -> tuple[float, ...]:
-    """Where what was reached may have met a limit: below each quantile, and closely below the largest."""
+    """Return where what was reached may have met a limit: below each quantile, and closely below the largest."""
     return tuple(0.97 * quantile for quantile in reached[1:-1]) + tuple(share * reached[-1] for share in NEAR)
 
 

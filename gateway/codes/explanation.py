@@ -17,6 +17,11 @@ class Explanation:
     do: str
     is_warning: bool = False
 
+    @property
+    def sentence(self) -> str:
+        """Title and cure as one clause, to end a message with."""
+        return f"{self.title}: {self.do[:1].lower()}{self.do[1:].rstrip('.')}"
+
 
 BUSY_CURE = "the machine is too busy: end other programs, or `run --realtime`"
 """Ends the sentences whose cause is a machine with too much to do (MACHINE_BUSY, A403)."""

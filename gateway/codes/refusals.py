@@ -160,7 +160,8 @@ class RefusalReason(IntEnum):
             "W213",
             "not ready",
             "Enable was asked for before everything was.",
-            "The gateway has just started, or a tare, an upload or a stop is under way.",
+            "The gateway has just started or ends, the cell is overloaded, a force stays at the safe voltage, or a stop is "
+            "under way.",
             "Wait for bit 1 (ready) of status_word.",
         ),
     )
@@ -172,7 +173,7 @@ class RefusalReason(IntEnum):
             "the output device is faulty",
             "Enable was asked for while the DAC or regulator does not answer properly.",
             "No power, a cable, or a device that refuses.",
-            "Read fault_code and warning_word; `force-gateway explain E111` for a silent line.",
+            "Check its power, its cable and its baud; `force-gateway explain E111` for a silent line.",
         ),
     )
     CELL_SILENT = (
@@ -183,7 +184,7 @@ class RefusalReason(IntEnum):
             "the load cell is silent",
             "Enable was asked for without a fresh sample of the load cell.",
             "No power, a cable, or an amplifier that has stopped streaming.",
-            "sample_age shows since when; `force-gateway explain E111` for a silent line.",
+            "Check its power, its cable and its stream mode; `force-gateway explain E111` for a silent line.",
         ),
     )
     RESET_NEEDS_ZERO = (

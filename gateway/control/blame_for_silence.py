@@ -37,7 +37,8 @@ NOT_HELD: Final = Held()
 
 
 def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: str) -> tuple[FaultCode, str]:
-    """The fault and what is to blame, in words. suspects: what it is where the machine did let us run; nan s: never heard."""
+    """Return the fault and what is to blame, in words. suspects: what it is where the machine did let us run; nan s: never
+    heard."""
     enough_s = _SHARE * silent_s
     waited_s = held.loop_waited_s
     ours = f"our own loop came {format_ms(held.loop_late_s)} late in that time"

@@ -45,13 +45,14 @@ class CommandTracker:
         self._update_demand()
 
     def expect_clearing(self) -> None:
-        """The bank is asked to zero the command: no bit stands any more, and the next heartbeat value is its doing and not a
-        beat."""
+        """Note that the bank is asked to zero the command: no bit stands any more, and the next heartbeat value is its doing
+        and not a beat."""
         self._word = 0
         self._adopt_heartbeat = True
 
     def edges_of(self, command: Command) -> Edges:
-        """What changes in the control word with this command. Reset, tare and takeover act whenever they are written as 1."""
+        """Return what changes in the control word with this command. Reset, tare and takeover act whenever they are written as
+        1."""
         word = int(command.control_word)
         if command.number == self.command.number:
             word &= ~_MOMENTARY  # the bank's own change of a command that has acted
@@ -59,7 +60,7 @@ class CommandTracker:
         return Edges(rises, falls, command.stops or bool(falls & _ENABLE and not rises & _CALIBRATE))
 
     def take(self, now_s: float, command: Command) -> Edges:
-        """From now on this is the command; none of its edges act twice."""
+        """Take this as the command from now on; none of its edges act twice."""
         if command is self.command:
             return NO_EDGES
         edges = self.edges_of(command)
@@ -89,7 +90,7 @@ class CommandTracker:
         return self.demand.gravity_n
 
     def start_lease(self, now_s: float) -> None:
-        """At enable: the master has one length of the lease to beat."""
+        """Start the lease at enable: the master has one length of the lease to beat."""
         self._lease.start(now_s)
 
     def is_lease_lost(self, now_s: float, owner_connected: bool) -> bool:
@@ -100,7 +101,8 @@ class CommandTracker:
         return self._lease.age_s(now_s)
 
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
-        """Whether the heartbeat has changed since then and within one length of the lease, were this command taken now."""
+        """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken
+        now."""
         return self._lease.would_be_fresh_since(since_s, now_s, command.heartbeat)
 
     @property

@@ -114,7 +114,7 @@ class Controller:
         return f"W305 {refused.text}" if refused else ""
 
     def safe_output(self, fault: FaultCode) -> Output:
-        """What to write when `step` raised."""
+        """Return what to write when `step` raised."""
         return safe_output(fault, self._settings.limits.safe_voltage_v)
 
     def step(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> Output:

@@ -27,7 +27,7 @@ class StepOutcome:
     release_owner: bool = False
 
     def tell(self, *sentences: str) -> None:
-        """Sentences for the log; empty ones are none."""
+        """Add sentences for the log; empty ones are none."""
         self.events.extend(filter(None, sentences))
 
 
@@ -48,7 +48,7 @@ class ControllerStatus:
 
 
 def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
-    """What a caller writes when `step` raised: the safe voltage, latched fault. `Controller.safe_output` knows the
+    """Return what a caller writes when `step` raised: the safe voltage, latched fault. `Controller.safe_output` knows the
     rig's voltage."""
     return Output(
         safe_voltage_v,
@@ -77,7 +77,7 @@ def status_bits(status: ControllerStatus, loop: ForceLoop) -> int:
 
 
 def warning_bits(word: int, loop: ForceLoop, restarted: bool, master_lost: bool) -> int:
-    """word: what the line and the process warn of."""
+    """Return the warning word. word: what the line and the process warn of."""
     return (
         word
         | (WarningBit.RESTARTED.value if restarted else 0)

@@ -24,16 +24,6 @@ _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), in
 _CALIBRATE, _TAKE = int(ControlBit.START_CALIBRATION), int(ControlBit.TAKE_OWNERSHIP)
 _WHOLE: Final = ControlBit(0)
 
-BLOCKS: Final = {
-    RefusalReason.FAULT_LATCHED: "a fault is latched: fix its cause (fault_code), then write force_setpoint 0 and "
-    "reset_fault (bit 1)",
-    RefusalReason.NOT_READY: "not ready yet: wait for bit 1 (ready) of status_word; first words of a device, an overloaded "
-    "cell, a force that stays at the safe voltage, or the end of the gateway",
-    RefusalReason.OUTPUT_FAULT: "the output device does not answer as it should: power, cable, baud?",
-    RefusalReason.CELL_SILENT: "no fresh sample of the load cell: power, cable, stream mode?",
-}
-"""Why the output cannot be enabled."""
-
 
 @dataclass(frozen=True, slots=True)
 class Situation:
@@ -175,7 +165,7 @@ def _refuse_blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
         return None
     what = "enable" if bit is ControlBit.ENABLE else "calibration"
     late = f"a device was not heard in time; {at.excuse}" if at.excuse and reason is at.block else ""
-    return EdgeRefusal(reason, bit, f"{what} refused: {late or BLOCKS[reason]}")
+    return EdgeRefusal(reason, bit, f"{what} refused: {late or reason.explanation.sentence}")
 
 
 def _no_run(reason: RefusalReason, why: str) -> EdgeRefusal:

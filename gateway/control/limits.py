@@ -33,7 +33,7 @@ def finite(value: float, name: str) -> float:
 
 
 def force_limited(target_n: float, limits: Limits) -> Limited:
-    """0 .. force_max_n (rig limits); the bank refuses such a setpoint before, this is the second line."""
+    """Limit a setpoint to 0 .. force_max_n (rig limits); the bank refuses such a setpoint before, this is the second line."""
     target_n = finite(target_n, "force_setpoint_n")
     ranged_n = max(0.0, min(limits.force_max_n, target_n))
     return ranged_n, LimitedBy.NONE if ranged_n == target_n else LimitedBy.FORCE_RANGE
@@ -49,25 +49,25 @@ def narrow_limits(limits: Limits, own_n: tuple[float, float] | None) -> Limits:
 
 
 def is_below_usable(target_n: float, limits: Limits) -> bool:
-    """Whether the target is below the smallest usable force, where the output is 0 V."""
+    """Return whether the target is below the smallest usable force, where the output is 0 V."""
     return finite(target_n, "force_target_n") < limits.smallest_force_n
 
 
 def trim_limited(trim_v: float, limit_v: float) -> Limited:
-    """+- limit_v (rig, trim.limit_v): the trim corrects the model, it does not replace it."""
+    """Limit a correction to +- limit_v (rig, trim.limit_v): the trim corrects the model, it does not replace it."""
     ranged_v = max(-limit_v, min(limit_v, finite(trim_v, "trim_v")))
     return ranged_v, LimitedBy.NONE if abs(ranged_v) < limit_v or limit_v == 0.0 else LimitedBy.TRIM_RANGE
 
 
 def voltage_limited(target_v: float, limits: Limits) -> Limited:
-    """voltage_min_v .. voltage_max_v (rig limits, within the output device's range)."""
+    """Limit a voltage to voltage_min_v .. voltage_max_v (rig limits, within the output device's range)."""
     target_v = finite(target_v, "voltage_v")
     ranged_v = max(limits.voltage_min_v, min(limits.voltage_max_v, target_v))
     return ranged_v, LimitedBy.NONE if ranged_v == target_v else LimitedBy.VOLTAGE_RANGE
 
 
 def slew_limited(target_v: float, last_v: float, slew_v_per_s: float, dt_s: float) -> Limited:
-    """At most slew_v_per_s x dt_s above last_v; falling is immediate: less voltage is less force."""
+    """Limit a rise to at most slew_v_per_s x dt_s above last_v; falling is immediate: less voltage is less force."""
     highest_v = last_v + slew_v_per_s * finite(dt_s, "dt_s")
     if finite(target_v, "voltage_v") > highest_v:
         return highest_v, LimitedBy.VOLTAGE_SLEW
@@ -75,7 +75,7 @@ def slew_limited(target_v: float, last_v: float, slew_v_per_s: float, dt_s: floa
 
 
 def ramp_limited(target_n: float, last_n: float, rate_n_per_s: float, dt_s: float) -> float:
-    """Towards the target by at most rate x dt, both ways (command register force_ramp, or the rig's default)."""
+    """Move towards the target by at most rate x dt, both ways (command register force_ramp, or the rig's default)."""
     step_n = rate_n_per_s * finite(dt_s, "dt_s")
     return max(last_n - step_n, min(last_n + step_n, finite(target_n, "force_target_n")))
 
@@ -90,12 +90,13 @@ class RateBudget:
         self.available_s = min(self.available_s + dt_s, max(TICK_S, min(dt_s, LONGEST_STEP_S)))
 
     def spend(self, moved: float, rate_per_s: float) -> None:
-        """moved: by how much the value went; rate_per_s: its limit, in the same unit per second."""
+        """Take what a movement costs from the budget. moved: by how much the value went; rate_per_s: its limit, in the same
+        unit per second."""
         self.available_s = max(0.0, self.available_s - abs(moved) / rate_per_s)
 
 
 def strongest(*limits: LimitedBy) -> LimitedBy:
-    """The strongest of several limits that act at once: the smallest number but NONE."""
+    """Return the strongest of several limits that act at once: the smallest number but NONE."""
     return min((limit for limit in limits if limit), default=LimitedBy.NONE)
 
 
@@ -112,7 +113,7 @@ class VoltageLimiter:
         self._pace.earn(dt_s)
 
     def drive(self, target_v: float) -> LimitedBy:
-        """Towards the target as far as the limits allow now."""
+        """Move the output towards the target as far as the limits allow now."""
         last_v, slew_v_per_s = self.voltage_v, self._limits.voltage_slew_v_per_s
         ranged_v, by_range = voltage_limited(target_v, self._limits)
         self.voltage_v, by_slew = slew_limited(ranged_v, last_v, slew_v_per_s, self._pace.available_s)

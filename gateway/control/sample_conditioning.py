@@ -32,7 +32,7 @@ NO_READING: Final = Reading()
 
 
 def at_time(reading: Reading, later_s: float, supervision: Supervision) -> Reading:
-    """The same reading later_s after it was made: older, and perhaps no longer fresh; not new any more."""
+    """Return the same reading later_s after it was made: older, and perhaps no longer fresh; not new any more."""
     age_s = reading.age_s + max(0.0, later_s)
     return replace(reading, age_s=age_s, interval_s=0.0, is_new=False, is_fresh=age_s <= supervision.sample_timeout_s)
 
@@ -84,7 +84,7 @@ class SampleConditioner:
         return self._zero.take(gravity_n)
 
     def why_no_zero(self, gravity_n: float) -> str:
-        """Why the recent samples are no zero, in numbers; empty where they are one."""
+        """Return why the recent samples are no zero, in numbers; empty where they are one."""
         return self._zero.unsteady(gravity_n)
 
     def _interval_s(self, time_s: float) -> float:

@@ -63,7 +63,7 @@ class TransitionError(Exception):
 
 
 def next_state(state: State, event: StateEvent) -> State:
-    """The state after an event. TransitionError for a pair that is not in the table."""
+    """Return the state after an event. TransitionError for a pair that is not in the table."""
     try:
         return TRANSITIONS[state, event]
     except KeyError:

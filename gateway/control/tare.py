@@ -26,11 +26,11 @@ class Zero:
         self._largest_n = _LARGEST_SHARE * supervision.saturation_n
 
     def observe(self, force_n: float) -> None:
-        """One more usable sample, N."""
+        """Keep one more usable sample, N."""
         self._recent_n.append(force_n)
 
     def forget(self) -> None:
-        """The stream was interrupted: what came before does not describe now."""
+        """Forget all samples after the stream was interrupted: they do not describe now."""
         self._recent_n.clear()
 
     def take(self, gravity_n: float) -> float:
@@ -40,7 +40,7 @@ class Zero:
         return self.zero_n - before_n
 
     def unsteady(self, gravity_n: float) -> str:
-        """Why the recent samples are no zero, in numbers; empty where they are one."""
+        """Return why the recent samples are no zero, in numbers; empty where they are one."""
         recent = self._recent_n
         if len(recent) < _FEWEST:
             return f"{len(recent)} usable samples, at least {_FEWEST} are needed"

@@ -52,7 +52,7 @@ class Transitions:
         self.outcome = StepOutcome()
 
     def tell(self, *sentences: str) -> None:
-        """Sentences for the log; empty ones are none."""
+        """Add sentences for the log; empty ones are none."""
         self.outcome.tell(*sentences)
 
     def fire(self, event: StateEvent) -> None:
@@ -84,7 +84,7 @@ class Transitions:
         self.tell(sentence)
 
     def disable(self, sentence: str) -> None:
-        """The output off: the safe voltage at once, and the command with it."""
+        """Switch the output off: the safe voltage at once, and the command with it."""
         self.fire(StateEvent.DISABLE)
         self._let_go(sentence)
 
@@ -94,7 +94,7 @@ class Transitions:
         self._let_go(cause.sentence)
 
     def fail_internally(self, now_s: float) -> None:
-        """After an exception: the safe voltage and INTERNAL, unless another fault is latched already."""
+        """Latch INTERNAL after an exception, with the safe voltage, unless another fault is latched already."""
         self._rest()
         if self.state is not State.FAULT:
             self._latch(now_s, FaultCode.INTERNAL)
@@ -109,7 +109,7 @@ class Transitions:
         self.fault, self.is_restarted = FaultCode.NONE, False
 
     def lose_master(self, now_s: float, seen: str, action: LeaseAction) -> None:
-        """The lease is over: what the rig says about it. seen: how it was noticed."""
+        """Do what the rig says where the lease is over. seen: how it was noticed."""
         self.outcome.release_owner = True
         if action is LeaseAction.FAULT:
             self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))

@@ -30,12 +30,12 @@ _TRAILERS: Final[dict[ChecksumName, Callable[[bytes], bytes]]] = {
 
 
 def add_checksum(body: bytes, name: ChecksumName) -> bytes:
-    """The sentence with its checksum behind it."""
+    """Return the sentence with its checksum behind it."""
     return body + _TRAILERS[name](body)
 
 
 def strip_checksum(sentence: bytes, name: ChecksumName) -> bytes | None:
-    """The sentence without its checksum, None when that is missing or wrong."""
+    """Return the sentence without its checksum, None when that is missing or wrong."""
     length = len(_TRAILERS[name](b""))
     body = sentence[: len(sentence) - length]
     return body if add_checksum(body, name) == sentence else None

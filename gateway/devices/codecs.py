@@ -46,5 +46,5 @@ def cell_host(profile: DeviceProfile, sign: int = 1, unit: str | None = None) ->
 
 
 def cell_device(profile: DeviceProfile, unit: str | None = None) -> CellDevice:
-    """The amplifier's end; unit as for `cell_host`."""
+    """Return the amplifier's end; unit as for `cell_host`."""
     return _find(CELL_CODECS, profile, Role.LOAD_CELL)[1](profile, unit)

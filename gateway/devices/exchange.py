@@ -47,7 +47,7 @@ class Scale:
         return self.device[0] - slack <= number <= self.device[1] + slack
 
     def on_grid(self, number: float, decimals: int) -> float:
-        """The nearest number with so many decimals that lies within the range, where one does."""
+        """Return the nearest number with so many decimals that lies within the range, where one does."""
         per_unit: int = 10**decimals
         lowest, highest = ceil(self.device[0] * per_unit - _GRAIN), floor(self.device[1] * per_unit + _GRAIN)
         return float(min(highest, max(lowest, round(number * per_unit)))) / per_unit
@@ -219,7 +219,7 @@ class ForceReading:
         return max(0.0, float(10.0**digits) - self.step)
 
     def word(self, quality: Quality) -> str | None:
-        """The status word that means this, None where the frame has none; a device may know unstable readings only."""
+        """Return the status word that means this, None where the frame has none; a device may know unstable readings only."""
         meant = (quality, Quality.UNSTABLE) if quality is Quality.OK else (quality,)
         return next((word for one in meant for word, meaning in self.quality.items() if meaning == one), None)
 

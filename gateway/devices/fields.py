@@ -211,7 +211,7 @@ _WORD = re.compile(r"[!-~]+")
 
 
 def field_from(name: str, spec: str) -> Field:
-    """The field that {name:spec} means; TemplateError where it is none of the five shapes."""
+    """Return the field that {name:spec} means; TemplateError where it is none of the five shapes."""
     if found := _WHOLE.fullmatch(spec):
         return WholeNumber(name, found[1], found[2], int(found[3] or 0))
     if found := _HEX.fullmatch(spec):

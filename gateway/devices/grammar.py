@@ -25,7 +25,7 @@ class Grammar:
         return self.profile.set_voltage
 
     def exchange(self, message: OutputRequest) -> Exchange:
-        """How this is asked and answered; ValueRefused when the device has no words for it."""
+        """Return how this is asked and answered; ValueRefused when the device has no words for it."""
         exchange: Exchange | None
         match message:
             case SetVoltage():
@@ -45,15 +45,15 @@ class Grammar:
         return self._numbers[template]
 
     def line(self, body: bytes) -> bytes:
-        """A sentence with its checksum and terminator: what goes on the wire."""
+        """Return a sentence with its checksum and terminator: what goes on the wire."""
         return add_checksum(body, self.profile.checksum) + self.profile.terminator_bytes
 
     def body(self, line: Line) -> bytes | None:
-        """The sentence in a line that arrived, None when it is overlong or its checksum is wrong."""
+        """Return the sentence in a line that arrived, None when it is overlong or its checksum is wrong."""
         return strip_checksum(line.body, self.profile.checksum) if line.is_whole else None
 
     def number_line(self, template: str, number: float) -> bytes:
-        """The line with this number in it, nearest on the template's own grid."""
+        """Return the line with this number in it, nearest on the template's own grid."""
         values: dict[str, Value] = dict(self.profile.constants)
         number_field, decimals = self._number_in(template)
         if number_field is not None:
@@ -61,7 +61,7 @@ class Grammar:
         return self.line(compile_template(template).encode(values))
 
     def answer_line(self, exchange: Exchange, value: float) -> bytes:
-        """The answer with this physical value in it; a sensor or a setting stops at the ends of its range."""
+        """Return the answer with this physical value in it; a sensor or a setting stops at the ends of its range."""
         number = exchange.range.scale.on_grid(
             exchange.range.scale.to_number(value), self._number_in(exchange.answer)[1]
         )
@@ -75,12 +75,12 @@ class Grammar:
         return values
 
     def number(self, template: str, values: dict[str, Value]) -> float | None:
-        """The number among the values, None when the template carries none."""
+        """Return the number among the values, None when the template carries none."""
         number_field, _ = self._number_in(template)
         return float(values[number_field.name]) if number_field else None
 
     def setting(self, voltage_v: float) -> float:
-        """The device's number for a voltage, on its grid. ValueRefused for nan, inf, and outside its range."""
+        """Return the device's number for a voltage, on its grid. ValueRefused for nan, inf, and outside its range."""
         exchange = self.set_voltage
         scale, number = exchange.range.scale, exchange.range.scale.to_number(voltage_v)
         decimals = self._number_in(exchange.ask)[1]
@@ -90,5 +90,6 @@ class Grammar:
         return scale.on_grid(number, decimals)
 
     def half_step(self, template: str) -> float:
-        """Half of what the template's number counts in: a reading beyond its range by less than that was only rounded."""
+        """Return half of what the template's number counts in: a reading beyond its range by less than that was only
+        rounded."""
         return 0.5 * float(10.0 ** -self._number_in(template)[1])

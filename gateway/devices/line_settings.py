@@ -36,7 +36,7 @@ class SerialSettings:
         return self.bits_per_character / self.baud
 
     def at(self, baud: int) -> "SerialSettings":
-        """The same frame at another speed: what a rig file says about a device that can be set."""
+        """Return the same frame at another speed: what a rig file says about a device that can be set."""
         return replace(self, baud=cast("Baud", baud))
 
     def __str__(self) -> str:

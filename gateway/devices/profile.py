@@ -104,7 +104,7 @@ class DeviceProfile:
         return self.terminator.encode("ascii")
 
     def number_in(self, template_text: str) -> Field | None:
-        """The field that carries the number: the only one that is neither a constant nor a word."""
+        """Return the field that carries the number: the only one that is neither a constant nor a word."""
         fields = compile_template(template_text).fields
         numbers = [one for one in fields if one.name not in self.constants and not isinstance(one, Choice)]
         if len(numbers) > 1 or any(not isinstance(one, WholeNumber | Decimals) for one in numbers):
@@ -112,7 +112,7 @@ class DeviceProfile:
         return numbers[0] if numbers else None
 
     def decimals_in(self, template_text: str) -> int:
-        """Decimals of the number that a template carries; 0 for a whole number, or none."""
+        """Return the decimals of the number that a template carries; 0 for a whole number, or none."""
         number = self.number_in(template_text)
         return number.decimals if isinstance(number, Decimals) else 0
 

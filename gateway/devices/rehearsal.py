@@ -35,7 +35,7 @@ _LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
 
 def rehearse(profile: DeviceProfile) -> Found:
-    """What keeps the two ends of this profile from understanding each other; nothing when they do."""
+    """Return what keeps the two ends of this profile from understanding each other; nothing when they do."""
     yield from _output(profile) if profile.role is Role.OUTPUT else _cell(profile)
 
 

@@ -28,7 +28,8 @@ class OutputHost(Protocol):
         """What to ask a device that has nothing to do; None where it can only be told its setting again."""
 
     def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
-        """Whether this answer to `question` says that the setting stands, up to the rounding of the numbers on the wire."""
+        """Return whether this answer to `question` says that the setting stands, up to the rounding of the numbers on the
+        wire."""
 
     @property
     def expecting(self) -> int:
@@ -39,13 +40,13 @@ class OutputHost(Protocol):
         """What acknowledges the last `safe_frame` (the least voltage before the first): a whole line."""
 
     def request(self, message: OutputRequest) -> bytes:
-        """The bytes to write; their answer is expected from now on. ValueRefused when the device cannot be told that."""
+        """Return the bytes to write; their answer is expected from now on. ValueRefused when the device cannot be told that."""
 
     def safe_frame(self, voltage_v: float) -> bytes:
-        """The bytes that set this voltage, without expecting anything: for the final safe-voltage write."""
+        """Return the bytes that set this voltage, without expecting anything: for the final safe-voltage write."""
 
     def receive(self, chunk: bytes, now_s: float) -> list[OutputReply]:
-        """What these bytes complete. Never raises."""
+        """Return what these bytes complete. Never raises."""
 
     def forget(self) -> None:
         """Drop half-received bytes and expected answers: after a timeout, or when the port was opened again."""
@@ -55,13 +56,13 @@ class OutputDevice(Protocol):
     """The regulator's end, for the simulated rig and for tests."""
 
     def receive(self, chunk: bytes, now_s: float) -> list[OutputRequest | Garbage]:
-        """Requests in the order of arrival. Garbage is answered by `refusal`."""
+        """Return requests in the order of arrival. Garbage is answered by `refusal`."""
 
     def reply(self, reply: OutputReply, to: OutputRequest | None = None) -> bytes:
-        """The bytes of an answer; `to` says the question where Accepted answers a ReadVoltage."""
+        """Return the bytes of an answer; `to` says the question where Accepted answers a ReadVoltage."""
 
     def refusal(self, garbage: Garbage) -> Refused:
-        """The device's own word for bytes that it does not obey; no text: it stays silent."""
+        """Return the device's own word for bytes that it does not obey; no text: it stays silent."""
 
 
 class CellHost(Protocol):
@@ -72,10 +73,10 @@ class CellHost(Protocol):
         """One count of the amplifier as it is set in the profile, N."""
 
     def poll(self) -> bytes:
-        """The bytes that ask for one reading; empty for a stream."""
+        """Return the bytes that ask for one reading; empty for a stream."""
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
-        """What these bytes complete. Never raises."""
+        """Return what these bytes complete. Never raises."""
 
     def forget(self) -> None:
         """Drop half-received bytes: when the port was opened again."""
@@ -85,8 +86,8 @@ class CellDevice(Protocol):
     """The amplifier's end, for the simulated rig and for tests."""
 
     def receive(self, chunk: bytes, now_s: float) -> int:
-        """How many readings these bytes ask for; 0 for a stream."""
+        """Return how many readings these bytes ask for; 0 for a stream."""
 
     def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
-        """One reading, in the rig's unit where the frame says none. What does not fit the display is an overload, as on
+        """Return one reading, in the rig's unit where the frame says none. What does not fit the display is an overload, as on
         the device."""

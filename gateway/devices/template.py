@@ -28,7 +28,8 @@ class Template:
         return next((field for field in self.fields if field.name == name), None)
 
     def encode(self, values: Mapping[str, Value], may_be_blank: str = "") -> bytes:
-        """The bytes of one sentence. A choice that is not given is its first word. ValueRefused when a value does not fit."""
+        """Return the bytes of one sentence. A choice that is not given is its first word. ValueRefused when a value does not
+        fit."""
         text = "".join(
             piece if isinstance(piece, str) else _encode_field(piece, values, may_be_blank) for piece in self.pieces
         )
@@ -38,7 +39,7 @@ class Template:
         return data
 
     def decode(self, data: bytes, may_be_blank: str = "") -> dict[str, Value] | None:
-        """The values by field name, None when these bytes are not this sentence."""
+        """Return the values by field name, None when these bytes are not this sentence."""
         found = self.pattern.fullmatch(data)
         if found is None:
             return None
@@ -64,7 +65,7 @@ def _encode_field(field: Field, values: Mapping[str, Value], may_be_blank: str) 
 
 @cache
 def compile_template(text: str) -> Template:
-    """The template that this text means; TemplateError with a sentence for its author."""
+    """Return the template that this text means; TemplateError with a sentence for its author."""
     pieces = _pieces(text)
     _check(text, pieces)
     expression = "".join(re.escape(piece) if isinstance(piece, str) else f"({piece.pattern})" for piece in pieces)

@@ -20,7 +20,7 @@ class PacedWire:
         self.dropped_bytes = 0
 
     def send(self, data: bytes, now_s: float) -> None:
-        """Bytes handed to the sender at now_s; they follow what is still on the wire."""
+        """Hand bytes to the sender at now_s; they follow what is still on the wire."""
         taken = data[: self.room]
         self.dropped_bytes += len(data) - len(taken)
         if not self._queue:
@@ -54,7 +54,7 @@ class PacedWire:
 
 
 def resample_at_baud(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
-    """What a UART at heard_baud makes of characters (8N1) sent at sent_baud.
+    """Return what a UART at heard_baud makes of characters (8N1) sent at sent_baud.
 
     The levels of the line are sampled as a receiver does: a start edge, then the middle of each bit. Characters without
     a stop bit (framing errors) are delivered as they were sampled, as Linux does with IGNPAR unset and INPCK off.

@@ -92,12 +92,13 @@ class _ColumnFit:
         return 1.0 - self.alike**2
 
     def off(self, factor: float = 1.0) -> float:
-        """|log| of the gain against a factor; infinite for a gain that is none."""
+        """Return |log| of the gain against a factor; infinite for a gain that is none."""
         return abs(log(self.gain / factor)) if self.gain > 0.0 else inf
 
 
 def find_suspects(measurements: Sequence[Measurement], plant: Plant, *, is_own: bool) -> tuple[Suspect, ...]:
-    """At most one for each recording, None for those that are as they should be. is_own: the plant is the recording's rig's."""
+    """Return at most one for each recording, None for those that are as they should be. is_own: the plant is the recording's
+    rig's."""
     against = "the rig's plant" if is_own else "the start plant"
     found = (_suspect(_thin(each), plant, is_own) for each in measurements)
     return tuple(replace(each, against=against) for each in found if each is not None)
@@ -109,7 +110,7 @@ def name_options(found: Sequence[Suspect], given: str = "") -> tuple[Suspect, ..
 
 
 def columns_option(suspect: Suspect, given: str = "") -> str:
-    """`--columns ...` that corrects it. given: what --columns said, NAME=SOURCE[:UNIT] with commas: sources stay."""
+    """Return `--columns ...` that corrects it. given: what --columns said, NAME=SOURCE[:UNIT] with commas: sources stay."""
     entries = dict(part.strip().split("=", 1) for part in given.split(",") if "=" in part)
     sources = {name: entry.rpartition(":")[0] or entry for name, entry in entries.items()}
     for name, source in suspect.mapping.items():

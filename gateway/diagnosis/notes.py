@@ -30,7 +30,7 @@ def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[flo
 
 
 def uninformative_force(measurements: Sequence[Measurement]) -> str:
-    """Why these recordings say nothing of the machine, as a sentence; empty where one of them does: its force moves."""
+    """Return why these recordings say nothing of the machine, as a sentence; empty where one of them does: its force moves."""
     whys = [_why_uninformative(each) for each in measurements]
     return whys[0] if all(whys) else ""
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 
 def pack_bits(values: Sequence[bool]) -> bytes:
-    """Values as on the wire; an empty sequence is no byte."""
+    """Pack values as they are on the wire; an empty sequence is no byte."""
     number = 0
     for index, value in enumerate(values):
         number |= bool(value) << index
@@ -12,7 +12,7 @@ def pack_bits(values: Sequence[bool]) -> bytes:
 
 
 def unpack_bits(data: bytes, count: int) -> list[bool]:
-    """The first count values; bits after them are ignored. Raises ValueError when data is too short."""
+    """Return the first count values; bits after them are ignored. Raises ValueError when data is too short."""
     if len(data) * 8 < count:
         raise ValueError(f"{count} bits do not fit in {len(data)} bytes")
     number = int.from_bytes(data, "little")

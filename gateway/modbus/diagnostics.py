@@ -34,7 +34,7 @@ def loopback_request(data: bytes) -> bytes:
 
 
 def loopback_answer(pdu: bytes) -> bytes:
-    """The request itself. RequestError: 01 other sub-functions, 03 half a word."""
+    """Return the request itself. RequestError: 01 other sub-functions, 03 half a word."""
     if len(pdu) < 3 or len(pdu) % 2 == 0:
         raise wrong_length(pdu, "a diagnostic request has a sub-function and whole words")
     function = int.from_bytes(pdu[1:3], "big")

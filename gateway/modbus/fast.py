@@ -27,7 +27,7 @@ def whole_read_answer(
     unpack_from: Callable[[bytes | bytearray], tuple[int, ...]] = _FRAME.unpack_from,
     pack: Callable[..., bytes] = _ANSWER.pack,
 ) -> bytes | None:
-    """The answer to the 12 bytes at the start of frame; None when they are not one plain, allowed register read."""
+    """Return the answer to the 12 bytes at the start of frame; None when they are not one plain, allowed register read."""
     transaction, protocol, length, unit, function, address, count = unpack_from(frame)
     if protocol or length != 6 or not 3 <= function <= 4 or not 0 < count < 126 or unit not in units:
         return None
@@ -38,7 +38,7 @@ def whole_read_answer(
 
 
 def whole_answer(buffer: bytearray, size: int, units: Container[int], bank: DataBank, peer: Peer) -> bytes | None:
-    """The answer to the size bytes at the start of buffer; None when they are not one whole frame for a served unit."""
+    """Return the answer to the size bytes at the start of buffer; None when they are not one whole frame for a served unit."""
     transaction, protocol, length, unit = HEADER.unpack_from(buffer)
     if protocol or length + 6 != size or not 2 <= length <= 254 or unit not in units:
         return None

@@ -27,7 +27,7 @@ def identification_request(code: int, first_object: int = 0) -> bytes:
 
 
 def identification_answer(pdu: bytes, identity: Mapping[int, bytes]) -> bytes:
-    """The device's answer. Raises RequestError: 01 other MEI types, 03 shape or code, 02 an object that is not there."""
+    """Return the device's answer. Raises RequestError: 01 other MEI types, 03 shape or code, 02 an object that is not there."""
     if len(pdu) > 1 and pdu[1] != MEI_TYPE:
         raise RequestError(
             RequestFault.FUNCTION, f"function 43 with MEI type {pdu[1]}, served is {MEI_TYPE}", ENCAPSULATED
@@ -44,7 +44,7 @@ def identification_answer(pdu: bytes, identity: Mapping[int, bytes]) -> bytes:
 
 
 def parse_identification(data: bytes) -> tuple[dict[int, bytes], int | None]:
-    """The host's reading of an answer after its function byte: objects, and which to ask for next (None: no more).
+    """Return the host's reading of an answer after its function byte: objects, and which to ask for next (None: no more).
 
     Raises ValueError when the objects do not fill the answer exactly.
     """

@@ -45,7 +45,7 @@ class MbapFramer:
         self._buffer += chunk
 
     def take(self) -> Adu | None:
-        """The next whole frame; None when there is none yet. Raises FramingLost as soon as the header tells."""
+        """Return the next whole frame; None when there is none yet. Raises FramingLost as soon as the header tells."""
         buffer = self._buffer
         if len(buffer) < 6:
             if len(buffer) >= 4 and (buffer[2] or buffer[3]):
@@ -71,7 +71,7 @@ class MbapFramer:
 
 
 def encode(adu: Adu) -> bytes:
-    """The frame as bytes, either direction. Raises ValueError when the PDU is empty or longer than 253."""
+    """Return the frame as bytes, either direction. Raises ValueError when the PDU is empty or longer than 253."""
     if not 1 <= len(adu.pdu) <= _LONGEST_LENGTH - 1:
         raise ValueError(f"a PDU has 1 to 253 bytes, not {len(adu.pdu)}")
     return HEADER.pack(adu.transaction, 0, len(adu.pdu) + 1, adu.unit) + adu.pdu

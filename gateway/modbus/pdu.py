@@ -1,4 +1,6 @@
 """Requests as bytes, both ends of the wire side by side: NAME_request() is the host's, parse_NAME() the device's.
+The service is a device only: three of the host's builders serve `upload` (gateway/cli/master), the others are the master's
+side that tests use as the other end.
 
 Plain functions and tuples on purpose: a frozen dataclass for each request costs more than the answer itself.
 parse_* check shape and quantity and raise RequestError(03): a truncated PDU, surplus bytes and a byte count that
@@ -49,7 +51,7 @@ def read_request(function: int, address: int, count: int) -> bytes:
 
 
 def parse_read(pdu: bytes, most: int) -> tuple[int, int]:
-    """address, count of FC01 to FC04."""
+    """Return address, count of FC01 to FC04."""
     if len(pdu) != _TWO.size:
         raise wrong_length(pdu, f"a read has {_TWO.size}")
     _function, address, count = _TWO.unpack(pdu)
@@ -68,7 +70,7 @@ def write_register_request(address: int, word: int) -> bytes:
 
 
 def parse_write_one(pdu: bytes) -> tuple[int, int]:
-    """address, word of FC05 and FC06. The word is the server's to judge: its address comes first."""
+    """Return address, word of FC05 and FC06. The word is the server's to judge: its address comes first."""
     if len(pdu) != _TWO.size:
         raise wrong_length(pdu, f"a single write has {_TWO.size}")
     _function, address, word = _TWO.unpack(pdu)
@@ -83,7 +85,7 @@ def write_coils_request(address: int, values: Sequence[bool]) -> bytes:
 
 
 def parse_write_coils(pdu: bytes) -> tuple[int, list[bool]]:
-    """address, values of FC15; padding bits are ignored."""
+    """Return address, values of FC15; padding bits are ignored."""
     address, count, data = _parse_many(pdu)
     _quantity(count, MOST_BITS_WRITTEN, address)
     _byte_count(len(data), (count + 7) // 8, address)
@@ -97,7 +99,7 @@ def write_registers_request(address: int, data: bytes) -> bytes:
 
 
 def parse_write_registers(pdu: bytes) -> tuple[int, bytes]:
-    """address, big-endian words of FC16."""
+    """Return address, big-endian words of FC16."""
     address, count, data = _parse_many(pdu)
     _quantity(count, MOST_REGISTERS_WRITTEN, address)
     _byte_count(len(data), 2 * count, address)
@@ -110,7 +112,7 @@ def mask_write_request(address: int, and_mask: int, or_mask: int) -> bytes:
 
 
 def parse_mask_write(pdu: bytes) -> tuple[int, int, int]:
-    """address, and_mask, or_mask of FC22."""
+    """Return address, and_mask, or_mask of FC22."""
     if len(pdu) != _MASK.size:
         raise wrong_length(pdu, f"a mask write has {_MASK.size}")
     _function, address, and_mask, or_mask = _MASK.unpack(pdu)
@@ -125,7 +127,7 @@ def read_write_request(read_address: int, count: int, write_address: int, data: 
 
 
 def parse_read_write(pdu: bytes) -> tuple[int, int, int, bytes]:
-    """read address, count, write address, big-endian words of FC23."""
+    """Return read address, count, write address, big-endian words of FC23."""
     if len(pdu) < _READ_WRITE.size:
         raise wrong_length(pdu, f"a read/write has at least {_READ_WRITE.size}")
     _function, read_address, count, write_address, written, size = _READ_WRITE.unpack_from(pdu)
@@ -138,7 +140,7 @@ def parse_read_write(pdu: bytes) -> tuple[int, int, int, bytes]:
 
 
 def exception_pdu(function: int, code: int) -> bytes:
-    """The answer that refuses: the function with its top bit set, and the code."""
+    """Return the answer that refuses: the function with its top bit set, and the code."""
     return bytes((function | 0x80, code))
 
 
@@ -153,12 +155,12 @@ def _parse_many(pdu: bytes) -> tuple[int, int, bytes]:
 
 
 def address_in(pdu: bytes) -> int | None:
-    """The (first) address of a request, where it has one."""
+    """Return the (first) address of a request, where it has one."""
     return int.from_bytes(pdu[1:3], "big") if len(pdu) > 2 and pdu[0] in _ADDRESSED else None
 
 
 def wrong_length(pdu: bytes, expected: str) -> RequestError:
-    """The refusal of a request that is cut off or has surplus bytes. expected: `a read has 5`."""
+    """Return the refusal of a request that is cut off or has surplus bytes. expected: `a read has 5`."""
     sentence = f"function {pdu[0]} with {len(pdu)} bytes, {expected}"
     return RequestError(RequestFault.QUANTITY, sentence, len(pdu), address_in(pdu))
 

@@ -35,19 +35,19 @@ class DataBank(Protocol):
         """Big-endian words. count is 1..125 already."""
 
     def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
-        """Packed, first bit lowest, unused bits 0. count is 1..2000 already."""
+        """Return bits, packed, first bit lowest, unused bits 0. count is 1..2000 already."""
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
-        """Raises what read_registers would raise."""
+        """Raise what read_registers would raise."""
 
     def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
         """Big-endian words, all or nothing."""
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
-        """All or nothing."""
+        """Write all or nothing."""
 
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
-        """One word: (word & and_mask) | (or_mask & ~and_mask)."""
+        """Write one word: (word & and_mask) | (or_mask & ~and_mask)."""
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Told of each request that the protocol's own rules have refused. Must not raise."""
@@ -66,7 +66,7 @@ def answer(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
 
 
 def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBank, peer: Peer) -> bytes:
-    """The answer to a request (unit, PDU) for a unit that is not served here."""
+    """Return the answer to a request (unit, PDU) for a unit that is not served here."""
     unit, pdu = request
     known = ", ".join(map(str, served))
     refusal = RequestError(RequestFault.UNIT, f"unit id {unit}, served here: {known}", unit, P.address_in(pdu))

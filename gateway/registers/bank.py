@@ -88,7 +88,7 @@ class RegisterBank:
         return ServerId(SERVER_ID, not is_fault, b" ".join(self.identity[number] for number in (0, 2, 6)))
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
-        """What the framing has refused leaves its reason as all others do."""
+        """Note the reason of what the framing has refused, as all others do."""
         self._note_refusal(request_refusal(refusal), peer)
 
     def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
@@ -110,14 +110,14 @@ class RegisterBank:
         return pack_bits([bool(word >> (address - first + k) & 1) for k in range(count)])
 
     def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
-        """All or nothing. Refusal says why not; nothing but the last-refusal registers has changed then."""
+        """Write all or nothing. Refusal says why not; nothing but the last-refusal registers has changed then."""
         try:
             self._write(address, data, peer)
         except Refusal as refusal:
             raise self._note_refusal(refusal, peer) from None
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
-        """Coils 0-15: the control word is read, changed and written under the same checks as by register."""
+        """Write coils 0-15: the control word is read, changed and written under the same checks as by register."""
         try:
             first = self._bit_word(address, len(values))
             if first != self._bits[0]:
@@ -131,7 +131,7 @@ class RegisterBank:
             raise self._note_refusal(refusal, peer) from None
 
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
-        """One word, under the same checks as any write."""
+        """Write some bits of one word, under the same checks as any write."""
         word, touched = self._image.word(address) if self._room[address] else 0, ~and_mask & ALL_BITS
         try:
             self._write(address, (word & and_mask | or_mask & touched).to_bytes(2, "big"), peer, touched)
@@ -165,7 +165,7 @@ class RegisterBank:
         self._show_owner()
 
     def release_owner(self) -> None:
-        """Nobody owns the setpoint any more (unless the rig names the owner)."""
+        """Make nobody the owner of the setpoint (unless the rig names the owner)."""
         self._ownership.release()
         self._show_owner()
 

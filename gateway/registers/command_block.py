@@ -58,8 +58,8 @@ class CommandBlock:
         self._low_first = Struct(f"<{block.words}f")
 
     def allow_force(self, limits_n: Sequence[float], source: str) -> None:
-        """From now on setpoints of 0 or limits_n (lowest, highest), whose they are is told by source; forces up to the smaller
-        of the rig's limit and theirs. Empty: the rig's alone."""
+        """Accept from now on setpoints of 0 or limits_n (lowest, highest), whose they are is told by source; forces up to the
+        smaller of the rig's limit and theirs. Empty: the rig's alone."""
         rules = self._rules
         if limits_n:
             high_n = max(0.0, min(limits_n[-1], rules.force_max_n))
@@ -205,7 +205,7 @@ class CommandBlock:
 
 
 def check_zeros(address: int, data: bytes) -> None:
-    """Reserved words accept only 0 (03)."""
+    """Refuse anything but 0 in reserved words (03)."""
     for k in range(0, len(data), 2):
         if word := data[k] << 8 | data[k + 1]:
             raise reserved_word_refusal(address + k // 2, word)

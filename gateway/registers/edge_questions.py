@@ -33,4 +33,4 @@ Decide: TypeAlias = Callable[[ProposedWrite], EdgeRefusal | None]
 
 
 def decide_nothing(asked: ProposedWrite) -> None:
-    """Stands for control where there is none: everything is taken."""
+    """Take everything: stands for control where there is none."""

@@ -43,11 +43,11 @@ class RegisterImage:
         return bytes(self.data[2 * address : 2 * (address + count)])
 
     def write(self, address: int, words: bytes) -> None:
-        """Words without any check."""
+        """Write words without any check."""
         self.data[2 * address : 2 * address + len(words)] = words
 
     def put(self, register: Register, value: float) -> None:
-        """A value in the register's unit. ValueError when its type cannot carry it."""
+        """Write a value in the register's unit. ValueError when its type cannot carry it."""
         self.write(register.address, register.encode(value))
 
     def word(self, address: int) -> int:

@@ -50,7 +50,7 @@ def swap_words(data: bytes) -> bytes:
 
 
 def words_swapped_from_little_endian(data: bytes) -> bytes:
-    """float32 values packed little-endian (DCBA) -> CDAB: one call instead of four slices, for publish."""
+    """Turn float32 values packed little-endian (DCBA) -> CDAB: one call instead of four slices, for publish."""
     words = array("H", data)
     words.byteswap()
     return words.tobytes()

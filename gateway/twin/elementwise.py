@@ -39,21 +39,21 @@ def where(condition: Real, yes: Real, no: Real) -> Real:
 
 
 def sign(value: Real) -> Real:
-    """-1, 0 or +1."""
+    """Return -1, 0 or +1."""
     if type(value) is float:
         return 1.0 if value > 0.0 else -1.0 if value < 0.0 else 0.0
     return np.sign(value)
 
 
 def any_below(value: Real, bound: float) -> bool:
-    """Is any lane below the bound?"""
+    """Return whether any lane is below the bound."""
     if type(value) is float:
         return value < bound
     return bool(np.minimum.reduce(value) < bound)
 
 
 def exponential(value: Real) -> Real:
-    """exp by the same routine for both, so that a float and its lane agree to the last bit."""
+    """Return exp by the same routine for both, so that a float and its lane agree to the last bit."""
     result = np.exp(value)
     return result if isinstance(value, np.ndarray) else float(result)
 
@@ -69,7 +69,7 @@ def quantise(value: Real, step: Real) -> Real:
 
 
 def sine(value: Real) -> Real:
-    """sin by the same routine for both."""
+    """Return sin by the same routine for both."""
     result = np.sin(value)
     return result if isinstance(value, np.ndarray) else float(result)
 
@@ -80,5 +80,5 @@ def root(value: Real) -> Real:
 
 
 def choose(condition: Real, yes: Real, no: Real) -> Real:
-    """`where` for a condition that may be a numpy bool."""
+    """Choose as `where` for a condition that may be a numpy bool."""
     return np.where(condition, yes, no) if isinstance(condition, np.ndarray) else yes if condition else no

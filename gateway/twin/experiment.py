@@ -69,7 +69,7 @@ def step_response(twin: Twin, voltage_v: float, duration_s: float = 1.5) -> Floa
 
 
 def settling_time_s(force_n: Floats, target_n: float, band_n: float, every_s: float = 1.0e-3) -> float:
-    """When the force has come within the band for good; nan when it never stays."""
+    """Return when the force has come within the band for good; nan when it never stays."""
     outside = np.flatnonzero(np.abs(force_n - target_n) > band_n)
     if outside.size == 0:
         return 0.0

@@ -79,7 +79,7 @@ def directional_drags(friction: Friction) -> tuple[Real, Real]:
 
 
 def travel_share(drag_n_s_per_m: Real, stiffness_n_per_m: Real, step_s: Real) -> Real:
-    """How much of its way a slide behind a spring goes in one step against viscous drag (implicit Euler)."""
+    """Return how much of its way a slide behind a spring goes in one step against viscous drag (implicit Euler)."""
     return stiffness_n_per_m / (stiffness_n_per_m + drag_n_s_per_m / step_s)
 
 
@@ -142,12 +142,12 @@ class Elements:
         self._total = self._total * ratio
 
     def set_drag(self, step_s: Real) -> None:
-        """Mean of the drags in both directions, and half of what they differ, as stiffness of a step, N/m."""
+        """Set the mean of the drags in both directions, and half of what they differ, as stiffness of a step, N/m."""
         out, back = directional_drags(self._friction)
         self.drag_n_per_m, self._more_out_n_per_m = 0.5 * (out + back) / step_s, 0.5 * (out - back) / step_s
 
     def travel_m(self, drive_n: Real, stiffness_n_per_m: Real, limit: Real) -> Real:
-        """How far `drive_n` moves the slide against a spring, the mean drag and this friction."""
+        """Return how far `drive_n` moves the slide against a spring, the mean drag and this friction."""
         share = limit * self._part
         held = drive_n - share * self._total
         direction = sign(held)

@@ -87,7 +87,7 @@ class LoadCellState:
             self._history.put(self.filtered_n)
 
     def read(self, rng: Generator, conditions: TwinConditions) -> Real:
-        """One reading, N, with the sign of the wiring. Chance is the same draw for all lanes, as one rig's is."""
+        """Return one reading, N, with the sign of the wiring. Chance is the same draw for all lanes, as one rig's is."""
         cell = self._cell
         force = self.filtered_n if self._history is None else self._shown_n(conditions)
         for term in self._terms:

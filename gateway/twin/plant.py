@@ -57,7 +57,7 @@ def with_value(plant: Plant, section: str, name: str, value: Real) -> Plant:
 
 
 def stack(plants: Sequence[Plant]) -> Plant:
-    """One plant whose fields are arrays with one value per lane; ValueError when there is none."""
+    """Return one plant whose fields are arrays with one value per lane; ValueError when there is none."""
     if not plants:
         raise ValueError("a stack needs at least one plant")
     stacked = plants[0]
@@ -68,7 +68,8 @@ def stack(plants: Sequence[Plant]) -> Plant:
 
 
 def plain(plant: Plant) -> Plant:
-    """The same plant with Python floats where it has integers or numpy scalars: those would be slow, or taken for lanes."""
+    """Return the same plant with Python floats where it has integers or numpy scalars: those would be slow, or taken for
+    lanes."""
     for section, name, value in values(plant):
         if type(value) is not float and not isinstance(value, np.ndarray):
             plant = with_value(plant, section, name, float(value))
@@ -76,7 +77,7 @@ def plain(plant: Plant) -> Plant:
 
 
 def lane_count(plant: Plant) -> int | None:
-    """How many lanes a stacked plant has; None for a plant of plain floats. ValueError when lanes differ in number."""
+    """Return how many lanes a stacked plant has; None for a plant of plain floats. ValueError when lanes differ in number."""
     counts = {value.size for _, _, value in values(plant) if isinstance(value, np.ndarray)}
     if len(counts) > 1:
         raise ValueError(f"fields of one plant have different numbers of lanes: {sorted(counts)}")

@@ -25,7 +25,7 @@ def lag_factor(lag_s: Real, step_s: float) -> Real:
 
 
 def filling_factor(regulator: Regulator, step_s: float) -> Real:
-    """lag_factor while the pressure rises."""
+    """Return lag_factor while the pressure rises."""
     return lag_factor(regulator.lag_s * (1.0 + regulator.fill_slowdown), step_s)
 
 
@@ -48,7 +48,7 @@ def apply_dead_band(target: Real, held: Real, dead_band: Real) -> Real:
 
 
 def apply_play(state: Real, value: Real, width: Real) -> Real:
-    """Hysteresis of full width `width`: the state is dragged along, half a width behind."""
+    """Apply a play of full width `width`: the state is dragged along, half a width behind."""
     return clip(state, value - 0.5 * width, value + 0.5 * width)
 
 

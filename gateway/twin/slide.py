@@ -83,12 +83,12 @@ class SlideState:
         self._touching = on
 
     def set_surface(self, height_m: Real) -> None:
-        """The workpiece's surface stands this much nearer to the tool than the gap says; 0 is null."""
+        """Set by how much the workpiece's surface stands nearer to the tool than the gap says; 0 is null."""
         self._gap_m = self._plant.contact.gap_m - height_m
         self._stop_in_reach = stop_in_reach(self._plant, self._gap_m)
 
     def set_side_load(self, load_n: Real, share: Real = 0.0) -> None:
-        """What presses the slide sideways raises its friction by this much, N, and this share of the thrust; 0 is null."""
+        """Set by how much what presses the slide sideways raises its friction, N, and this share of the thrust; 0 is null."""
         self._elements.load_sideways(load_n, share)
 
     def settle(self, pressure_pa: Real) -> None:
@@ -111,7 +111,7 @@ class SlideState:
         self._elements.resume(rest)
 
     def set_disturbance(self, force_n: Real) -> None:
-        """An outside force on the slide, positive towards the workpiece; 0 is null."""
+        """Set an outside force on the slide, positive towards the workpiece; 0 is null."""
         self._steady_n = self._weight_n + force_n
 
     def step(self, pressure_pa: Real) -> Real:

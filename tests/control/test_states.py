@@ -168,7 +168,7 @@ def test_an_enable_that_is_blocked_changes_nothing_and_says_why():
     output = bench.enable(12.0)
     assert bench.refused is not None
     assert (bench.refused.reason, bench.refused.bit) == (RefusalReason.CELL_SILENT, ControlBit.ENABLE)
-    assert bench.refused.text.startswith("enable refused: no fresh sample of the load cell")
+    assert bench.refused.text.startswith("enable refused: the load cell is silent: check its power")
     assert (output.state, output.voltage_v, output.clear_command) == (State.OFF, 0.0, False)
 
 

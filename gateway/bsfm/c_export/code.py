@@ -26,7 +26,7 @@ SOURCE_PARTS = ("source.c", "self_test.c")
 
 
 def c_source(calibration: Calibration) -> dict[str, str]:
-    """{"bsfm_NAME.h": text, "bsfm_NAME.c": text}, the same for the same calibration; plain ASCII.
+    """Return {"bsfm_NAME.h": text, "bsfm_NAME.c": text}, the same for the same calibration; plain ASCII.
 
     NAME is the calibration's, with what C does not allow in a name replaced by "_". ValueError with a sentence if the
     calibration is no model, or if float32 cannot follow it.

@@ -33,7 +33,7 @@ class SpanChoice:
 
 
 def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
-    """What the control law gets wrong along a walk, N; one shorter than the walk."""
+    """Return what the control law gets wrong along a walk, N; one shorter than the walk."""
     memory, errors = model.reversal.start(), []
     low_n, high_n = model.force_range_n
     for k in range(1, len(force_n)):
@@ -47,7 +47,8 @@ def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
 def choose_span(
     branches: Branches, voltage_v: Floats, force_n: Floats, seen: NDArray[np.bool_] | None = None
 ) -> SpanChoice | None:
-    """The span with the smallest error on the walk, or on those of its points that are seen; None where it is too short."""
+    """Return the span with the smallest error on the walk, or on those of its points that are seen; None where it is too
+    short."""
     if len(voltage_v) < FEWEST_POINTS:
         return None
     model = Bsfm(branches, LinearBlend(0.0))

@@ -54,7 +54,7 @@ def fit_orders(
     ties: Ties | str = Ties.TIED,
     settings: FitSettings | None = None,
 ) -> list[FitResult]:
-    """Fits of several orders, ascending; each order starts from the one below it, too."""
+    """Fit several orders, ascending; each order starts from the one below it, too."""
     chosen = settings or FitSettings()
     used = ladder.part(inlier_mask(ladder)) if chosen.outliers == "reject" else ladder
     results: list[FitResult] = []
@@ -73,7 +73,7 @@ def fit_orders(
 def solve_robustly(
     ladder: Ladder, form: ModelForm, settings: FitSettings, lower: Floats | None
 ) -> tuple[Solution, Floats]:
-    """The solution and the weights it was found with: the ladder's own, times Huber's if asked for."""
+    """Return the solution and the weights it was found with: the ladder's own, times Huber's if asked for."""
     own = own_weight(ladder)
     samples = split_samples(ladder, own, form, settings)
     solution, weight = explore_starts(samples, form, lower, settings.effort), own
@@ -103,7 +103,7 @@ def voltage_range(ladder: Ladder, settings: FitSettings) -> tuple[float, float]:
 
 
 def split_samples(ladder: Ladder, weight: Floats, form: ModelForm, settings: FitSettings) -> tuple[Samples, ...]:
-    """One Samples per curve of the form."""
+    """Return one Samples per curve of the form."""
     if not 1 <= form.order <= ORDER_MAX:
         raise ValueError(f"order {form.order}: 1 .. {ORDER_MAX} is allowed")
     x0_v, x1_v = voltage_range(ladder, settings)
@@ -112,7 +112,7 @@ def split_samples(ladder: Ladder, weight: Floats, form: ModelForm, settings: Fit
 
 
 def curve_rows(ladder: Ladder, form: ModelForm) -> list[NDArray[np.bool_]]:
-    """Which samples belong to each curve of the form."""
+    """Return which samples belong to each curve of the form."""
     if form.model.per_direction:
         return [ladder.direction == RISING, ladder.direction == FALLING]
     return [ladder.direction != 0]
@@ -135,7 +135,7 @@ def branches_of(solution: Solution, x0_v: float, x1_v: float) -> Branches:
 
 
 def residual_n(ladder: Ladder, branches: Branches) -> Floats:
-    """Measured minus model, each sample against its own branch."""
+    """Return measured minus model, N, each sample against its own branch."""
     rising, falling = branches.rising.value(ladder.voltage_v), branches.falling.value(ladder.voltage_v)
     return np.asarray(ladder.force_n - np.where(ladder.direction == RISING, rising, falling))
 
@@ -143,7 +143,7 @@ def residual_n(ladder: Ladder, branches: Branches) -> Floats:
 def result_of(
     ladder: Ladder, form: ModelForm, branches: Branches, log_weights: Floats, settings: FitSettings
 ) -> FitResult:
-    """Residuals and verdicts of given branches; nothing is claimed about their parameters."""
+    """Return residuals and verdicts of given branches; nothing is claimed about their parameters."""
     residual = residual_n(ladder, branches)
     return FitResult(
         form=form,

@@ -68,7 +68,7 @@ class Effort:
 
 
 def polish(problem: ProjectedProblem, starts: Floats, effort: Effort) -> FitLanes:
-    """The lowest minimum reached from starts (k, d), as one lane."""
+    """Return the lowest minimum reached from starts (k, d), as one lane."""
     best = lowest(descend(problem, starts, effort.ridge_n2, effort), 1)
     for _ in range(3):
         cost = float(best.cost[0])
@@ -102,7 +102,7 @@ def _spread_starts(unknowns: int, count: int, bound: float) -> Floats:
 
 
 def pairs_of(rising: Floats, falling: Floats) -> Floats:
-    """Each minimum of one branch beside each of the other: (a, n), (b, n) -> (a b, 2 n)."""
+    """Return each minimum of one branch beside each of the other: (a, n), (b, n) -> (a b, 2 n)."""
     return np.concatenate([np.repeat(rising, len(falling), axis=0), np.tile(falling, (len(rising), 1))], axis=1)
 
 

@@ -26,12 +26,12 @@ class Error:
 
     @classmethod
     def of(cls, away_n: Floats) -> "Error":
-        """Of errors (N,), at least one."""
+        """Return the RMS, the largest and the number of errors in N, (N,), at least one."""
         return cls(float(np.sqrt(np.mean(away_n * away_n))), float(np.abs(away_n).max()), len(away_n))
 
 
 def walked_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
-    """Model minus measured at each point of a walk that begins on the rising branch, N."""
+    """Return model minus measured at each point of a walk that begins on the rising branch, N."""
     memory, errors = model.reversal.start(), []
     before_n = float(force_n[0]) if len(force_n) else 0.0
     for volts, newtons in zip(voltage_v.tolist(), force_n.tolist(), strict=True):
@@ -41,13 +41,13 @@ def walked_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
 
 
 def branch_error_n(model: Bsfm, ladder: Ladder) -> Floats:
-    """Model minus measured at every stair by the branch of its direction, N."""
+    """Return model minus measured at every stair by the branch of its direction, N."""
     rising, falling = model.branches.rising.value(ladder.voltage_v), model.branches.falling.value(ladder.voltage_v)
     return np.asarray(np.where(ladder.direction == RISING, rising, falling) - ladder.force_n)
 
 
 def measured_error_n(model: Bsfm, checked: CheckedLadder) -> Floats:
-    """Model minus measured at every stair and every point of the walk, whose first only says where it began."""
+    """Return model minus measured at every stair and every point of the walk, whose first only says where it began."""
     if len(checked.minor_v) < 2:
         return branch_error_n(model, checked.ladder)
     ladder = walked_error_n(model, checked.ladder.voltage_v, checked.ladder.force_n)

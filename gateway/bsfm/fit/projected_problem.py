@@ -28,7 +28,7 @@ class Samples:
 
 
 def merge_samples(t: Floats, force_n: Floats, weight: Floats) -> Samples:
-    """One row per distinct t: least squares sees the same minimum, and ten groups cost as little as one."""
+    """Merge samples into one row per distinct t: least squares sees the same minimum, and ten groups cost as little as one."""
     places, index = np.unique(t, return_inverse=True)
     total = np.bincount(index, weight).astype(np.float64)
     return Samples(places, np.bincount(index, weight * force_n) / total, total)
@@ -86,12 +86,12 @@ class ProjectedProblem:
         return len(self.curves) * self.order
 
     def weights(self, theta: Floats) -> Floats:
-        """w_0 = 1, w_i = exp(theta_i): (k, d) -> (k, curves, n + 1)."""
+        """Return w_0 = 1, w_i = exp(theta_i): (k, d) -> (k, curves, n + 1)."""
         logs = theta.reshape(len(theta), len(self.curves), self.order)
         return np.asarray(np.concatenate([np.ones((*logs.shape[:2], 1)), np.exp(logs)], axis=2))
 
     def designs(self, theta: Floats) -> tuple[Floats, Floats]:
-        """Shares R_i of each row's own curve, (k, m, n + 1), and the weighted design, (k, m, p)."""
+        """Return the shares R_i of each row's own curve, (k, m, n + 1), and the weighted design, (k, m, p)."""
         weights = self.weights(theta)
         shares = np.concatenate([basis * weights[:, c, None, :] for c, basis in enumerate(self._bases)], axis=1)
         shares /= shares.sum(axis=2, keepdims=True)
@@ -111,7 +111,7 @@ class ProjectedProblem:
         return FitLanes(theta, handles, residual, shares, q, r * lengths[:, None, :], (residual * residual).sum(axis=1))
 
     def jacobian(self, at: FitLanes) -> Floats:
-        """d residual / d theta, (k, m, d)."""
+        """Return d residual / d theta, (k, m, d)."""
         direct = self.sensitivity(at.shares, at.handles)
         inner = at.q.transpose(0, 2, 1) @ direct - np.linalg.solve(at.r.transpose(0, 2, 1), self._moved_normals(at))
         return np.asarray(at.q @ inner - direct)
@@ -123,7 +123,7 @@ class ProjectedProblem:
         return self._force - design[0] @ handles, -np.concatenate([slopes, design[0]], axis=1)
 
     def sensitivity(self, shares: Floats, handles: Floats) -> Floats:
-        """Weighted df / d theta at fixed handles (k, p), R_k (b_k - f): (k, m, d)."""
+        """Return weighted df / d theta at fixed handles (k, p), R_k (b_k - f): (k, m, d)."""
         result = np.zeros((len(shares), len(self._force), self.unknowns))
         for c, (rows, columns) in enumerate(zip(self.rows, self.columns, strict=True)):
             share, own = shares[:, rows], handles[:, columns]
@@ -155,7 +155,7 @@ def _columns(curves: int, order: int, tied: bool) -> list[NDArray[np.intp]]:
 
 
 def raise_order(theta: Floats, by: int) -> Floats:
-    """theta (n,) of the same curve written `by` orders higher: a start that loses nothing."""
+    """Return theta (n,) of the same curve written `by` orders higher: a start that loses nothing."""
     weights = np.exp(np.concatenate([[0.0], theta]))
     for _ in range(by):
         share = np.arange(len(weights) + 1) / len(weights)

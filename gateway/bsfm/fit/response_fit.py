@@ -53,7 +53,7 @@ class Stair:
     path_n: Floats
 
     def expected_n(self, dead_time_s: float, lag_s: float, second_lag_s: float) -> Floats:
-        """The force by the model, N, at the times of the readings."""
+        """Return the force by the model, N, at the times of the readings."""
         arrived_v = np.full_like(self.time_s, self.end_v)
         for at_s, moved_v in self.changes:
             arrived_v -= moved_v * missing(self.time_s - at_s - dead_time_s, lag_s, second_lag_s)
@@ -92,7 +92,8 @@ def measure_response(
     slew_v_per_s: float = inf,
     when: str = "",
 ) -> MeasuredResponse:
-    """From the rows of a run. slew_v_per_s: how fast a command may rise, which the rows between do not show."""
+    """Measure the response in the rows of a run. slew_v_per_s: how fast a command may rise, which the rows between do not
+    show."""
     scale = DriveMap(model)
     stairs = [_linearize(stair, scale) for stair in _stairs(time_s, command_v, force_n, model, slew_v_per_s)]
     if len(stairs) < FEWEST_STAIRS:

@@ -150,7 +150,7 @@ class FitResult:
         return self.overall.count
 
     def bsfm(self, blend_span_n: float) -> Bsfm:
-        """The model for control. ValueError if a branch is not increasing."""
+        """Return the model for control. ValueError if a branch is not increasing."""
         return Bsfm(self.branches, LinearBlend(blend_span_n))
 
 

@@ -35,7 +35,7 @@ class Solution:
 
 
 def explore_starts(samples: tuple[Samples, ...], form: ModelForm, lower: Floats | None, effort: Effort) -> Solution:
-    """The best solution from many starts. lower: log weights (curves, n) of a lower order."""
+    """Return the best solution from many starts. lower: log weights (curves, n) of a lower order."""
     if not form.model.rational:
         return refine_solution(samples, form, np.zeros((len(samples), form.order)), effort)
     coarse = tuple(_coarse(part, form.order) for part in samples)
@@ -55,7 +55,7 @@ def explore_starts(samples: tuple[Samples, ...], form: ModelForm, lower: Floats 
 
 
 def refine_solution(samples: tuple[Samples, ...], form: ModelForm, log_weights: Floats, effort: Effort) -> Solution:
-    """The solution nearest to known log weights (curves, order)."""
+    """Return the solution nearest to known log weights (curves, order)."""
     starts = [log_weights.reshape(1, -1)] if form.tied else [part[None] for part in log_weights]
     return _solution(samples, form, starts, effort)
 

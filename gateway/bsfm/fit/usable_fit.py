@@ -60,7 +60,7 @@ class _Search:
         return np.asarray(-self._rows @ self._values_at(u)[1])
 
     def cost(self, u: Floats) -> tuple[float, Floats]:
-        """Mean square and its gradient."""
+        """Return the mean square and its gradient."""
         residual, jacobian = self.problem.at_fixed(*np.split(u, [self.problem.unknowns]))
         return float(residual @ residual), 2.0 * jacobian.T @ residual
 
@@ -76,7 +76,7 @@ def fit_usable(
     ties: Ties | str = Ties.TIED,
     settings: FitSettings | None = None,
 ) -> FitResult:
-    """`fit`, and if that may not drive a plant, the best fit found that may.
+    """Fit as `fit` does; if that may not drive a plant, return the best fit found that may.
 
     Residuals are honest: those of the curves returned. ValueError with the free fit's verdicts if nothing usable is found.
     """
@@ -98,8 +98,8 @@ def fit_usable(
 
 
 def is_moderate(branches: Branches) -> bool:
-    """No handle far beyond the forces of the ends: a handle of 1500 N with a weight of 0.002 describes a curve of 50 N as
-    well as any, but no cell's range allows it."""
+    """Return whether no handle is far beyond the forces of the ends: a handle of 1500 N with a weight of 0.002 describes a
+    curve of 50 N as well as any, but no cell's range allows it."""
     most_n = HANDLES_SHARE * _most_n(branches)
     return all(
         abs(handle) <= most_n + 1.0e-9 for curve in (branches.rising, branches.falling) for handle in curve.handles

@@ -68,7 +68,7 @@ class CheckedLadder:
 def check_ladder(
     columns: Mapping[str, Floats], facts: Mapping[str, object], expected: Expectation = NOTHING_KNOWN
 ) -> CheckedLadder:
-    """The ladder in a table of the recording contract. LadderError with one sentence if it must not be fitted."""
+    """Return the ladder in a table of the recording contract. LadderError with one sentence if it must not be fitted."""
     said = _check_rig(facts, expected)
     rows = usable_rows(columns, facts, expected.force_unit)
     labels = Labels.of(columns)
@@ -97,7 +97,7 @@ def check_ladder(
 
 
 def join_ladders(parts: Sequence[CheckedLadder]) -> CheckedLadder:
-    """The groups of several recordings as one ladder; walk, noise and slope are the last one's."""
+    """Return the groups of several recordings as one ladder; walk, noise and slope are the last one's."""
     ladders = [part.ladder for part in parts if not part.only_walk]
     if not ladders:
         said = "only the reversal part of a resumed run: the recordings with its groups must lie beside it"

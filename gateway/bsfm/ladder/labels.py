@@ -51,7 +51,8 @@ class Labels:
         return int(self.stair.max())
 
     def stairs_of(self, mask: NDArray[np.bool_]) -> Integers:
-        """The stairs in these rows if they are whole: none missing between, and the last one was left. Empty otherwise."""
+        """Return the stairs in these rows if they are whole: none missing between, and the last one was left. Empty
+        otherwise."""
         stairs = np.unique(self.stair[mask])
         whole = len(stairs) > 0 and stairs[-1] - stairs[0] == len(stairs) - 1 and stairs[-1] < self.last_stair
         return stairs if whole else stairs[:0]
@@ -88,7 +89,8 @@ class LabelSplit:
 
 
 def split_by_labels(points: Points, labels: Labels, *, by_check: bool = False) -> LabelSplit:
-    """The points of a labelled recording. labels: of its rows; by_check: of a run that had only the reversal part left."""
+    """Return the points of a labelled recording. labels: of its rows; by_check: of a run that had only the reversal part
+    left."""
     at = {int(labels.stair[row]): k for k, row in enumerate(points.row.tolist())}  # the last point of a stair counts
     masks = [labels.phase == CHECK] if by_check else [labels.group == group for group in labels.whole_groups]
     found = [[at[stair] for stair in labels.stairs_of(mask).tolist() if stair in at] for mask in masks]

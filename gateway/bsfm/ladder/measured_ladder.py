@@ -46,7 +46,7 @@ class Ladder:
 
     @classmethod
     def from_rows(cls, rows: Iterable[Sequence[float]]) -> "Ladder":
-        """Rows of voltage, force, direction, group."""
+        """Build a ladder from rows of voltage, force, direction, group."""
         voltage, force, direction, group = zip(*rows, strict=True)
         return cls(np.array(voltage), np.array(force), np.array(direction), np.array(group))
 
@@ -58,7 +58,7 @@ class Ladder:
         return tuple(int(group) for group in np.unique(self.group))
 
     def part(self, mask: NDArray[np.bool_]) -> "Ladder":
-        """The samples where mask is true."""
+        """Return the samples where mask is true."""
         weight = None if self.weight is None else self.weight[mask]
         return Ladder(self.voltage_v[mask], self.force_n[mask], self.direction[mask], self.group[mask], weight)
 

@@ -22,7 +22,7 @@ class LadderPlan:
 
 
 def ladder_plan(v_max_v: float, step_v: float, groups: int, v_min_v: float = 0.0) -> LadderPlan:
-    """`groups` times v_min -> v_max -> v_min in even steps, shortened if step_v does not divide the way.
+    """Plan `groups` times v_min -> v_max -> v_min in even steps, shortened if step_v does not divide the way.
 
     ValueError if that is no ladder.
     """

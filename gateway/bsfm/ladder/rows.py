@@ -42,7 +42,7 @@ class Rows:
 
 
 def usable_rows(columns: Mapping[str, Floats], facts: Mapping[str, object], force_unit: str | None = None) -> Rows:
-    """The rows that can be used. force_unit: what the caller says the force is in. LadderError where there are none."""
+    """Return the rows that can be used. force_unit: what the caller says the force is in. LadderError where there are none."""
     force_name, factor, unit_known, said = _force_column(columns, facts, force_unit)
     missing = [name for name in ("time_s", "command_v") if name not in columns]
     if missing:

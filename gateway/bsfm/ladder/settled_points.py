@@ -43,8 +43,8 @@ class Points:
 
 
 def find_settled_points(time_s: Floats, command_v: Floats, force_n: Floats, stair: Integers | None = None) -> Points:
-    """Points of finite columns whose time does not fall. stair: of each row, where it is known: two stairs of one voltage
-    are two points then. ValueError when the command never rests."""
+    """Find the settled points of finite columns whose time does not fall. stair: of each row, where it is known: two stairs of
+    one voltage are two points then. ValueError when the command never rests."""
     starts = _starts(command_v) if stair is None else _starts_of_stairs(command_v, stair)
     lengths = np.diff(np.append(starts, len(command_v)))
     if stair is None and np.median(lengths) < 3:

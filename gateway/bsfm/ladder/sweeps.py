@@ -48,7 +48,8 @@ class SweepSplit:
 
 
 def split_by_sweeps(points: Points) -> SweepSplit:
-    """Groups and minor loops. ladder is None where no whole group is found: `left_out`, `rising` and `falling` say why."""
+    """Split points into groups and minor loops. ladder is None where no whole group is found: `left_out`, `rising` and
+    `falling` say why."""
     sweeps = _find_sweeps(points.voltage_v)
     fine, coarse = _without_coarse(sweeps)
     pairs, others = _pair_sweeps(fine)

@@ -16,7 +16,7 @@ NEAR_SHARE: Final = 1.0e-4  # of the range: between two places this far apart a 
 
 
 def value_by_numbers(curve: RationalBezier, voltage_v: Floats) -> Floats:
-    """df / d(b_0 .. b_n, log w_1 .. log w_n) at voltages within the curve: (N, 2 n + 1)."""
+    """Return df / d(b_0 .. b_n, log w_1 .. log w_n) at voltages within the curve: (N, 2 n + 1)."""
     handles = np.array(curve.handles)
     shares = bernstein((voltage_v - curve.x0) / (curve.x1 - curve.x0), curve.order) * np.array(curve.weights)
     shares /= shares.sum(axis=1, keepdims=True)
@@ -25,7 +25,7 @@ def value_by_numbers(curve: RationalBezier, voltage_v: Floats) -> Floats:
 
 
 def slope_by_numbers(curve: RationalBezier, voltage_v: Floats) -> Floats:
-    """d(df/dx) / d(handles, log weights), (N, 2 n + 1)."""
+    """Return d(df/dx) / d(handles, log weights), (N, 2 n + 1)."""
     near_v = NEAR_SHARE * (curve.x1 - curve.x0)
     below_v, above_v = np.maximum(voltage_v - near_v, curve.x0), np.minimum(voltage_v + near_v, curve.x1)
     rise = value_by_numbers(curve, above_v) - value_by_numbers(curve, below_v)
@@ -33,7 +33,7 @@ def slope_by_numbers(curve: RationalBezier, voltage_v: Floats) -> Floats:
 
 
 def voltage_by_numbers(curve: RationalBezier, voltage_v: Floats, gentlest_n_per_v: float) -> Floats:
-    """dV / d(handles, log weights) of the inverse at these voltages; 0 where it is clamped to an end."""
+    """Return dV / d(handles, log weights) of the inverse at these voltages; 0 where it is clamped to an end."""
     inside = (voltage_v > curve.x0) & (voltage_v < curve.x1)
     steepness = np.maximum(curve.slope(voltage_v), gentlest_n_per_v)
     return np.asarray(-value_by_numbers(curve, voltage_v) * (inside / steepness)[:, None])
@@ -57,8 +57,8 @@ def in_free_numbers(rising: Floats, falling: Floats) -> Floats:
 def penalties_by_numbers(
     branches: Branches, grid_v: Floats, wanted_n_per_v: float, gap: tuple[Floats, float]
 ) -> Floats:
-    """Of slopes below the wanted one on each branch, then of the gap between them, as shares (N,) of what it may be at each
-    place, below the wanted one: (3 grid, 4 n + 1)."""
+    """Return the derivatives of slopes below the wanted one on each branch, then of the gap between them, as shares (N,) of
+    what it may be at each place, below the wanted one: (3 grid, 4 n + 1)."""
     rising, falling = branches.rising, branches.falling
     shares, gap_n = gap
     flat = [
@@ -76,8 +76,8 @@ def penalties_by_numbers(
 
 
 def without(taken_up: Floats, heavy: Floats, jacobian: Floats) -> Floats:
-    """What of the jacobian (N, p) the columns (N, c) cannot take up. heavy: (rows, c), equations beside the data that bind
-    them."""
+    """Return what of the jacobian (N, p) the columns (N, c) cannot take up. heavy: (rows, c), equations beside the data that
+    bind them."""
     q, _ = np.linalg.qr(np.concatenate([taken_up, heavy]))
     along = q[: len(jacobian)].T @ jacobian
     return np.asarray(jacobian - q[: len(jacobian)] @ along)

@@ -49,7 +49,7 @@ class Walk:
 
 
 def places(voltage_v: Floats, radii_v: Floats) -> Floats:
-    """stop / r along a walk that starts fallen: shape (N, radii)."""
+    """Return stop / r along a walk that starts fallen: shape (N, radii)."""
     place, found = np.full(len(radii_v), -1.0), []
     for step_v in np.diff(voltage_v, prepend=voltage_v[:1]):
         place = np.clip(place + step_v / radii_v, -1.0, 1.0)
@@ -58,7 +58,7 @@ def places(voltage_v: Floats, radii_v: Floats) -> Floats:
 
 
 def inverses(curve: RationalBezier, force_n: Floats) -> Floats:
-    """Voltages of many forces, clamped to the curve: a table, then Newton. Within 1e-9 V where the curve is not flat."""
+    """Return voltages of many forces, clamped to the curve: a table, then Newton. Within 1e-9 V where the curve is not flat."""
     grid_v = np.linspace(curve.x0, curve.x1, GRID)
     inside_n = np.clip(force_n, curve.handles[0], curve.handles[-1])
     voltage_v: Floats = np.interp(inside_n, curve.value(grid_v), grid_v)
@@ -92,7 +92,7 @@ class SlipProblem:
         self.weight = np.sqrt(np.concatenate([walk.trusts for walk in walks]))
 
     def shares(self, branches: Branches) -> Floats:
-        """The best c for these branches: non-negative, sum 1, no stiffer than a model may be."""
+        """Return the best c for these branches: non-negative, sum 1, no stiffer than a model may be."""
         return self.best_shares(self.system(branches))
 
     def best_shares(self, system: System) -> Floats:
@@ -109,7 +109,7 @@ class SlipProblem:
         return HEAVY * np.array([np.append(np.ones(len(stiffness)), 0.0), np.append(stiffness, 1.0)])
 
     def errors_n(self, branches: Branches, shares: Floats | None = None) -> Floats:
-        """Model minus walk: V(f) - V, in newtons. shares: None for the best."""
+        """Return model minus walk: V(f) - V, in newtons. shares: None for the best."""
         system = self.system(branches)
         errors: Floats = system.matrix @ (self.best_shares(system) if shares is None else shares) - system.wanted
         return errors

@@ -26,16 +26,16 @@ class Reversal(Protocol):
     """What happens between the branches. All methods are pure; the memory is immutable."""
 
     def start(self) -> Memory:
-        """Of a vented tool, where the calibration ladder starts."""
+        """Return the memory of a vented tool, where the calibration ladder starts."""
 
     def at(self, branch_share: float) -> Memory:
         """Return a memory with this branch share; +1 and -1 are the branches, whatever came before."""
 
     def branch_share(self, memory: Memory) -> float:
-        """s in [-1, 1]: +1 on the rising branch, -1 on the falling one."""
+        """Return s in [-1, 1]: +1 on the rising branch, -1 on the falling one."""
 
     def memory_after(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
-        """The memory after the force has gone from one value to another without turning round in between."""
+        """Return the memory after the force has gone from one value to another without turning round in between."""
 
     def check(self, branches: Branches) -> None:
         """ValueError with a sentence where this policy and these branches make no unique voltage."""
@@ -64,7 +64,7 @@ class LinearBlend:
         return (self.advance(memory[0], to_n - from_n),)
 
     def check(self, branches: Branches) -> None:
-        """Any branches that increase will do: the voltage is explicit."""
+        """Accept any branches that increase: the voltage is explicit."""
 
     def advance(self, branch_share: float, delta_n: float) -> float:
         """Return the branch share, -1 .. 1, after the force has moved by delta_n. ValueError unless both are finite."""

@@ -41,13 +41,13 @@ class SlipSearch:
         self._log_weights = 2 * start.rising.order
 
     def best(self) -> Branches:
-        """The branches at the minimum."""
+        """Return the branches at the minimum."""
         first = free_numbers(self._start)
         found = least_squares(self.residuals, first, self.jacobian, x_scale="jac", ftol=CLOSE, max_nfev=STEPS_MAX)
         return branches_of(found.x, self._start)
 
     def residuals(self, numbers: Floats) -> Floats:
-        """Weighted errors, penalties, ridge: (rows + 3 grid + log weights,)."""
+        """Return weighted errors, penalties, ridge: (rows + 3 grid + log weights,)."""
         refused = np.full(len(self._slope) + 3 * len(self._grid_v) + self._log_weights, REFUSED_N)
         try:
             trial = branches_of(numbers, self._start)
@@ -60,7 +60,7 @@ class SlipSearch:
         return np.concatenate([error_n, self._penalties(trial), RIDGE * numbers[-self._log_weights :]])
 
     def jacobian(self, numbers: Floats) -> Floats:
-        """Of residuals where they are no refusal: (rows + 3 grid + log weights, numbers)."""
+        """Return the derivatives of residuals where they are no refusal: (rows + 3 grid + log weights, numbers)."""
         trial = branches_of(numbers, self._start)
         penalties = PENALTY * penalties_by_numbers(trial, self._grid_v, self._wanted_n_per_v, (self._open, self._gap_n))
         ridge = np.zeros((self._log_weights, len(numbers)))

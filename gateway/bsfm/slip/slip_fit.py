@@ -73,7 +73,7 @@ class PolicyError:
 
 
 def walk_of(ladder: Ladder) -> Walk:
-    """The staircase as a walk: the mean of its groups, where all of them visit the same stairs, else all in order."""
+    """Return the staircase as a walk: the mean of its groups, where all of them visit the same stairs, else all in order."""
     groups = [ladder.part(ladder.group == group) for group in ladder.groups]
     first = groups[0].voltage_v
     if all(len(group) == len(first) and np.allclose(group.voltage_v, first, atol=5.0e-3) for group in groups):
@@ -82,15 +82,15 @@ def walk_of(ladder: Ladder) -> Walk:
 
 
 def fit_stops(branches: Branches, walks: Sequence[Walk]) -> SlipFit:
-    """The stops alone. ValueError when there is no point, or no loop between the branches."""
+    """Fit the stops alone. ValueError when there is no point, or no loop between the branches."""
     problem = SlipProblem(list(walks), _radii_v(branches))
     problem.weight = problem.weight * _huber(problem, problem.errors_n(branches))
     return _result(problem, branches, joint=False)
 
 
 def fit_joint(branches: Branches, walks: Sequence[Walk], highest_order: int = HIGHEST_ORDER) -> SlipFit:
-    """Branches and stops together, from these branches on; the stops alone where that leads to no usable model. One order more
-    is tried up to highest_order."""
+    """Fit branches and stops together, from these branches on; return the stops alone where that leads to no usable model.
+    One order more is tried up to highest_order."""
     best = fit_stops(branches, walks)
     if branches.rising.order != branches.falling.order:
         return best
@@ -127,7 +127,7 @@ def _elevated(branches: Branches) -> Branches:
 
 
 def compare_policies(branches: Branches, fits: Sequence[SlipFit], training: Walk, held_out: Walk) -> list[PolicyError]:
-    """Switched branches, the blend with its best span on `training`, and each slip fit, all on `held_out`.
+    """Compare switched branches, the blend with its best span on `training`, and each slip fit, all on `held_out`.
 
     PolicyError as control would use them (blend_span.command_error_n): driven by the forces, told in newtons.
     """

@@ -51,11 +51,11 @@ class SlipStops:
         return sum(share / radius for share, radius in zip(self.shares, self.radii_v, strict=True))
 
     def start(self) -> Memory:
-        """Of a vented tool: fallen to the lowest voltage from so far above that every stop has given way."""
+        """Return the memory of a vented tool: fallen to the lowest voltage from so far above that every stop has given way."""
         return self.at(FALLING)
 
     def at(self, share: float) -> Memory:
-        """All stops at the same share: on a branch for +1 and -1."""
+        """Return all stops at the same share: on a branch for +1 and -1."""
         return (share,) * len(self.radii_v)
 
     def branch_share(self, memory: Memory) -> float:
@@ -66,7 +66,7 @@ class SlipStops:
         return max(-1.0, min(1.0, total))  # shares in decimal digits add up to 1 only nearly
 
     def advance(self, memory: Memory, voltage_delta_v: float) -> Memory:
-        """The memory after the voltage has moved. ValueError unless the change is finite."""
+        """Return the memory after the voltage has moved. ValueError unless the change is finite."""
         if not isfinite(voltage_delta_v):
             raise ValueError(f"change of {voltage_delta_v!r} V: not finite")
         if voltage_delta_v == 0.0:
@@ -76,7 +76,7 @@ class SlipStops:
         )
 
     def memory_after(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
-        """The memory after the force has gone from one value to another without turning round in between."""
+        """Return the memory after the force has gone from one value to another without turning round in between."""
         if from_n == to_n:
             return memory
         share = self.branch_share(memory)
@@ -110,7 +110,7 @@ class SlipStops:
 
 
 def middle_and_half(branches: Branches, force_n: float) -> tuple[float, float]:
-    """(m, h) in V: middle and half width of the loop at this force, each branch clamped to its range."""
+    """Return (m, h) in V: middle and half width of the loop at this force, each branch clamped to its range."""
     rising_v, _ = branches.rising.inverse(force_n)
     falling_v, _ = branches.falling.inverse(force_n)
     return 0.5 * (rising_v + falling_v), 0.5 * (rising_v - falling_v)

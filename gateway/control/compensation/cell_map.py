@@ -26,14 +26,15 @@ class CellMap:
     zero_n: float = 0.0
 
     def force_n(self, reading_n: float, temperature_c: float, voltage_v: float) -> float:
-        """temperature_c nan: taken as the reference; voltage_v: on the output when the reading was taken."""
+        """Return the force that made a reading, N. temperature_c nan: taken as the reference; voltage_v: on the output when
+        the reading was taken."""
         away_k = self._away_k(temperature_c)
         bent_n = reading_n - self.zero_n - self.zero_n_per_k * away_k - self.crosstalk_n_per_v * voltage_v
         bent_n /= max(_FLATTEST, 1.0 + self.span_per_k * away_k)
         return self._straight_n(bent_n) + self.zero_n
 
     def reading_n(self, force_n: float, temperature_c: float, voltage_v: float) -> float:
-        """The other way: what the cell makes of a force."""
+        """Return what the cell makes of a force, N: the other way."""
         away_k = self._away_k(temperature_c)
         disturbed_n = self.zero_n + self.zero_n_per_k * away_k + self.crosstalk_n_per_v * voltage_v
         return self._bent_n(force_n) * (1.0 + self.span_per_k * away_k) + disturbed_n

@@ -22,7 +22,7 @@ class CommandMap:
     full_scale_v: float = 10.0
 
     def straight_v(self, sent_v: float) -> float:
-        """What the regulator makes of a voltage; outside 0 .. full scale the voltage itself."""
+        """Return what the regulator makes of a voltage; outside 0 .. full scale the voltage itself."""
         share = sent_v / self.full_scale_v
         if not 0.0 < share < 1.0:
             return sent_v
@@ -30,7 +30,7 @@ class CommandMap:
         return sent_v + self.full_scale_v * middle * (self.bow + self.s * 2.0 * (2.0 * share - 1.0))
 
     def sent_v(self, straight_v: float) -> float:
-        """What to send for it: bracketed secant steps, as the bent map may be flat at an end."""
+        """Return what to send for it: bracketed secant steps, as the bent map may be flat at an end."""
         if not 0.0 < straight_v < self.full_scale_v:
             return straight_v
         low_v, high_v, sent_v = 0.0, self.full_scale_v, straight_v

@@ -51,7 +51,7 @@ class TimingCompensation:
     more_second_lag_s: float = 0.0
 
     def settings(self, settings: ControlSettings) -> ControlSettings:
-        """The same for a slower rig: the lead's lags, the supervision's patience, and a trim that is no faster than the
+        """Return the same for a slower rig: the lead's lags, the supervision's patience, and a trim that is no faster than the
         answer to it."""
         lead, supervision, trim = settings.lead, settings.supervision, settings.trim
         if lead.lag_s > 0.0:
@@ -93,7 +93,7 @@ class Compensation:
         return self.outside.force_n(tilt_rad, feed_mm_s) if self.outside else 0.0
 
     def settings(self, settings: ControlSettings) -> ControlSettings:
-        """What the rig file says about control, for the rig as it is."""
+        """Return what the rig file says about control, for the rig as it is."""
         return self.timing.settings(settings) if self.timing else settings
 
 

@@ -152,7 +152,7 @@ class ForceLoop:
         self._limiter.earn(dt_s)
         self._lead.advance(self._limiter.voltage_v if line.sent_v is None else line.sent_v, dt_s)
         if isinstance(self._lead, LinearizedLagInverse):
-            self._lead.know_wire(line.wire_s)
+            self._lead.set_wire_time(line.wire_s)
         self.expected.advance(self.voltage_v, dt_s)
 
     def rest(self) -> None:
@@ -220,7 +220,7 @@ class ForceLoop:
             self._trim.take_volts(law.correction_v(given_n))
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
         wanted_v = model_v + self._trim.value_v
-        push_v = self._led_v(wanted_v) - wanted_v if has_model else 0.0
+        push_v = self._compensated_v(wanted_v) - wanted_v if has_model else 0.0
         if demand.force_n <= 0.0:
             push_v = 0.0  # a release goes along its ramp in volts, too: pushing it would vent the tool at once
         self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
@@ -229,11 +229,11 @@ class ForceLoop:
         self._answer.restart()
         return self._judge_force(demand, inputs, goal_n)
 
-    def _led_v(self, wanted_v: float) -> float:
+    def _compensated_v(self, wanted_v: float) -> float:
         self._wanted_v = wanted_v
         if isinstance(self._lead, LinearizedLagInverse):
-            return self._lead.led_v(wanted_v, self._limiter.voltage_v)
-        return self._lead.led_v(wanted_v)
+            return self._lead.compensated_v(wanted_v, self._limiter.voltage_v)
+        return self._lead.compensated_v(wanted_v)
 
     def _learn(self, inputs: LoopInputs, moved_n: float, given_n: float) -> None:
         law, trim = self.feedforward, self._trim

@@ -71,10 +71,10 @@ class LagInverse:
             self._later = [_decays(self._lag_s, self._second_lag_s, 0.06 * lags_s * 1.35**k) for k in range(12)]
             self._pulses = [_pulses(self._lag_s, self._second_lag_s, horizon_s) for horizon_s in self._horizons]
         self._wire_s = inf
-        self.know_wire(WIRE_S)
+        self.set_wire_time(WIRE_S)
 
-    def know_wire(self, wire_s: float) -> None:
-        """One setting keeps the wire so long: what is decided meanwhile waits, and what stands stays. nan: not known."""
+    def set_wire_time(self, wire_s: float) -> None:
+        """Set how long one setting keeps the wire, s: what is decided meanwhile waits. nan: not known."""
         if not abs(wire_s - self._wire_s) > LATE_S:
             return
         self._wire_s = wire_s = min(wire_s, SLOWEST_WIRE_S)
@@ -89,11 +89,11 @@ class LagInverse:
 
     @property
     def landing_s(self) -> float:
-        """How much later than the wish the model arrives where no limit acts."""
+        """Delay of the model behind the wish where no limit acts, s."""
         return 2.0 * self._damping * self.horizon_s if self._second_lag_s else self.horizon_s
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
-        """voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
+        """Advance the model of the lags: voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
         first_v, second_v = self.first_v - voltage_v, self.second_v - voltage_v
         decay = exp(-dt_s / self._lag_s)
         self.first_v = voltage_v + decay * first_v
@@ -104,8 +104,8 @@ class LagInverse:
         passed = self._lag_s * (decay - second_decay) / (self._lag_s - self._second_lag_s)
         self.second_v = voltage_v + second_decay * second_v + passed * first_v
 
-    def led_v(self, wanted_v: float, standing_v: float) -> float:
-        """What to ask for now. standing_v: on the output. A wish outside the range passes, and the stage says so."""
+    def compensated_v(self, wanted_v: float, standing_v: float) -> float:
+        """Return the voltage to ask for now, V. standing_v: on the output. A wish outside the range passes."""
         lowest_v = min(self._limits.voltage_min_v, wanted_v)
         highest_v = max(self._limits.voltage_max_v, wanted_v)
         first_v, second_v = self.first_v - wanted_v, self.second_v - wanted_v
@@ -215,22 +215,23 @@ class LinearizedLagInverse:
         return self._map.n_per_v
 
     def away_n(self, wanted_v: float) -> float:
-        """By how much the thrust of the model's lags is short of the wish's, N."""
+        """Return by how much the thrust of the model's lags is short of the wish's, N."""
         return (self._map.linear_v(wanted_v) - self._inverse.second_v) * self._map.n_per_v
 
     def go_on_from(self, first_v: float, second_v: float) -> None:
         """Take over from another model of the lags."""
         self._inverse.first_v, self._inverse.second_v = self._map.linear_v(first_v), self._map.linear_v(second_v)
 
-    def know_wire(self, wire_s: float) -> None:
-        self._inverse.know_wire(wire_s)
+    def set_wire_time(self, wire_s: float) -> None:
+        """Set how long one setting keeps the wire, s; nan: not known."""
+        self._inverse.set_wire_time(wire_s)
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
-        """voltage_v stood on the output for the last dt_s."""
+        """Advance the model of the lags: voltage_v stood on the output for the last dt_s."""
         self._inverse.advance(self._map.linear_v(voltage_v), dt_s)
 
-    def led_v(self, wanted_v: float, standing_v: float) -> float:
-        """What to ask for now. standing_v: on the output. A wish outside the range passes, and the stage says so."""
+    def compensated_v(self, wanted_v: float, standing_v: float) -> float:
+        """Return the voltage to ask for now, V. standing_v: on the output. A wish outside the range passes."""
         linear_v = self._map.linear_v(wanted_v)
-        asked_v = self._inverse.led_v(linear_v, self._map.linear_v(standing_v))
+        asked_v = self._inverse.compensated_v(linear_v, self._map.linear_v(standing_v))
         return wanted_v if asked_v == linear_v else self._map.volts(asked_v)

@@ -33,7 +33,7 @@ class LeadCompensator:
 
     @property
     def gained_s(self) -> float:
-        """By how much the response comes earlier than without."""
+        """Time by which the response comes earlier than without, s."""
         left_s = 2.0 * self._left_s if self._second_lag_s > 0.0 else self._left_s
         return max(0.0, self._lag_s + self._second_lag_s - left_s)
 
@@ -42,7 +42,7 @@ class LeadCompensator:
         self.first_v, self.second_v = first_v, second_v
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
-        """voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
+        """Advance the model of the lags: voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
         if self._lag_s <= 0.0:
             self.first_v = self.second_v = voltage_v
             return
@@ -52,7 +52,7 @@ class LeadCompensator:
         self.second_v = voltage_v + self._second(first_v, second_v, dt_s)
 
     def _second(self, first_v: float, second_v: float, dt_s: float) -> float:
-        """The second lag behind the first, both as differences to the held voltage."""
+        """Return the second lag behind the first, both as differences to the held voltage."""
         lag_s, second_lag_s = self._lag_s, self._second_lag_s
         decay = exp(-dt_s / lag_s)
         if second_lag_s <= 0.0:
@@ -63,9 +63,9 @@ class LeadCompensator:
         passed = decay * dt_s / lag_s if spread_s < 1.0e-6 * lag_s else lag_s * (decay - second_decay) / spread_s
         return second_decay * second_v + passed * first_v
 
-    def led_v(self, wanted_v: float) -> float:
-        """What to ask for now. Only the push is kept within the range: a wish outside it passes, and the output stage
-        says that it was limited."""
+    def compensated_v(self, wanted_v: float) -> float:
+        """Return the voltage to ask for now, V. Only the push is kept within the range: a wish outside it passes, and the
+        limiter says so."""
         if self._lag_s <= 0.0:
             return wanted_v
         asked_v = self._asked_v(wanted_v)

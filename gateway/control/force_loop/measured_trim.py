@@ -77,14 +77,14 @@ class MeasuredTrim:
         self.value_n = self._own_n = self._learned_n = value_n
 
     def take_volts(self, value_v: float) -> float:
-        """What the correction asks for, within the limit of the rig."""
+        """Return what the correction asks for, within the limit of the rig."""
         self.value_v, limited_by = trim_limited(value_v, self._settings.limit_v)
         if limited_by:
             self.limited_by = limited_by
         return self.value_v
 
     def travel(self, moved_n: float) -> None:
-        """The applied target moved by so much, N."""
+        """Fade what was learned: the applied target moved by so much, N."""
         if not moved_n:
             return
         self._at_n += moved_n
@@ -118,12 +118,12 @@ class MeasuredTrim:
         self.limited_by = LimitedBy.NONE
 
     def rest(self) -> None:
-        """Nothing may be learned now: what was smoothed belongs to another moment."""
+        """Forget what was smoothed, for nothing may be learned now: it belongs to another moment."""
         self._rest()
 
     def integrate(self, error_n: float, slope_n_per_v: float, interval_s: float) -> None:
-        """error_n: wanted minus what is measured and still comes, on a new sample; slope_n_per_v: of the model at the working
-        point, which tells the limit in newtons."""
+        """Learn from one new sample. error_n: wanted minus what is measured and still comes; slope_n_per_v:
+        of the model at the working point, which tells the limit in newtons."""
         if self.is_off or self.hunted:
             return
         self._smooth(error_n, interval_s)

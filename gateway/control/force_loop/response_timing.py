@@ -25,7 +25,8 @@ LONGEST_LAG_S: Final = 2.0
 
 
 def timing_of(response: Response | None, settings: ControlSettings) -> ControlSettings:
-    """The rig's settings with what follows from a measured response; unchanged without one, or where the rig file rules."""
+    """Return the rig's settings with what follows from a measured response; unchanged without one, or where the rig file
+    rules."""
     if response is None or settings.response is ResponseSource.RIG:
         return replace(settings, timing=None)
     lags_s = response.lag_s + response.second_lag_s

@@ -32,13 +32,13 @@ class TrimIntegral:
         self.value_v, self.limited_by = trim_limited(value_v, self._settings.limit_v)
 
     def travel(self, moved_n: float) -> None:
-        """The applied target moved by so much, N."""
+        """Fade the correction: the applied target moved by so much, N."""
         if moved_n and self.value_v:
             self.value_v *= exp(-abs(moved_n) / self._settings.memory_n)
             self.limited_by = LimitedBy.NONE
 
     def integrate(self, error_n: float, interval_s: float) -> None:
-        """error_n: wanted minus measured; interval_s: since the sample before."""
+        """Add one sample to the integral. error_n: wanted minus measured; interval_s: since the sample before."""
         zone_n = self._settings.dead_zone_n
         beyond_n = error_n - max(-zone_n, min(zone_n, error_n))
         wanted_v = self.value_v + self._settings.gain_v_per_n_s * beyond_n * interval_s

@@ -68,7 +68,7 @@ class ActiveRun:
         self.model = model
 
     def ask(self, plan: AnyPlan) -> AnyRun:
-        """A local run for the next step to begin. ValueError with a sentence for a plan that the rig does not allow."""
+        """Ask for a local run for the next step to begin. ValueError with a sentence for a plan that the rig does not allow."""
         run = self.build(plan)
         self._asked, self.refused = plan, ""
         self.phase = CalibrationPhase.IDLE
@@ -81,7 +81,7 @@ class ActiveRun:
         return LadderRun(plan, self._settings, self.model)
 
     def ask_stop(self, sentence: str) -> None:
-        """The next step ends the run: the force goes to 0 along the rig's ramp."""
+        """Ask the next step to end the run: the force goes to 0 along the rig's ramp."""
         self._stop_asked = sentence
 
     def take_asked(self) -> AnyPlan | None:
@@ -97,8 +97,8 @@ class ActiveRun:
         self._ceiling = self._new_ceiling()
 
     def step(self, now_s: float, reading: Reading, loop: ForceLoop) -> StopCause | None:
-        """One step of the run, through the limits of the force loop; what ended it (a fault, or a sentence), None while it goes
-        on."""
+        """Do one step of the run, through the limits of the force loop; return what ended it (a fault, or a sentence), None
+        while it goes on."""
         run = self.run
         assert run
         self.cell_n = reading.cell_n

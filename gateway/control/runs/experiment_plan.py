@@ -116,7 +116,7 @@ _ALLOWED: Final[dict[MoveKind, tuple[str, ...]]] = {
 
 
 def move_faults(move: Move) -> Iterator[tuple[str, str]]:
-    """(key, sentence) for what this kind of move lacks, has twice, or does not take; key empty for the move itself."""
+    """Return (key, sentence) for what this kind of move lacks, has twice, or does not take; key empty for the move itself."""
     given = [field.name for field in fields(move) if field.name != "do" and getattr(move, field.name) is not None]
     known = {name for group in _NEEDED[move.do] for name in group} | set(_ALLOWED[move.do])
     for name in given:
@@ -133,7 +133,7 @@ def move_faults(move: Move) -> Iterator[tuple[str, str]]:
 
 
 def plan_faults(plan: ExperimentPlan) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """(path, sentence) for everything that the types cannot say."""
+    """Return (path, sentence) for everything that the types cannot say."""
     for p, part in enumerate(plan.parts):
         if not part.moves:
             yield ("parts", p, "moves"), "is empty: a part has at least one move"

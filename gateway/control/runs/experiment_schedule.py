@@ -65,7 +65,7 @@ class _Range:
 
 
 def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segment, ...]:
-    """The whole plan in volts. ValueError with a sentence for a plan that the rig does not allow, or that is none."""
+    """Return the whole plan in volts. ValueError with a sentence for a plan that the rig does not allow, or that is none."""
     for _, sentence in plan_faults(plan):
         raise ValueError(f"plan {plan.name}: {sentence}")
     usable = _Range(limits, model, limits.voltage_min_v, highest_voltage_v(limits, model))
@@ -132,7 +132,7 @@ class Schedule:
         return max(segment.to_v for segment in self.segments)
 
     def index(self, elapsed_s: float) -> int:
-        """Of the segment that runs at this time; the last one's after the end."""
+        """Return the index of the segment that runs at this time; the last one's after the end."""
         return min(bisect_right(self._starts_s, elapsed_s) - 1, len(self.segments) - 1)
 
     def voltage_v(self, elapsed_s: float) -> float:
@@ -144,5 +144,5 @@ class Schedule:
         return self._from_v[k] + (segment.to_v - self._from_v[k]) * since_s / segment.over_s
 
     def direction(self, elapsed_s: float) -> int:
-        """+1 when the voltage last rose, -1 when it last fell."""
+        """Return +1 when the voltage last rose, -1 when it last fell."""
         return self._ways[self.index(elapsed_s)]

@@ -37,7 +37,7 @@ class LadderPace:
         return len(self._rise_s) >= 3
 
     def observe(self, trace: Trace, from_n: float, to_n: float, noise_n: float) -> None:
-        """trace: (seconds since the step, N); from_n, to_n: settled before and after."""
+        """Learn from one settled step. trace: (seconds since the step, N); from_n, to_n: settled before and after."""
         way_n = to_n - from_n
         if abs(way_n) < max(LEAST_N, NOISE_AT * noise_n):
             return
@@ -46,7 +46,7 @@ class LadderPace:
         self._rise_s.append(max(0.0, late_s - early_s))
 
     def blind_s(self, step_n: float, noise_n: float) -> float:
-        """Seconds after a step of this size until what is left of it is nothing to speak of."""
+        """Return the seconds after a step of this size until what is left of it is nothing to speak of."""
         if not self.is_known:
             return UNKNOWN_BLIND_S
         left = max(LEAST_LEFT_N, LEFT_NOISE * noise_n) / max(abs(step_n), 1.0e-6)

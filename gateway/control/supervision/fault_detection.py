@@ -70,14 +70,14 @@ class FaultDetector:
         self._stuck_s = 0.0
 
     def start(self) -> None:
-        """At enable."""
+        """Forget what was counted before, at an enable."""
         self._rise.start()
         self._frozen.start()
         self._response_fault = FaultCode.NONE
         self._over = 0
 
     def observe(self, reading: Reading, response: ExpectedForce, branch_share: float, touching: bool) -> None:
-        """Every new sample, enabled or not."""
+        """Count a new sample, enabled or not."""
         self._rise.smooth(reading)
         self._frozen.observe(reading, response, touching)
         is_over = reading.overload or abs(reading.contact_n) >= self._limits.over_force_n
@@ -85,7 +85,7 @@ class FaultDetector:
         self._response_fault = self._rise.judge(response, branch_share, touching, reading.interval_s)
 
     def observe_rest(self, reading: Reading) -> None:
-        """While disabled: a force that stays at the safe voltage."""
+        """Time a force that stays at the safe voltage, while disabled."""
         stuck = reading.is_usable and reading.contact_n > self._bounds.stuck_n
         self._stuck_s = self._stuck_s + reading.interval_s if stuck else 0.0
 
@@ -105,7 +105,7 @@ class FaultDetector:
         return self._rise.is_too_high
 
     def shift_zero(self, moved_n: float) -> None:
-        """The zero moved: what was measured before reads that much less now."""
+        """Take over a zero that has moved: what was measured before reads that much less now."""
         self._rise.shift(moved_n)
 
     @property
@@ -113,7 +113,7 @@ class FaultDetector:
         return self._stuck_s >= _STUCK_S
 
     def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
-        """Why an enable would be refused now, apart from a latched fault."""
+        """Return why an enable would be refused now, apart from a latched fault."""
         if line.fault or self._is_silent(now_s, line):
             return RefusalReason.OUTPUT_FAULT
         if line.cell_lost or not reading.is_fresh:
@@ -123,7 +123,7 @@ class FaultDetector:
         return RefusalReason.NONE
 
     def excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
-        """Why the machine, and not the device, keeps an enable back; empty where it does not."""
+        """Return why the machine, and not the device, keeps an enable back; empty where it does not."""
         if block is RefusalReason.CELL_SILENT:
             return cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, "")[1]
         if block is RefusalReason.OUTPUT_FAULT and line.unanswered_since_s is not None and not line.fault:
@@ -132,7 +132,7 @@ class FaultDetector:
         return ""
 
     def first_cause(self, now_s: float, reading: Reading, line: LineStatus, expected_n: float) -> StopCause | None:
-        """expected_n: the model's rise, for the sentences."""
+        """Return the first cause of a fault, None where there is none. expected_n: the model's rise, for the sentences."""
         return self._of_line(now_s, line) or self._of_cell(reading, line) or self._of_force(reading, expected_n)
 
     def _is_silent(self, now_s: float, line: LineStatus) -> bool:

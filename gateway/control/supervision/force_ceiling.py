@@ -49,11 +49,11 @@ class ForceCeiling:
             self._before, self._last = self._last, (row.stair.voltage_v, row.force_n)
 
     def is_reached(self, noise_n: float) -> bool:
-        """Whether the force of now is as high as it may be."""
+        """Return whether the force of now is as high as it may be."""
         return len(self._recent_n) == _SAMPLES and self.measured_n >= self._ceiling_n(noise_n)
 
     def is_beyond(self, voltage_v: float, noise_n: float) -> bool:
-        """Whether a stair of this voltage would pass the ceiling, after the ones that have settled."""
+        """Return whether a stair of this voltage would pass the ceiling, after the ones that have settled."""
         return self._expected_n(voltage_v) + self._given_n > self._ceiling_n(noise_n)
 
     def _ceiling_n(self, noise_n: float) -> float:

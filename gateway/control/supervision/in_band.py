@@ -18,14 +18,14 @@ class InBandTimer:
         self.restart()
 
     def restart(self) -> None:
-        """Nothing is pursued, or something new."""
+        """Restart both timers: nothing is pursued, or something new."""
         self._in_since_s = inf
         self._out_since_s = inf
         self.in_band = False
         self.unreachable = False
 
     def update(self, now_s: float, is_inside: bool, in_band_time_s: float) -> None:
-        """is_inside: the comparison of this moment, with the target at its goal."""
+        """Compare once more. is_inside: the comparison of this moment, with the target at its goal."""
         if is_inside:
             self._in_since_s = min(self._in_since_s, now_s)
             self._out_since_s, self.unreachable = inf, False

@@ -26,7 +26,7 @@ class Lease:
             self._changed_s = now_s
 
     def start(self, now_s: float) -> None:
-        """An enable starts the lease: the master has one length to beat."""
+        """Start the lease at an enable: the master has one length to beat."""
         self._started_s = now_s
 
     def age_s(self, now_s: float) -> float:
@@ -39,11 +39,11 @@ class Lease:
         return not owner_connected or self.age_s(now_s) > self._length_s
 
     def is_fresh_since(self, since_s: float, now_s: float) -> bool:
-        """Has the heartbeat changed after since_s, and within one length? Always true without a lease."""
+        """Return whether the heartbeat has changed after since_s, and within one length; always true without a lease."""
         if self._length_s is None:
             return True
         return self._changed_s > since_s and now_s - self._changed_s <= self._length_s
 
     def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
-        """The same, were this value observed now."""
+        """Return the same, were this value observed now."""
         return heartbeat != self._heartbeat or self.is_fresh_since(since_s, now_s)

@@ -44,7 +44,7 @@ class ExpectedForce:
         self._evaluate()
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
-        """voltage_v stood on the output for the last dt_s."""
+        """Advance the model: voltage_v stood on the output for the last dt_s."""
         if dt_s > 0.0:
             self._lagged_v += (voltage_v - self._lagged_v) * dt_s / (self._lag_s + dt_s)
             self._evaluate()
@@ -54,11 +54,11 @@ class ExpectedForce:
         self.falling_n = self._model.force_n(self._lagged_v, -1.0)
 
     def force_n(self, branch_share: float) -> float:
-        """Expected cell force at this branch share."""
+        """Return the expected cell force at this branch share."""
         return self.falling_n + (0.5 + 0.5 * branch_share) * (self.rising_n - self.falling_n)
 
     def rise_n(self, branch_share: float) -> float:
-        """The same above the force at rest."""
+        """Return the same above the force at rest."""
         return self.force_n(branch_share) - self._rest_n
 
     @property
@@ -82,7 +82,7 @@ class RiseCheck:
         self.start()
 
     def start(self) -> None:
-        """At enable. A positive rest counts as residual force in contact, not as zero error."""
+        """Take the force at rest, at an enable. A positive rest counts as residual force in contact, not as zero error."""
         self._base_n = min(self.smooth_n, self._threshold_n)
         self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = 0.0
         self._proven = False
@@ -93,16 +93,16 @@ class RiseCheck:
         return self.smooth_n - self._base_n
 
     def smooth(self, reading: Reading) -> None:
-        """Every new sample, enabled or not."""
+        """Smooth a new sample, enabled or not."""
         if reading.is_usable:
             self.smooth_n += (reading.cell_n - self.smooth_n) * reading.interval_s / (_SMOOTHING_S + reading.interval_s)
 
     def shift(self, moved_n: float) -> None:
-        """The zero moved: what was measured before reads that much less now."""
+        """Take over a zero that has moved: what was measured before reads that much less now."""
         self.smooth_n -= moved_n
 
     def judge(self, response: "ExpectedForce", branch_share: float, touching: bool, interval_s: float) -> FaultCode:
-        """One more new sample against the rise that the model expects at this branch share."""
+        """Judge one new sample against the rise that the model expects at this branch share."""
         expected_n = response.rise_n(branch_share)
         rise_n = self.measured_rise_n
         wrong_sign = expected_n >= _LEAST_RISE_N and rise_n <= -max(self._threshold_n, _LOWEST_SHARE * expected_n)

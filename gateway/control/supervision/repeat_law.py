@@ -32,12 +32,12 @@ _SAMPLES: Final = 65536  # of one generation of runs
 
 
 def stays(counts: float) -> float:
-    """Probability that normal noise of this standard deviation is read as one count, at the worst place in it."""
+    """Return the probability that normal noise of this standard deviation is read as one count, at the worst place in it."""
     return erf(0.5 / (sqrt(2.0) * counts)) if counts > 0.0 else 1.0
 
 
 def equal_samples(counts: float, rate_hz: float, independent: float = 1.0) -> float:
-    """So many equal samples in a row are a false alarm once in FALSE_ALARM_S; inf where noise shows too seldom.
+    """Return how many equal samples in a row are a false alarm once in FALSE_ALARM_S; inf where noise shows too seldom.
 
     independent: share of the samples that are new ones.
     """
@@ -49,13 +49,13 @@ def equal_samples(counts: float, rate_hz: float, independent: float = 1.0) -> fl
 
 
 def seconds_to_find(counts: float, rate_hz: float, at_least_s: float) -> float:
-    """How long a cell of this noise repeats itself until it is called frozen, inf where it never is."""
+    """Return how long a cell of this noise repeats itself until it is called frozen, inf where it never is."""
     samples = equal_samples(counts, rate_hz)
     return max(at_least_s, ceil(samples) / rate_hz) if samples < inf else inf
 
 
 def counts_found_within(bound_s: float, rate_hz: float) -> float:
-    """The least noise, in counts, of which a frozen cell is found within bound_s; inf where no noise is enough."""
+    """Return the least noise, in counts, of which a frozen cell is found within bound_s; inf where no noise is enough."""
     low, high = FEWEST_COUNTS, MOST_COUNTS
     if seconds_to_find(high, rate_hz, 0.0) > bound_s:
         return inf

@@ -67,7 +67,7 @@ class RepeatedReadings:
         self._stay = 1.0
 
     def observe(self, value_n: float, interval_s: float, under_force: bool) -> None:
-        """One more sample. Only what has ended with a change was alive: the present run is not learned from."""
+        """Count one more sample. Only what has ended with a change was alive: the present run is not learned from."""
         if value_n == self._value_n:
             self._run += 1
             return
@@ -78,7 +78,7 @@ class RepeatedReadings:
         self._value_n, self._run, self._is_dead = value_n, 1, False
 
     def forget_run(self) -> None:
-        """The present run is no sign of life, however long it goes on."""
+        """Forget the present run: it is no sign of life, however long it goes on."""
         self._is_dead = True
 
     @property

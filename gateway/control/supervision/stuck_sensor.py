@@ -34,7 +34,7 @@ class StuckSensorCheck:
         self.start()
 
     def start(self) -> None:
-        """At enable: what happened before does not count."""
+        """Begin anew at an enable: what happened before does not count."""
         self._equal = 1
         self._equal_s = 0.0
         self._watch_model()
@@ -44,7 +44,7 @@ class StuckSensorCheck:
         self._least_n, self._most_n = -inf, inf
 
     def observe(self, reading: Reading, response: ExpectedForce, touching: bool) -> None:
-        """One more new reading."""
+        """Judge one new reading."""
         if reading.is_usable:
             self._noise.observe(reading.raw_n, reading.interval_s, touching)
         if reading.raw_n != self._value_n:
@@ -95,5 +95,5 @@ class StuckSensorCheck:
         )
 
     def tripped(self) -> None:
-        """The fault is told: these equal samples are not learned from."""
+        """Note that the fault is told: these equal samples are not learned from."""
         self._noise.forget_run()

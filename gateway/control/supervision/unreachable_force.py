@@ -69,7 +69,7 @@ class Evidence:
 
 
 def unreachable_words(seen: Evidence) -> str:
-    """What it probably is, and one thing to do."""
+    """Return what it probably is, and one thing to do."""
     pressure = _pressure(seen)
     if seen.no_air:
         return f"{pressure}: no air, or a closed valve; open the air supply and look at its gauge"

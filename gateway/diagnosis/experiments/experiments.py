@@ -74,7 +74,7 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {effect.name: experiment_of(effect) 
 
 
 def plan_for(names: Iterable[str], *, besides: Iterable[str] = (), longest_s: float = inf) -> Plan:
-    """One plan that shows each of these effects, or tells them apart: blocks that several need once, shortest first.
+    """Plan one run that shows each of these effects, or tells them apart: blocks that several need once, shortest first.
 
     Where some need a person meanwhile and others do not, those that do are left out. Those of `besides` are taken as far as
     longest_s goes, those of `names` whatever the time.

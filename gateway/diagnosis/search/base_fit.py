@@ -55,7 +55,8 @@ def without_effects(plant: Plant) -> Plant:
 
 
 def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -> tuple[Parameter, ...]:
-    """What is refitted. hidden: names of effects that are switched off; late_s: how late readings may come, see Options."""
+    """Return what is refitted. hidden: names of effects that are switched off; late_s: how late readings may come, see
+    Options."""
     commanded = any(each.command_v is not None for each in bench.measurements)
     found = [AREA]
     found += [LAG] if commanded else []

@@ -60,7 +60,8 @@ def try_initial_strains(
 
 
 def fit_initial_strains(bench: Bench, plant: Plant) -> FittedModel:
-    """This very plant with the offset and the start that fit each recording best: what of its error is not the start's."""
+    """Return this very plant with the offset and the start that fit each recording best: what of its error is not the
+    start's."""
     whiten = white_whitener(bench, bench.measured_n)
     (parameters,) = try_initial_strains(
         bench, ModelParameters(plant, tuple(0.0 for _ in bench.measurements)), whiten, most=1
@@ -86,7 +87,8 @@ def _squares_per_recording(bench: Bench, residual: Floats) -> list[float]:
 
 
 def drop_unfelt_strains(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[Bench, FittedModel]:
-    """The same fit without strains that its recording does not feel, on a bench whose young rows are those that feel them."""
+    """Return the same fit without strains that its recording does not feel, on a bench whose young rows are those that feel
+    them."""
     offsets = len(fitted.parameters.offsets_n)
     columns = whiten(fitted.jacobian)
     kept = [

@@ -22,7 +22,7 @@ _REST_SLACK_SHARE: Final = 5.0e-3  # of the forces' range that a force at rest m
 
 
 def settled_s(measurement: Measurement) -> float:
-    """When the state before the first row does not matter any more: lags have settled, and friction has slid."""
+    """Return when the state before the first row does not matter any more: lags have settled, and friction has slid."""
     settled_s = min(SETTLING_S, 0.1 * measurement.duration_s)
     drive = measurement.command_v if measurement.command_v is not None else measurement.pressure_pa
     if drive is None:

@@ -63,7 +63,8 @@ class DoubtfulEffect:
 def drop_doubtful_effects(
     bench: Bench, found: SearchResult
 ) -> tuple[SearchResult, ReportedModels, tuple[DoubtfulEffect, ...]]:
-    """What is reported once everything counts again, without effects that are no finding then, the worst of them first."""
+    """Return what is reported once everything counts again, without effects that are no finding then, the worst of them
+    first."""
     reported, dropped = _refit_for_report(bench, found), list[DoubtfulEffect]()
     while found.accepted:
         gains = [
@@ -87,7 +88,7 @@ def drop_doubtful_effects(
 
 
 def reason_for_doubt(accepted: AcceptedEffect, gain: Gain) -> str:
-    """Why this is no finding, as a sentence; empty where it is one."""
+    """Return why this is no finding, as a sentence; empty where it is one."""
     name, comparison = accepted.effect.name, accepted.comparison
     before_n, after_n = gain.held_out_rms_before_n, gain.held_out_rms_after_n
     if gain.ci95[0] <= 0.0:

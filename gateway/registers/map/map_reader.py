@@ -37,7 +37,7 @@ class MapError(ValueError):
 
 
 def read_map(document: Mapping[str, Any]) -> RegisterMap:
-    """Raises MapError with every fault found."""
+    """Read and check a map. Raises MapError with every fault found."""
     reader = _MapReader()
     found = reader.map(document)
     if reader.faults:

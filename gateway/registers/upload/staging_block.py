@@ -73,14 +73,14 @@ class StagingBlock:
         failing_reason: int = 0,
         notice: CommitNotice = NO_NOTICE,
     ) -> None:
-        """How far a commit is, from whoever serves it; checking and writing lock the block."""
+        """Show how far a commit is, from whoever serves it; checking and writing lock the block."""
         self._status = status
         self._image.put(self._notice, notice)
         for register, value in zip(self._shown, (status, failing_index, failing_reason), strict=True):
             self._image.put(register, value)
 
     def show_active(self, calibration: Calibration, slot: int) -> None:
-        """The set in use, with its model_hash; the same number is crc32."""
+        """Show the set in use, with its model_hash; the same number is crc32."""
         words = CoefficientSet.of_calibration(calibration).to_words()
         self._image.write(self._active_first, words[:HEAD_BYTES])
         self._image.write(self._active_first + TAIL_FROM, words[HEAD_BYTES:])

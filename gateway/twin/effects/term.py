@@ -27,7 +27,7 @@ class Term:
 
 
 def is_switched_on(section: Any, names: Sequence[str]) -> bool:
-    """Is one of these fields, in any lane, not 0?"""
+    """Return whether one of these fields is not 0 in any lane."""
     for name in names:
         value = getattr(section, name)
         if np.any(value) if isinstance(value, np.ndarray) else value != 0.0:

@@ -23,7 +23,7 @@ _ALIKE: Final = 1.0e-6  # of a step
 
 
 def common_step_s(steps_s: Floats, first: int = 0) -> Real:
-    """Lengths of steps, s: one float where, from the first that counts, they are alike."""
+    """Return the lengths of steps, s: one float where, from the first that counts, they are alike."""
     counted = steps_s[first:]
     return float(np.mean(counted)) if np.ptp(counted) < _ALIKE * counted[0] else steps_s
 

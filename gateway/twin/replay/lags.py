@@ -21,12 +21,12 @@ from gateway.twin.sections import Regulator
 
 
 def has_lags(regulator: Regulator) -> bool:
-    """Does the pressure take any time at all? If not, it jumps with the target."""
+    """Return whether the pressure takes any time at all; if not, it jumps with the target."""
     return regulator.lag_s > 0.0 or regulator.second_lag_s > 0.0 or regulator.slew_pa_per_s < UNLIMITED
 
 
 def is_linear(regulator: Regulator) -> bool:
-    """Are there lags, and neither another one for rising nor a slew limit?"""
+    """Return whether there are lags, and neither another one for rising nor a slew limit."""
     slews = regulator.slew_pa_per_s < UNLIMITED
     return has_lags(regulator) and not slews and regulator.fill_slowdown == 0.0
 
@@ -53,7 +53,7 @@ def filter_even_rows(regulator: Regulator, target_pa: Floats, step_s: float) -> 
 
 
 def scan_recursion(kept: Real, gained: Floats, start: float) -> Floats:
-    """x[0] = start, x[k + 1] = kept[k] x[k] + gained[k]; kept: a float, or one for each step.
+    """Solve x[0] = start, x[k + 1] = kept[k] x[k] + gained[k]; kept: a float, or one for each step.
 
     BLAS solves it as a triangular band; lfilter takes no coefficients that change. Imported here, as above: the twin's
     real-time part knows no scipy.
@@ -76,7 +76,7 @@ def follow_lag(series: Floats, lag_s: float, steps_s: Real) -> Floats:
 
 
 def lag_coupling(first_s: float, second_s: float, held_s: Real) -> tuple[Real, Real, Real]:
-    """(e1, e2, K) of two lags over the times that targets are held; see the module's text. Lags of 0 are none."""
+    """Return (e1, e2, K) of two lags over the times that targets are held; see the module's text. Lags of 0 are none."""
     kept_1 = np.exp(held_s * (-1.0 / first_s)) if first_s > 0.0 else 0.0
     kept_2 = np.exp(held_s * (-1.0 / second_s)) if second_s > 0.0 else 0.0
     if second_s == 0.0:
@@ -89,7 +89,7 @@ def lag_coupling(first_s: float, second_s: float, held_s: Real) -> tuple[Real, R
 
 
 def states_at_commands(regulator: Regulator, target_pa: Floats, held_s: Real) -> Floats:
-    """States when each target arrives: rows for the first lag, for the second and for the slew limit where there are.
+    """Return states when each target arrives: rows for the first lag, for the second and for the slew limit where there are.
 
     held_s: of all targets but the last, a float or (targets - 1,). At rest under the first target, which lasts.
     """

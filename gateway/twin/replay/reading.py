@@ -33,7 +33,7 @@ class Readings:
         self._shown = None if drive.repeated is None else _last_fresh(drive.repeated)
 
     def fill(self, plant: Plant, contact_n: Floats, force_n: Floats, found: Floats) -> None:
-        """Readings in N. contact_n: on the grid, without the spindle; force_n: at the rows, with it."""
+        """Fill in readings in N. contact_n: on the grid, without the spindle; force_n: at the rows, with it."""
         cell, conditions = plant.cell, self._grid.row_conditions
         reading = self._amplified(plant, contact_n, force_n)
         for term in active_formulas(TERMS, cell, conditions):

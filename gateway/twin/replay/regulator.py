@@ -127,7 +127,7 @@ class Pressures:
 
 
 def commands_seen(row_s: Floats, time_s: Floats, delay_s: float) -> tuple[NDArray[np.intp], Floats]:
-    """At each time: how many commands were seen behind this delay, and for how long the last one has been, s.
+    """Return, at each time: how many commands were seen behind this delay, and for how long the last one has been, s.
 
     A command that arrives just now is not seen yet. np.interp is three times as fast as np.searchsorted, for both rise.
     """
@@ -138,7 +138,7 @@ def commands_seen(row_s: Floats, time_s: Floats, delay_s: float) -> tuple[NDArra
 
 
 def held_targets(regulator: Regulator, command_v: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """(target of each command, Pa; whether it was noticed as a change), by map, steps, dead band, play and supply.
+    """Return (target of each command, Pa; whether it was noticed as a change), by map, steps, dead band, play and supply.
 
     The state before the first command is that of rest at 0. Equal commands after one another count as one.
     """

@@ -47,7 +47,7 @@ class Slides:
         which: NDArray[np.intp],
         starts: Sequence[Strains | None],
     ) -> list[Floats]:
-        """One force per plant; equal ones are the same array."""
+        """Return one force per plant; equal ones are the same array."""
         keys: list[Hashable] = [(self._key(plant), start) for plant, start in zip(plants, starts, strict=True)]
         known = {key: found for key in keys if (found := self._forces.get(key)) is not None}
         missing: dict[Hashable, Load] = {}

@@ -29,7 +29,7 @@ class _Elements(Elements):
     """Elements in steps that differ."""
 
     def set_step(self, step_s: Real, last_s: Real) -> None:
-        """The length of the coming step, and of the one in which the slide made its last travel, s."""
+        """Set the length of the coming step, and of the one in which the slide made its last travel, s."""
         self.set_drag(step_s)
         self._stribeck_travel_m = self._friction.stribeck_speed_m_per_s * last_s
         if self.ages:

@@ -24,7 +24,7 @@ class Loop:
         self, lag_s: float, second_lag_s: float, at_v: float = 0.0, wire_s: float = 0.03, off: float = 1.0
     ) -> None:
         self.push = LagInverse(LeadSettings(lag_s=off * lag_s, second_lag_s=off * second_lag_s), LIMITS)
-        self.push.know_wire(wire_s)
+        self.push.set_wire_time(wire_s)
         self.stage = VoltageLimiter(LIMITS)
         self.push.first_v = self.push.second_v = self.stage.voltage_v = at_v
         self.first_v = self.second_v = self.sent_v = at_v
@@ -38,7 +38,7 @@ class Loop:
         for _ in range(round(seconds * 1000)):
             if self.ms % 5 == 0:
                 self.stage.earn(0.005)
-                self.stage.drive(self.push.led_v(wanted_v, self.stage.voltage_v))
+                self.stage.drive(self.push.compensated_v(wanted_v, self.stage.voltage_v))
                 self.given_v.append(self.stage.voltage_v)
             if self.ms >= self.free_ms and self.stage.voltage_v != self.sent_v:
                 self.sent_v, self.free_ms = self.stage.voltage_v, self.ms + self.wire_ms
@@ -101,4 +101,4 @@ def test_at_rest_the_wish_itself_is_asked_for_and_one_beyond_the_range_passes(la
     loop = Loop(*lags)
     loop.run(4.0, 4.0)
     assert loop.stage.voltage_v == 4.0
-    assert loop.push.led_v(9.5, loop.stage.voltage_v) == 9.5
+    assert loop.push.compensated_v(9.5, loop.stage.voltage_v) == 9.5

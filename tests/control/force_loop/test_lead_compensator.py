@@ -37,7 +37,7 @@ class Loop:
             self.second_v += (self.first_v - self.second_v) * share / TWO.second_lag_s
         self.stage.earn(dt_s)
         self.lead.advance(voltage_v, dt_s)
-        self.limited_by = self.stage.drive(self.lead.led_v(wanted_v))
+        self.limited_by = self.stage.drive(self.lead.compensated_v(wanted_v))
         return self.second_v
 
     def settled_ticks(self, wanted_v: float, within_v: float = 0.1) -> int:
@@ -54,7 +54,7 @@ def test_off_equals_absent():
     for _ in range(100):
         wanted_v = rng.uniform(-1.0, 10.0)
         lead.advance(rng.uniform(0.0, 8.0), rng.uniform(0.0, 0.02))
-        assert lead.led_v(wanted_v) == wanted_v
+        assert lead.compensated_v(wanted_v) == wanted_v
     assert lead.gained_s == 0.0
 
 
@@ -99,7 +99,7 @@ def test_the_response_neither_passes_the_target_nor_depends_on_how_the_lags_are_
     one, other = (
         LeadCompensator(LeadSettings(lag_s=a, second_lag_s=b), LIMITS) for a, b in ((0.05, 0.09), (0.09, 0.05))
     )
-    assert (one.led_v(2.0), one.gained_s) == (other.led_v(2.0), other.gained_s)
+    assert (one.compensated_v(2.0), one.gained_s) == (other.compensated_v(2.0), other.gained_s)
 
 
 def test_nothing_winds_up_behind_a_clip_or_a_slow_slew():
@@ -120,8 +120,8 @@ def test_calls_microseconds_apart_change_nothing():
     for _ in range(1000):
         often.advance(4.0, 1e-6)
     seldom.advance(4.0, 1e-3)
-    assert often.led_v(2.0) == pytest.approx(seldom.led_v(2.0), abs=1e-9)
-    assert often.led_v(2.0) == often.led_v(2.0)
+    assert often.compensated_v(2.0) == pytest.approx(seldom.compensated_v(2.0), abs=1e-9)
+    assert often.compensated_v(2.0) == often.compensated_v(2.0)
 
 
 @pytest.mark.parametrize("second_lag_s", [0.072 * (1 - 1e-5), 0.072 * (1 - 1e-7), 0.0])

@@ -64,7 +64,7 @@ def test_without_a_fresh_sample_or_while_pressing_no_run_begins(tmp_path: Path) 
     runs = kept(wired, tmp_path)
     wired.fault("cell-cut")
     wired.run(0.5)
-    with pytest.raises(ValueError, match="no fresh sample of the load cell"):
+    with pytest.raises(ValueError, match="the load cell is silent"):
         runs.answer({"plan": PLAN})
     wired.fault("cell-cut", on=False)
     wired.run(0.5)
