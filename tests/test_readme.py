@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from gateway.cli.main import command
-from gateway.profiles import load_device, load_register_map
+from gateway.profiles import load_register_map
 from gateway.registers import render_block
+from tests.profile_files import load_device
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

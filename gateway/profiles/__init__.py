@@ -11,7 +11,7 @@ from gateway.profiles.find import list_shipped, shipped_profiles_folder
 from gateway.profiles.kinds.any_file import Checked, check_file
 from gateway.profiles.kinds.kinds import CALLED
 from gateway.profiles.kinds.plants import Origin, PlantProfile
-from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
+from gateway.profiles.load import load_calibration, load_plant, load_register_map
 from gateway.profiles.rigs.assembly import Report, check_report, load_rig
 from gateway.profiles.rigs.rig import CellLine, OutputLine, Rig
 from gateway.profiles.rigs.rig_file import Network, ResidualWatch
@@ -35,7 +35,6 @@ __all__ = [
     "check_report",
     "list_shipped",
     "load_calibration",
-    "load_device",
     "load_plant",
     "load_register_map",
     "load_rig",

@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from gateway.bsfm.model import Calibration
-from gateway.devices import DeviceProfile
 from gateway.profiles.find import display, locate
 from gateway.profiles.kinds.calibrations import read_calibration
-from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.kinds import CALLED, kind_of
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
@@ -62,7 +60,7 @@ def open_profile(kind: str, reference: ProfileReference, findings: Findings) -> 
 
 
 def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
-    """Return the same, whatever the file turns out to be."""
+    """Find, read and parse one file, whatever its kind turns out to be; None with the faults noted."""
     try:
         path = locate(kind, reference.name, reference.beside)
         data = path.read_bytes()
@@ -98,12 +96,8 @@ def _load(kind: str, name: str | Path, read: Read[T]) -> T:
     return value
 
 
-def load_device(name: str | Path) -> DeviceProfile:
-    """Return a device profile by shipped name or path; ProfileError with every fault. So the three below."""
-    return _load("device", name, read_device)
-
-
 def load_plant(name: str | Path) -> PlantProfile:
+    """Return a plant profile by shipped name or path; ProfileError with every fault. So the two below."""
     return _load("plant", name, read_plant)
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from gateway.profiles import ProfileError, load_device, shipped_profiles_folder
+from gateway.profiles import ProfileError, shipped_profiles_folder
 from gateway.profiles.strict_yaml.text import parse
+from tests.profile_files import load_device
 
 
 def loaded(folder: Path, name: str, **changes: Any) -> list[str]:

@@ -3,7 +3,7 @@
 import pytest
 
 from gateway.devices import DeviceProfile
-from gateway.profiles.load import load_device
+from tests.profile_files import load_device
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import pytest
 
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.ports import PortError, Pty, SerialPort
-from gateway.profiles.load import load_device
+from tests.profile_files import load_device
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 import gateway
-from gateway.profiles import ProfileError, check_report, find, list_shipped, load_device, load_rig
+from gateway.profiles import ProfileError, check_report, find, list_shipped, load_rig
+from tests.profile_files import load_device
 
 PROFILES = Path(__file__).parents[2] / "profiles"
 DEMO = (PROFILES / "rigs" / "demo.yaml").read_text(encoding="utf-8")

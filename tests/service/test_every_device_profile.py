@@ -9,9 +9,10 @@ from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceProfile, PacedWire, Role, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import Accepted, ForceSample, Garbage, Pressure, ReadPressure, ReadVoltage, SetVoltage
 from gateway.ports import Pty
-from gateway.profiles import list_shipped, load_device, load_rig
+from gateway.profiles import list_shipped, load_rig
 from gateway.registers.words import State
 from gateway.service.running_rig.output_line import OutputExchange
+from tests.profile_files import load_device
 from tests.service.wired import Wired
 
 STEP_S, DURATION_S = 0.001, 5.0

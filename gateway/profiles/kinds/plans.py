@@ -24,11 +24,6 @@ _EXPERIMENT_KEYS: Final = frozenset(entry.name for entry in fields(ExperimentPla
 _SCHEMA_LINE: Final = "# force-gateway schema plan > plan.json gives editors the schema\n"
 
 
-def load_plan(path: str | Path) -> AnyPlan:
-    """Return the plan of a file. ProfileError with every fault."""
-    return read_plan(_open_plan(path))
-
-
 def load_plan_fields(path: str | Path) -> dict[str, Any]:
     """Return what a good file says and no more, for options that fill in what it leaves out. ProfileError with every fault."""
     document = _open_plan(path)
@@ -45,7 +40,7 @@ def _open_plan(path: str | Path) -> Document:
 
 
 def read_plan(document: Document) -> AnyPlan:
-    """ProfileError with every fault, at its place."""
+    """Return the plan of a document. ProfileError with every fault, at its place."""
     plan: AnyPlan | None
     if _EXPERIMENT_KEYS & set(document.value):
         plan, faults = _experiment(document)
@@ -79,7 +74,7 @@ def plan_document(plan: AnyPlan) -> dict[str, Any]:
 
 
 def plan_text(plan: ExperimentPlan, comment: str = "") -> str:
-    """Return the whole file, which `load_plan` reads back to the same plan. comment: lines to stand at its top."""
+    """Return the whole file, which `read_plan` reads back to the same plan. comment: lines to stand at its top."""
     head = "".join(f"# {printable(line)}\n" for line in comment.splitlines())
     return head + _SCHEMA_LINE + "".join(_about(plan)) + "parts:\n" + "".join(map(_part, plan.parts))
 

@@ -9,7 +9,7 @@ from click.testing import Result
 import gateway.diagnosis
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.diagnosis.result import Diagnosis
-from gateway.profiles.kinds.plans import load_plan
+from tests.profile_files import load_plan
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
 
 Call = Callable[..., Result]

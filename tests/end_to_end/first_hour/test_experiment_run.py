@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.profiles.kinds.plans import load_plan, plan_document
+from gateway.profiles.kinds.plans import plan_document
 from gateway.recording import read_recording
 from gateway.recording.measurement import measurement_of
+from tests.profile_files import load_plan
 
 OFF = 0
 PHASE, RECORDED, STOPPED = 126, 10, 7

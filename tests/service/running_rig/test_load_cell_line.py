@@ -7,8 +7,8 @@ import pytest
 from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.exchange import ForceReading
 from gateway.devices.messages import ForceSample
-from gateway.profiles import load_device
 from gateway.service.running_rig.load_cell_line import CellExchange
+from tests.profile_files import load_device
 
 TIMEOUT_S, ROUND_TRIP_S = 0.1, 0.02
 READING = ForceReading(ask="W?", frame="W {force:+08.2f}", unit="N")
