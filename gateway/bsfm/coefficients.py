@@ -89,11 +89,13 @@ class Coefficients:
 
     @classmethod
     def of(cls, branches: Branches, blend_span_n: float = 0.0) -> "Coefficients":
+        """Return the coefficients of two branches with a linear blend."""
         rising, falling = branches.rising, branches.falling
         return cls(rising.x0, rising.x1, rising.handles, rising.weights, falling.handles, falling.weights, blend_span_n)
 
     @classmethod
     def of_calibration(cls, calibration: Calibration) -> "Coefficients":
+        """Return the coefficients of a calibration, stops and response included."""
         return cls(
             calibration.x0_v,
             calibration.x1_v,

@@ -94,6 +94,7 @@ class CommandTracker:
         self._lease.start(now_s)
 
     def is_lease_lost(self, now_s: float, owner_connected: bool) -> bool:
+        """Return whether the master is lost: disconnected, or without a heartbeat for one length of the lease."""
         return self._lease.is_lost(now_s, owner_connected)
 
     def lease_age_s(self, now_s: float) -> float:

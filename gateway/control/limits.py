@@ -87,6 +87,7 @@ class RateBudget:
         self.available_s = TICK_S
 
     def earn(self, dt_s: float) -> None:
+        """Add the time that has passed, within what one movement may claim."""
         self.available_s = min(self.available_s + dt_s, max(TICK_S, min(dt_s, LONGEST_STEP_S)))
 
     def spend(self, moved: float, rate_per_s: float) -> None:
@@ -110,6 +111,7 @@ class VoltageLimiter:
         self._pace = RateBudget()
 
     def earn(self, dt_s: float) -> None:
+        """Add the time that has passed, within what one movement may claim."""
         self._pace.earn(dt_s)
 
     def drive(self, target_v: float) -> LimitedBy:
@@ -122,4 +124,5 @@ class VoltageLimiter:
         return by_slew or by_range
 
     def make_safe(self) -> None:
+        """Put the output at the safe voltage at once."""
         self.voltage_v = self._limits.safe_voltage_v

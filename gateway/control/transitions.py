@@ -49,6 +49,7 @@ class Transitions:
         return self.state in ENABLED_STATES
 
     def begin_step(self) -> None:
+        """Begin a step with an empty outcome."""
         self.outcome = StepOutcome()
 
     def tell(self, *sentences: str) -> None:
@@ -60,6 +61,7 @@ class Transitions:
         self.state = next_state(self.state, event)
 
     def enable(self, now_s: float) -> None:
+        """Enable the output and tell who asked for it."""
         self.fire(StateEvent.ENABLE)
         self._start(now_s, f"enabled by {self._parts.commands.who}")
 

@@ -37,9 +37,11 @@ class Scale:
         return (self.physical[1] - self.physical[0]) / (self.device[1] - self.device[0])
 
     def to_physical(self, number: float) -> float:
+        """Return the physical value of a number on the wire."""
         return self.physical[0] + (number - self.device[0]) * self.physical_per_number
 
     def to_number(self, value: float) -> float:
+        """Return the number on the wire for a physical value, not rounded."""
         return self.device[0] + (value - self.physical[0]) / self.physical_per_number
 
     def carries(self, number: float, slack: float = 0.0) -> bool:
@@ -163,6 +165,7 @@ class Refusals:
                 raise ValueError(f"refusals are ASCII text, {text!r} is not")
 
     def texts(self) -> tuple[str, ...]:
+        """Return the texts by which the device refuses."""
         texts = (self.unknown, self.out_of_range.text if self.out_of_range else "")
         return tuple(text for text in texts if text)
 

@@ -32,10 +32,6 @@ class OutputHost(Protocol):
         wire."""
 
     @property
-    def expecting(self) -> int:
-        """How many requests wait for their answer; when each was sent is the caller's to know."""
-
-    @property
     def safe_reply(self) -> bytes:
         """What acknowledges the last `safe_frame` (the least voltage before the first): a whole line."""
 

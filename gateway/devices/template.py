@@ -25,6 +25,7 @@ class Template:
     pattern: re.Pattern[bytes]
 
     def field(self, name: str) -> Field | None:
+        """Return the field of this name, None where the template has none."""
         return next((field for field in self.fields if field.name == name), None)
 
     def encode(self, values: Mapping[str, Value], may_be_blank: str = "") -> bytes:

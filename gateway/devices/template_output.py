@@ -47,10 +47,6 @@ class TemplateOutputHost:
             self._tolerance_v[ReadVoltage] = _ROUNDING * self._steps_between(profile.read_voltage)
 
     @property
-    def expecting(self) -> int:
-        return len(self._expected)
-
-    @property
     def safe_reply(self) -> bytes:
         return self._grammar.answer_line(self._confirmation, self._safe_v)
 

@@ -74,6 +74,7 @@ def implausible_area(area_m2: float, start_m2: float) -> str:
 
 
 def nothing_to_switch_off(name: str) -> str:
+    """Return the note for --without of an effect that the base model does not have."""
     return (
         f"--without {name}: the base model has no {name} that could be switched off, so nothing was; it competes like "
         "every other effect"
@@ -81,6 +82,7 @@ def nothing_to_switch_off(name: str) -> str:
 
 
 def too_high_a_floor(given_n: float, rms_n: float) -> str:
+    """Return the note for a noise floor that confirms nothing."""
     return (
         f"the noise floor of {given_n:.3g} N that was given is more than the base model leaves ({rms_n:.3g} N), so it "
         "confirms nothing and was not used: it is the noise of the readings at rest, in newtons"

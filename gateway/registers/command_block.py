@@ -212,5 +212,6 @@ def check_zeros(address: int, data: bytes) -> None:
 
 
 def reserved_word_refusal(address: int, word: int) -> Refusal:
+    """Return the refusal of a number other than 0 in a reserved word."""
     text = f"address {address} is reserved: {word} was written, only 0 is accepted"
     return Refusal(RefusalReason.RESERVED, address, text, value=float(word))

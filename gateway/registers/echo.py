@@ -28,6 +28,7 @@ class ByteOrderEcho:
         self._proven: dict[str, WordOrder] = {}
 
     def is_proven_by(self, host: str) -> bool:
+        """Return whether this host has shown its word order."""
         return host in self._proven
 
     def write(self, address: int, data: bytes, host: str) -> WordOrder | None:

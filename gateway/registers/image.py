@@ -51,6 +51,7 @@ class RegisterImage:
         self.write(register.address, register.encode(value))
 
     def word(self, address: int) -> int:
+        """Return the word at this address."""
         return self.data[2 * address] << 8 | self.data[2 * address + 1]
 
     def cuts_value(self, address: int, count: int) -> Register | None:

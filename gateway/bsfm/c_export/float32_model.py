@@ -66,18 +66,23 @@ class Float32Model:
         self.rounds_max = 0  # most Newton rounds that any call has taken
 
     def rising_force(self, voltage_v: Float32) -> Answer:
+        """Return the force of the rising branch at this voltage, N, and the code, as the C does."""
         return self._force_of(self.rising, voltage_v)
 
     def falling_force(self, voltage_v: Float32) -> Answer:
+        """Return the force of the falling branch at this voltage, N, and the code, as the C does."""
         return self._force_of(self.falling, voltage_v)
 
     def rising_voltage(self, force_n: Float32) -> Answer:
+        """Return the voltage of the rising branch for this force, V, and the code, as the C does."""
         return self._voltage_of(self.rising, force_n)
 
     def falling_voltage(self, force_n: Float32) -> Answer:
+        """Return the voltage of the falling branch for this force, V, and the code, as the C does."""
         return self._voltage_of(self.falling, force_n)
 
     def blend(self, blend: Float32, delta_n: Float32) -> Float32:
+        """Return the blend after the force has moved by delta_n, in [-1, 1], as the C does."""
         if isfinite(delta_n) and delta_n != 0:
             if abs(delta_n) >= self.blend_span:
                 return _ONE if delta_n > 0 else -_ONE
@@ -85,6 +90,7 @@ class Float32Model:
         return _clip(blend, -_ONE, _ONE)
 
     def voltage(self, force_n: Float32, blend: Float32) -> Answer:
+        """Return the voltage for a force between the branches, V, and the code, as the C does."""
         if not _is_blend(blend):
             return self.x0, Code.INVALID
         share = _HALF + _HALF * blend
@@ -97,6 +103,7 @@ class Float32Model:
         return falling_v + share * (rising_v - falling_v), falling if rising is Code.OK else rising
 
     def force(self, voltage_v: Float32, blend: Float32) -> Answer:
+        """Return the force at a voltage between the branches, N, and the code, as the C does."""
         if not _is_blend(blend):
             return self.falling.handles[0], Code.INVALID
         falling_n, status = self._force_of(self.falling, voltage_v)
@@ -113,9 +120,11 @@ class Float32Model:
         return _clip(total, -_ONE, _ONE)
 
     def reset(self) -> CommandState:
+        """Return the memory of a vented tool, where the calibration ladder starts."""
         return CommandState(self.lowest, [-_ONE] * len(self.radii) or [_ONE], self.x0)
 
     def command(self, state: CommandState, force_n: Float32) -> Answer:
+        """Move the memory to a force and return its voltage, V, and the code, as the C does."""
         if self._is_damaged(state):
             return self.x0, Code.INVALID
         if not isfinite(force_n):

@@ -58,6 +58,7 @@ class FitLanes:
     cost: Floats  # (k,)
 
     def pick(self, lanes: Floats | NDArray[np.intp] | NDArray[np.bool_]) -> "FitLanes":
+        """Return the chosen lanes."""
         return FitLanes(*(getattr(self, field.name)[lanes] for field in fields(self)))
 
     def where(self, chosen: NDArray[np.bool_], other: "FitLanes") -> "FitLanes":

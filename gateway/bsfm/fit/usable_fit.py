@@ -57,6 +57,7 @@ class _Search:
         return np.asarray(-self._rows @ self._values_at(u)[0] - self._least)
 
     def margin_slopes(self, u: Floats) -> Floats:
+        """Return the derivatives of the margins by the unknowns."""
         return np.asarray(-self._rows @ self._values_at(u)[1])
 
     def cost(self, u: Floats) -> tuple[float, Floats]:

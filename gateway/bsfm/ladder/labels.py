@@ -44,6 +44,7 @@ class Labels:
         return cls(*(column.astype(np.int64) for column in found))
 
     def part(self, keep: NDArray[np.bool_] | Integers) -> "Labels":
+        """Return the labels of the rows to keep."""
         return Labels(self.phase[keep], self.group[keep], self.stair[keep])
 
     @property

@@ -38,6 +38,7 @@ class Points:
         return len(self.voltage_v)
 
     def part(self, keep: NDArray[np.bool_] | Integers) -> "Points":
+        """Return the points to keep."""
         voltage_v, force_n, row = self.voltage_v[keep], self.force_n[keep], self.row[keep]
         return Points(voltage_v, force_n, row, self.drift_n[keep], self.noise_n, self.notes)
 

@@ -59,13 +59,16 @@ class SentBsfm(Bsfm):
         """The inner model was proven when it was made; the loop has no time to prove it again."""
 
     def voltage_v(self, force_n: float, branch_share: float) -> tuple[float, InverseStatus]:
+        """Return the voltage to send for a force, V, through the command map, and how it was found."""
         voltage_v, status = Bsfm.voltage_v(self, force_n, branch_share)
         return self.command.sent_v(voltage_v) if self.command else voltage_v, status
 
     def force_n(self, voltage_v: float, branch_share: float) -> float:
+        """Return the force at a voltage that was sent, N."""
         return Bsfm.force_n(self, self._straight_v(voltage_v), branch_share)
 
     def settled_n(self, voltage_v: float, branch_share: float) -> float:
+        """Return the force that comes to rest at a voltage that was sent, N."""
         straight = Bsfm(self.branches, self.reversal, self.limits_n)
         return straight.settled_n(self._straight_v(voltage_v), branch_share)
 

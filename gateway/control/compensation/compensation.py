@@ -90,6 +90,7 @@ class Compensation:
         return not (self.cell or self.command or self.outside or self.timing)
 
     def outside_n(self, tilt_rad: float, feed_mm_s: float) -> float:
+        """Return the force that tilt and feed bring onto the workpiece, N; 0 where it is not compensated."""
         return self.outside.force_n(tilt_rad, feed_mm_s) if self.outside else 0.0
 
     def settings(self, settings: ControlSettings) -> ControlSettings:

@@ -62,6 +62,7 @@ class MeasuredTrim:
         return self._turns >= MOST_TURNS
 
     def reset(self) -> None:
+        """Forget the correction and what was smoothed."""
         self.value_n = self.value_v = 0.0
         self.limited_by = LimitedBy.NONE
         self._at_n = self._turned_n = 0.0  # of the target: now, and where it was furthest on its way

@@ -25,6 +25,7 @@ class TrimIntegral:
         self.limited_by = LimitedBy.NONE
 
     def reset(self) -> None:
+        """Forget the correction."""
         self.value_v, self.limited_by = 0.0, LimitedBy.NONE
 
     def resume(self, value_v: float) -> None:

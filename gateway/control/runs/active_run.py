@@ -85,6 +85,7 @@ class ActiveRun:
         self._stop_asked = sentence
 
     def take_asked(self) -> AnyPlan | None:
+        """Return the plan that was asked for, once."""
         asked, self._asked = self._asked, None
         return asked
 
@@ -136,10 +137,12 @@ class ActiveRun:
         self.is_local = False
 
     def take_refused(self) -> str:
+        """Return why the last run was refused, once; empty for nothing."""
         refused, self.refused = self.refused, ""
         return refused
 
     def take_said(self) -> str:
+        """Return what the run has said, once; empty for nothing."""
         said, self.said = self.said, ""
         return said
 

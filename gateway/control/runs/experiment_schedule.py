@@ -54,6 +54,7 @@ class _Range:
         return max(volts, self.low_v), f"{force_n:g} N"
 
     def check_level_v(self, volts: float, told: str) -> float:
+        """Return a voltage of the plan; ValueError where it is outside the rig's range. told: how the plan names it."""
         if not (isfinite(volts) and self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V):
             low_n, high_n = (self.model.branches.rising.value(end_v) for end_v in (self.low_v, self.top_v))
             raise ValueError(

@@ -21,6 +21,7 @@ class Lease:
         self._heartbeat = heartbeat
 
     def observe(self, now_s: float, heartbeat: int) -> None:
+        """Note the time of a heartbeat that has changed."""
         if heartbeat != self._heartbeat:
             self._heartbeat = heartbeat
             self._changed_s = now_s
@@ -34,6 +35,7 @@ class Lease:
         return now_s - max(self._changed_s, self._started_s)
 
     def is_lost(self, now_s: float, owner_connected: bool) -> bool:
+        """Return whether the owner is disconnected, or its heartbeat older than the lease; never without a lease."""
         if self._length_s is None:
             return False
         return not owner_connected or self.age_s(now_s) > self._length_s

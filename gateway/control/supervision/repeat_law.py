@@ -98,6 +98,7 @@ class Runs:
         self._samples = [0, 0]
 
     def add(self, length: int) -> None:
+        """Count a run of this many equal samples."""
         self._now[length] = self._now.get(length, 0) + 1
         self._samples[0] += length
         if self._samples[0] >= _SAMPLES:

@@ -148,6 +148,7 @@ class _Window:
         return taken
 
     def change(self, steps: int) -> None:
+        """Count a change of the reading by so many counts."""
         self.changes += 1
         self.travel += steps
         self.squares += steps * steps

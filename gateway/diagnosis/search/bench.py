@@ -133,6 +133,7 @@ class Bench:
         return np.concatenate(parts)
 
     def time_s(self) -> Floats:
+        """Return the times of all rows, (rows,), s."""
         return np.concatenate([self.measurements[channel.recording].time_s for channel in self.channels])
 
     def command(self) -> Floats:

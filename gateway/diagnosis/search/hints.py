@@ -19,6 +19,7 @@ _PITCH_BINS: Final = 4096
 
 
 def search_hints(bench: Bench, fitted: FittedModel, whiten: Whitener) -> SearchHints:
+    """Return what the starts of a search may know of the recordings."""
     simulated = bench.measured_n - fitted.residual_n
     forces = simulated[bench.judged]
     area_m2 = fitted.parameters.value(AREA)

@@ -134,6 +134,7 @@ def _model_without(accepted: AcceptedEffect, found: SearchResult) -> FittedModel
 
 
 def gain_of(before: HeldOutErrors, after: HeldOutErrors, floor_n: float) -> Gain:
+    """Return by how much a model's held-out error falls, with its interval from resampled blocks."""
     errors_before, errors_after, counts = (
         np.add.reduceat(values, _part_edges(before)) for values in (before.squares, after.squares, before.squares > 0.0)
     )
@@ -156,5 +157,6 @@ def _part_edges(held: HeldOutErrors) -> NDArray[np.intp]:
 
 
 def share_of_excess(before_n: float, after_n: float, floor_n: float) -> float:
+    """Return the share of the error above the floor that a model takes away, 0 .. 1."""
     excess = before_n**2 - min(floor_n, after_n) ** 2
     return float(min(max((before_n**2 - after_n**2) / excess, 0.0), 1.0)) if excess > 0.0 else 0.0

@@ -29,24 +29,29 @@ class DocumentReader:
         self.faults: list[Flaw] = []
 
     def fault(self, place: Place, sentence: str, *, is_of_key: bool = False) -> None:
+        """Note a fault. is_of_key: it is the key and not its value that is wrong."""
         self.faults.append(Flaw(place, sentence, is_of_key))
 
     def keys(self, place: Place, content: Mapping[str, Any], known: tuple[str, ...]) -> None:
+        """Check that all keys are known."""
         for key in content:
             if key not in known:
                 self.fault((*place, key), f"is not a known key{suggest(str(key), known)}", is_of_key=True)
 
     def group(self, place: Place, content: Any) -> Mapping[str, Any]:
+        """Return a mapping; a fault and an empty one for anything else."""
         if isinstance(content, Mapping):
             return content
         self.fault(place, "is missing" if content is None else "is not a group of keys", is_of_key=content is None)
         return {}
 
     def is_name(self, place: Place, name: str) -> None:
+        """Check that this is a name of registers, blocks or values."""
         if not _NAME.fullmatch(name):
             self.fault(place, f'"{name}" is not a name: small letters, digits and _, beginning with a letter')
 
     def text(self, place: Place, content: Mapping[str, Any], key: str, default: str | None = None) -> str:
+        """Return a text; a fault and an empty one for anything else."""
         found = content.get(key, default)
         if not isinstance(found, str):
             self.fault(
@@ -58,6 +63,7 @@ class DocumentReader:
         return found
 
     def number(self, place: Place, content: Mapping[str, Any], key: str) -> float:
+        """Return a finite number; a fault and 0 for anything else."""
         found = content[key]
         if isinstance(found, bool) or not isinstance(found, (int, float)) or not isfinite(found):
             self.fault((*place, key), f"{found} is not a number")
@@ -65,6 +71,7 @@ class DocumentReader:
         return found
 
     def whole(self, place: Place, content: Mapping[str, Any], key: str, low: int, high: int) -> int:
+        """Return a whole number within low .. high; a fault and low for anything else."""
         found = content.get(key)
         if found is None:
             self.fault(place, f"{key} is missing", is_of_key=True)
@@ -75,6 +82,7 @@ class DocumentReader:
         return low
 
     def order(self, place: Place, content: Mapping[str, Any]) -> WordOrder:
+        """Return the word order; a fault and abcd for an unknown one."""
         given = content.get("word_order", "abcd")
         if given not in tuple(WordOrder):
             self.fault((*place, "word_order"), f"{given} is not abcd or cdab")
@@ -100,5 +108,6 @@ class DocumentReader:
 
 
 def suggest(word: str, known: Iterable[str]) -> str:
+    """Return "; did you mean ...?" with the nearest known word, empty where none is near."""
     near = get_close_matches(word, list(known), 1, 0.6)
     return f"; did you mean {near[0]}?" if near else ""

@@ -49,6 +49,7 @@ class _MapReader(DocumentReader):
     """Knows what a map, a block and a register consist of."""
 
     def map(self, document: Mapping[str, Any]) -> RegisterMap:
+        """Return the whole map, checked."""
         self.keys((), document, _MAP_KEYS)
         given = self.group(("blocks",), document.get("blocks"))
         blocks = tuple(self.block(name, self.group(("blocks", name), content)) for name, content in given.items())
@@ -65,6 +66,7 @@ class _MapReader(DocumentReader):
         )
 
     def block(self, name: str, content: Mapping[str, Any]) -> Block:
+        """Return one block without its registers."""
         place: Place = ("blocks", name)
         self.keys(place, content, _BLOCK_KEYS)
         self.is_name(place, name)
@@ -81,6 +83,7 @@ class _MapReader(DocumentReader):
         )
 
     def registers(self, block: Block, content: Mapping[str, Any]) -> Iterator[Register]:
+        """Yield the registers of one block."""
         given = content.get("registers", [])
         if not isinstance(given, list):
             self.fault(("blocks", block.name, "registers"), "is not a list")
@@ -104,6 +107,7 @@ class _MapReader(DocumentReader):
             yield self.one(place, block, entry, (label, kind, address + k * words_of(kind)))
 
     def one(self, place: Place, block: Block, entry: Mapping[str, Any], what: tuple[str, str, int]) -> Register:
+        """Return one register. what: its name, type and address."""
         name, kind, address = what
         scale = self.scale(place, entry, kind)
         low, high = self.limits(place, entry, kind, scale)
@@ -128,6 +132,7 @@ class _MapReader(DocumentReader):
         )
 
     def repetitions(self, blocks: tuple[Block, ...], own: list[Register]) -> Iterator[Register]:
+        """Yield the registers that a block shows again as float32."""
         by_name = {block.name: block for block in blocks}
         for block in blocks:
             for source_name, base in block.repeats.items():
@@ -144,6 +149,7 @@ class _MapReader(DocumentReader):
                     yield from (register for register in copies if register is not None)
 
     def blocks_apart(self, blocks: tuple[Block, ...]) -> None:
+        """Check that no two blocks overlap."""
         ordered = sorted(blocks, key=lambda block: block.first)
         for left, right in pairwise(ordered):
             if right.first <= left.last:
@@ -153,6 +159,7 @@ class _MapReader(DocumentReader):
                 )
 
     def registers_apart(self, registers: list[Register]) -> None:
+        """Check that no two registers of a block share a name, and that none overlap."""
         names: set[tuple[str, str]] = set()
         taken: dict[int, Register] = {}
         for register in registers:
@@ -166,6 +173,7 @@ class _MapReader(DocumentReader):
                     self.fault(place, f"{register.name} overlaps {other.name} at {address}")
 
     def scale(self, place: Place, entry: Mapping[str, Any], kind: str) -> float:
+        """Return the scale of an entry, 1 where none is given."""
         scale = self.number(place, entry, "scale") if "scale" in entry else 1.0
         if scale not in (1, 0.1, 0.01, 0.001) or (scale != 1 and kind not in RAW_LIMITS):
             self.fault((*place, "scale"), f"{scale} is not 1, 0.1, 0.01 or 0.001 (float32: 1)")
@@ -175,6 +183,7 @@ class _MapReader(DocumentReader):
     def limits(
         self, place: Place, entry: Mapping[str, Any], kind: str, scale: float
     ) -> tuple[float | None, float | None]:
+        """Return the lowest and highest allowed value in the register's unit; None where the type has no bound."""
         low, high = RAW_LIMITS.get(kind, (None, None))
         minimum = self.number(place, entry, "min") if "min" in entry else _scale_bound(low, scale)
         maximum = self.number(place, entry, "max") if "max" in entry else _scale_bound(high, scale)
@@ -186,6 +195,7 @@ class _MapReader(DocumentReader):
         return minimum, maximum
 
     def access(self, place: Place, entry: Mapping[str, Any]) -> str:
+        """Return R or RW."""
         access = self.text(place, entry, "access", "R")
         if access not in ("R", "RW"):
             self.fault((*place, "access"), f"{access} is not R or RW")
