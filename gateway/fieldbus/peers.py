@@ -55,7 +55,7 @@ class Peers:
         self._open[host] = self._open.get(host, 0) + 1
 
     def leave(self, host: str) -> bool:
-        """One connection is gone; true when it was the last of its address."""
+        """Count a closed connection; return whether it was the last of its address."""
         self._open[host] -= 1
         if self._open[host]:
             return False

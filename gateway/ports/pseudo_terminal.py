@@ -33,7 +33,7 @@ class Pty:
         return int(speed)
 
     def set_client_baud(self, baud: int) -> None:
-        """The speed that a client gets that sets none; any speed, for termios knows the usual ones only."""
+        """Set the speed that a client gets that sets none; any speed, for termios knows the usual ones only."""
         *flags, line, control, _, _ = _TERMIOS2.unpack(fcntl.ioctl(self._slave, _TCGETS2, bytes(_TERMIOS2.size)))
         flags[2] = flags[2] & ~_CBAUD | _BOTHER
         fcntl.ioctl(self._slave, _TCSETS2, _TERMIOS2.pack(*flags, line, control, baud, baud))

@@ -85,7 +85,7 @@ class SerialPort:
         self._is_wanted = True
 
     def begin_lost(self, failure: PortError) -> None:
-        """Where the first opening failed: told like any loss, and tried again like after any."""
+        """Report a first opening that failed like any loss, and try again as after one."""
         self._identity.take(self._path)
         self._is_wanted = True
         self._reopen_after(self._backoff_s)

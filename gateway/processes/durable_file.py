@@ -22,7 +22,7 @@ _SEAL: Final = b"# crc32 %08x of all that follows\n"
 
 @contextlib.contextmanager
 def lock_directory(directory: Path, *, shared: bool = False) -> Iterator[int]:
-    """The directory's descriptor, while no other holder changes it. FileNotFoundError when there is none."""
+    """Yield the directory's descriptor, while no other holder changes it. FileNotFoundError when there is none."""
     descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH if shared else fcntl.LOCK_EX)
@@ -32,7 +32,7 @@ def lock_directory(directory: Path, *, shared: bool = False) -> Iterator[int]:
 
 
 def make_directory(directory: Path) -> None:
-    """The directory, durably; nothing when it is there. OSError, and it is not there, when that fails."""
+    """Make the directory, durably; do nothing when it is there. OSError, and it is not there, when that fails."""
     directory.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     try:
         directory.mkdir(mode=0o700)

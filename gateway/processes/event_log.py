@@ -159,7 +159,7 @@ class QueuedWriter:
             self._events.put_nowait(event)
 
     def end(self) -> None:
-        """All that is in the queue is written first, if that takes no longer than a second."""
+        """Write what is in the queue, then end, if that takes no longer than a second."""
         with contextlib.suppress(queue.Full):
             self._events.put(None, timeout=_END_BOUND_S)
         self._thread.join(_END_BOUND_S)

@@ -19,7 +19,7 @@ def export_csv(recording: Recording, target: Path) -> None:
 
 
 def write_csv(recording: Recording, stream: IO[bytes]) -> None:
-    """The CSV's bytes, to a stream that stays open."""
+    """Write the CSV's bytes to a stream that stays open."""
     from pyarrow import csv
 
     for key, value in _comments(recording):

@@ -48,7 +48,7 @@ class SampleRing:
         self._written = self._count[0]
 
     def append(self, values: tuple[float, ...]) -> None:
-        """The row first, the count after it: who sees the count finds the row."""
+        """Write the row, and the count after it: who sees the count finds the row."""
         self._row.pack_into(self._map, _ROWS_AT + self._written % self._capacity * self._row.size, *values)
         self._written += 1
         self._count[0] = self._written

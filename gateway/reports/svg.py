@@ -51,7 +51,7 @@ def _round_ticks(low: float, high: float, count: int = 6) -> list[float]:
 
 
 def spread(values: Iterable[float], margin: float = 0.06, around: float | None = None) -> tuple[float, float]:
-    """Limits that hold all values with a margin; symmetric about `around` where given."""
+    """Return limits that hold all values with a margin; symmetric about `around` where given."""
     finite = list(values)
     low, high = min(finite), max(finite)
     if around is not None:

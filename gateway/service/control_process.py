@@ -59,7 +59,7 @@ def _report_start_failure(log: EventLog, sentence: str, exit_code: int, event: s
 
 
 def prepare(options: dict[str, Any]) -> None:
-    """What takes long the first time: imports, and the types that the rig's files are checked against."""
+    """Do what takes long the first time: imports, and the types that the rig's files are checked against."""
     _loop_factory()
     with contextlib.suppress(ProfileError):  # told by the process that runs
         load(options)
@@ -97,7 +97,7 @@ def _loop_factory() -> Any:
 
 
 async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: EventLog, notes: tuple[str, ...]) -> int:
-    """From the first open port to the last safe voltage; the exit code."""
+    """Run the rig from the first open port to the final safe-voltage write; return the exit code."""
     guardian = GuardianLine(link)
     ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
     if ports is None:

@@ -45,7 +45,7 @@ class WatchReference:
         self.plant = with_value(self.plant, "cell", "noise_n", 0.0)
 
     def rms_n(self, window: Window) -> float:
-        """Measured minus replayed over the judged rows, see `rms_of`."""
+        """Return the RMS of measured minus replayed over the judged rows, see `rms_of`."""
         return rms_of(window.measurement, self.plant)
 
     def floor_n(self, window: Window) -> float | None:
@@ -80,7 +80,7 @@ def rms_of(measurement: Measurement, plant: Plant) -> float:
 
 
 def residuals(measurement: Measurement, plants: list[Plant]) -> Floats:
-    """Measured minus replayed at the judged rows; shape (plants, judged rows)."""
+    """Return measured minus replayed at the judged rows; shape (plants, judged rows)."""
     readings_n = replay_of(measurement, "inferred").run(plants).reading_n
     return np.asarray((measurement.force_n - readings_n)[:, measurement.usable])
 

@@ -45,7 +45,7 @@ def yield_to_others() -> None:
 
 
 def exit_with_guardian(link: socket.socket) -> None:
-    """A thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does."""
+    """Start a thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does."""
 
     def wait() -> None:
         with contextlib.suppress(OSError):
@@ -84,7 +84,7 @@ def diagnose_window(measurements: "Sequence[Measurement]", plant: "Plant") -> "D
 
 
 def pause_s(every_s: float, spent_s: float) -> float:
-    """From the end of a look to the next one. spent_s: of processor time, by the look."""
+    """Return the pause from the end of a look to the next one. spent_s: of processor time, by the look."""
     return max(every_s, spent_s / SHARE) - min(spent_s, every_s)
 
 

@@ -11,7 +11,7 @@ NOTHING = "nothing to plan: every effect of the catalogue is found, ruled out, o
 
 
 def next_plan(diagnosis: Diagnosis) -> Plan | None:
-    """None where there is nothing to plan."""
+    """Return the next plan; None where there is nothing to plan."""
     return plan_next(diagnosis)
 
 

@@ -35,7 +35,7 @@ class SeenStatus:
 
 
 def seen_of(values: Mapping[str, float]) -> SeenStatus:
-    """From the status block's values by register name."""
+    """Return what is seen, from the status block's values by register name."""
     return SeenStatus(
         state=State(int(values["state"])),
         fault=FaultCode(int(values["fault_code"])),

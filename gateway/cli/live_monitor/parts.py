@@ -39,7 +39,7 @@ def big(value: float, decimals: int, *, sign: str = "-", width: int, style: str)
 
 
 def chart(points: Sequence[TrackPoint | None], rows: int, top_n: float) -> Text:
-    """Measured force as columns from 0 to top_n, newest at the right; the setpoint as a line where no column hides it."""
+    """Draw measured force as columns from 0 to top_n, newest at the right; the setpoint as a line where no column hides it."""
     text = Text(no_wrap=True)
     for row in range(rows - 1, -1, -1):
         for point in points:

@@ -54,7 +54,7 @@ class Track:
         self._step_s: float | None = None
 
     def add(self, time_s: float, readings: Iterable[RegisterReading]) -> None:
-        """One poll."""
+        """Add the readings of one poll."""
         self.time_s = time_s
         self.readings = {reading.register.name: reading for reading in readings}
         for name, reading in self.readings.items():
@@ -66,7 +66,7 @@ class Track:
             self.points.popleft()
 
     def value(self, name: str) -> float:
-        """In the register's unit; NaN when unavailable, or not in the map."""
+        """Return the newest value in the register's unit; NaN when unavailable, or not in the map."""
         reading = self.readings.get(name)
         return float(reading.value) if reading else nan
 

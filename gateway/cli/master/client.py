@@ -80,7 +80,7 @@ class GatewayClient:
         self.close()
 
     def close(self) -> None:
-        """The next request connects again."""
+        """Close the connection; the next request connects again."""
         if self._client:
             self._client.close()  # type: ignore[no-untyped-call]
             self._client = None

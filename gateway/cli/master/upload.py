@@ -63,7 +63,7 @@ class UploadClient(GatewayClient):
         return bool(word & CommitNotice.KNOWN_SET)
 
     def check_active(self, upload: UploadFrames, slot: int) -> None:
-        """The active block holds what was sent, word for word."""
+        """Check that the active block holds what was sent, word for word."""
         sent = struct.unpack(f">{len(upload.set_words) // 2}H", upload.set_words)
         first = self.register_map.find("order@active").address
         places = [*range(first, first + HEAD_WORDS)]

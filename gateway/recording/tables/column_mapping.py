@@ -32,7 +32,7 @@ class ColumnMapping:
 
     @classmethod
     def parse(cls, text: str) -> "ColumnMapping":
-        """From `time_s=1:ms,force_n=7:n`. RecordingError in the user's words."""
+        """Return the mapping that a text means, such as `time_s=1:ms,force_n=7:n`. RecordingError in the user's words."""
         entries: dict[str, str] = {}
         for part in filter(None, (piece.strip() for piece in text.split(","))):
             name, equals, source = (piece.strip() for piece in part.partition("="))

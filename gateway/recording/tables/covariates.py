@@ -68,7 +68,7 @@ def interpolate_missing(values: Floats, time_s: Floats) -> Floats:
 
 
 def is_constant(values: Floats) -> bool:
-    """One value in all rows where it is known. values: one finite at least."""
+    """Return whether there is one value in all rows where it is known. values: one finite at least."""
     known = values[np.isfinite(values)]
     return bool(np.ptp(known) <= 1.0e-12 * np.abs(known).max())
 

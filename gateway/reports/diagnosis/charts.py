@@ -60,7 +60,7 @@ def _width(wide: bool) -> int:
 def force_over_time(
     trace: Trace, after: bool, window: tuple[float, float] | None = None, *, wide: bool = True
 ) -> Drawing:
-    """Measured and simulated force over time; window: (start, end), s, of a closer look."""
+    """Draw measured and simulated force over time; window: (start, end), s, of a closer look."""
     left = TraceResiduals.of(trace)
     start, end = window or (float(left.time_s[0]), float(left.time_s[-1]))
     shown = (left.time_s >= start) & (left.time_s <= end)

@@ -206,7 +206,8 @@ def dependence(x: Floats, y: Floats, bins: int = 20) -> float:
 def occupied_cells(
     x: Floats, y: Floats, cells: tuple[int, int], limits: tuple[float, float, float, float]
 ) -> NDArray[np.int64]:
-    """The cells (column, row) of a picture that hold at least one point, shape (n, 2). limits: x low, high, y low, high."""
+    """Return the cells (column, row) of a picture that hold at least one point, shape (n, 2). limits: x
+    low, high, y low, high."""
     x_low, x_high, y_low, y_high = limits
     held = np.isfinite(x) & np.isfinite(y)
     across = np.clip((x[held] - x_low) / (x_high - x_low) * cells[0], 0, cells[0] - 1).astype(np.int64)

@@ -34,7 +34,7 @@ class SeriesChart(Chart):
     cell_px: float = 4.0
 
     def envelope(self, series: Envelope, style: str, name: str = "") -> None:
-        """A band from least to greatest; one stroke of it is seen where both are equal."""
+        """Draw a band from least to greatest; one stroke of it is seen where both are equal."""
         paths = []
         for piece in series.pieces:
             top = self._run(series.x[piece], series.high[piece])
@@ -47,7 +47,7 @@ class SeriesChart(Chart):
         self._note(name, "line", style)
 
     def cloud(self, x: Floats, y: Floats, style: str, name: str = "") -> None:
-        """Every small cell of the picture that holds a point, once. Its path counts in cells, which keeps it short."""
+        """Draw every small cell of the picture that holds a point, once. Its path counts in cells, which keeps it short."""
         columns, rows = self._cells()
         across, down = (self.width - LEFT - RIGHT) / columns, (self.height - TOP - BOTTOM) / rows
         box = (self.x.low, self.x.high, self.y.low, self.y.high)

@@ -68,7 +68,8 @@ DWELL: Final = Dwell(least_s=0.1, most_s=0.6, check_s=0.02, readings=1)
 
 
 def quasi_static(plant: Plant) -> Plant:
-    """The same plant without what passes and without what the surroundings bring: noise, time, delays, tilt, warmth. What is
+    """Return the same plant without what passes and without what the surroundings bring: noise, time, delays,
+    tilt, warmth. What is
     left is where the force comes to rest, and plants that rest alike become one."""
     return replace(
         plant,

@@ -63,7 +63,7 @@ class SimulatedLoop:
         self.fault = ""
 
     def tick(self, time_s: float, force_n: float, schedule: SetpointSchedule) -> float:
-        """One sample, one write of the master, one step between; returns the true force at the end, N."""
+        """Run one sample, one write of the master and one step between; return the true force at the end, N."""
         tilt_rad = self._surround(schedule.around(time_s)) if schedule.columns else 0.0
         self._write(time_s, force_n, tilt_rad)
         self._twin.advance(0.5 * TICK_S)

@@ -51,7 +51,7 @@ def fit_recording(recording: Recording, request: FitRequest, context: RigContext
 
 
 def default_name(document: Document) -> str:
-    """Of a calibration that nobody has named: model and order."""
+    """Return the name of a calibration that nobody has named: model and order."""
     return f"{document['chosen']['model']}-{document['chosen']['order']}"
 
 
@@ -100,7 +100,7 @@ def _source(fit: LadderFit) -> str:
 
 
 def write_report(fit: LadderFit, target: Path) -> None:
-    """The HTML report, whole or not at all."""
+    """Write the HTML report, whole or not at all."""
     write_whole(target, fit_page(fit.evaluation, fit.document))
 
 
@@ -115,7 +115,7 @@ def write_whole(target: Path, text: str) -> None:
 
 
 def data_sha256(checked: CheckedLadder) -> str:
-    """Of every settled point that the fit has used, as text with fixed digits."""
+    """Return the SHA-256 of every settled point that the fit has used, as text with fixed digits."""
     ladder = checked.ladder
     rows = zip(ladder.voltage_v, ladder.force_n, ladder.direction, ladder.group, strict=True)
     text = "".join(f"{volts:.4f},{newtons:.6f},{way},{group}\n" for volts, newtons, way, group in rows)

@@ -109,7 +109,7 @@ def rig_of_state(state: Path | None) -> str | None:
 
 
 def find_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
-    """By name, else by the file that the recording names, if that is (still) the one."""
+    """Find the rig by name, else by the file that the recording names, if that is (still) the one."""
     if not name:
         return None, []
     try:

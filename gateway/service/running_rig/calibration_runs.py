@@ -122,7 +122,7 @@ class CalibrationRuns:
     # -- from the loop
 
     def follow(self, decision: Output) -> None:
-        """After each step of the controller."""
+        """Follow the run; to be called after each step of the controller."""
         self._decision = decision
         calibrating = self._calibrating
         if calibrating.running and self._recording is None:

@@ -48,7 +48,7 @@ class Lateness:
         self._rig_ran_s = 0.0
 
     def follow_rig(self, rig: SchedulerCounters | None) -> None:
-        """The process behind a simulated rig, or the one that took its place."""
+        """Count the turns of the process behind a simulated rig, or the one that took its place."""
         if self._rig:
             self._rig.close()
         self._rig, self._rig_turns = rig, None

@@ -29,7 +29,7 @@ class CellExchange:
         self.reset()
 
     def reset(self) -> None:
-        """The port is (again) open: nothing said before counts any more."""
+        """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()
         self._sent_s: float | None = None
         self._next_s = -inf

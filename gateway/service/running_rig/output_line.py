@@ -58,7 +58,7 @@ class OutputExchange:
         self.reset()
 
     def reset(self) -> None:
-        """The port is (again) open: nothing said before counts any more."""
+        """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()
         self._wanted_v: float | None = None
         self._in_flight: OutputRequest | None = None

@@ -18,7 +18,7 @@ _QUALITY_NUMBER = {Quality.OK: 0.0, Quality.UNSTABLE: 1.0, Quality.OVERLOAD: 2.0
 
 
 def row_of(time_s: float, sample: ForceSample, decision: Output, line: LineState) -> tuple[float, ...]:
-    """One row in the order of COLUMNS; time_s counts from wherever the taker's begins."""
+    """Return one row in the order of COLUMNS; time_s counts from wherever the taker's begins."""
     return (
         time_s,
         decision.voltage_v,

@@ -123,7 +123,7 @@ def _spawn_process(command: list[str], passed: tuple[int, ...]) -> int:
 
 
 def reap_orphans(known: set[int]) -> None:
-    """Orphans of our children come to us, their subreaper: let them go, but none that somebody still asks for."""
+    """Reap the orphans of our children, whose subreaper we are, but none that somebody still asks for."""
     with contextlib.suppress(OSError):
         while (ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)) and ended.si_pid not in known:
             os.waitpid(ended.si_pid, os.WNOHANG)

@@ -43,7 +43,7 @@ _NAME_BYTES: Final = 15  # of a process's name, which top and ps -c show
 
 
 def become_subreaper() -> bool:
-    """Orphans of our children become ours; False where the kernel cannot."""
+    """Make the orphans of our children ours; False where the kernel cannot."""
     import ctypes
 
     try:

@@ -93,7 +93,7 @@ class Guardian:
         self.others = OtherChildren(self.starter, self.log, lambda answer: self._tell_control(message_link.RIG, answer))
 
     def watch(self) -> int:
-        """Until the end; the exit code."""
+        """Guard the rig until the end; return the exit code."""
         self.ring = create_shared_memory()
         try:
             self.starter.open()

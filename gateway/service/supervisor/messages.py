@@ -15,7 +15,7 @@ _PATIENCE_S: Final = 0.1
 
 
 def print_error(sentence: str) -> None:
-    """To stderr. A paused terminal gets nothing: the guardian has other work than to wait for it."""
+    """Print to stderr. A paused terminal gets nothing: the guardian has other work than to wait for it."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         if select.select([], [sys.stderr], [], _PATIENCE_S)[1]:
             sys.stderr.write(sentence + "\n")
@@ -23,7 +23,7 @@ def print_error(sentence: str) -> None:
 
 
 def print_ready(what: str | dict[str, Any]) -> None:
-    """To stdout: READY, for people or for a program. A reader that is gone (`| head -1`) is no reason to end."""
+    """Print READY to stdout, for people or for a program. A reader that is gone (`| head -1`) is no reason to end."""
     try:
         sys.stdout.write((what if isinstance(what, str) else json.dumps(what)) + "\n")
         sys.stdout.flush()

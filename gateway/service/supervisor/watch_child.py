@@ -41,7 +41,7 @@ class WatchSupervisor:
         return [self._child.died] if self._child else []
 
     def start(self, now_s: float) -> None:
-        """The first start; a watch that runs goes on."""
+        """Start the watch for the first time; one that runs goes on."""
         if self._child is None and self._deaths == 0:
             self._begin(now_s)
 
