@@ -68,9 +68,10 @@ DWELL: Final = Dwell(least_s=0.1, most_s=0.6, check_s=0.02, readings=1)
 
 
 def quasi_static(plant: Plant) -> Plant:
-    """Return the same plant without what passes and without what the surroundings bring: noise, time, delays,
-    tilt, warmth. What is
-    left is where the force comes to rest, and plants that rest alike become one."""
+    """Return the same plant without what passes and without what the surroundings bring.
+
+    Noise, time, delays, tilt and warmth go. The rest says where the force settles, and plants that settle alike become one.
+    """
     return replace(
         plant,
         regulator=replace(Regulator(), lag_s=QUICK_LAG_S, **_section_values(plant.regulator, REGULATOR)),
