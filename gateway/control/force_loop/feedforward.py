@@ -61,7 +61,7 @@ class Approach:
         self._touched_s: float | None = None
 
     def goal(self, now_s: float, demand: Demand, touching: bool, law: "Feedforward") -> tuple[float, float]:
-        """(goal N, rate N/s) for this step."""
+        """Return (goal N, rate N/s) for this step."""
         applied_n = law.applied_n
         if not touching:
             self._touched_s = None
@@ -99,7 +99,7 @@ class Feedforward:
         self._delayed.restart(self.applied_n)
 
     def reset(self) -> None:
-        """Vented: nothing applied, nothing remembered."""
+        """Forget everything: vented, nothing applied."""
         self.applied_n = self.aimed_n = self.reference_n = 0.0
         self._delayed.restart(0.0)
         self._trend.restart()
@@ -174,7 +174,7 @@ class Feedforward:
             self._slide = self.model.memory_after(self._slide, slid_n, self._slid_n)
 
     def correction_v(self, gravity_n: float) -> float:
-        """What the correction adds to the feedforward: by the slide's own friction, not by the target's."""
+        """Return what the correction adds to the feedforward: by the slide's own friction, not by the target's."""
         if self.applied_n <= 0.0 or is_below_usable(self.applied_n, self._limits):
             return 0.0
         corrected_v, _ = self.model.voltage_v(self._slid_n, self.model.reversal.branch_share(self._slide))
@@ -186,7 +186,7 @@ class Feedforward:
         self._memory = self._slide = self.model.reversal.at(RISING)
 
     def slope_n_per_v(self, gravity_n: float) -> float:
-        """How much force a volt makes at the working point, N/V, by the branches as they are shared there."""
+        """Return how much force a volt makes at the working point, N/V, by the branches as they are shared there."""
         rising, falling = self.model.branches.rising, self.model.branches.falling
         force_n, share = self.aimed_n - gravity_n, 0.5 + 0.5 * self.branch_share
         slopes = [max(LEAST_SLOPE_N_PER_V, curve.slope(curve.inverse(force_n)[0])) for curve in (rising, falling)]

@@ -147,8 +147,8 @@ class ForceLoop:
         return self._band.unreachable or self._answer.unreachable
 
     def elapse(self, dt_s: float, line: LineStatus) -> None:
-        """dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags hears what the wire
-        has really taken, where that is known: it carries one setting at a time."""
+        """Advance the models: dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags
+        hears what the wire has really taken, where that is known: it carries one setting at a time."""
         self._limiter.earn(dt_s)
         self._lead.advance(self._limiter.voltage_v if line.sent_v is None else line.sent_v, dt_s)
         if isinstance(self._lead, LinearizedLagInverse):
@@ -156,7 +156,7 @@ class ForceLoop:
         self.expected.advance(self.voltage_v, dt_s)
 
     def rest(self) -> None:
-        """Disabled: the safe voltage at once, everything learned forgotten."""
+        """Go to the safe voltage at once and forget everything learned: disabled."""
         self._limiter.make_safe()
         self.feedforward.reset()
         self._trim.reset()
@@ -166,12 +166,12 @@ class ForceLoop:
         self.feedforward_v, self.limited_by = 0.0, LimitedBy.NONE
 
     def step(self, demand: Demand, inputs: LoopInputs) -> Moved:
-        """One step towards the demand."""
+        """Do one step towards the demand."""
         return _or_fault(lambda: self._step(demand, inputs))
 
     def descend(self, demand: Demand, dt_s: float, given_n: float) -> Moved:
-        """One step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that is
-        being calibrated may not fit, and never up."""
+        """Do one step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that
+        is being calibrated may not fit, and never up."""
         return _or_fault(lambda: self._step_down(demand, dt_s, given_n))
 
     def drive_run(self, voltage_v: float, branch_share: float) -> None:

@@ -32,7 +32,7 @@ class SetpointTrend:
         self._rate_n_per_s = self._change_n_per_s2 = 0.0
 
     def advance(self, setpoint_n: float, dt_s: float) -> None:
-        """dt_s has passed, and this is the setpoint from now on, N."""
+        """Follow the setpoint: dt_s has passed, and this is the setpoint from now on, N."""
         self._now_s += dt_s
         values = self._values
         if values and self._now_s - values[-1][0] > self._patience_s:

@@ -132,12 +132,12 @@ class ActiveRun:
         self.run, self.eta_s, self.target_n = None, 0.0, 0.0
 
     def rest(self) -> None:
-        """The output is off."""
+        """End what a run has left behind: the output is off."""
         self.end()
         self.is_local = False
 
     def take_refused(self) -> str:
-        """Return why the last run was refused, once; empty for nothing."""
+        """Return why the last plan asked for was not begun, once; empty for nothing."""
         refused, self.refused = self.refused, ""
         return refused
 

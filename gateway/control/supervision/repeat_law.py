@@ -110,7 +110,8 @@ class Runs:
         return max((*self._now, *self._before), default=0)
 
     def is_explained(self, length: int, stay: float) -> bool:
-        """Is a run of this length no surprise among so many samples, each repeated with a probability of stay?"""
+        """Return whether a run of this length is no surprise among so many samples, each repeated with a probability of
+        stay."""
         expected = sum(self._samples) * (1.0 - stay) * stay ** (length - 1)
         return expected > _SURPRISE
 
