@@ -189,8 +189,10 @@ def test_whatever_a_calibration_is_its_words_make_the_same_words_again(given_set
 
 
 CHANGES = {
-    "a handle": {"rising_handles_n": (0.965065713935, 1.2546, 65.2318728635)},
-    "a weight": {"falling_weights": (1.0, 0.76985, 0.565741917759)},
+    "a handle": {
+        "rising_handles_n": (DEMO.rising_handles_n[0], DEMO.rising_handles_n[1] + 1e-4, DEMO.rising_handles_n[2])
+    },
+    "a weight": {"falling_weights": (1.0, DEMO.falling_weights[1] + 1e-5, DEMO.falling_weights[2])},
     "the range": {"x1_v": 7.9},
     "a limit": {"force_limits_n": (2.5, 25.3)},
     "the blend span": {"blend_span_n": 13.5},
