@@ -149,14 +149,28 @@ def _fill_states(regulator: Regulator, target_pa: Floats, held_s: Real) -> list[
 
 
 def _limit_slew(pressure_pa: Floats, most_pa: Real) -> Floats:
-    """What a slew limit of `most_pa` per step lets through."""
-    pressure = float(pressure_pa[0])
-    found = [pressure]
-    for asked, most in zip(pressure_pa[1:].tolist(), _one_for_each(most_pa, pressure_pa.size - 1), strict=True):
-        travel = asked - pressure
-        pressure += most if travel > most else -most if travel < -most else travel
-        found.append(pressure)
-    return np.array(found)
+    """Return what a slew limit of `most_pa` per step lets through.
+
+    Marched only where it binds: from a step that is too large until the pressure has caught up.
+    """
+    binds = np.flatnonzero(np.abs(np.diff(pressure_pa)) > most_pa)
+    if binds.size == 0:
+        return pressure_pa
+    asked, last = pressure_pa.tolist(), pressure_pa.size - 1
+    most = most_pa.tolist() if np.ndim(most_pa) else [float(most_pa)] * last
+    passed, k = list(asked), 0
+    while k < binds.size:
+        at = int(binds[k])
+        pressure = passed[at]
+        while at < last:
+            travel, step = asked[at + 1] - pressure, most[at]
+            at += 1
+            if -step <= travel <= step:
+                break
+            pressure += step if travel > 0.0 else -step
+            passed[at] = pressure
+        k = int(np.searchsorted(binds, at))
+    return np.array(passed)
 
 
 def _one_for_each(values: Real, steps: int) -> Iterable[float]:
