@@ -71,6 +71,12 @@ def evaluate(checked: CheckedLadder, question: FitRequest) -> Evaluation:
     reversal = choose_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)
     span_n = reversal.span.span_n if reversal else _assume_span(chosen, question, said)
     model = reversal.model if reversal else chosen.result.bsfm(span_n)
+    order = model.branches.rising.order
+    if order != chosen.result.order:
+        said.append(
+            f"with the slip stops the branches are fitted anew, to the minor loops as well: of order {order}, which the model "
+            "keeps; the table above is of the staircase alone"
+        )
     return Evaluation(checked, tuple(scores), chosen, model, span_n, reversal, (*checked.notes, *said))
 
 
