@@ -12,10 +12,11 @@ from typing import Final
 
 import numpy as np
 
+from gateway.catalogue.effect import PartName
 from gateway.control.runs.active_run import AnyPlan
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.diagnosis.experiments import blocks as block
+from gateway.diagnosis.experiments.blocks import BLOCKS
 from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.registers.words import State
@@ -121,7 +122,7 @@ def _ladder(run: Run) -> None:
 
 def _plan(run: Run) -> None:
     run.record()
-    parts = (block.STEPS, block.REVERSALS, block.DWELLS)
+    parts = tuple(BLOCKS[name] for name in (PartName.STEPS, PartName.REVERSALS, PartName.DWELLS))
     run.conduct(ExperimentPlan(name="a plan", parts=parts, check=False))
 
 
