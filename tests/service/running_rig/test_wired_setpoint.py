@@ -228,3 +228,16 @@ def test_every_sample_is_a_row_of_what_was_read_and_what_was_decided(tmp_path: P
     assert 150 < column["pressure_kpa"][-1] < 190, "what 15 N take on this slide"
     assert column["command_v"][-1] == pytest.approx(column["feedforward_v"][-1] + column["trim_v"][-1])
     assert set(column["fault_code"]) == {float(FaultCode.NONE)}
+
+
+def test_a_release_goes_along_its_ramp_in_volts() -> None:
+    """The lead of a measured response does not push it: 30 N at 200 N/s are let go in 0.15 s, and not in one write."""
+    wired = Wired().ready()
+    wired.write(0, 1, 3000)
+    wired.run(3.0)
+    before_v = wired.observer.settings[-1].voltage_v
+    began_s = wired.now_s
+    wired.write(1, 0)
+    wired.run(0.5)
+    half_s = next(one.time_s for one in wired.settings_since(began_s) if one.voltage_v < 0.25 * before_v) - began_s
+    assert 0.06 < half_s < 0.25
