@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from paper.comparison import Comparison, Interval, compared, interval
-from paper.laws import Switched
-from paper.verdict import YES, near, word
+from paper.comparison import Comparison, Interval, compare_scores, interval
+from paper.experiments.laws import Switched
+from paper.verdicts.verdict import YES, near, word
 
 from gateway.bsfm import Branches, RationalBezier
 
@@ -42,7 +42,7 @@ def test_more_seeds_make_a_narrower_interval() -> None:
 
 def test_a_goal_is_met_only_by_the_whole_interval() -> None:
     def found(ratios: list[float]) -> Comparison:
-        return compared("error", "N", {"bsfm": np.ones(4), "ours": np.array(ratios)}, goal=0.5)
+        return compare_scores("error", "N", {"bsfm": np.ones(4), "ours": np.array(ratios)}, goal=0.5)
 
     assert found([0.3, 0.4, 0.35, 0.3]).meets("ours")
     assert not found([0.1, 0.9, 0.1, 0.9]).meets("ours")

@@ -9,8 +9,8 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from paper.figures import FIGURES
-from paper.verdicts_tracking import roughness
+from paper.figures.all_figures import FIGURES
+from paper.verdicts.tracking import roughness
 
 COMMAND = Path(__file__).parents[2] / "tools" / "paper" / "reproduce"
 
@@ -36,7 +36,7 @@ def test_figure_10_is_outside_software_whatever_the_numbers() -> None:
 SMALL = """
 import runpy, sys
 sys.path.insert(0, sys.argv[1])
-from paper import exercises
+from paper.experiments import exercises
 exercises.QUICK_RECIPROCATING_S, exercises.QUICK_HOLDS, exercises.TRAVEL_M, exercises.UNLOADED_S = 10.0, 3, 0.01, 0.5
 sys.exit(runpy.run_path(sys.argv[1] + "/paper/reproduce", run_name="small")["main"](sys.argv[2:]))
 """

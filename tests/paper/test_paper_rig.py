@@ -4,13 +4,13 @@ import math
 from functools import cache
 
 import numpy as np
-from paper import exercises, limit, rigs
-from paper.bench import Surroundings, run
-from paper.calibration import READ_ONCE, Calibrated, calibrate, condition, paper_ladder, quiet_twin
-from paper.laws import LAW_NAMES, Ours, Switched, law
-from paper.limit import Fastest
-from paper.rigs import bed, copy_of, lifted, paper_plant
-from paper.trials import Lane
+from paper.experiments import exercises, limit, rigs
+from paper.experiments.calibration import READ_ONCE, Calibrated, calibrate, condition, paper_ladder, quiet_twin
+from paper.experiments.closed_loop import Surroundings, run
+from paper.experiments.laws import LAW_NAMES, Ours, Switched, law
+from paper.experiments.limit import Fastest
+from paper.experiments.rigs import copy_of, lifted, paper_plant, rig_lanes
+from paper.experiments.trials import Lane
 
 from gateway.bsfm.ladder.measured_ladder import ladder_plan
 from gateway.twin.experiment import staircase
@@ -49,15 +49,15 @@ def test_the_paper_ladder_has_1010_points_and_the_copies_ladder_is_the_same_expe
 
 
 def test_lanes_of_one_seed_read_the_same_noise_whatever_drives_them() -> None:
-    noise = bed([paper_plant()] * 3, [4, 4, 5], 7).readings(200)
+    noise = rig_lanes([paper_plant()] * 3, [4, 4, 5], 7).readings(200)
     np.testing.assert_array_equal(noise[:, 0], noise[:, 1])
     assert np.all(noise[:, 0] != noise[:, 2])
-    assert np.any(bed([paper_plant()], [4], 8).readings(200)[:, 0] != noise[:, 0])
+    assert np.any(rig_lanes([paper_plant()], [4], 8).readings(200)[:, 0] != noise[:, 0])
 
 
 def test_without_a_wish_no_law_moves_the_tool() -> None:
     fresh = [law(name, rig_itself()) for name in LAW_NAMES]
-    record = run(bed([paper_plant()] * len(fresh), [0] * len(fresh), 7), fresh, np.zeros((30, len(fresh))))
+    record = run(rig_lanes([paper_plant()] * len(fresh), [0] * len(fresh), 7), fresh, np.zeros((30, len(fresh))))
     assert np.all(record.command_v == 0.0)
     assert np.all(record.force_n == 0.0)
 
@@ -66,7 +66,7 @@ def test_a_flat_plate_and_a_still_spindle_are_as_good_as_none() -> None:
     wish = np.full((60, 1), 20.0)
     still = Surroundings(lambda time_s: np.zeros(1), lambda time_s: np.zeros(1))
     records = [
-        run(bed([lifted(paper_plant())], [0], 7), [Switched(rig_itself().bsfm)], wish, around)
+        run(rig_lanes([lifted(paper_plant())], [0], 7), [Switched(rig_itself().bsfm)], wish, around)
         for around in (still, Surroundings())
     ]
     np.testing.assert_array_equal(records[0].force_n, records[1].force_n)
@@ -85,7 +85,7 @@ def test_the_plate_starts_at_its_own_height_and_stands_still_after_the_travel() 
 def test_ours_settles_where_the_open_loop_never_comes_within_a_newton() -> None:
     plants = [lifted(paper_plant())] * 2
     wish = np.full((200, 2), 5.0)
-    record = run(bed(plants, [0, 0], 8), [Switched(rig_itself().bsfm), Ours(rig_itself().ours)], wish)
+    record = run(rig_lanes(plants, [0, 0], 8), [Switched(rig_itself().bsfm), Ours(rig_itself().ours)], wish)
     paper_n, ours_n = np.abs(record.error_n[-300:]).max(axis=0)
     assert 1.0 < paper_n < 2.0
     assert ours_n < 0.3
@@ -117,6 +117,6 @@ def test_physics_allows_the_settling_goal_so_it_is_no_excuse() -> None:
 
 
 def test_conditioning_leaves_the_friction_on_the_falling_branch() -> None:
-    rig = bed([paper_plant()], [0], 1)
+    rig = rig_lanes([paper_plant()], [0], 1)
     condition(rig.twin)
     assert rigs.paper_plant().friction.coulomb_n * 0.5 < float(rig.twin.force_n[0]) < 2.0

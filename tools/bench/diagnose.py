@@ -50,15 +50,16 @@ def main() -> None:
     began = time.perf_counter()
     measurement = measurement_of(read_table(given)) if given else generated()
     read_s = time.perf_counter() - began
-    found = diagnose([measurement], None, Options(clock=time.perf_counter))
+    diagnosis = diagnose([measurement], None, Options(clock=time.perf_counter))
     print(f"{measurement.name}: {measurement.rows} rows, {measurement.duration_s:.0f} s, seed {SEED}")
     print(f"{'read':24s} {read_s:6.2f} s")
-    for stage, spent_s in found.spent_s.items():
+    for stage, spent_s in diagnosis.spent_s.items():
         print(f"{stage:24s} {spent_s:6.2f} s")
     print(f"{'whole':24s} {time.perf_counter() - began:6.2f} s")
     print(f"largest memory           {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:6.0f} MB")
     print(
-        f"verdict {found.verdict}: " + (", ".join(f"{c.name} {c.confidence:.2f}" for c in found.causes) or "no cause")
+        f"verdict {diagnosis.verdict}: "
+        + (", ".join(f"{c.name} {c.confidence:.2f}" for c in diagnosis.causes) or "no cause")
     )
 
 

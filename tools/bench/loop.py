@@ -128,7 +128,7 @@ def ask(master: socket.socket, request: bytes) -> bytes:
 
 def latencies(devices: Devices, address: tuple[str, int], count: int) -> list[float]:
     """Voltage mode steps up and down, one every 50 ms: each one moves the output by many counts at once."""
-    found = []
+    seconds = []
     with socket.create_connection(address) as master:
         master.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         ask(master, write_request(0, 1, 0, 0, 1, 0, 2000))
@@ -139,9 +139,9 @@ def latencies(devices: Devices, address: tuple[str, int], count: int) -> list[fl
             sent_s = time.perf_counter()
             ask(master, request)
             if devices.set_arrived.wait(1.0) and devices.set_seen_s:
-                found.append(devices.set_seen_s - sent_s)
+                seconds.append(devices.set_seen_s - sent_s)
         ask(master, write_request(0, 0, 0))
-    return found
+    return seconds
 
 
 def load(address: tuple[str, int], seconds: float, per_second: int, connections: int = 4) -> int:
@@ -175,13 +175,13 @@ def bare_hops(count: int) -> list[float]:
     """From a write on a pty until another thread sees it, nothing else: what the machine itself takes at this moment."""
     master, client = pty.openpty()
     tty.setraw(client)
-    seen: list[float] = []
+    arrivals_s: list[float] = []
     arrived = threading.Event()
 
     def listen() -> None:
         for _ in range(count):
             select.select([master], [], [])
-            seen.append(time.perf_counter())
+            arrivals_s.append(time.perf_counter())
             os.read(master, 64)
             arrived.set()
 
@@ -194,7 +194,7 @@ def bare_hops(count: int) -> list[float]:
         sent_s = time.perf_counter()
         os.write(client, b"SET 512\r\n")
         arrived.wait()
-        hops.append(seen[-1] - sent_s)
+        hops.append(arrivals_s[-1] - sent_s)
     thread.join()
     os.close(master)
     os.close(client)
@@ -207,13 +207,13 @@ def bench_latency(loop_hz: int, count: int, rigs: Path) -> None:
     rig = rigs / "bench.yaml"
     rig.write_text(RIG.format(loop_hz=loop_hz, output=devices.paths[0], cell=devices.paths[1]))
     with gateway(str(rig)) as (host, port, _):
-        found = latencies(devices, (host, port), count)
+        seconds = latencies(devices, (host, port), count)
     devices.stop.set()
     devices.join()
-    p50, p99 = quantile(found, 0.5), quantile(found, 0.99)
+    p50, p99 = quantile(seconds, 0.5), quantile(seconds, 0.99)
     verdict = "reached" if p99 <= GOAL_P99_S else "MISSED"
-    print(f"setpoint to first byte, idle unpaced pty, {len(found)} of {count} setpoints:")
-    print(f"  p50 {p50 * 1e6:.0f} us, p99 {p99 * 1e6:.0f} us, max {max(found) * 1e6:.0f} us")
+    print(f"setpoint to first byte, idle unpaced pty, {len(seconds)} of {count} setpoints:")
+    print(f"  p50 {p50 * 1e6:.0f} us, p99 {p99 * 1e6:.0f} us, max {max(seconds) * 1e6:.0f} us")
     hops = bare_hops(100)
     print(
         f"  a bare pty hop, beside it: p50 {quantile(hops, 0.5) * 1e6:.0f} us, p99 {quantile(hops, 0.99) * 1e6:.0f} us"

@@ -137,25 +137,25 @@ def compiled(source: str, into: Path, *libraries: str) -> Path | None:
 def importable(module: str) -> bool:
     import importlib.util
 
-    found = importlib.util.find_spec(module) is not None
-    if not found:
+    is_there = importlib.util.find_spec(module) is not None
+    if not is_there:
         print(f"SKIPPED everything that needs {module}: it is not installed", file=sys.stderr)
-    return found
+    return is_there
 
 
 def contenders(into: Path, bank: str) -> list[Contender]:
     me = [sys.executable, str(Path(__file__).resolve())]
-    found: list[Contender] = []
+    servers: list[Contender] = []
     if (server := compiled("libmodbus_server.c", into, "-lmodbus")) is not None:
-        found.append(Contender(YARDSTICK, [str(server)]))
+        servers.append(Contender(YARDSTICK, [str(server)]))
     if importable("uvloop"):
-        found.append(Contender("ours on uvloop", [*me, "--serve", "ours", "--loop", "uvloop", "--bank", bank]))
-    found.append(Contender("ours on asyncio", [*me, "--serve", "ours", "--loop", "asyncio", "--bank", bank]))
+        servers.append(Contender("ours on uvloop", [*me, "--serve", "ours", "--loop", "uvloop", "--bank", bank]))
+    servers.append(Contender("ours on asyncio", [*me, "--serve", "ours", "--loop", "asyncio", "--bank", bank]))
     if importable("pymodbus"):
-        found.append(
+        servers.append(
             Contender("stock pymodbus", [*me, "--serve", "pymodbus", "--loop", "asyncio"], stderr=subprocess.DEVNULL)
         )
-    return found
+    return servers
 
 
 def measured(load: Path, servers: list[Contender], arguments: argparse.Namespace, kind: str) -> list[dict[str, object]]:
@@ -191,13 +191,13 @@ def row(server: Contender, yardstick: Contender | None, kind: str) -> dict[str, 
 
 def shown(rows: list[dict[str, object]], title: str) -> None:
     print(f"\n{title}\n{'server':<18}{'requests/s':>12}{'x libmodbus':>13}{'CPU us/req':>12}{'x libmodbus':>13}  goal")
-    for found in rows:
-        goal, reached = found["rate_goal"], found["goal_reached"]
+    for result in rows:
+        goal, reached = result["rate_goal"], result["goal_reached"]
         verdict = "" if reached is None else f">= {goal}, CPU <= {CPU_GOAL}: {'reached' if reached else 'MISSED'}"
-        faulty = f"  {found['faulty_answers']} FAULTY ANSWERS" if found["faulty_answers"] else ""
-        cells = [f"{found['requests_per_s']:>12}", f"{found['rate_ratio'] or '-':>13}"]
-        cells += [f"{found['cpu_us_per_request']:>12}", f"{found['cpu_ratio'] or '-':>13}"]
-        print(f"{found['server']:<18}{''.join(cells)}  {verdict}{faulty}")
+        faulty = f"  {result['faulty_answers']} FAULTY ANSWERS" if result["faulty_answers"] else ""
+        cells = [f"{result['requests_per_s']:>12}", f"{result['rate_ratio'] or '-':>13}"]
+        cells += [f"{result['cpu_us_per_request']:>12}", f"{result['cpu_ratio'] or '-':>13}"]
+        print(f"{result['server']:<18}{''.join(cells)}  {verdict}{faulty}")
 
 
 def main() -> int:
@@ -232,7 +232,7 @@ def compare(arguments: argparse.Namespace) -> int:
         titles = {"read": "FC03, 32 registers", "write": "FC16, 13 registers"}
         results = {kind: measured(load, servers, arguments, kind) for kind in titles}
     if arguments.json:
-        print(json.dumps([found for rows in results.values() for found in rows], indent=1))
+        print(json.dumps([result for rows in results.values() for result in rows], indent=1))
         return 0
     for kind, title in titles.items():
         shown(results[kind], f"{title}, {arguments.connections} connections, bank {arguments.bank}")

@@ -142,8 +142,8 @@ def cost(calibration: Calibration, compiler: str) -> Cost:
         units = ["main.c", "cubic.c", f"{prefix}.c"]
         subprocess.run([compiler, *FLAGS, "-o", "bench", *units, "-lm"], cwd=directory, check=True)
         shown = subprocess.run([Path(directory, "bench")], check=True, capture_output=True, text=True).stdout
-    found = {name: float(number) for name, number in (line.split() for line in shown.splitlines())}
-    return Cost(calibration.name, calibration.order, *(found[k] for k in ("cubic", "forward", "inverse", "command")))
+    figures = {name: float(number) for name, number in (line.split() for line in shown.splitlines())}
+    return Cost(calibration.name, calibration.order, *(figures[k] for k in ("cubic", "forward", "inverse", "command")))
 
 
 def costs(compiler: str = "gcc") -> list[Cost]:
@@ -153,11 +153,13 @@ def costs(compiler: str = "gcc") -> list[Cost]:
     return [cost(calibration, compiler) for calibration in (load_calibration("demo"), *map(made_up, ORDERS))]
 
 
-def table(found: list[Cost]) -> str:
+def table(rows: list[Cost]) -> str:
     lines = [f"{'C, ns per call':<14}{'order':>6}{'cubic':>8}{'forward':>16}{'inverse':>16}{'command':>16}"]
-    for row in found:
-        cells = (f"{ns:7.1f} ({ns / row.cubic_ns:4.1f}x)" for ns in (row.forward_ns, row.inverse_ns, row.command_ns))
-        lines.append(f"{row.name:<14}{row.order:>6}{row.cubic_ns:>8.1f}" + "".join(f"{cell:>16}" for cell in cells))
+    for cost in rows:
+        cells = (
+            f"{ns:7.1f} ({ns / cost.cubic_ns:4.1f}x)" for ns in (cost.forward_ns, cost.inverse_ns, cost.command_ns)
+        )
+        lines.append(f"{cost.name:<14}{cost.order:>6}{cost.cubic_ns:>8.1f}" + "".join(f"{cell:>16}" for cell in cells))
     return "\n".join(lines)
 
 
@@ -167,15 +169,15 @@ def main() -> int:
     options.add_argument("--compiler", default="gcc")
     chosen = options.parse_args()
     try:
-        found = costs(chosen.compiler)
+        rows = costs(chosen.compiler)
     except FileNotFoundError as missing:
         print(missing, file=sys.stderr)
         return 2
     if chosen.json:
-        rows = [{name: getattr(row, name) for name in Cost.__dataclass_fields__} for row in found]
+        rows = [{name: getattr(cost, name) for name in Cost.__dataclass_fields__} for cost in rows]
         print(json.dumps(rows, indent=2))
     else:
-        print(table(found))
+        print(table(rows))
     return 0
 
 

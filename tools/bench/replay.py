@@ -38,9 +38,9 @@ def rich_drive(jitter_s: float = 0.0) -> Drive:
 
 def wandered(time_s: Floats, jitter_s: float) -> Floats:
     """Rows too early or too late by up to this much."""
-    found: Floats = time_s + np.random.default_rng(2).uniform(-jitter_s, jitter_s, time_s.size)
-    found -= found[0]
-    return found
+    times_s: Floats = time_s + np.random.default_rng(2).uniform(-jitter_s, jitter_s, time_s.size)
+    times_s -= times_s[0]
+    return times_s
 
 
 def stepping_drive(jitter_s: float) -> Drive:
@@ -120,8 +120,8 @@ def print_accuracy(base: Plant) -> None:
     base = with_value(base, "regulator", "second_lag_s", 0.0)
     still = with_value(base, "friction", "viscous_n_s_per_m", 0.0)
     for name, plant in (("rigid friction", rigid(base)), ("presliding", still), ("presliding, drag", base)):
-        found = [worst_n(plant, stepping_drive(jitter_s)) for jitter_s in (0.0, JITTER_S)]
-        print(f"{name:28}" + "".join(f"{worst:9.4f}" for worst in found))
+        errors_n = [worst_n(plant, stepping_drive(jitter_s)) for jitter_s in (0.0, JITTER_S)]
+        print(f"{name:28}" + "".join(f"{worst:9.4f}" for worst in errors_n))
 
 
 def main() -> None:
@@ -131,10 +131,10 @@ def main() -> None:
     print(f"real-time twin: {step_us:.2f} us per step of 1 ms, {step_us * 60.0:.0f} ms for the minute\n")
     print(f"{'ms for one call, lanes:':28}" + "".join(f"{n:>9}" for n in LANES) + f"{'us/lane':>10}{'jitter':>9}")
     for name, make in CASES.items():
-        found = [best_ms(lambda: Replay(even), make(base, lanes)) for lanes in LANES]
+        best = [best_ms(lambda: Replay(even), make(base, lanes)) for lanes in LANES]
         jittered = best_ms(lambda: Replay(uneven), make(base, LANES[-1]))
-        us_per_lane = found[-1] / LANES[-1] * 1.0e3
-        print(f"{name:28}" + "".join(f"{ms:9.1f}" for ms in found) + f"{us_per_lane:10.0f}{jittered:9.1f}")
+        us_per_lane = best[-1] / LANES[-1] * 1.0e3
+        print(f"{name:28}" + "".join(f"{ms:9.1f}" for ms in best) + f"{us_per_lane:10.0f}{jittered:9.1f}")
     plants = CASES["presliding and lag"](base, LANES[-1])
     for name, drive in (("even", even), ("jitter", uneven)):
         replay = Replay(drive)

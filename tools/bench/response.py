@@ -48,12 +48,12 @@ def described(one: Calibrated) -> str:
     machine, response = one.machine, one.response
     late_s = machine.dead_time_s + machine.wire_s + machine.cell_lag_s
     true = f"{late_s * 1e3:.0f} + {machine.lag_s * 1e3:.0f} + {machine.second_lag_s * 1e3:.0f} ms"
-    found = "not measured"
+    measured = "not measured"
     if response:
-        found = f"{response.dead_time_s * 1e3:.0f} + {response.lag_s * 1e3:.0f} + {response.second_lag_s * 1e3:.0f} ms"
-    return (
-        f"{machine.name}: {true}, measured {found}; friction {machine.coulomb_n:.1f} N, noise {machine.noise_n:.2f} N"
-    )
+        measured = (
+            f"{response.dead_time_s * 1e3:.0f} + {response.lag_s * 1e3:.0f} + {response.second_lag_s * 1e3:.0f} ms"
+        )
+    return f"{machine.name}: {true}, measured {measured}; friction {machine.coulomb_n:.1f} N, noise {machine.noise_n:.2f} N"
 
 
 def row(name: str, one: Calibrated, done: Course) -> dict[str, object]:
@@ -76,10 +76,10 @@ def row(name: str, one: Calibrated, done: Course) -> dict[str, object]:
     }
 
 
-def shown(found: dict[str, object]) -> str:
+def shown(result: dict[str, object]) -> str:
     numbers = "hold_n after_1_s_n still_n settled_s of_bound within_1_5 sine_0_5_n sine_0_2_n ramp_n".split()
-    cells = "".join(f"{float(str(found[name])):>9.2f}" for name in numbers)
-    return f"  {found['way']!s:<18}{cells}{found['never']!s:>7}"
+    cells = "".join(f"{float(str(result[name])):>9.2f}" for name in numbers)
+    return f"  {result['way']!s:<18}{cells}{result['never']!s:>7}"
 
 
 def write(seeds: Iterable[int], demo: Bsfm) -> None:

@@ -24,7 +24,7 @@ from typing import Final
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2]), str(Path(__file__).resolve().parents[1])]
-from paper.calibration import (
+from paper.experiments.calibration import (
     MINOR_READINGS,
     READ_ONCE,
     STAIR_V,
@@ -34,8 +34,8 @@ from paper.calibration import (
     quiet_twin,
     stairs_between,
 )
+from paper.experiments.rigs import copy_of
 from paper.paper_values import GROUPS, LADDER_STEP_V, LADDER_TOP_V
-from paper.rigs import copy_of
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.branch_fit import fit
@@ -119,8 +119,8 @@ def scores(seeds: Sequence[int]) -> list[Score]:
     for seed in seeds:
         plant = copy_of(seed)
         for policy, model in calibrated(plant, seed).items():
-            found, step_v = run(model, plant)
-            errors[policy].append(found)
+            exercise_errors, step_v = run(model, plant)
+            errors[policy].append(exercise_errors)
             steps_v[policy] = max(steps_v[policy], step_v)
     return [_score(policy, errors[policy], steps_v[policy]) for policy in FIRST_STUDY]
 

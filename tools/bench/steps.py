@@ -97,9 +97,9 @@ def run(gain: float) -> list[Settling]:
         return [settle(client, setpoint_n) for setpoint_n in STEPS_N]
 
 
-def shown(found: Settling) -> str:
-    settled = "never" if found.settled_s is None else f"{found.settled_s:.2f} s"
-    return f"{settled:>8}  {found.error_n:+6.2f} N"
+def shown(result: Settling) -> str:
+    settled = "never" if result.settled_s is None else f"{result.settled_s:.2f} s"
+    return f"{settled:>8}  {result.error_n:+6.2f} N"
 
 
 def main() -> None:
@@ -114,8 +114,8 @@ def main() -> None:
     print("            within 1 N  error    within 1 N  error")
     for trimmed, plain in zip(with_trim, alone, strict=True):
         print(f"{trimmed.setpoint_n:6.1f} N  {shown(trimmed)}   {shown(plain)}")
-    worst = max(abs(found.error_n) for found in with_trim)
-    print(f"largest steady error: {worst:.2f} N with trim, {max(abs(found.error_n) for found in alone):.2f} N alone")
+    worst = max(abs(result.error_n) for result in with_trim)
+    print(f"largest steady error: {worst:.2f} N with trim, {max(abs(result.error_n) for result in alone):.2f} N alone")
 
 
 if __name__ == "__main__":

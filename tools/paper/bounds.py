@@ -8,13 +8,13 @@ from math import pi, sin
 
 import numpy as np
 
-from paper import exercises
 from paper.comparison import Comparison
-from paper.exercises import PACE_N_PER_S, PATH_LENGTH_M
+from paper.experiments import exercises
+from paper.experiments.exercises import PACE_N_PER_S, PATH_LENGTH_M
+from paper.experiments.rigs import paper_plant
+from paper.experiments.trials import settled_s
 from paper.paper_values import SETTLING_S, TRACKING_FEEDS_M_PER_S
-from paper.rigs import paper_plant
 from paper.study import Study
-from paper.trials import settled_s
 
 
 def bound(study: Study, comparison: Comparison) -> str:

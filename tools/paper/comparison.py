@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 
 from gateway.twin.experiment import Floats, settling_time_s
-from paper import exercises
-from paper.bench import Record
+from paper.experiments import exercises
+from paper.experiments.closed_loop import Record
+from paper.experiments.trials import Trial, largest_n, rms_n, settled_s
 from paper.paper_values import SETTLING_S, TARGETS_N, TRACKING_FEEDS_M_PER_S
-from paper.trials import Trial, largest_n, rms_n, settled_s
 
 RESAMPLES: Final = 4000
 ERROR_GOAL, SETTLING_GOAL = 0.5, 0.7
@@ -53,7 +53,7 @@ def interval(ratios: Floats) -> Interval:
     return Interval(*(float(np.exp(value)) for value in (np.mean(logs), low, high)))
 
 
-def compared(name: str, unit: str, scores: dict[str, Floats], goal: float | None = None) -> Comparison:
+def compare_scores(name: str, unit: str, scores: dict[str, Floats], goal: float | None = None) -> Comparison:
     """scores: per law one number per seed."""
     ratios = {law: interval(scores[law] / scores["bsfm"]) for law in scores if law != "bsfm"}
     return Comparison(name, unit, {law: float(np.mean(values)) for law, values in scores.items()}, ratios, goal)
@@ -64,7 +64,7 @@ def errors(name: str, trial: Trial, part: Callable[[Floats], Floats], case: int 
     rows = []
     for kind, measure, goal in (("largest error", largest_n, ERROR_GOAL), ("RMS error", rms_n, None)):
         scores = {law: trial.score(lambda f, d, m=measure: m(part(f), part(d)), law)[:, case] for law in LAWS}
-        rows.append(compared(f"{name}: {kind}", "N", scores, goal))
+        rows.append(compare_scores(f"{name}: {kind}", "N", scores, goal))
     return rows
 
 
@@ -77,7 +77,7 @@ def settling(name: str, times_s: dict[str, Floats], bands_n: tuple[float, ...]) 
         scores = {
             law: np.sum(np.where(everywhere, grid, 0.0), axis=1) / everywhere.sum(axis=1) for law, grid in grids.items()
         }
-        rows.append(compared(f"{name}: time to stay within {band_n:g} N", "s", scores, SETTLING_GOAL))
+        rows.append(compare_scores(f"{name}: time to stay within {band_n:g} N", "s", scores, SETTLING_GOAL))
     return rows
 
 
@@ -86,7 +86,10 @@ def steps_from_no_load(trial: Trial) -> list[Comparison]:
     times_s = {law: np.stack([trial.score(settled_s(band), law) for band in bands_n], axis=-1) for law in LAWS}
     rest = {law: trial.score(lambda f, d: largest_n(f[-300:], d[-300:]), law).max(axis=1) for law in LAWS}
     title = "steps from no load (Fig. 8)"
-    return [*settling(title, times_s, bands_n), compared(f"{title}: largest error at rest", "N", rest, ERROR_GOAL)]
+    return [
+        *settling(title, times_s, bands_n),
+        compare_scores(f"{title}: largest error at rest", "N", rest, ERROR_GOAL),
+    ]
 
 
 def steps_in_contact(trial: Trial) -> list[Comparison]:
@@ -102,7 +105,10 @@ def steps_in_contact(trial: Trial) -> list[Comparison]:
     times_s = {law: trial.score(per_target, law)[:, 0] for law in LAWS}
     rest = {law: trial.score(at_rest, law)[:, 0] for law in LAWS}
     title = "steps in contact, unloading between"
-    return [*settling(title, times_s, bands_n), compared(f"{title}: largest error at rest", "N", rest, ERROR_GOAL)]
+    return [
+        *settling(title, times_s, bands_n),
+        compare_scores(f"{title}: largest error at rest", "N", rest, ERROR_GOAL),
+    ]
 
 
 def tracking(trial: Trial) -> list[Comparison]:
@@ -136,7 +142,7 @@ def fed_errors(
             [_fed(trial.of(law, seed_at, case), case, part) for case in cases] for seed_at in range(len(trial.seeds))
         ]
         scores[law] = np.max(worst, axis=1)
-    return compared(f"{name}: largest error", "N", scores, ERROR_GOAL)
+    return compare_scores(f"{name}: largest error", "N", scores, ERROR_GOAL)
 
 
 def _fed(record: Record, case: int, part: Callable[[Floats], Floats]) -> float:

@@ -6,17 +6,17 @@ from typing import Final
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from paper.bounds import allowed_ratio, bound, delay_s, shaken_n
 from paper.comparison import ERROR_GOAL, SETTLING_GOAL, Comparison
-from paper.exercises import PACE_N_PER_S, UNBALANCE_N
-from paper.laws import LAG_S, RESPONSE_LAG_S, TRIM, settings
+from paper.experiments.exercises import PACE_N_PER_S, UNBALANCE_N
+from paper.experiments.laws import LAG_S, RESPONSE_LAG_S, TRIM, settings
+from paper.experiments.rigs import paper_plant
 from paper.paper_values import SETTLING_S
-from paper.rigs import paper_plant
 from paper.study import Study
 
 MET, MISSED, NO_GOAL = "met", "missed", ""
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class GoalResult:
     """A comparison with the verdict on ours, what bounds every law here, and the reason where ours misses."""
 
     comparison: Comparison
@@ -25,15 +25,15 @@ class Judged:
     why: str
 
 
-def judged(study: Study) -> list[Judged]:
+def judge_goals(study: Study) -> list[GoalResult]:
     return [_judge(study, comparison) for comparison in study.comparisons]
 
 
-def _judge(study: Study, comparison: Comparison) -> Judged:
+def _judge(study: Study, comparison: Comparison) -> GoalResult:
     if comparison.goal is None:
-        return Judged(comparison, NO_GOAL, "", "")
+        return GoalResult(comparison, NO_GOAL, "", "")
     ours = MET if comparison.meets("ours") else MISSED
-    return Judged(comparison, ours, bound(study, comparison), "" if ours == MET else _reason(study, comparison))
+    return GoalResult(comparison, ours, bound(study, comparison), "" if ours == MET else _reason(study, comparison))
 
 
 def _reason(study: Study, comparison: Comparison) -> str:
@@ -88,7 +88,7 @@ REASONS: Final = (
 
 def summary(study: Study) -> list[str]:
     """The goal in sentences."""
-    rows = [row for row in judged(study) if row.ours]
+    rows = [row for row in judge_goals(study) if row.ours]
     sentences = []
     for goal, words in (
         (ERROR_GOAL, f"at most {ERROR_GOAL:g} of the largest error"),

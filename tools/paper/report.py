@@ -8,15 +8,15 @@ from typing import Final
 from rich.console import Console
 from rich.table import Table
 
-from paper import exercises, rigs
 from paper.comparison import Interval
-from paper.figures import FIGURES
-from paper.goals import MET, MISSED, Judged, judged, summary
-from paper.laws import FASTEST_N_PER_S, LEAD, RESPONSE_LAG_S, TRIM
+from paper.experiments import exercises, rigs
+from paper.experiments.laws import FASTEST_N_PER_S, LEAD, RESPONSE_LAG_S, TRIM
+from paper.experiments.trials import settled_s
+from paper.figures.all_figures import FIGURES
+from paper.goals import MET, MISSED, GoalResult, judge_goals, summary
 from paper.study import Study
-from paper.trials import settled_s
-from paper.verdict import NO, OUTSIDE, YES, Verdict
-from paper.verdicts import counts, verdicts
+from paper.verdicts.all_verdicts import counts, verdicts
+from paper.verdicts.verdict import NO, OUTSIDE, YES, Verdict
 
 CSS: Final = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; background: #fff; }
@@ -60,15 +60,15 @@ def verdict_cells(line: Verdict) -> tuple[str, ...]:
     return (line.where, line.statement, line.paper, line.ours, line.verdict, line.why)
 
 
-def ratio_cells(row: Judged) -> tuple[str, ...]:
-    found = row.comparison
-    digits = 3 if found.unit == "s" else 2
-    means = tuple(f"{found.means[law]:.{digits}f} {found.unit}" for law in ("bsfm", "ours"))
-    goal = f" (≤ {found.goal:g})" if found.goal else ""
+def ratio_cells(row: GoalResult) -> tuple[str, ...]:
+    comparison = row.comparison
+    digits = 3 if comparison.unit == "s" else 2
+    means = tuple(f"{comparison.means[law]:.{digits}f} {comparison.unit}" for law in ("bsfm", "ours"))
+    goal = f" (≤ {comparison.goal:g})" if comparison.goal else ""
     return (
-        found.name,
+        comparison.name,
         *means,
-        spread(found.ratios["ours"]),
+        spread(comparison.ratios["ours"]),
         row.ours + (goal if row.ours else ""),
         row.bound,
         row.why,
@@ -166,7 +166,7 @@ def html_figure(name: str, png: bytes) -> str:
 
 def html(study: Study, pictures: dict[str, bytes]) -> str:
     """The whole page. pictures: PNG bytes by short name."""
-    lines, rows = verdicts(study), judged(study)
+    lines, rows = verdicts(study), judge_goals(study)
     shown = {name: html_figure(name, png) for name, png in pictures.items()}
     paper_figures = "\n".join(text for name, text in shown.items() if name.startswith("fig"))
     items = "".join(f"<li>{escape(text)}</li>" for text in assumptions(study))
@@ -209,7 +209,10 @@ def print_tables(study: Study, console: Console) -> None:
     lines = verdicts(study)
     _print(console, f"the paper on the twin: {counts(lines)}", TABLE_HEAD, map(verdict_cells, lines))
     _print(
-        console, f"ours beside the paper's law, {len(study.seeds)} seeds", RATIO_HEAD, map(ratio_cells, judged(study))
+        console,
+        f"ours beside the paper's law, {len(study.seeds)} seeds",
+        RATIO_HEAD,
+        map(ratio_cells, judge_goals(study)),
     )
     for sentence in summary(study):
         console.print(sentence)

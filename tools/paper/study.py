@@ -7,13 +7,14 @@ from typing import Final
 
 from gateway.bsfm.fit.result import FitResult
 from gateway.bsfm.ladder.measured_ladder import Ladder
-from paper import comparison, exercises
-from paper.calibration import Calibrated, calibrate, paper_ladder, sweep
+from paper import comparison
 from paper.comparison import Comparison
-from paper.limit import Fastest, limits
+from paper.experiments import exercises
+from paper.experiments.calibration import Calibrated, calibrate, paper_ladder, sweep
+from paper.experiments.limit import Fastest, limits
+from paper.experiments.rigs import copy_of, paper_plant
+from paper.experiments.trials import Trial
 from paper.paper_values import GROUPS, ORDERS, SETTLING_S, TARGETS_N
-from paper.rigs import copy_of, paper_plant
-from paper.trials import Trial
 
 FEW_ORDERS: Final = (1, 2, 3, 4, 5, 15)
 FEW_SEEDS: Final = 2
@@ -64,8 +65,8 @@ def compare(validation: Trial, reversals: Trial, steps: Trial, in_contact: Trial
     rows = []
     for case, (low_n, high_n) in enumerate(exercises.RANGES_N):
         name = f"reciprocating {low_n:g} .. {high_n:g} N at {exercises.PACE_N_PER_S:g} N/s"
-        rows += comparison.errors(name, validation, exercises.counted, case)
+        rows += comparison.errors(name, validation, exercises.without_first_step, case)
     for case, name in enumerate(("partial reversals, settled", "the same, months after the calibration")):
-        rows += comparison.errors(name, reversals, exercises.settled, case)
+        rows += comparison.errors(name, reversals, exercises.ends_of_holds, case)
     rows += comparison.steps_from_no_load(steps) + comparison.steps_in_contact(in_contact)
     return rows + comparison.tracking(tracking)

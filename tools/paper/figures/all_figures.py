@@ -6,10 +6,10 @@ from typing import Final
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
-from paper.drawing import STYLE
-from paper.figures_fits import figure_4, figure_5, figure_6
-from paper.figures_ours import limit_figure, ratio_figure
-from paper.figures_rig import figure_7, figure_8, figure_9, settling_figure
+from paper.figures.drawing import STYLE
+from paper.figures.fits import figure_4, figure_5, figure_6
+from paper.figures.ratios_and_limit import limit_figure, ratio_figure
+from paper.figures.runs import figure_7, figure_8, figure_9, settling_figure
 from paper.study import Study
 
 FIGURES: Final[dict[str, tuple[str, Callable[[Study], Figure]]]] = {

@@ -13,7 +13,7 @@ from gateway.control import Controller, ControlSettings, Defaults, LeadSettings,
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
-from paper.calibration import Calibrated
+from paper.experiments.calibration import Calibrated
 
 TICK_S: Final = 0.01
 OFF_TICKS: Final = 20  # samples that the controller sees before it is enabled

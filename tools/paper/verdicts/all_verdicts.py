@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 
 from paper.study import Study
-from paper.verdict import NO, OUTSIDE, YES, Verdict
-from paper.verdicts_fits import per_direction, pooled
-from paper.verdicts_rig import steps, two_steps, validation
-from paper.verdicts_tracking import roughness, spindle, tracking
+from paper.verdicts.fits import per_direction, pooled
+from paper.verdicts.tracking import roughness, spindle, tracking
+from paper.verdicts.validation_and_steps import steps, two_steps, validation
+from paper.verdicts.verdict import NO, OUTSIDE, YES, Verdict
 
 
 def verdicts(study: Study) -> list[Verdict]:

@@ -2,10 +2,11 @@
 
 from matplotlib.figure import Figure
 
-from paper import exercises, paper_values
-from paper.drawing import COLOUR, LABEL, sheet
+from paper import paper_values
+from paper.experiments import exercises
+from paper.experiments.trials import settled_s
+from paper.figures.drawing import COLOUR, LABEL, sheet
 from paper.study import Study
-from paper.trials import settled_s
 
 
 def figure_7(study: Study) -> Figure:

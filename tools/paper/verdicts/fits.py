@@ -5,7 +5,7 @@ from typing import Final
 from gateway.bsfm.fit.result import FitResult
 from paper import paper_values
 from paper.study import Study
-from paper.verdict import NORM_TOLERANCE, Verdict, near, word
+from paper.verdicts.verdict import NORM_TOLERANCE, Verdict, near, word
 
 FLAT: Final = {"pfm": 1.005, "bfm": 1.005, "psfm": 1.1, "bsfm": 1.1}
 """An order is enough when its RMS residual is less than so many times that of order 15."""

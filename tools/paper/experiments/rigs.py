@@ -65,7 +65,7 @@ def lifted(plant: Plant) -> Plant:
 
 
 @dataclass(frozen=True, slots=True)
-class Bed:
+class RigLanes:
     """A quiet twin of many lanes and the noise of each lane's cell."""
 
     twin: Twin
@@ -78,8 +78,8 @@ class Bed:
         return np.stack(columns, axis=1) * self.noise_n
 
 
-def bed(plants: Sequence[Plant], seeds: Sequence[int], part: int) -> Bed:
+def rig_lanes(plants: Sequence[Plant], seeds: Sequence[int], part: int) -> RigLanes:
     """One lane per plant. Lanes with the same seed and `part` (of the experiment) read the same noise, whatever drives them."""
     noise_n = np.array([plant.cell.noise_n for plant in plants])
     quiet = stack([with_value(plant, "cell", "noise_n", 0.0) for plant in plants])
-    return Bed(Twin(quiet, 0), noise_n, tuple(default_rng([seed, 2, part]) for seed in seeds))
+    return RigLanes(Twin(quiet, 0), noise_n, tuple(default_rng([seed, 2, part]) for seed in seeds))

@@ -5,12 +5,13 @@ from typing import Final
 import numpy as np
 
 from gateway.twin.experiment import Floats
-from paper import exercises, paper_values
-from paper.exercises import PACE_N_PER_S
-from paper.rigs import paper_plant
+from paper import paper_values
+from paper.experiments import exercises
+from paper.experiments.exercises import PACE_N_PER_S
+from paper.experiments.rigs import paper_plant
+from paper.experiments.trials import Trial, largest_n, settled_s
 from paper.study import Study
-from paper.trials import Trial, largest_n, settled_s
-from paper.verdict import ERROR_TOLERANCE, TIME_TOLERANCE_S, Verdict, near, word
+from paper.verdicts.verdict import ERROR_TOLERANCE, TIME_TOLERANCE_S, Verdict, near, word
 
 CUBIC: Final = "a cubic per direction fits the twin's loop down to the noise, so both laws give the same volts"
 
@@ -18,13 +19,13 @@ CUBIC: Final = "a cubic per direction fits the twin's loop down to the noise, so
 def signs(trial: Trial, name: str) -> tuple[float, float]:
     """Share of time with a negative error while rising, and with a positive one while falling."""
     record = trial.of(name)
-    slope = exercises.counted(np.repeat(np.gradient(record.desired_n[:, 0]), 10))
-    error_n = exercises.counted(record.error_n[:, 0])
+    slope = exercises.without_first_step(np.repeat(np.gradient(record.desired_n[:, 0]), 10))
+    error_n = exercises.without_first_step(record.error_n[:, 0])
     return float(np.mean(error_n[slope > 0] < 0)), float(np.mean(error_n[slope < 0] > 0))
 
 
 def largest(trial: Trial, name: str) -> float:
-    return float(np.max(np.abs(exercises.counted(trial.of(name).error_n[:, 0]))))
+    return float(np.max(np.abs(exercises.without_first_step(trial.of(name).error_n[:, 0]))))
 
 
 def validation(study: Study) -> list[Verdict]:

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from gateway.twin.experiment import Floats
-from paper.laws import OFF_TICKS, TICK_S, Law
-from paper.rigs import Bed
+from paper.experiments.laws import OFF_TICKS, TICK_S, Law
+from paper.experiments.rigs import RigLanes
 
 STEP_S: Final = 1.0e-3
 STEPS: Final = round(TICK_S / STEP_S)
@@ -54,7 +54,7 @@ class Record:
         return Record(*(getattr(self, name)[:, index] for name in ("desired_n", "measured_n", "command_v", "force_n")))
 
 
-def run(rig: Bed, laws: Sequence[Law], desired_n: Floats, around: Surroundings = NOTHING) -> Record:
+def run(rig: RigLanes, laws: Sequence[Law], desired_n: Floats, around: Surroundings = NOTHING) -> Record:
     """desired_n: (ticks, lanes), after a lead-in of nothing, which the record leaves out."""
     idle = round(LEAD_IN_S / TICK_S)
     wanted = np.concatenate([np.zeros((idle, len(laws))), desired_n])
@@ -62,8 +62,8 @@ def run(rig: Bed, laws: Sequence[Law], desired_n: Floats, around: Surroundings =
     measured, command, force = np.zeros_like(wanted), np.zeros_like(wanted), np.zeros((len(wanted) * STEPS, len(laws)))
     for tick, row in enumerate(wanted):
         measured[tick] = rig.twin.read() + noise[tick]
-        told = zip(laws, row.tolist(), measured[tick].tolist(), strict=True)
-        command[tick] = [law.command_v(want, got) for law, want, got in told]
+        wishes_and_readings = zip(laws, row.tolist(), measured[tick].tolist(), strict=True)
+        command[tick] = [law.command_v(want, measured_n) for law, want, measured_n in wishes_and_readings]
         rig.twin.command(command[tick])
         for step in range(tick * STEPS, (tick + 1) * STEPS):
             _surround(rig, around, step * STEP_S - LEAD_IN_S)
@@ -72,7 +72,7 @@ def run(rig: Bed, laws: Sequence[Law], desired_n: Floats, around: Surroundings =
     return Record(desired_n, measured[idle:], command[idle:], force[idle * STEPS :])
 
 
-def _surround(rig: Bed, around: Surroundings, time_s: float) -> None:
+def _surround(rig: RigLanes, around: Surroundings, time_s: float) -> None:
     if around.height_m is not None:
         rig.twin.set_surface(around.height_m(time_s))
     if around.force_n is not None:

@@ -18,7 +18,7 @@ import numpy as np
 from gateway.twin import Plant, Twin, stack
 from gateway.twin.experiment import Floats, settling_time_s
 from gateway.twin.plant import with_value
-from paper.rigs import lifted
+from paper.experiments.rigs import lifted
 
 HIGH_V: Final = 10.0
 DURATION_S: Final = 0.6
@@ -75,13 +75,13 @@ def fastest(plant: Plant, target_n: float, bands_n: Sequence[float], hold_v: flo
     """full_n: the response to 10 V."""
     pulses = useful_pulses(plant, target_n, full_n)
     force_n = responses(plant, bang_bang_v(pulses, hold_v))
-    found = []
+    rows = []
     for band_n in bands_n:
         times_s = np.array([settling_time_s(column, target_n, band_n) for column in force_n.T])
         best = int(np.argmin(np.where(np.isnan(times_s), np.inf, times_s)))
         entered_s = int(np.argmax(full_n >= target_n - band_n)) * 1.0e-3
-        found.append(Fastest(target_n, band_n, entered_s, float(times_s[best]), *pulses[best]))
-    return found
+        rows.append(Fastest(target_n, band_n, entered_s, float(times_s[best]), *pulses[best]))
+    return rows
 
 
 def limits(plant: Plant, targets_n: Sequence[float], bands_n: Sequence[float]) -> list[Fastest]:

@@ -11,12 +11,12 @@ import numpy as np
 
 from gateway.twin import Plant
 from gateway.twin.experiment import Floats
-from paper.bench import Surroundings
-from paper.calibration import Calibrated
-from paper.laws import LAW_NAMES, TICK_S
+from paper.experiments.calibration import Calibrated
+from paper.experiments.closed_loop import Surroundings
+from paper.experiments.laws import LAW_NAMES, TICK_S
+from paper.experiments.rigs import drifted, lifted
+from paper.experiments.trials import Lane, Trial, TrialConditions, trial
 from paper.paper_values import SPINDLE_HZ, TARGETS_N, TRACKING_FEEDS_M_PER_S, TRACKING_FORCES_N
-from paper.rigs import drifted, lifted
-from paper.trials import Lane, Scene, Trial, trial
 
 RANGES_N: Final = ((1.5, 38.0), (8.0, 30.0))  # the whole ladder of every copy, and reversals inside the loop
 PACE_N_PER_S: Final = 5.0  # assumed: the paper's text gives its reciprocating command neither range nor pace
@@ -59,14 +59,14 @@ def reciprocating_n(low_n: float, high_n: float, duration_s: float) -> Floats:
 def validation(copies: Sequence[Calibrated], quick: bool) -> Trial:
     """Cases are RANGES_N."""
     duration_s = QUICK_RECIPROCATING_S if quick else RECIPROCATING_S
-    return trial(copies, LAW_NAMES, [_between(*ends_n, duration_s) for ends_n in RANGES_N], Scene(7))
+    return trial(copies, LAW_NAMES, [_between(*ends_n, duration_s) for ends_n in RANGES_N], TrialConditions(7))
 
 
 def _between(low_n: float, high_n: float, duration_s: float) -> Callable[[int], Floats]:
     return lambda seed: reciprocating_n(low_n, high_n, duration_s)
 
 
-def counted(series: Floats) -> Floats:
+def without_first_step(series: Floats) -> Floats:
     """Without the first step."""
     return series[round(FIRST_S * 1000) :]
 
@@ -77,7 +77,7 @@ def counted(series: Floats) -> Floats:
 def steps(copies: Sequence[Calibrated]) -> Trial:
     """One fresh start per target: no load, the pad lifted."""
     wishes = [_constant(target_n) for target_n in TARGETS_N]
-    return trial(copies, LAW_NAMES, wishes, Scene(8, conditioned=False, changed=_lifted))
+    return trial(copies, LAW_NAMES, wishes, TrialConditions(8, conditioned=False, changed=_lifted))
 
 
 def _lifted(plant: Plant, case: int) -> Plant:
@@ -92,7 +92,7 @@ def steps_in_contact(copies: Sequence[Calibrated], laws: tuple[str, ...] = LAW_N
     """All targets in one go, 0 V between them; the pad stays on the workpiece."""
     load, rest = np.ones(ticks(STEP_S)), np.zeros(ticks(UNLOADED_S))
     wish_n = np.concatenate([np.concatenate([target_n * load, rest]) for target_n in TARGETS_N])
-    return trial(copies, laws, [lambda seed: wish_n], Scene(9))
+    return trial(copies, laws, [lambda seed: wish_n], TrialConditions(9))
 
 
 def each_step(series: Floats) -> Floats:
@@ -107,8 +107,8 @@ def each_step(series: Floats) -> Floats:
 def partial_reversals(copies: Sequence[Calibrated], quick: bool) -> Trial:
     """Random forces, each held; a series of its own for each seed. Case 0: as calibrated, case 1: months later."""
     wish = _held(holds(quick))
-    scene = Scene(10, changed=lambda plant, case: drifted(plant) if case else plant)
-    return trial(copies, LAW_NAMES, [wish, wish], scene)
+    conditions = TrialConditions(10, changed=lambda plant, case: drifted(plant) if case else plant)
+    return trial(copies, LAW_NAMES, [wish, wish], conditions)
 
 
 def holds(quick: bool) -> int:
@@ -122,7 +122,7 @@ def _held(count: int) -> Callable[[int], Floats]:
     return wish
 
 
-def settled(series: Floats) -> Floats:
+def ends_of_holds(series: Floats) -> Floats:
     """The end of each hold but the first, joined."""
     parts = series.reshape(-1, round(HOLD_S * 1000))
     return parts[1:, -round(SETTLED_S * 1000) :].ravel()
@@ -135,7 +135,7 @@ def tracking(copies: Sequence[Calibrated], laws: tuple[str, ...] = ("bsfm", "our
     """Contact from the lifted pad, then feed along the plate. Cases are CONDITIONS."""
     longest_s = FEED_FROM_S + TRAVEL_M / min(TRACKING_FEEDS_M_PER_S)
     wishes = [_constant(force_n, longest_s) for force_n, _, _ in CONDITIONS]
-    return trial(copies, laws, wishes, Scene(11, conditioned=False, changed=_lifted, around=moving_surface))
+    return trial(copies, laws, wishes, TrialConditions(11, conditioned=False, changed=_lifted, around=moving_surface))
 
 
 def moving_surface(lanes: list[Lane]) -> Surroundings:

@@ -7,10 +7,10 @@ import numpy as np
 
 from gateway.twin import Plant
 from gateway.twin.experiment import Floats, settling_time_s
-from paper.bench import NOTHING, Record, Surroundings, run
-from paper.calibration import Calibrated, condition
-from paper.laws import law
-from paper.rigs import bed
+from paper.experiments.calibration import Calibrated, condition
+from paper.experiments.closed_loop import NOTHING, Record, Surroundings, run
+from paper.experiments.laws import law
+from paper.experiments.rigs import rig_lanes
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class TrialConditions:
     """part: which noise; conditioned: the friction remembers a full cycle, as on the ladder; changed: the plant here, by case;
     around: inputs from outside, given the lanes."""
 
@@ -55,16 +55,19 @@ class Scene:
 
 
 def trial(
-    copies: Sequence[Calibrated], laws: tuple[str, ...], wishes: Sequence[Callable[[int], Floats]], scene: Scene
+    copies: Sequence[Calibrated],
+    laws: tuple[str, ...],
+    wishes: Sequence[Callable[[int], Floats]],
+    conditions: TrialConditions,
 ) -> Trial:
     """wishes: one per case, seed -> desired force per tick."""
     lanes = [Lane(copy, name, case) for copy in copies for case in range(len(wishes)) for name in laws]
-    plants = [scene.changed(lane.calibrated.plant, lane.case) for lane in lanes]
-    rig = bed(plants, [lane.calibrated.seed for lane in lanes], scene.part)
-    if scene.conditioned:
+    plants = [conditions.changed(lane.calibrated.plant, lane.case) for lane in lanes]
+    rig = rig_lanes(plants, [lane.calibrated.seed for lane in lanes], conditions.part)
+    if conditions.conditioned:
         condition(rig.twin)
     desired_n = np.stack([wishes[lane.case](lane.calibrated.seed) for lane in lanes], axis=1)
-    record = run(rig, [law(lane.law, lane.calibrated) for lane in lanes], desired_n, scene.around(lanes))
+    record = run(rig, [law(lane.law, lane.calibrated) for lane in lanes], desired_n, conditions.around(lanes))
     return Trial(tuple(copy.seed for copy in copies), len(wishes), laws, record)
 
 

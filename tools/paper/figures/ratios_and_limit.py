@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paper import paper_values
-from paper.bench import STEP_S
-from paper.drawing import COLOUR, LABEL, RED, sheet
-from paper.limit import bang_bang_v, holding_v, responses
-from paper.rigs import paper_plant
+from paper.experiments.closed_loop import STEP_S
+from paper.experiments.limit import bang_bang_v, holding_v, responses
+from paper.experiments.rigs import paper_plant
+from paper.figures.drawing import COLOUR, LABEL, RED, sheet
 from paper.study import Study
 
 

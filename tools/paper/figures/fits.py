@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from gateway.bsfm.fit.result import FitResult
 from gateway.bsfm.ladder.measured_ladder import RISING, Ladder
 from paper import paper_values
-from paper.drawing import COLOUR, GREY, sheet
+from paper.figures.drawing import COLOUR, GREY, sheet
 from paper.study import Study
 
 

@@ -3,14 +3,15 @@
 import numpy as np
 
 from gateway.twin.experiment import Floats
-from paper import exercises, paper_values
-from paper.exercises import CONDITIONS
-from paper.rigs import paper_plant
+from paper import paper_values
+from paper.experiments import exercises
+from paper.experiments.exercises import CONDITIONS
+from paper.experiments.rigs import paper_plant
 from paper.study import Study
-from paper.verdict import OUTSIDE, Verdict, word
+from paper.verdicts.verdict import OUTSIDE, Verdict, word
 
 
-def fed(study: Study, law: str, case: int) -> Floats:
+def fed_error_n(study: Study, law: str, case: int) -> Floats:
     """Error while the plate is fed, on the paper's rig."""
     return exercises.feeding(study.tracking.of(law, 0, case).error_n[:, 0], case)
 
@@ -28,11 +29,11 @@ def mean_of(values: dict[int, float], **wanted: object) -> float:
 
 def tracking(study: Study) -> list[Verdict]:
     slow, fast = paper_values.TRACKING_FEEDS_M_PER_S
-    worst = {case: float(np.max(np.abs(fed(study, "bsfm", case)))) for case in range(len(CONDITIONS))}
+    worst = {case: float(np.max(np.abs(fed_error_n(study, "bsfm", case)))) for case in range(len(CONDITIONS))}
     pairs = [mean_of(worst, feed=feed, spinning=False) for feed in (slow, fast)]
     stiff_n = stiff_variation_n()
     soft_n = [
-        max(float(np.ptp(fed(study, "bsfm", case))) for case in worst if CONDITIONS[case][2] is on)
+        max(float(np.ptp(fed_error_n(study, "bsfm", case))) for case in worst if CONDITIONS[case][2] is on)
         for on in (False, True)
     ]
     return [
@@ -74,7 +75,7 @@ def stiff_variation_n() -> float:
 
 def spindle(study: Study) -> list[Verdict]:
     cases = range(len(CONDITIONS))
-    shaking = {case: exercises.shaking_n(fed(study, "bsfm", case)) for case in cases}
+    shaking = {case: exercises.shaking_n(fed_error_n(study, "bsfm", case)) for case in cases}
     over = {case: overshoot_n(study, "bsfm", case) for case in cases}
     off, on = (
         {kind: mean_of(values, spinning=spinning) for kind, values in (("shake", shaking), ("over", over))}
