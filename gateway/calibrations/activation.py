@@ -100,7 +100,8 @@ class Activation:
 
 
 def make_uploaded(staged: Staged, *, name: str, rig: str, date_utc: str, source: str) -> Calibration:
-    """A checked set as a calibration. What it was fitted to is not known here: no residuals, and the hash is the set's."""
+    """Return a checked set as a calibration.
+    What it was fitted to is not known here: no residuals, and the hash is the set's."""
     coefficients = staged.coefficients
     fresh = Calibration(
         number=0,

@@ -32,7 +32,7 @@ class Selection:
 
     @property
     def slot_word(self) -> int:
-        """What the active_slot register shows."""
+        """Value of the active_slot register."""
         return NO_SLOT if self.slot is None else self.slot
 
 

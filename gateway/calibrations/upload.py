@@ -82,7 +82,7 @@ class UploadService:
         staging.on_select = self._on_select
 
     def close(self) -> None:
-        """Nothing more is begun; what is under way ends on the disk as it would have."""
+        """Begin nothing more; what is under way ends on the disk as it would have."""
         self._thread.close()
 
     # -- asked by a master
@@ -147,7 +147,7 @@ class UploadService:
         return self._ask("calibration rollback", self._activation.roll_back)
 
     def status(self) -> dict[str, Any]:
-        """What is in use, and how the last job went; job is its number, for whoever began it; reason as failing_reason."""
+        """Return what is in use, and how the last job went; job is its number; reason as failing_reason."""
         return {
             "active": self._calibration.number,
             "name": self._calibration.name,

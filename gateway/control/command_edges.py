@@ -98,7 +98,7 @@ class CommandTracker:
         return self._lease.is_lost(now_s, owner_connected)
 
     def lease_age_s(self, now_s: float) -> float:
-        """Time since the lease was renewed."""
+        """Return the time since the lease was renewed, s."""
         return self._lease.age_s(now_s)
 
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
@@ -108,4 +108,5 @@ class CommandTracker:
 
     @property
     def who(self) -> str:
+        """Address of the master that sent the command."""
         return self.command.peer or "a command"

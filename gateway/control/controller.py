@@ -81,16 +81,16 @@ class Controller:
 
     @property
     def has_stopped(self) -> bool:
-        """True once a `stop` has led to a disabled output."""
+        """Decide whether a `stop` has led to a disabled output."""
         return self._stopping and not self._machine.is_enabled
 
     @property
     def zero_n(self) -> float:
-        """What the last tare has taken as zero, N of the cell."""
+        """Force of the cell that the last tare has taken as zero, N."""
         return self._conditioner.zero_n
 
     def stop(self) -> None:
-        """Ramp the force to 0 in the following steps, then OFF for good; no enable is accepted any more."""
+        """Ramp the force to 0 in the following steps, then stay OFF; no enable is accepted any more."""
         self._stopping = True
 
     def use(self, model: Bsfm, calibration_id: int, response: Response | None = None) -> None:

@@ -20,7 +20,7 @@ _FAULT, _WARNING, _LIMITED, _UNREACHABLE = 16, 32, 64, 128
 
 @dataclass(slots=True)
 class StepOutcome:
-    """What a step wants from its caller besides the voltage."""
+    """Answer of a step beside the voltage."""
 
     events: list[str] = field(default_factory=list)
     clear_command: bool = False

@@ -36,12 +36,12 @@ class Demand:
 
 
 def gravity_n(payload_kg: float, tilt_rad: float) -> float:
-    """Part of the payload's weight that presses, N: m g cos(tilt), tilt 0 = tool pointing down."""
+    """Return the part of the payload's weight that presses, N: m g cos(tilt), tilt 0 = tool pointing down."""
     return finite(payload_kg, "payload_kg") * STANDARD_GRAVITY_M_PER_S2 * cos(finite(tilt_rad, "tilt_angle_rad"))
 
 
 def demand_of(command: Command, settings: ControlSettings) -> Demand:
-    """NotFiniteError if any number that matters is NaN or infinite."""
+    """Return what the command demands. NotFiniteError if any number that matters is NaN or infinite."""
     defaults = settings.defaults
     force_n, limited_by = force_limited(command.force_setpoint_n, settings.limits)
     return Demand(

@@ -10,7 +10,7 @@ def fault_sentence(fault: FaultCode, detail: str) -> str:
 
 
 def unreachable_sentence(seen: Evidence) -> str:
-    """A301 in numbers, and what it probably is."""
+    """Return A301 in numbers, with what it probably is."""
     return (
         f"A301 {seen.voltage_v:.2f} V out, {seen.measured_n:.1f} N measured, {seen.expected_n:.1f} expected: "
         f"{unreachable_words(seen)}"
@@ -18,7 +18,7 @@ def unreachable_sentence(seen: Evidence) -> str:
 
 
 def hunting_sentence(force_n: float, turns: int) -> str:
-    """W360: the trim has backed off."""
+    """Return W360, which says that the trim has backed off."""
     return (
         f"W360 at {force_n:.1f} N the trim has turned round {turns} times: the force sticks and slips, or the "
         "workpiece moves; the trim stands still until there is another setpoint"

@@ -51,7 +51,8 @@ class SampleConditioner:
     def read(
         self, now_s: float, sample: ForceSample | None, gravity_n: float, around: tuple[float, float] = (nan, 0.0)
     ) -> Reading:
-        """around: temperature of the cell in degrees C (nan: not known) and voltage on the output."""
+        """Return what the sample means for control.
+        around: temperature of the cell in degrees C (nan: not known) and voltage on the output."""
         if sample is None:
             return NO_READING
         force_n = sample.force_n
@@ -71,16 +72,17 @@ class SampleConditioner:
 
     @property
     def zero_n(self) -> float:
-        """What the last tare has taken as zero, N of the cell."""
+        """Force of the cell that the last tare has taken as zero, N."""
         return self._zero.zero_n
 
     @property
     def zero_spread_n(self) -> float:
-        """How far recent samples may lie apart to be taken as zero, N."""
+        """Largest spread of recent samples that may be taken as zero, N."""
         return self._zero.largest_spread_n
 
     def take_zero(self, gravity_n: float) -> float:
-        """Tare: by how much the zero moved, N; gravity_n as in `demand`. Ask `why_no_zero` first."""
+        """Take the present force as zero (tare) and return by how much the zero moved, N.
+        gravity_n as in `demand`. Ask `why_no_zero` first."""
         return self._zero.take(gravity_n)
 
     def why_no_zero(self, gravity_n: float) -> str:

@@ -28,7 +28,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defaults:
-    """What 0 in a command register means."""
+    """Values that 0 in a command register means."""
 
     __pydantic_config__ = STRICT
     force_ramp_n_per_s: Annotated[float, Gt(0), Le(3276.7)] = 200.0
@@ -61,7 +61,7 @@ class LeadSettings:
 
 
 class ResponseSource(StrEnum):
-    """Where control takes the timing of the rig from."""
+    """Source of the rig's timing that control uses."""
 
     MEASURED = "measured"  # by the calibration in use, where it has measured it; else the numbers of this file
     RIG = "rig"  # the numbers of this file: trim.gain_v_per_n_s, lead, supervision.response_lag_s
@@ -81,7 +81,7 @@ class LoopTiming:
 
 
 class LeaseAction(StrEnum):
-    """What happens when the master is lost."""
+    """Action when the master is lost."""
 
     FAULT = "fault"  # safe voltage at once, latched
     HOLD = "hold"  # keep the last setpoint, raise a warning

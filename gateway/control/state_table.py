@@ -14,7 +14,7 @@ from gateway.registers.words import State
 
 
 class StateEvent(Enum):
-    """What makes a state go over into another."""
+    """Event that makes a state go over into another."""
 
     ENABLE = "enable"  # rise of control_word bit 0, accepted
     DISABLE = "disable"  # fall of it, or the end of a ramp down

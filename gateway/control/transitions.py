@@ -21,7 +21,7 @@ from gateway.registers.words import State
 
 @dataclass(frozen=True, slots=True)
 class ControllerParts:
-    """What a change of state acts on."""
+    """Parts that a change of state acts on."""
 
     commands: CommandTracker
     faults: FaultDetector
@@ -46,6 +46,7 @@ class Transitions:
 
     @property
     def is_enabled(self) -> bool:
+        """Decide whether the state is an enabled one."""
         return self.state in ENABLED_STATES
 
     def begin_step(self) -> None:
@@ -79,8 +80,8 @@ class Transitions:
         self.tell(sentence)
 
     def end_run(self, sentence: str, given_n: float) -> None:
-        """However it ended, but by a fault or a disable: the force goes to 0 along the rig's ramp, then the output off.
-        given_n: contact force that the slide need not give."""
+        """Ramp the force to 0 along the rig's ramp after a run, then switch the output off.
+        However the run ended, but by a fault or a disable. given_n: contact force that the slide need not give."""
         self._parts.run.leave(self._parts.loop, given_n)
         self.is_ramping_down = True
         self.tell(sentence)
@@ -111,7 +112,7 @@ class Transitions:
         self.fault, self.is_restarted = FaultCode.NONE, False
 
     def lose_master(self, now_s: float, seen: str, action: LeaseAction) -> None:
-        """Do what the rig says where the lease is over. seen: how it was noticed."""
+        """Act as the rig says where the lease is over. seen: how it was noticed."""
         self.outcome.release_owner = True
         if action is LeaseAction.FAULT:
             self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))

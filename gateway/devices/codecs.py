@@ -31,7 +31,8 @@ def _find(table: dict[str, Ends], profile: DeviceProfile, role: Role) -> Ends:
 
 
 def output_host(profile: DeviceProfile) -> OutputHost:
-    """Our end of an output device's line. ValueError when the profile is none, or its codec is unknown; so the three below."""
+    """Return our end of an output device's line.
+    ValueError when the profile is of no output, or its codec is unknown; so the three below."""
     return _find(OUTPUT_CODECS, profile, Role.OUTPUT)[0](profile)
 
 
@@ -41,7 +42,7 @@ def output_device(profile: DeviceProfile) -> OutputDevice:
 
 
 def cell_host(profile: DeviceProfile, sign: int = 1, unit: str | None = None) -> CellHost:
-    """Our end of a load cell's line; sign and unit are the rig's (see CellLine)."""
+    """Return our end of a load cell's line; sign and unit are the rig's (see CellLine)."""
     return _find(CELL_CODECS, profile, Role.LOAD_CELL)[0](profile, sign, unit)
 
 

@@ -34,6 +34,7 @@ class Scale:
 
     @property
     def physical_per_number(self) -> float:
+        """Slope of the scale: physical units per number of the device."""
         return (self.physical[1] - self.physical[0]) / (self.device[1] - self.device[0])
 
     def to_physical(self, number: float) -> float:
@@ -45,7 +46,8 @@ class Scale:
         return self.device[0] + (value - self.physical[0]) / self.physical_per_number
 
     def carries(self, number: float, slack: float = 0.0) -> bool:
-        """slack: in the device's numbers; half a step where the number was rounded before it was sent."""
+        """Decide whether the scale spans this number of the device.
+        slack: in the device's numbers; half a step where the number was rounded before it was sent."""
         return self.device[0] - slack <= number <= self.device[1] + slack
 
     def on_grid(self, number: float, decimals: int) -> float:
@@ -74,6 +76,7 @@ class VoltageRange:
 
     @property
     def scale(self) -> Scale:
+        """The scale between the device's numbers and volts."""
         return Scale(self.device, self.voltage_v)
 
 
@@ -90,6 +93,7 @@ class PressureRange:
 
     @property
     def scale(self) -> Scale:
+        """The scale between the device's numbers and pascals."""
         return Scale(self.device, self.pressure_pa)
 
 
@@ -195,14 +199,17 @@ class ForceReading:
 
     @property
     def template(self) -> Template:
+        """The compiled template of the cell's frame."""
         return compile_template(self.frame)
 
     @property
     def may_be_blank(self) -> str:
+        """Name of the field that the cell leaves blank when overloaded; empty where it does not."""
         return FORCE if self.blank_is_overload else ""
 
     @property
     def decimals(self) -> int:
+        """Number of digits behind the point of the cell's force, 0 for whole numbers."""
         number = self.template.field(FORCE)
         return number.decimals if isinstance(number, Decimals) else 0
 

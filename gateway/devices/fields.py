@@ -33,13 +33,22 @@ class Field(Protocol):
     """One hole of a template. pattern: regular expression of its bytes; is_open: its length is not fixed."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name that stands in the template's braces."""
+
     @property
-    def pattern(self) -> str: ...
+    def pattern(self) -> str:
+        """Regular expression that matches every text of this field."""
+
     @property
-    def is_open(self) -> bool: ...
-    def encode(self, value: Value) -> str: ...
-    def decode(self, text: str) -> Value | None: ...
+    def is_open(self) -> bool:
+        """Decide whether the field is of open length."""
+
+    def encode(self, value: Value) -> str:
+        """Return the text of a value on the wire. ValueRefused when the field cannot hold it."""
+
+    def decode(self, text: str) -> Value | None:
+        """Return the value of a text that matches `pattern`, None where it means none."""
 
 
 def _refuse(name: str, value: Value, why: str) -> ValueRefused:
@@ -72,13 +81,16 @@ class WholeNumber:
 
     @property
     def is_open(self) -> bool:
+        """Decide whether the number takes as many digits as it needs."""
         return self.width == 0
 
     @property
     def pattern(self) -> str:
+        """Regular expression of a signed whole number, padded to the width where there is one."""
         return rf"[+-]?\d{{1,{_LONGEST_NUMBER}}}" if self.is_open else rf"[ +\-0-9]{{{self.width}}}"
 
     def encode(self, value: Value) -> str:
+        """Return the digits. ValueRefused for a fraction, or a number that does not fit."""
         number = _finite(self.name, value)
         if number != int(number):
             raise _refuse(self.name, value, "not a whole number")
@@ -87,6 +99,7 @@ class WholeNumber:
         return _of_width(self.name, format(int(number), f"{self.sign}{self.zero}{self.width or ''}d"), self.width)
 
     def decode(self, text: str) -> Value | None:
+        """Return the whole number, None for blanks between digits or signs alone."""
         return int(text.replace(" ", "")) if re.fullmatch(rf"{_PADDED_NUMBER}\d+", text) else None
 
 
@@ -99,19 +112,23 @@ class HexNumber:
 
     @property
     def is_open(self) -> bool:
+        """Return False: a hexadecimal number has a fixed width."""
         return False
 
     @property
     def pattern(self) -> str:
+        """Regular expression of upper-case hexadecimal digits."""
         return rf"[0-9A-F]{{{self.width}}}"
 
     def encode(self, value: Value) -> str:
+        """Return the digits, with leading zeros. ValueRefused for a fraction, a negative number, or one that does not fit."""
         number = _finite(self.name, value)
         if number != int(number) or number < 0:
             raise _refuse(self.name, value, "not a whole number from 0")
         return _of_width(self.name, format(int(number), f"0{self.width}X"), self.width)
 
     def decode(self, text: str) -> Value | None:
+        """Return the number of these digits."""
         return int(text, 16)
 
 
@@ -127,15 +144,18 @@ class Decimals:
 
     @property
     def is_open(self) -> bool:
+        """Decide whether the number takes as many digits as it needs."""
         return self.width == 0
 
     @property
     def pattern(self) -> str:
+        """Regular expression of a number with a fixed count of decimals, padded to the width where there is one."""
         if self.is_open:
             return rf"[+-]?\d{{1,{_LONGEST_NUMBER}}}\.\d{{{self.decimals}}}"
         return rf"[ +\-0-9.]{{{self.width}}}"
 
     def encode(self, value: Value) -> str:
+        """Return the rounded number, never as -0.00. ValueRefused for one that is not finite or does not fit."""
         number = _finite(self.name, value)
         if abs(number) >= 10.0**_LONGEST_NUMBER:
             raise _refuse(self.name, value, "too large")
@@ -144,9 +164,11 @@ class Decimals:
 
     @property
     def blank(self) -> str:
+        """Return the text of a display that shows nothing."""
         return " " * self.width
 
     def decode(self, text: str) -> Value | None:
+        """Return the number, NaN for a blank display, None for anything else."""
         if not self.is_open and not text.strip(" +-"):
             return nan
         if re.fullmatch(rf"{_PADDED_NUMBER}\d+\.\d{{{self.decimals}}}", text):
@@ -163,18 +185,22 @@ class Choice:
 
     @property
     def is_open(self) -> bool:
+        """Return False: each word is known with its length."""
         return False
 
     @property
     def pattern(self) -> str:
+        """Regular expression of the words, longest first."""
         return "|".join(re.escape(word) for word in sorted(self.words, key=len, reverse=True))
 
     def encode(self, value: Value) -> str:
+        """Return the word itself. ValueRefused for another one."""
         if value not in self.words:
             raise _refuse(self.name, value, f"not one of {', '.join(self.words)}")
         return str(value)
 
     def decode(self, text: str) -> Value | None:
+        """Return the word itself."""
         return text
 
 
@@ -187,19 +213,23 @@ class Text:
 
     @property
     def is_open(self) -> bool:
+        """Decide whether the text takes as many characters as it has."""
         return self.width == 0
 
     @property
     def pattern(self) -> str:
+        """Regular expression of printable ASCII."""
         return "[ -~]+?" if self.is_open else rf"[ -~]{{{self.width}}}"
 
     def encode(self, value: Value) -> str:
+        """Return the text, padded to the width. ValueRefused for characters that do not print or blanks at the end."""
         text = str(value)
         if not re.fullmatch("[ -~]+", text) or text != text.rstrip(" "):
             raise _refuse(self.name, repr(value), "not printable text")
         return _of_width(self.name, text.ljust(self.width), self.width)
 
     def decode(self, text: str) -> Value | None:
+        """Return the text without the blanks that pad it."""
         return text.rstrip(" ")
 
 

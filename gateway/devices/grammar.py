@@ -21,6 +21,7 @@ class Grammar:
 
     @property
     def set_voltage(self) -> VoltageExchange:
+        """The exchange that sets the voltage; an output's profile always has one."""
         assert self.profile.set_voltage  # an output's profile was checked for it
         return self.profile.set_voltage
 
@@ -68,7 +69,8 @@ class Grammar:
         return self.number_line(exchange.answer, number)
 
     def read(self, template: str, body: bytes | None, may_be_blank: str = "") -> dict[str, Value] | None:
-        """Field values, None unless body is this sentence with this profile's constants: another address is not ours."""
+        """Return the field values, None unless body is this sentence with this profile's constants.
+        A sentence with another address belongs to another device."""
         values = compile_template(template).decode(body, may_be_blank) if body is not None and template else None
         if values is None or any(values.get(name, fixed) != fixed for name, fixed in self.profile.constants.items()):
             return None

@@ -27,7 +27,7 @@ class SerialSettings:
 
     @property
     def bits_per_character(self) -> int:
-        """On the wire: start bit, data, parity, stop bits."""
+        """Bits of a character on the wire: start bit, data, parity, stop bits."""
         return 1 + self.data_bits + (self.parity != "none") + self.stop_bits
 
     @property

@@ -50,7 +50,7 @@ class Garbage:
 
 
 class Quality(StrEnum):
-    """How far a force reading can be believed."""
+    """Quality of a force reading: how far it can be believed."""
 
     OK = "ok"
     UNSTABLE = "unstable"  # the device's own motion flag; normal under moving force

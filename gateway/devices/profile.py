@@ -28,7 +28,7 @@ from gateway.devices.template import compile_template
 
 
 class Certainty(StrEnum):
-    """Where the grammar was taken from; none of it replaces a run on the device."""
+    """Source of the grammar; none of it replaces a run on the device."""
 
     MANUAL = "manual"  # read in a maker's manual
     PUBLIC_DRIVER = "public driver"  # read in drivers that others have published
@@ -36,7 +36,7 @@ class Certainty(StrEnum):
 
 
 class Role(StrEnum):
-    """What a device is for."""
+    """Purpose of a device."""
 
     OUTPUT = "output"
     LOAD_CELL = "load cell"
@@ -44,7 +44,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceProfile:
-    """How one serial device speaks. `watchdog: none` and `identity: none` are facts that the service must know."""
+    """Language of one serial device. `watchdog: none` and `identity: none` are facts that the service must know."""
 
     __pydantic_config__ = STRICT
     name: Annotated[str, MinLen(1)]  # the file's name without .yaml
@@ -90,17 +90,18 @@ class DeviceProfile:
 
     @property
     def voltage_range_v(self) -> Span:
-        """What the output can be set to, V; (0, 0) for a load cell."""
+        """Voltages that the output can be set to, V; (0, 0) for a load cell."""
         return self.set_voltage.range.voltage_v if self.set_voltage else (0.0, 0.0)
 
     @property
     def pressure_pa_per_v(self) -> float:
-        """Of a regulator whose ranges of pressure and voltage have one end, as its profile says; nan without a pressure."""
+        """Pressure per volt of a regulator whose ranges of both have one end, as its profile says; nan without a pressure."""
         top_v = self.voltage_range_v[1]
         return self.read_pressure.range.pressure_pa[1] / top_v if self.read_pressure and top_v else nan
 
     @property
     def terminator_bytes(self) -> bytes:
+        """The bytes that end a line."""
         return self.terminator.encode("ascii")
 
     def number_in(self, template_text: str) -> Field | None:
@@ -118,7 +119,7 @@ class DeviceProfile:
 
     @property
     def reading(self) -> ForceReading:
-        """How a load cell says its force; ValueError for an output."""
+        """The way in which a load cell reports its force; ValueError for an output."""
         reading = self.stream or self.read_force
         if reading is None:
             raise ValueError(f"{self.name} is not a load cell")

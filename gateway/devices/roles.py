@@ -25,7 +25,7 @@ class OutputHost(Protocol):
 
     @property
     def idle_question(self) -> OutputRequest | None:
-        """What to ask a device that has nothing to do; None where it can only be told its setting again."""
+        """Question for a device that has nothing to do; None where it can only be told its setting again."""
 
     def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
         """Return whether this answer to `question` says that the setting stands, up to the rounding of the numbers on the
@@ -33,7 +33,7 @@ class OutputHost(Protocol):
 
     @property
     def safe_reply(self) -> bytes:
-        """What acknowledges the last `safe_frame` (the least voltage before the first): a whole line."""
+        """The whole line that acknowledges the last `safe_frame` (the least voltage before the first)."""
 
     def request(self, message: OutputRequest) -> bytes:
         """Return the bytes to write; their answer is expected from now on. ValueRefused when the device cannot be told that."""

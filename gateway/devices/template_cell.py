@@ -52,12 +52,15 @@ class TemplateCellHost:
         self.resolution_n = self._reading.step * self._newton_per_unit
 
     def poll(self) -> bytes:
+        """Return the question for one sample, empty for a cell that streams."""
         return _question(self._grammar, self._reading)
 
     def forget(self) -> None:
+        """Drop half a frame: what comes next belongs to another stream."""
         self._lines.forget()
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
+        """Return the samples and the garbage that these bytes complete. now_s: time of their arrival."""
         return [self._sample(line, now_s) for line in self._lines.feed(chunk)]
 
     def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage:
@@ -88,10 +91,12 @@ class TemplateCellDevice:
         self._lines = LineSplitter(profile.terminator_bytes)
 
     def receive(self, chunk: bytes, now_s: float) -> int:
+        """Return how many questions these bytes complete."""
         question = _question(self._grammar, self._reading)
         return sum(line.data == question for line in self._lines.feed(chunk)) if question else 0
 
     def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
+        """Return the frame that shows this force, or overload where the display is too small for it."""
         raw = force_n / NEWTON_PER_UNIT[self._unit]
         if quality is not Quality.OVERLOAD and isfinite(raw):
             try:

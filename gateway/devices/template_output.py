@@ -48,17 +48,21 @@ class TemplateOutputHost:
 
     @property
     def safe_reply(self) -> bytes:
+        """Return the line that confirms the safe voltage."""
         return self._grammar.answer_line(self._confirmation, self._safe_v)
 
     def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
+        """Decide whether a reply repeats this voltage, within the device's rounding."""
         return abs(reply.voltage_v - voltage_v) <= self._tolerance_v[type(question)]
 
     def safe_frame(self, voltage_v: float) -> bytes:
+        """Return the request that sets the safe voltage, and remember the voltage for `safe_reply`."""
         frame = self._encode_request(SetVoltage(voltage_v))
         self._safe_v = voltage_v
         return frame
 
     def request(self, message: OutputRequest) -> bytes:
+        """Return the bytes of a request, and expect its answer. ValueRefused for a voltage that the device cannot be sent."""
         data = self._encode_request(message)
         if not self._expected:
             self._lines.forget()  # bytes that came before the question are no part of its answer
@@ -66,10 +70,12 @@ class TemplateOutputHost:
         return data
 
     def forget(self) -> None:
+        """Drop half a line and every answer still expected."""
         self._lines.forget()
         self._expected.clear()
 
     def receive(self, chunk: bytes, now_s: float) -> list[OutputReply]:
+        """Return the replies that these bytes complete. now_s: time of their arrival."""
         return [self._reply(line) for line in self._lines.feed(chunk)]
 
     def _encode_request(self, message: OutputRequest) -> bytes:
@@ -133,9 +139,11 @@ class TemplateOutputDevice:
         self._setting = self._scale.device[0]
 
     def receive(self, chunk: bytes, now_s: float) -> list[OutputRequest | Garbage]:
+        """Return the requests and the garbage that these bytes complete."""
         return [self._request(line) for line in self._lines.feed(chunk)]
 
     def reply(self, reply: OutputReply, to: OutputRequest | None = None) -> bytes:
+        """Return the bytes of a reply; to: the request that it answers."""
         match reply:
             case Accepted(voltage_v):
                 return self._number(to or SetVoltage(voltage_v), voltage_v)
@@ -147,6 +155,7 @@ class TemplateOutputDevice:
                 return data
 
     def refusal(self, garbage: Garbage) -> Refused:
+        """Return the refusal that the device gives for this garbage."""
         refusals = self._profile.refusals
         number = self._number_in(garbage)
         beyond = refusals.out_of_range

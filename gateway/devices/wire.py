@@ -29,12 +29,12 @@ class PacedWire:
 
     @property
     def room(self) -> int:
-        """How many more bytes are taken now."""
+        """Number of bytes that are taken now."""
         return MOST_QUEUED_BYTES - len(self._queue)
 
     @property
     def last_through_s(self) -> float | None:
-        """When the last queued byte will be through, None when the wire is idle."""
+        """Time at which the last queued byte will be through, None when the wire is idle."""
         return self._through_s(len(self._queue)) if self._queue else None
 
     def bytes_through(self, now_s: float) -> bytes:

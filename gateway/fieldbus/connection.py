@@ -30,20 +30,27 @@ BUFFER_BYTES: Final = 1024  # 85 reads, or four of the longest requests
 
 
 class Timer(Protocol):
-    def cancel(self) -> None: ...
+    """Handle of a delayed call."""
+
+    def cancel(self) -> None:
+        """Cancel the call."""
 
 
 class Clock(Protocol):
-    """What is needed of an event loop; a test's own clock has the same two methods."""
+    """Methods of an event loop that a connection needs; a test's own clock has the same two."""
 
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Return the loop's time, s."""
+        ...
 
-    def call_later(self, delay: float, callback: Callable[[], None], /) -> Timer: ...
+    def call_later(self, delay: float, callback: Callable[[], None], /) -> Timer:
+        """Call back after delay s."""
+        ...
 
 
 @dataclass(slots=True)
 class ServerState:
-    """What all connections of one server share."""
+    """State that all connections of one server share."""
 
     bank: DataBank
     settings: ServerSettings
@@ -72,6 +79,7 @@ class Connection(asyncio.BufferedProtocol):
         self._admitted = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Admit the peer, or abort the connection where there are too many."""
         shared, now_s = self._shared, self._shared.clock.time()
         self._transport = cast(asyncio.Transport, transport)  # uvloop's is no subclass
         self._write = self._transport.write
@@ -103,7 +111,7 @@ class Connection(asyncio.BufferedProtocol):
         return self._view
 
     def buffer_updated(self, size: int) -> None:
-        """The one call per request: size bytes have been put into the buffer."""
+        """Answer the size bytes that have been put into the buffer: the one call per request."""
         if self._partial_since_s is None:
             frame = None
             if size == READ_FRAME_BYTES:
@@ -182,7 +190,7 @@ class Connection(asyncio.BufferedProtocol):
             self._transport.resume_reading()
 
     def pause_writing(self) -> None:
-        """The transport holds more than the cap."""
+        """Abort the connection: the transport holds more than the cap."""
         cap_bytes = self._shared.settings.write_buffer_bytes
         self._log("unread", f"W231 {self.peer}: more than {cap_bytes} bytes of answers were not read, closed")
         self.abort()
@@ -201,12 +209,12 @@ class Connection(asyncio.BufferedProtocol):
             self._close("idle", f"{self.peer}: no request for {settings.idle_s:g} s")
 
     def close(self) -> None:
-        """The server closes; answers given so far are still delivered."""
+        """Close from the server's side; answers given so far are still delivered."""
         self._stop()
         self._transport.close()
 
     def abort(self) -> None:
-        """The server does not wait any longer."""
+        """Abort the connection: the server does not wait any longer."""
         self._stop()
         self._transport.abort()
 
@@ -226,6 +234,7 @@ class Connection(asyncio.BufferedProtocol):
         self._shared.log(cause, sentence, self._shared.clock.time())
 
     def connection_lost(self, _error: Exception | None) -> None:
+        """Give the peer's place back."""
         if not self._admitted:
             return
         self._stop()

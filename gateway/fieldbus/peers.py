@@ -52,6 +52,7 @@ class Peers:
         return None
 
     def join(self, host: str) -> None:
+        """Count one more connection of this host."""
         self._open[host] = self._open.get(host, 0) + 1
 
     def leave(self, host: str) -> bool:

@@ -50,7 +50,7 @@ class ModbusTcpServer:
 
     @property
     def peers(self) -> tuple[Peer, ...]:
-        """Who is connected now."""
+        """Peers that are connected now."""
         return tuple(connection.peer for connection in self._shared.connections) if self._shared else ()
 
     async def start(self, host: str, port: int) -> tuple[str, int]:

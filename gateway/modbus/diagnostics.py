@@ -49,7 +49,8 @@ def report_request() -> bytes:
 
 
 def report_answer(pdu: bytes, server: ServerId) -> bytes:
-    """Byte count, server id, run indicator, text, run indicator. RequestError: 03 surplus bytes."""
+    """Return the FC17 answer: byte count, server id, run indicator, text.
+    RequestError: 03 for a request with surplus bytes."""
     if len(pdu) != 1:
         raise wrong_length(pdu, "report server id has 1")
     run = RUNNING if server.is_running else STOPPED

@@ -36,7 +36,7 @@ class ModbusError(Exception):
 
 
 class RequestFault(Enum):
-    """What is wrong with a request that no bank has to look at, and the exception code that answers it."""
+    """Fault of a request that no bank has to look at, and the exception code that answers it."""
 
     FUNCTION = "function", ILLEGAL_FUNCTION
     QUANTITY = "quantity", ILLEGAL_VALUE  # a count, a byte count or a length that the specification does not allow
@@ -46,6 +46,7 @@ class RequestFault(Enum):
 
     @property
     def code(self) -> int:
+        """Return the exception code that Modbus gives this fault."""
         return int(self.value[1])
 
 

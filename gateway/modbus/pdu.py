@@ -44,7 +44,7 @@ _READ_WRITE: Final = Struct(">BHHHHB")  # function, read address, quantity, writ
 
 
 def read_request(function: int, address: int, count: int) -> bytes:
-    """FC01 to FC04. Raises ValueError for a quantity that no device may accept."""
+    """Return an FC01 to FC04 request. ValueError for a quantity that no device may accept."""
     most = MOST_BITS_READ if function <= READ_DISCRETE_INPUTS else MOST_REGISTERS_READ
     _own_quantity(count, most)
     return _TWO.pack(function, address, count)
@@ -60,12 +60,12 @@ def parse_read(pdu: bytes, most: int) -> tuple[int, int]:
 
 
 def write_coil_request(address: int, value: bool) -> bytes:
-    """FC05."""
+    """Return an FC05 request."""
     return _TWO.pack(WRITE_COIL, address, 0xFF00 if value else 0)
 
 
 def write_register_request(address: int, word: int) -> bytes:
-    """FC06. word: 0..65535."""
+    """Return an FC06 request. word: 0..65535."""
     return _TWO.pack(WRITE_REGISTER, address, word)
 
 
@@ -78,7 +78,7 @@ def parse_write_one(pdu: bytes) -> tuple[int, int]:
 
 
 def write_coils_request(address: int, values: Sequence[bool]) -> bytes:
-    """FC15."""
+    """Return an FC15 request."""
     _own_quantity(len(values), MOST_BITS_WRITTEN)
     data = pack_bits(values)
     return _MANY.pack(WRITE_COILS, address, len(values), len(data)) + data
@@ -93,7 +93,7 @@ def parse_write_coils(pdu: bytes) -> tuple[int, list[bool]]:
 
 
 def write_registers_request(address: int, data: bytes) -> bytes:
-    """FC16. data: big-endian words."""
+    """Return an FC16 request. data: big-endian words."""
     _own_quantity(len(data) // 2, MOST_REGISTERS_WRITTEN, odd=len(data) % 2)
     return _MANY.pack(WRITE_REGISTERS, address, len(data) // 2, len(data)) + data
 
@@ -107,7 +107,7 @@ def parse_write_registers(pdu: bytes) -> tuple[int, bytes]:
 
 
 def mask_write_request(address: int, and_mask: int, or_mask: int) -> bytes:
-    """FC22: word = (word & and_mask) | (or_mask & ~and_mask)."""
+    """Return an FC22 request: word = (word & and_mask) | (or_mask & ~and_mask)."""
     return _MASK.pack(MASK_WRITE, address, and_mask, or_mask)
 
 
@@ -120,7 +120,7 @@ def parse_mask_write(pdu: bytes) -> tuple[int, int, int]:
 
 
 def read_write_request(read_address: int, count: int, write_address: int, data: bytes) -> bytes:
-    """FC23: data (big-endian words) is written before the count words are read."""
+    """Return an FC23 request: data (big-endian words) is written before the count words are read."""
     _own_quantity(count, MOST_REGISTERS_READ)
     _own_quantity(len(data) // 2, MOST_REGISTERS_READ_WRITE, odd=len(data) % 2)
     return _READ_WRITE.pack(READ_WRITE, read_address, count, write_address, len(data) // 2, len(data)) + data

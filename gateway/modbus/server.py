@@ -29,10 +29,10 @@ class DataBank(Protocol):
 
     @property
     def server_id(self) -> ServerId:
-        """What FC17 reports."""
+        """The identity that FC17 reports."""
 
     def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
-        """Big-endian words. count is 1..125 already."""
+        """Return the registers as big-endian words. count is 1..125 already."""
 
     def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Return bits, packed, first bit lowest, unused bits 0. count is 1..2000 already."""
@@ -41,7 +41,7 @@ class DataBank(Protocol):
         """Raise what read_registers would raise."""
 
     def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
-        """Big-endian words, all or nothing."""
+        """Write big-endian words, all or nothing."""
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
         """Write all or nothing."""
@@ -50,7 +50,7 @@ class DataBank(Protocol):
         """Write one word: (word & and_mask) | (or_mask & ~and_mask)."""
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
-        """Told of each request that the protocol's own rules have refused. Must not raise."""
+        """Note a request that the protocol's own rules have refused. Must not raise."""
 
 
 def answer(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:

@@ -18,11 +18,7 @@ _NAME_ONLY: Final[int] = getattr(os, "O_PATH", 0)
 
 
 class PtyIdentity:
-    """Of the pty that a path leads to now; `take` and `release` as often as wanted.
-
-    is_kept: without it nothing is remembered and nothing is ever gone: a rig file that names a pty by its number means
-    whatever is there.
-    """
+    """Identity of the pty that a path leads to now; `take` and `release` as often as wanted."""
 
     def __init__(self, *, is_kept: bool) -> None:
         self._is_kept = is_kept
@@ -37,10 +33,11 @@ class PtyIdentity:
 
     @property
     def is_gone(self) -> bool:
-        """Whether the pty that was remembered has lost its device: what is found under its number now is another one."""
+        """Decide whether the pty that was remembered has lost its device: another one has its number now."""
         return self._descriptor >= 0 and os.fstat(self._descriptor).st_nlink == 0
 
     def release(self) -> None:
+        """Release the pseudo-terminal."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1

@@ -21,6 +21,7 @@ class PortInfo:
 
     @property
     def path(self) -> str:
+        """Path that names the port best: by its serial number where it has one."""
         return self.by_id or self.device
 
 

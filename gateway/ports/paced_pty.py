@@ -32,6 +32,7 @@ class PacedPty:
 
     @property
     def path(self) -> str:
+        """Path of the terminal's end that a program opens."""
         return self._open_pty.path
 
     @property

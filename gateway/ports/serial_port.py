@@ -58,10 +58,12 @@ class SerialPort:
 
     @property
     def path(self) -> str:
+        """Path of the port."""
         return self._path
 
     @property
     def is_open(self) -> bool:
+        """Decide whether the port is open and works."""
         return self._descriptor >= 0 and self._failure is None
 
     @property
@@ -76,6 +78,7 @@ class SerialPort:
         return self._descriptor
 
     async def open(self) -> None:
+        """Open the port and keep it open from now on. PortError when it cannot be opened."""
         self._identity.take(self._path)
         try:
             self._open()
@@ -92,7 +95,7 @@ class SerialPort:
         self._on_lost(failure)
 
     def move(self, path: str) -> None:
-        """The device is found elsewhere from now on: whatever is not that one is given up, and it is opened at once."""
+        """Move to another path: the present port is given up, and the other opened at once."""
         was, self._path = self._path, path
         if not self._is_wanted or (path == was and self.is_open and not self._identity.is_gone):
             return
@@ -129,6 +132,7 @@ class SerialPort:
         return dropped
 
     async def drain(self, deadline_s: float = WRITE_DEADLINE_S) -> None:
+        """Wait until the driver has taken every byte. PortError after deadline_s."""
         end_s = monotonic_s() + deadline_s
         while (unsent := self._still_unsent()) and (left_s := end_s - monotonic_s()) > 0:
             await asyncio.sleep(min(left_s, max(1e-3, unsent * self._settings.character_s)))
@@ -137,6 +141,7 @@ class SerialPort:
         termios.tcdrain(self._descriptor)  # the driver's queue is empty: only the chip's own few bytes are left
 
     async def write_last(self, data: bytes, deadline_s: float = WRITE_DEADLINE_S) -> None:
+        """Write data and wait until it is sent. PortError when it cannot be."""
         if not self.write(data):
             raise PortError("E102", f"{self._path} is not open")
         try:
@@ -145,7 +150,7 @@ class SerialPort:
             raise explain_loss(self._path, error) from error
 
     def close(self) -> None:
-        """Blocks for at most 0.25 s, and only while bytes are on their way."""
+        """Close the port. Blocks for at most 0.25 s, and only while bytes are on their way."""
         self._is_wanted = False
         self._stop_reopening()
         self._identity.release()

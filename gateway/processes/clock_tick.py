@@ -50,6 +50,7 @@ class ClockTick:
         self._due_s = 0.0
 
     def start(self) -> None:
+        """Start the timer."""
         loop = asyncio.get_running_loop()
         if self.is_fallback:
             self._due_s = time.monotonic() + self.period_s
@@ -60,6 +61,7 @@ class ClockTick:
         loop.add_reader(self._fd, self._on_expired)
 
     def close(self) -> None:
+        """Stop the timer."""
         if self._timer:
             self._timer.cancel()
         if self._fd >= 0:

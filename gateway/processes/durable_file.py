@@ -47,7 +47,7 @@ def make_directory(directory: Path) -> None:
 
 
 def write_durably(directory: int, name: str, data: bytes) -> None:
-    """`name`, which is new in this directory, holds `data` durably. OSError, and it is not there, when that fails."""
+    """Write a new file durably: `name` in this directory holds `data`. OSError, and it is not there, when that fails."""
     try:
         _write(directory, name + _FRESH, data)
         os.rename(name + _FRESH, name, src_dir_fd=directory, dst_dir_fd=directory)
@@ -59,7 +59,7 @@ def write_durably(directory: int, name: str, data: bytes) -> None:
 
 
 def remove_if_possible(directory: int, name: str) -> None:
-    """Away with a file that means nothing; if it cannot be removed it stays."""
+    """Remove a file that means nothing; if it cannot be removed it stays."""
     with contextlib.suppress(OSError):
         os.unlink(name, dir_fd=directory)
 

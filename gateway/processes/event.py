@@ -43,7 +43,7 @@ class EventRecord(NamedTuple):
 
 
 def severity_of(code: str | None) -> str:
-    """info where there is no code."""
+    """Return the severity of a code, info where there is none."""
     if code is None:
         return INFO
     return WARNING if code.startswith("W") or code in WARNING_ALARMS else ERROR
@@ -60,7 +60,7 @@ def make_event(time_s: float, source: str, group: str, sentence: str) -> EventRe
 
 
 def utc_text(time_s: float) -> str:
-    """`2026-11-22T10:31:47.123Z`, from seconds since the epoch. These texts sort as the times do."""
+    """Return seconds since the epoch as `2026-11-22T10:31:47.123Z`. These texts sort as the times do."""
     return datetime.fromtimestamp(time_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
@@ -84,8 +84,8 @@ def parse_event(line: bytes) -> EventRecord | None:
 
 
 def format_event(event: EventRecord) -> str:
-    """For people: time, severity, cause, code, sentence. What follows a sentence's first line is indented; signs that
-    would move a terminal's cursor are spelled out."""
+    """Return the event for people: time, severity, cause, code, sentence.
+    What follows a sentence's first line is indented; characters that would move a terminal's cursor are spelled out."""
     code = f"{event.code} " if event.code else ""
     text = _UNPRINTABLE.sub(lambda sign: f"\\x{ord(sign[0]):02x}", event.text.rstrip("\n")).replace("\n", "\n    ")
     return f"{event.time} {event.severity:<7} {event.cause} {code}{text}"

@@ -44,6 +44,7 @@ class EventFile:
             self._rotate()
 
     def close(self) -> None:
+        """Close the file."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1
@@ -112,6 +113,7 @@ class EventReader:
         self.close()
 
     def close(self) -> None:
+        """Close the file."""
         if self._stream is not None:
             self._stream.close()
             self._stream = None

@@ -59,7 +59,7 @@ class EventLog:
         return lambda cause, sentence: self._say(source, cause, sentence)
 
     def note(self, cause: str, sentence: str) -> None:
-        """For the file only: the terminal knows it already. Not limited."""
+        """Write an event to the file only, where the terminal shows it already. Not limited."""
         if self._disk:
             self._disk.put(self._event(cause, sentence))
 
@@ -149,12 +149,15 @@ class QueuedWriter:
 
     @property
     def is_alive(self) -> bool:
+        """Decide whether the writing thread runs."""
         return self._thread.is_alive()
 
     def start(self) -> None:
+        """Start the writing thread."""
         self._thread.start()
 
     def put(self, event: EventRecord) -> None:
+        """Queue an event; a full queue drops it."""
         with contextlib.suppress(queue.Full):
             self._events.put_nowait(event)
 

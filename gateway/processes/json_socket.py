@@ -90,7 +90,7 @@ class JsonLineServer:
         return ""
 
     async def close(self) -> None:
-        """At once: a caller that reads nothing would never let go of a polite close."""
+        """Close at once: a caller that reads nothing would never let go of a polite close."""
         if self._listener is None:
             return
         self.loop.remove_reader(self._listener)
@@ -160,11 +160,13 @@ class JsonLineServer:
         return True
 
     def note_activity(self, caller: "_Client") -> None:
+        """Make this caller the one that spoke last."""
         caller.spoke_s = self.loop.time()
         self._callers.pop(caller, None)
         self._callers[caller] = None
 
     def forget_client(self, caller: "_Client") -> None:
+        """Drop a caller that has left."""
         self._callers.pop(caller, None)
 
     def _sweep(self) -> None:

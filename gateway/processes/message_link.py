@@ -34,11 +34,13 @@ _FLAGS: Final = socket.MSG_DONTWAIT | getattr(socket, "MSG_CMSG_CLOEXEC", 0)  # 
 
 
 class ProtocolError(ValueError):
-    """What came is no message of this protocol: a defect of the sender, which cannot be relied on any more."""
+    """Error of a sender that sent no message of this protocol, and cannot be relied on any more."""
 
 
 @dataclass
 class Message:
+    """One message between processes: tag, JSON body, descriptors handed over."""
+
     tag: str
     body: dict[str, Any] = field(default_factory=dict)
     descriptors: list[int] = field(default_factory=list)

@@ -38,7 +38,7 @@ def set_nice(nice: int) -> int:
 
 
 def lower_priority() -> None:
-    """Out of a parent's real-time class, and behind everybody else: for what calculates."""
+    """Leave a parent's real-time class and go behind everybody else: for what calculates."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     set_nice(HELPER_NICE)

@@ -21,7 +21,7 @@ _CURE: Final = f": {BUSY_CURE}, or a longer stall_s in the rig"
 
 @dataclass(frozen=True, slots=True)
 class ProcessorTime:
-    """What a process has had until now, in seconds."""
+    """Processor time of a process until now, in seconds."""
 
     on_cpu_s: float = 0.0
     waited_s: float = 0.0
@@ -49,7 +49,7 @@ class SchedulerCounters:
             self._descriptor = os.open(proc / str(pid) / "schedstat", os.O_RDONLY | os.O_CLOEXEC)
 
     def read(self) -> ProcessorTime | None:
-        """1.5 us: cheap enough for every heartbeat."""
+        """Return the processor time used and waited for. 1.5 us: cheap enough for every heartbeat."""
         try:
             on_cpu_ns, waited_ns = os.pread(self._descriptor, 64, 0).split()[:2]
         except (OSError, ValueError):
@@ -62,13 +62,14 @@ class SchedulerCounters:
         return turns.waited_s if turns else None
 
     def state(self) -> str:
-        """R, S, D, T, ...: the letter behind the name, which may hold brackets itself."""
+        """Return the state letter, R, S, D, T, ...: it stands behind the name, which may hold brackets itself."""
         try:
             return self._stat.read_text().rpartition(")")[2].split()[0]
         except (OSError, IndexError):
             return ""
 
     def close(self) -> None:
+        """Close the descriptor."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1
@@ -100,7 +101,8 @@ def explain_silence(silence: Silence, load: str) -> Ending:
 
 
 def load_of_machine(proc: Path = Path("/proc")) -> str:
-    """`load 8.4 on 2 cores, 62 % of the time somebody waited for a processor (10 s)`, as far as the kernel says."""
+    """Return how busy the machine is, as far as the kernel says.
+    `load 8.4 on 2 cores, 62 % of the time somebody waited for a processor (10 s)`"""
     words = []
     with contextlib.suppress(OSError, IndexError):
         words.append(f"load {(proc / 'loadavg').read_text().split()[0]} on {_cores()} cores")

@@ -102,8 +102,10 @@ def load_plant(name: str | Path) -> PlantProfile:
 
 
 def load_calibration(name: str | Path) -> Calibration:
+    """Return the calibration of a name or path. ProfileError with every fault of the file."""
     return _load("calibration", name, read_calibration)
 
 
 def load_register_map(name: str | Path) -> RegisterMap:
+    """Return the register map of a name or path. ProfileError with every fault of the file."""
     return _load("registers", name, read_registers)

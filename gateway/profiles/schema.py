@@ -40,7 +40,7 @@ _ORIGIN: Final[dict[str, Any]] = {
 
 @cache
 def field_comments(kind: type) -> dict[str, str]:
-    """Field name -> the comment behind it in the source; fields without one are left out."""
+    """Return field name -> the comment behind it in the source; fields without one are left out."""
     try:
         source = inspect.getsource(kind)
     except (OSError, TypeError):  # no source at hand: a help text less

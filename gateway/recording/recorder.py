@@ -50,7 +50,7 @@ class Recorder:
 
     @property
     def is_open(self) -> bool:
-        """Whether rows are still written."""
+        """Decide whether rows are still written."""
         return self._descriptor is not None
 
     def append(self, values: tuple[float, ...]) -> None:

@@ -54,6 +54,7 @@ class SampleRing:
         self._count[0] = self._written
 
     def close(self) -> None:
+        """Close the memory."""
         self._count.release()
         self._map.close()
 
@@ -69,6 +70,7 @@ class RingReader:
 
     @property
     def is_ready(self) -> bool:
+        """Decide whether there is a ring to read."""
         return self._map is not None or self._open()
 
     @property
@@ -80,7 +82,7 @@ class RingReader:
         return int(count)
 
     def newest(self, rows: int) -> bytes:
-        """At most this many of the newest rows, oldest first, each len(columns) float64, little-endian."""
+        """Return at most this many of the newest rows, oldest first, each len(columns) float64, little-endian."""
         end = self.written - 1  # the newest one is left alone: its count may be seen before it on some processors
         first = max(0, end - min(rows, self._capacity - 1), 0)
         if self._map is None or end <= first:
@@ -108,6 +110,7 @@ class RingReader:
         return True
 
     def close(self) -> None:
+        """Close the memory."""
         if self._map is not None:
             self._map.close()
 

@@ -83,7 +83,7 @@ class RegisterBank:
 
     @property
     def server_id(self) -> ServerId:
-        """For FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
+        """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
         is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
         return ServerId(SERVER_ID, not is_fault, b" ".join(self.identity[number] for number in (0, 2, 6)))
 
@@ -98,6 +98,7 @@ class RegisterBank:
         return bytes(self._data[2 * address : 2 * (address + count)])
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
+        """Check that these registers can be read; RequestError as `read_registers`."""
         self.read_registers(address, count, peer)
 
     def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
@@ -140,7 +141,7 @@ class RegisterBank:
 
     @property
     def on_asked(self) -> Decide:
-        """Asked before a write of the command block is stored: None takes it, an EdgeRefusal is the answer to it."""
+        """Function of control that takes or refuses a whole command before it is stored."""
         return self._admission.decide
 
     @on_asked.setter
@@ -153,7 +154,7 @@ class RegisterBank:
         self._status.publish(status)
 
     def clear_command(self) -> None:
-        """Control's doing when the output went off: control_word and setpoints to 0. No new Command number."""
+        """Clear control_word and the setpoints, because control has switched the output off. The Command keeps its number."""
         values = self._commands.values
         if values[CONTROL_WORD] or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT] or self.command.control_word:
             cleared = values.copy()

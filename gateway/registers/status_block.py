@@ -102,7 +102,7 @@ class StatusBlock:
         self._own = {name: _faces(register_map, name) for name in BANK_REGISTERS}
 
     def publish(self, status: Status) -> None:
-        """Everything that control and service know, into all three faces."""
+        """Write everything that control and service know into all three faces."""
         counts: list[int] = []
         numbers: list[float] = []
         for value, (units_per_si, counts_per_unit, low, high, unavailable) in zip(
@@ -128,9 +128,11 @@ class StatusBlock:
             data[run.low_first_at : run.low_first_at + len(low_first)] = low_first
 
     def show_owner(self, number: int) -> None:
+        """Show who may command: the owner's IPv4 address as a number, 0 for nobody."""
         self._put("owner_ip", number)
 
     def show_refusal(self, refusal: Refusal) -> None:
+        """Show the last refused write: its address, reason and value."""
         self._put("refusal_address", refusal.address)
         self._put("refusal_reason", refusal.reason)
         self._put("refusal_value", refusal.value)

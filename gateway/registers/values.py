@@ -15,6 +15,8 @@ LARGEST_FLOAT32: Final = 3.4028234663852886e38
 
 
 class WordOrder(StrEnum):
+    """Order of the two words of a 32-bit value."""
+
     ABCD = "abcd"  # high word first
     CDAB = "cdab"  # low word first
 
@@ -43,7 +45,7 @@ def words_of(kind: str) -> int:
 
 
 def swap_words(data: bytes) -> bytes:
-    """ABCD <-> CDAB for any number of 32-bit values, as bytes."""
+    """Swap the words of any number of 32-bit values: ABCD bytes become CDAB bytes, and back."""
     swapped = bytearray(data)
     swapped[0::4], swapped[1::4], swapped[2::4], swapped[3::4] = data[2::4], data[3::4], data[0::4], data[1::4]
     return bytes(swapped)

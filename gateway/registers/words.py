@@ -18,11 +18,15 @@ class State(IntEnum):
 
 
 class Mode(IntEnum):
+    """Values of register mode: what a setpoint means."""
+
     FORCE = 0
     VOLTAGE = 1
 
 
 class ControlBit(IntFlag):
+    """Bits of register control_word, which a master writes."""
+
     ENABLE = 1 << 0
     RESET_FAULT = 1 << 1  # acts whenever written as 1
     TARE = 1 << 2  # acts whenever written as 1
@@ -33,6 +37,8 @@ class ControlBit(IntFlag):
 
 
 class StatusBit(IntFlag):
+    """Bits of register status_word, which a master reads."""
+
     ENABLED = 1 << 0
     READY = 1 << 1  # an enable would be accepted (or has been): cell fresh, output acknowledged, no fault
     CONTACT = 1 << 2
@@ -44,7 +50,7 @@ class StatusBit(IntFlag):
 
 
 class LimitedBy(IntEnum):
-    """What kept the voltage from being what the law asked for, strongest first when several act."""
+    """Limit that kept the voltage from what the law asked for, strongest first when several act."""
 
     NONE = 0
     VOLTAGE_SLEW = 1
@@ -56,7 +62,7 @@ class LimitedBy(IntEnum):
 
 
 class CalibrationPhase(IntEnum):
-    """How far the calibration that control_word bit 5 starts is."""
+    """Progress of the calibration that control_word bit 5 starts."""
 
     IDLE = 0
     ZERO = 1  # rest force and noise
@@ -72,7 +78,7 @@ class CalibrationPhase(IntEnum):
 
 
 class CommitAction(IntEnum):
-    """What the commit word of the staging block asks for."""
+    """Request that the commit word of the staging block makes."""
 
     NONE = 0
     COMMIT = 1
@@ -81,7 +87,7 @@ class CommitAction(IntEnum):
 
 
 class CommitStatus(IntEnum):
-    """How far the last commit is."""
+    """Progress of the last commit."""
 
     IDLE = 0
     CHECKING = 1

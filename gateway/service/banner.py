@@ -13,7 +13,7 @@ _USUAL_LEASE_S: Final = 0.15  # what `hold` keeps without knowing the lease
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """What is known at READY: where Modbus listens, where the devices are and what they last said."""
+    """Facts of a rig that is ready: where Modbus listens, where the devices are and what they last said."""
 
     rig: Rig
     modbus: tuple[str, int]
@@ -57,7 +57,7 @@ def format_banner(ready: Ready) -> str:
 
 
 def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
-    """Command lines that work on this rig, from this machine, as they stand.
+    """Return command lines that work on this rig, from this machine, as they stand.
 
     A rig with a lease needs a heartbeat, which mbpoll has none of. A rig that names its master lets nobody else command.
     """

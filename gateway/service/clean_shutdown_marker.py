@@ -4,6 +4,8 @@ from pathlib import Path
 
 
 class CleanShutdownMarker:
+    """File that exists while a run lasts: found at the next start, the last run did not end cleanly."""
+
     def __init__(self, state: Path) -> None:
         self._path = state / "running"
 
@@ -14,4 +16,5 @@ class CleanShutdownMarker:
         return was_unclean
 
     def clear(self) -> None:
+        """Remove the file: this run ended cleanly."""
         self._path.unlink(missing_ok=True)

@@ -59,7 +59,7 @@ def _report_start_failure(log: EventLog, sentence: str, exit_code: int, event: s
 
 
 def prepare(options: dict[str, Any]) -> None:
-    """Do what takes long the first time: imports, and the types that the rig's files are checked against."""
+    """Prepare what takes long the first time: imports, and the types that the rig's files are checked against."""
     _loop_factory()
     with contextlib.suppress(ProfileError):  # told by the process that runs
         load(options)

@@ -23,7 +23,7 @@ from gateway.service.watch_reports import WatchReports
 
 @dataclass(frozen=True, slots=True)
 class RunningParts:
-    """Who answers: the parts of a running gateway that its tools may ask."""
+    """Parts of a running gateway that its tools may ask."""
 
     bank: RegisterBank
     recordings: Recordings
@@ -36,6 +36,8 @@ class RunningParts:
 
 
 class ControlSocket(JsonLineServer):
+    """Local socket of control's process, on which commands of the command line are answered."""
+
     def __init__(self, state: Path, asked: RunningParts, log: Callable[[str, str], None]) -> None:
         handlers: dict[str, Handler] = {
             "record": self._record,

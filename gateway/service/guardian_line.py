@@ -37,6 +37,7 @@ class GuardianLine:
         return ptys
 
     def heartbeat(self) -> None:
+        """Send a heartbeat, and what the line could not take before."""
         if self._waiting:
             self._send_waiting()
         with contextlib.suppress(OSError):  # a guardian that is gone shows as the end of the line
@@ -52,9 +53,11 @@ class GuardianLine:
         self._tell(guardian_link.FIRST_CAUSE, {"text": cause})
 
     def ready(self, announcement: dict[str, Any], stall_s: float) -> None:
+        """Tell the guardian that the rig runs. stall_s: silence that it has to act on."""
         self._tell(guardian_link.READY, announcement | {"stall_s": stall_s})
 
     def close(self) -> None:
+        """Send what is still waiting, as far as the line takes it, and close the line."""
         self._send_waiting()
         while self._waiting:
             self._forget_first()

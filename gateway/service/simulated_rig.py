@@ -71,10 +71,12 @@ class SimulatedRig:
         self.is_cell_frozen, self._shown_n = False, 0.0
 
     def advance(self, now_s: float) -> None:
+        """Advance the twin to now_s; after a long pause by a limited time only."""
         self.twin.advance(min(max(0.0, now_s - self._now_s), _LONGEST_LEAP_S))
         self._now_s = now_s
 
     def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        """Answer requests to the output device, unless its wire is cut."""
         self.advance(now_s)
         for request in self._output.receive(chunk, now_s):
             answer = self._answer(request)
@@ -82,12 +84,12 @@ class SimulatedRig:
                 self._send_output(answer)
 
     def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
-        """Questions to a load cell that answers when it is asked."""
+        """Answer questions to a load cell that speaks only when asked."""
         for _ in range(self._cell.receive(chunk, now_s)):
             self.stream(now_s)
 
     def stream(self, now_s: float) -> None:
-        """One frame of the load-cell amplifier."""
+        """Send one frame of the load-cell amplifier."""
         self.advance(now_s)
         if not self.is_cell_cut:
             measured_n = self._wiring * float(self.twin.measured_n)
@@ -109,8 +111,9 @@ class SimulatedRig:
                 return self._output.reply(self._output.refusal(request))
 
     def fault(self, request: dict[str, Any]) -> dict[str, Any]:
-        """{"do": "fault", "name": NAME, "on": bool}; NAME plant takes {"values": {"friction.coulomb_n": 2.5}} besides.
+        """Switch a simulated fault on or off.
 
+        {"do": "fault", "name": NAME, "on": bool}; NAME plant takes {"values": {"friction.coulomb_n": 2.5}} besides.
         ValueError on an unknown name, or a value that no plant has.
         """
         asked = parse_request(FaultRequest, request)

@@ -62,7 +62,7 @@ class CalibrateRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResidualRequest:
-    """What the residual watch tells; without a cause it is asked."""
+    """Report of the residual watch; without a cause it is a question."""
 
     __pydantic_config__ = _STRICT
     cause: Number | None = None

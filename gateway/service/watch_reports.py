@@ -32,14 +32,15 @@ class WatchReports:
         self._heard_s: float | None = None
 
     def answer(self, request: Answer) -> Answer:
-        """{"cause": number, "sentence": text, "counters": {...}} tells; without a cause it is asked. ValueError refuses."""
+        """Take the watch's report, or answer how it stands. ValueError refuses.
+        {"cause": number, "sentence": text, "counters": {...}} reports; without a cause it is a question."""
         told = parse_request(ResidualRequest, request)
         if told.cause is not None:
             self._hear(told.cause, told)
         return self.figures() | {"sentence": self._sentence}
 
     def figures(self) -> Answer:
-        """Cause by number and name, how often a warning rose, the watch's own counters, and how old all of it is."""
+        """Return cause by number and name, how often a warning rose, the watch's counters, and the age of it all."""
         cause = self._loop.residual_cause
         age_s = None if self._heard_s is None else round(self._clock() - self._heard_s, 3)
         return {"cause": int(cause), "name": cause.effect, "warnings": self._warnings, "age_s": age_s} | self._counters

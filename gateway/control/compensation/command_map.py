@@ -74,6 +74,7 @@ class SentBsfm(Bsfm):
 
     @property
     def voltage_range_v(self) -> tuple[float, float]:
+        """Voltages on the wire, V, between which the model's rising branch lies."""
         low_v, high_v = self.branches.rising.x0, self.branches.rising.x1
         return (self.command.sent_v(low_v), self.command.sent_v(high_v)) if self.command else (low_v, high_v)
 

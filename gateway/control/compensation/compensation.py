@@ -31,7 +31,7 @@ class OutsideForce:
     feed_drag_abs_n_s_per_mm: float = 0.0
 
     def force_n(self, tilt_rad: float, feed_mm_s: float) -> float:
-        """N towards the workpiece; what is not known (nan) adds nothing."""
+        """Return the force from outside in N towards the workpiece; what is not known (nan) adds nothing."""
         force_n = self.tilt_n * cos(tilt_rad - self.tilt_zero_rad) if self.tilt_n and isfinite(tilt_rad) else 0.0
         if isfinite(feed_mm_s):
             sign = (feed_mm_s > 0.0) - (feed_mm_s < 0.0)
@@ -42,7 +42,7 @@ class OutsideForce:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimingCompensation:
-    """Of the rig as it is: transport delay and the sum of all lags behind it; more_*: what the settings do not know of."""
+    """Timing of the rig as it is: dead time and the sum of all lags behind it; more_*: what the settings do not know of."""
 
     delay_s: float
     lags_s: float
@@ -76,7 +76,8 @@ def _within_2_s(lag_s: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compensation:
-    """None: that part is off. acts: names of the effects that are compensated; limited: (name, why not) of the others."""
+    """Parts of the compensation, None where one is off.
+    acts: names of the effects that are compensated; limited: (name, why not) of the others."""
 
     cell: CellMap | None = None
     command: CommandMap | None = None
@@ -87,6 +88,7 @@ class Compensation:
 
     @property
     def is_null(self) -> bool:
+        """Decide whether nothing is compensated."""
         return not (self.cell or self.command or self.outside or self.timing)
 
     def outside_n(self, tilt_rad: float, feed_mm_s: float) -> float:

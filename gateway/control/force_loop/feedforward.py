@@ -38,12 +38,12 @@ class TransportDelay:
         self.restart(0.0)
 
     def restart(self, value: float) -> None:
-        """It has been this value for long."""
+        """Fill the delay line with this value, as if it had stood for long."""
         self._past: deque[tuple[float, float]] = deque()
         self._now_s, self._value = 0.0, value
 
     def advance(self, value: float, dt_s: float) -> float:
-        """dt_s has passed and the value is this from now on; returns what it was delay_s ago."""
+        """Advance by dt_s, take the value that holds from now on, and return the value of delay_s ago."""
         if self._delay_s <= 0.0:
             return value
         self._now_s += dt_s
@@ -93,7 +93,7 @@ class Feedforward:
         self.reset()
 
     def retime(self, response_lag_s: float, delay_s: float, ahead_s: float) -> None:
-        """Another response from now on."""
+        """Replace the response: lag, dead time and how far ahead the setpoint is known, s."""
         self._lag_s, self._ahead_s = response_lag_s, ahead_s
         self._delayed = TransportDelay(delay_s)
         self._delayed.restart(self.applied_n)
@@ -110,12 +110,13 @@ class Feedforward:
 
     @property
     def branch_share(self) -> float:
-        """Where between the branches the plant is, -1 .. 1."""
+        """Place of the plant between the branches, -1 .. 1."""
         return self.model.reversal.branch_share(self._memory)
 
     def approaching_n(self, precontact_n: float) -> float:
-        """The pre-contact force, but never one that cannot move a vented tool: what friction keeps pressed at the ladder's
-        lowest stair is the friction itself, and where the ladder begins to press it has been overcome twice."""
+        """Return the pre-contact force, but never one that cannot move a vented tool.
+        Friction alone keeps pressed what the ladder's lowest stair shows, and where the ladder begins to press it has been
+        overcome twice."""
         return max(precontact_n, 2.0 * self.model.force_range_n[0] + APPROACH_N)
 
     def use(self, model: Bsfm, gravity_n: float) -> None:
@@ -165,8 +166,8 @@ class Feedforward:
             self._memory = self.model.memory_after(self._memory, from_n, to_n)
 
     def correct(self, correction_n: float, gravity_n: float) -> None:
-        """The slide goes where the aim and a trim's correction of it lead, in one movement: friction turns round with their
-        sum, and with nothing else."""
+        """Slide to where the aim and a trim's correction of it lead, in one movement.
+        Friction turns round with their sum, and with nothing else."""
         slid_n, self._slid_n = self._slid_n, self.aimed_n + correction_n - gravity_n
         if self.applied_n <= 0.0:
             self._slide = self._memory
@@ -181,7 +182,7 @@ class Feedforward:
         return corrected_v - self.model.voltage_v(self.aimed_n - gravity_n, self.branch_share)[0]
 
     def fall_back(self, goal_n: float) -> None:
-        """Contact lost: at once down to the goal, and on the rising branch for the next contact."""
+        """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact."""
         self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
         self._memory = self._slide = self.model.reversal.at(RISING)
 

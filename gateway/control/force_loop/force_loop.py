@@ -102,7 +102,7 @@ class ForceLoop:
 
     @property
     def voltage_v(self) -> float:
-        """On the output since the last step."""
+        """Voltage on the output since the last step, V."""
         return self._limiter.voltage_v
 
     @property
@@ -112,7 +112,7 @@ class ForceLoop:
 
     @property
     def branch_share(self) -> float:
-        """Where between the branches the plant is, -1 .. 1."""
+        """Place of the plant between the branches, -1 .. 1."""
         return self.feedforward.branch_share
 
     @property
@@ -127,10 +127,12 @@ class ForceLoop:
 
     @property
     def trim_v(self) -> float:
+        """Voltage that the trim adds, V."""
         return self._trim.value_v
 
     @property
     def is_trim_at_limit(self) -> bool:
+        """Decide whether the trim stands at its limit."""
         return self._trim.limited_by is not LimitedBy.NONE
 
     @property
@@ -140,10 +142,12 @@ class ForceLoop:
 
     @property
     def in_band(self) -> bool:
+        """Decide whether the force is within the tolerance of the setpoint."""
         return self._band.in_band
 
     @property
     def unreachable(self) -> bool:
+        """Decide whether the setpoint cannot be reached."""
         return self._band.unreachable or self._answer.unreachable
 
     def elapse(self, dt_s: float, line: LineStatus) -> None:
@@ -166,11 +170,11 @@ class ForceLoop:
         self.feedforward_v, self.limited_by = 0.0, LimitedBy.NONE
 
     def step(self, demand: Demand, inputs: LoopInputs) -> Moved:
-        """Do one step towards the demand."""
+        """Make one step towards the demand."""
         return _or_fault(lambda: self._step(demand, inputs))
 
     def descend(self, demand: Demand, dt_s: float, given_n: float) -> Moved:
-        """Do one step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that
+        """Make one step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that
         is being calibrated may not fit, and never up."""
         return _or_fault(lambda: self._step_down(demand, dt_s, given_n))
 

@@ -203,15 +203,17 @@ class LinearizedLagInverse:
 
     @property
     def first_v(self) -> float:
+        """State of the first lag, V."""
         return self._map.volts(self._inverse.first_v)
 
     @property
     def second_v(self) -> float:
+        """State of the second lag, V."""
         return self._map.volts(self._inverse.second_v)
 
     @property
     def n_per_v(self) -> float:
-        """How much thrust a linearized volt makes."""
+        """Thrust per linearized volt, N/V."""
         return self._map.n_per_v
 
     def away_n(self, wanted_v: float) -> float:

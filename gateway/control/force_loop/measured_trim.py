@@ -55,10 +55,12 @@ class MeasuredTrim:
 
     @property
     def is_off(self) -> bool:
+        """Decide whether the trim has no gain."""
         return self._settings.gain_v_per_n_s <= 0.0
 
     @property
     def hunted(self) -> bool:
+        """Decide whether the trim has turned round too often."""
         return self._turns >= MOST_TURNS
 
     def reset(self) -> None:

@@ -50,11 +50,12 @@ class ActiveRun:
 
     @property
     def running(self) -> bool:
+        """Decide whether a run is under way."""
         return self.run is not None
 
     @property
     def is_busy(self) -> bool:
-        """A run, or the fit of one."""
+        """Decide whether a run, or the fit of one, is under way."""
         return self.running or self.phase is CalibrationPhase.FITTING
 
     @property
@@ -64,7 +65,7 @@ class ActiveRun:
         return f"{name} ({_PHASES[self.phase]}, {self.progress:.0%})"
 
     def use(self, model: Bsfm) -> None:
-        """Of a later run; one that runs keeps what it was begun with."""
+        """Set the model of later runs; one that is under way keeps its own."""
         self.model = model
 
     def ask(self, plan: AnyPlan) -> AnyRun:
@@ -98,7 +99,7 @@ class ActiveRun:
         self._ceiling = self._new_ceiling()
 
     def step(self, now_s: float, reading: Reading, loop: ForceLoop) -> StopCause | None:
-        """Do one step of the run, through the limits of the force loop; return what ended it (a fault, or a sentence), None
+        """Make one step of the run, through the limits of the force loop; return what ended it (a fault, or a sentence), None
         while it goes on."""
         run = self.run
         assert run
@@ -126,7 +127,7 @@ class ActiveRun:
         self.end()
 
     def end(self) -> None:
-        """Whatever ends it; complete or not is told by the run itself."""
+        """End the run, for whatever reason; the run itself knows whether it is complete."""
         if self.run:
             self.phase = self.run.end_phase if self.run.is_done else CalibrationPhase.STOPPED
         self.run, self.eta_s, self.target_n = None, 0.0, 0.0

@@ -70,6 +70,7 @@ class Part:
 
     @property
     def duration_s(self) -> float:
+        """Duration of all moves, s."""
         return sum(move.duration_s for move in self.moves)
 
 
@@ -91,7 +92,7 @@ class ExperimentPlan:
 
     @property
     def duration_s(self) -> float:
-        """Of the parts; zero and check come before."""
+        """Duration of the parts, s; zero and check come before."""
         return sum(part.duration_s for part in self.parts)
 
 

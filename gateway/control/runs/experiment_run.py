@@ -19,7 +19,7 @@ from gateway.registers.words import CalibrationPhase
 
 
 class ExperimentRun:
-    """As LadderRun is asked. ValueError for a plan that the rig does not allow."""
+    """Run of an experiment plan, asked as a LadderRun is. ValueError for a plan that the rig does not allow."""
 
     end_phase: Final = CalibrationPhase.RECORDED
 
@@ -36,18 +36,22 @@ class ExperimentRun:
 
     @property
     def stop_cause(self) -> StopCause | None:
+        """Cause of which the run has to stop, None while it may go on."""
         return self._check.stop_cause
 
     @property
     def noise_n(self) -> float:
+        """Noise of the cell at rest, N."""
         return self._check.noise_n
 
     @property
     def is_done(self) -> bool:
+        """Decide whether the schedule is over."""
         return self._began_s is not None and self._elapsed_s >= self.schedule.duration_s
 
     @property
     def eta_s(self) -> float:
+        """Time until the end, s."""
         return self._check.eta_s + max(0.0, self.schedule.duration_s - self._elapsed_s)
 
     @property
@@ -62,11 +66,11 @@ class ExperimentRun:
 
     @property
     def end_sentence(self) -> str:
-        """What is said at its end."""
+        """Sentence of a message at its end."""
         return f"experiment {self.plan.name} done: {len(self.plan.parts)} parts, {self.schedule.duration_s:.0f} s"
 
     def step(self, now_s: float, reading: Reading) -> RunStep:
-        """reading: of this moment."""
+        """Advance to now_s and return the voltage and labels to apply. reading: of this moment."""
         if not self._check.is_done or self._check.is_waiting:
             checked = self._check.step(now_s, reading)
             if not self._check.is_done or self._check.is_waiting:

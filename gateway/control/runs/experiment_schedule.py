@@ -26,6 +26,7 @@ class Segment:
 
     @property
     def duration_s(self) -> float:
+        """Duration of the ramp and what is held after it, s."""
         return self.over_s + self.hold_s
 
 
@@ -126,10 +127,12 @@ class Schedule:
 
     @property
     def duration_s(self) -> float:
+        """Duration of all segments, s."""
         return self._starts_s[-1]
 
     @property
     def top_v(self) -> float:
+        """Highest voltage of the schedule, V."""
         return max(segment.to_v for segment in self.segments)
 
     def index(self, elapsed_s: float) -> int:

@@ -34,6 +34,7 @@ class LadderPace:
 
     @property
     def is_known(self) -> bool:
+        """Decide whether enough stairs have been seen to know the pace."""
         return len(self._rise_s) >= 3
 
     def observe(self, trace: Trace, from_n: float, to_n: float, noise_n: float) -> None:

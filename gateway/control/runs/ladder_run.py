@@ -86,16 +86,17 @@ class LadderRun:
 
     @property
     def is_done(self) -> bool:
+        """Decide whether every stair has been done."""
         return self.done >= len(self.stairs)
 
     @property
     def is_waiting(self) -> bool:
-        """Rest force and noise are not known yet."""
+        """Decide whether rest force and noise are not known yet."""
         return self._stair_s is None
 
     @property
     def end_sentence(self) -> str:
-        """What is said at its end."""
+        """Sentence of a message at its end."""
         return f"calibration ladder done: {self.done} stairs, {self.unsettled} of them never settled"
 
     @property
@@ -111,8 +112,11 @@ class LadderRun:
         return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
 
     def leave_out(self, now_s: float, voltage_v: float, *, was_there: bool) -> bool:
-        """No stair from now on is as high as this voltage; whether any is left. was_there: the output has been; if not, the
-        smaller stairs of the ladder may still try after a check, and the same stair is no other one on the way down."""
+        """Leave out every stair as high as this voltage; return whether any stair is left.
+
+        was_there: the output has been at this voltage. If not, the smaller stairs of the ladder may still try after a
+        check, and the same stair is no other one on the way down.
+        """
         phase = self._stair.phase
         tries_again = phase is CalibrationPhase.CHECK and not was_there
         left = [
@@ -134,7 +138,8 @@ class LadderRun:
         return self.stairs[min(self.done, len(self.stairs) - 1)]
 
     def step(self, now_s: float, reading: Reading) -> RunStep:
-        """reading: of this moment; only new usable ones count."""
+        """Advance to now_s and return the voltage and labels to apply.
+        reading: of this moment; only new usable ones count."""
         if self._began_s is None:
             self._began_s = now_s
         if not (reading.is_new and reading.is_usable):

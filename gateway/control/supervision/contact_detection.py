@@ -25,7 +25,7 @@ class ContactDetector:
         self._below_s = 0.0
 
     def update(self, reading: Reading) -> bool:
-        """Contact now. Only new, usable samples count; an overload leaves it as it is."""
+        """Decide whether the tool is in contact. Only new, usable samples count; an overload changes nothing."""
         if reading.is_new and reading.is_usable:
             self._count(reading.contact_n, reading.interval_s)
         return self.touching

@@ -85,7 +85,7 @@ class FaultDetector:
         self._response_fault = self._rise.judge(response, branch_share, touching, reading.interval_s)
 
     def observe_rest(self, reading: Reading) -> None:
-        """Time a force that stays at the safe voltage, while disabled."""
+        """Measure how long a force stays at the safe voltage, while disabled."""
         stuck = reading.is_usable and reading.contact_n > self._bounds.stuck_n
         self._stuck_s = self._stuck_s + reading.interval_s if stuck else 0.0
 
@@ -110,6 +110,7 @@ class FaultDetector:
 
     @property
     def is_stuck(self) -> bool:
+        """Decide whether the force has stayed at the safe voltage for too long."""
         return self._stuck_s >= _STUCK_S
 
     def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:

@@ -36,13 +36,13 @@ class ForceCeiling:
         return sum(self._recent_n) / len(self._recent_n) if self._recent_n else 0.0
 
     def observe(self, reading: Reading) -> None:
-        """Every reading."""
+        """Take in every reading."""
         if reading.is_new and reading.is_usable:
             self._recent_n.append(reading.contact_n)
             self._given_n = reading.contact_n - reading.cell_n
 
     def observe_row(self, row: LadderRow) -> None:
-        """A stair that has ended."""
+        """Take in a stair that has ended."""
         if row.stair.direction < 0:
             self._last = self._before = None
         else:

@@ -31,7 +31,7 @@ class Lease:
         self._started_s = now_s
 
     def age_s(self, now_s: float) -> float:
-        """Time since the lease was renewed."""
+        """Return the time since the lease was renewed, s."""
         return now_s - max(self._changed_s, self._started_s)
 
     def is_lost(self, now_s: float, owner_connected: bool) -> bool:

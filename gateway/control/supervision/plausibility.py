@@ -34,7 +34,7 @@ class ExpectedForce:
         self.use(model)
 
     def retime(self, lag_s: float) -> None:
-        """Another lag from now on."""
+        """Replace the lag, s."""
         self._lag_s = lag_s
 
     def use(self, model: Bsfm) -> None:
@@ -63,12 +63,12 @@ class ExpectedForce:
 
     @property
     def kept_n(self) -> float:
-        """What friction kept pressed at rest when the model was measured: a vented tool rises by so much more."""
+        """Force that friction kept pressed at rest when the model was measured, N: a vented tool rises by so much more."""
         return max(0.0, self._rest_n)
 
     @property
     def width_n(self) -> float:
-        """How much friction alone can explain."""
+        """Force that friction alone can explain, N."""
         return abs(self.falling_n - self.rising_n)
 
 
@@ -90,6 +90,7 @@ class RiseCheck:
 
     @property
     def measured_rise_n(self) -> float:
+        """Rise of the measured force since the check began, N."""
         return self.smooth_n - self._base_n
 
     def smooth(self, reading: Reading) -> None:

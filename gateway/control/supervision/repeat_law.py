@@ -66,7 +66,7 @@ def counts_found_within(bound_s: float, rate_hz: float) -> float:
 
 
 def spread_of(variance: float, centred: float) -> float:
-    """Standard deviation in counts of normal noise whose readings in whole counts have this variance, counts^2.
+    """Return the standard deviation in counts of normal noise whose readings in whole counts have this variance, counts^2.
 
     centred: cosine of the force's place in its count, 1 in the middle, -1 between two. Sheppard's correction with the
     first harmonic of the rounding (Widrow and Kollar, Quantization Noise, 2008), which counts below 0.5 counts of noise.
@@ -81,7 +81,7 @@ def spread_of(variance: float, centred: float) -> float:
 
 
 def spread_within_two(share: float) -> float:
-    """Standard deviation in counts of normal noise of which two neighbouring counts hold at most this share."""
+    """Return the standard deviation in counts of normal noise of which two neighbouring counts hold at most this share."""
     low, high = 0.0, MOST_COUNTS
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -107,6 +107,7 @@ class Runs:
 
     @property
     def longest(self) -> int:
+        """Length of the longest run."""
         return max((*self._now, *self._before), default=0)
 
     def is_explained(self, length: int, stay: float) -> bool:
@@ -116,9 +117,10 @@ class Runs:
         return expected > _SURPRISE
 
     def equal_samples(self, rate_hz: float) -> float:
-        """What their tail allows, whatever the noise is like: as `equal_samples`, 0 as long as too few runs are known.
+        """Return what the tail of the runs allows, whatever the noise is like: as `equal_samples`.
 
-        Extrapolated from the shortest length that only _TAIL_RUNS runs have reached, and how seldom those went on.
+        0 as long as too few runs are known. Extrapolated from the shortest length that only _TAIL_RUNS runs have reached, and
+        how seldom those went on.
         """
         reached = gone_on = length = 0
         lengths = sorted({*self._now, *self._before}, reverse=True)

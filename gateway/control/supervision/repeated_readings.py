@@ -83,6 +83,7 @@ class RepeatedReadings:
 
     @property
     def longest(self) -> int:
+        """Length of the longest run of equal readings."""
         return self.runs.longest
 
     def _learn(self, step_n: float, under_force: bool) -> None:

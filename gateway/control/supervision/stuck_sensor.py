@@ -62,7 +62,7 @@ class StuckSensorCheck:
 
     @property
     def words(self) -> str:
-        """What was seen and why it cannot be, empty for a cell that may be alive."""
+        """Observation and why it cannot be, empty for a cell that may be alive."""
         must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
         if self._same_s >= self._frozen_s and must_have_moved:
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
@@ -77,7 +77,7 @@ class StuckSensorCheck:
 
     @property
     def found_s(self) -> float:
-        """How long a cell that freezes now would repeat itself, the force at rest, until it is called frozen; inf: never."""
+        """Time, s, that a cell which freezes now repeats itself, the force at rest, until it is called frozen; inf: never."""
         limit = self._noise.limit if self._told_limit is None else self._told_limit
         return max(self._frozen_s, ceil(limit) * self._noise.interval_s) if limit < inf else inf
 

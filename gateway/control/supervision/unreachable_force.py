@@ -44,22 +44,27 @@ class Evidence:
 
     @property
     def no_air(self) -> bool:
+        """Decide whether the pressure is too low to move the tool."""
         return self._pressure_share < (_LITTLE if self.learned else _VERY_LITTLE)
 
     @property
     def has_air(self) -> bool:
+        """Decide whether the pressure is high enough to press."""
         return self._pressure_share >= (_ENOUGH if self.learned else _PLENTY)
 
     @property
     def is_silent(self) -> bool:
+        """Decide whether the cell shows next to nothing of the expected force."""
         return self.measured_n < _SILENT_SHARE * self.expected_n
 
     @property
     def factor(self) -> float:
+        """Measured over expected force, nan where none is expected."""
         return self.measured_n / self.expected_n if self.expected_n > 0.0 else nan
 
     @property
     def looks_like_another_unit(self) -> bool:
+        """Decide whether the factor is that between newtons and kilograms-force, either way."""
         if self.factor < 1.0:
             return (
                 self.measured_n > _LEAST_N and 1.0 / _UNIT_SLACK < self.factor * STANDARD_GRAVITY_M_PER_S2 < _UNIT_SLACK

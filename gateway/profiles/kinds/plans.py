@@ -66,7 +66,7 @@ def plan_of(fields_: Mapping[str, Any]) -> AnyPlan:
 
 
 def plan_document(plan: AnyPlan) -> dict[str, Any]:
-    """As JSON takes it and `plan_of` reads it back: without what is not given."""
+    """Return the plan as JSON takes it and `plan_of` reads it back: without what is not given."""
     document: dict[str, Any] = json.loads(json.dumps(asdict(plan)))
     for part in document.get("parts", ()):
         part["moves"] = [{key: value for key, value in move.items() if value is not None} for move in part["moves"]]

@@ -61,6 +61,7 @@ TREATMENTS: Final = treatments_of(EFFECTS)
 
 
 def number_at(plant: Plant, path: str) -> Any:
+    """Return the plant's number at a path such as `friction.coulomb_n`."""
     section, name = path.split(".")
     return getattr(getattr(plant, section), name)
 
@@ -114,7 +115,8 @@ def without_compensable(plant: Plant) -> Plant:
 
 
 def in_simulation(compensation: Compensation) -> Compensation:
-    """Without the forces from outside: a simulated rig is not told how the tool is held, so its plant does not feel them."""
+    """Return the compensation without the forces from outside.
+    A simulated rig is not told how the tool is held, so its plant does not feel them."""
     outside = {treatment.name for treatment in TREATMENTS if treatment.by is By.OUTSIDE}
     off = tuple((name, _NOT_SIMULATED) for name in compensation.acts if name in outside)
     if not off:
@@ -124,7 +126,7 @@ def in_simulation(compensation: Compensation) -> Compensation:
 
 
 def compensation_words(compensation: Compensation) -> tuple[str, ...]:
-    """For those who start the rig: what is taken back, and what is not."""
+    """Return what is compensated and what is not, for those who start the rig."""
     acts = f"compensated: {', '.join(compensation.acts) or 'nothing'}"
     return (acts, *(f"not compensated: {name}: {why}" for name, why in compensation.limited))
 

@@ -86,18 +86,18 @@ class Rig:
 
     @property
     def plant(self) -> Plant | None:
-        """What is simulated; None for a real rig that names no plant."""
+        """The simulated plant; None for a real rig that names no plant."""
         return self.plant_profile.plant if self.plant_profile else None
 
     @property
     def is_watched(self) -> bool:
-        """Whether a residual watch runs: the rig names a plant, and is simulated or enables the watch."""
+        """Decide whether a residual watch runs: the rig names a plant, and is simulated or enables the watch."""
         enabled = self.residual_watch.enabled
         return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
 
     @property
     def lacks_device_watchdog(self) -> bool:
-        """Whether a real output device would hold its last voltage when nobody talks to it any more."""
+        """Decide whether a real output device would hold its last voltage when nobody talks to it any more."""
         return not self.simulated and self.output.device.watchdog == "none"
 
     def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:

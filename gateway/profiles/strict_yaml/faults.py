@@ -27,7 +27,7 @@ def printable(text: str) -> str:
 
 
 class FaultKind(Enum):
-    """What other checks decide by; the sentence is for people."""
+    """Kind of a fault, which other checks decide by; the sentence is for people."""
 
     OTHER = "other"
     MISSING = "missing"  # a key that must be there
@@ -78,4 +78,5 @@ def closest(word: str, known: Iterable[str]) -> str | None:
 
 
 def one_of(words: Iterable[object]) -> str:
+    """Return the words as a list for a sentence: `a, b, c`."""
     return ", ".join(str(word) for word in words)

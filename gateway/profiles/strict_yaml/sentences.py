@@ -48,14 +48,17 @@ def number(value: float) -> str:
 
 
 def newton(value: float) -> str:
+    """Return a force with its unit."""
     return f"{number(value)} N"
 
 
 def volt(value: float) -> str:
+    """Return a voltage with its unit."""
     return f"{number(value)} V"
 
 
 def second(value: float) -> str:
+    """Return a time with its unit."""
     return f"{number(value)} s"
 
 

@@ -24,7 +24,7 @@ _MOST_FINDINGS: Final = 50
 
 @cache
 def adapter(kind: type) -> TypeAdapter[Any]:
-    """pydantic's view of one dataclass; built once, it costs milliseconds."""
+    """Return pydantic's view of one dataclass; built once, because it costs milliseconds."""
     return TypeAdapter(kind)
 
 

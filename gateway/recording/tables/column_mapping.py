@@ -28,6 +28,8 @@ class ColumnSource:
 
 @dataclass(frozen=True, slots=True)
 class ColumnMapping:
+    """Which column of a foreign table is which of ours, and in which unit."""
+
     sources: tuple[ColumnSource, ...]
 
     @classmethod
@@ -45,7 +47,8 @@ class ColumnMapping:
 
     @classmethod
     def of(cls, entries: Mapping[str, int | str]) -> "ColumnMapping":
-        """From name -> number, header, `number:unit` or `header:unit`. RecordingError for a unit that is none."""
+        """Return the mapping from name -> number, header, `number:unit` or `header:unit`.
+        RecordingError for a unit that is none."""
         if not entries:
             raise RecordingError(f"--columns: no column is named; {EXAMPLE}")
         return cls(tuple(_source(name, str(entry).strip()) for name, entry in entries.items()))
@@ -62,11 +65,13 @@ class SelectedColumn:
 
     @property
     def is_contract(self) -> bool:
+        """Decide whether the column is one that every recording has."""
         return self.name in CONTRACT
 
 
 def quantity_of(name: str) -> tuple[str, str] | None:
-    """(quantity, unit) that a column's name ends with, None when it ends with none: `oil_temperature_c`, `feed_mm_s`."""
+    """Return the (quantity, unit) that a column's name ends with, None when it ends with none.
+    `oil_temperature_c`, `feed_mm_s`."""
     found = [
         (len(unit), quantity, unit)
         for quantity, units in LINEAR.items()
@@ -99,7 +104,8 @@ def _check_unit(name: str, unit: str) -> None:
 
 
 def select_columns(names: Sequence[str], mapping: ColumnMapping | None, file: str) -> tuple[SelectedColumn, ...]:
-    """What is read from a table with these headers ("" where there is none). RecordingError when a column is not there."""
+    """Return what is read from a table with these headers ("" where there is none).
+    RecordingError when a column is not there."""
     mapped = [_select_column(source, names, file) for source in mapping.sources] if mapping else []
     taken = {pick.index for pick in mapped}
     claimed = {pick.name for pick in mapped}
@@ -135,6 +141,6 @@ def _index(source: ColumnSource, names: Sequence[str], file: str) -> int:
 
 
 def join_names(words: Sequence[str], most: int = 12) -> str:
-    """`a, b, c and 9 more`; `none` for nothing."""
+    """Return `a, b, c and 9 more`; `none` for nothing."""
     more = len(words) - most
     return ", ".join(words[:most]) + (f" and {more} more" if more > 0 else "") or "none"

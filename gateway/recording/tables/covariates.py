@@ -62,7 +62,7 @@ def extract_covariates(
 
 
 def interpolate_missing(values: Floats, time_s: Floats) -> Floats:
-    """NaN and infinite values drawn straight between the known ones, held beyond the first and the last."""
+    """Draw NaN and infinite values straight between the known ones; hold beyond the first and the last."""
     known = np.isfinite(values)
     return np.asarray(np.interp(time_s, time_s[known], values[known]), dtype=np.float64)
 

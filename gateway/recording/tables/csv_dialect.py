@@ -90,7 +90,7 @@ def detect_dialect(path: Path) -> CsvDialect:
 
 
 def rows_of(stream: TextIO, facts: dict[str, str]) -> Iterator[tuple[int, str]]:
-    """(line number, line) of every line that is neither blank nor a comment; `# key: value` goes into facts."""
+    """Yield (line number, line) of every line that is neither blank nor a comment; `# key: value` goes into facts."""
     for at, line in enumerate(stream, start=1):
         stripped = line.strip()
         if stripped.startswith("#"):

@@ -39,7 +39,8 @@ _QUALITY_WORDS: Final = {
 
 
 def read_csv(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool = False) -> Recording:
-    """Header facts and columns of a CSV; RecordingError with what was seen when it is none, OSError as usual."""
+    """Read header facts and columns of a CSV.
+    RecordingError with what was seen when it is none, OSError as usual."""
     form = detect_dialect(path)
     if mapping is None and not form.has_header:
         raise RecordingError(
@@ -140,6 +141,7 @@ def _check_size(form: CsvDialect, data: mmap.mmap, columns: int) -> None:
 
 
 def refuse_too_large(path: Path, rows: int, columns: int) -> None:
+    """Refuse a table of more numbers than the program takes, with RecordingError."""
     if rows * columns > LARGEST_CELLS:
         raise RecordingError(
             f"{path}: {rows} rows of {columns} columns are more than {LARGEST_CELLS} numbers: "

@@ -24,8 +24,11 @@ _KERNEL: Final = np.full(_SMOOTH, 1.0 / _SMOOTH)
 
 
 def resample_evenly(measurement: Measurement, sent_v: Floats, sent_age_s: Floats) -> Measurement:
-    """The same on even rows. sent_v, sent_age_s: of each row, NaN where nothing had been sent; the measurement itself where
-    its command is not known so."""
+    """Resample the measurement to even rows.
+
+    sent_v, sent_age_s: of each row, NaN where nothing had been sent. Returns the measurement itself where these do not
+    tell its command.
+    """
     times_s, volts = _distinct_settings(measurement.time_s - sent_age_s, sent_v)
     if measurement.command_v is None or not volts.size or measurement.rows < _FEWEST:
         return measurement

@@ -40,7 +40,7 @@ class TimeAxis:
 
 
 def check_time_axis(recording: Recording) -> TimeAxis:
-    """RecordingError that names the row, for times that run backwards or are mostly missing."""
+    """Check the times; RecordingError that names the row, for times that run backwards or are mostly missing."""
     stamps = recording.columns["time_s"]
     known = np.isfinite(stamps)
     notes = _check_unknown(recording, known)

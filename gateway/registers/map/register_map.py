@@ -50,6 +50,7 @@ class Register:
 
     @property
     def is_writable(self) -> bool:
+        """Decide whether a master may write this register."""
         return self.access == "RW"
 
     @property

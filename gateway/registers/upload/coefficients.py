@@ -59,11 +59,12 @@ class CoefficientSet:
 
     @property
     def arrays(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """The four arrays: rising handles in N, rising weights, falling handles in N, falling weights."""
         return self.rising_handles_n, self.rising_weights, self.falling_handles_n, self.falling_weights
 
     @property
     def response(self) -> Response | None:
-        """As the decimals that were meant; None where it was not measured."""
+        """The response, as the decimals that were meant; None where it was not measured."""
         if self.response_s == NOT_MEASURED:
             return None
         dead_time_s, lag_s, second_lag_s = map(decimal, self.response_s)

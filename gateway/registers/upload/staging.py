@@ -41,7 +41,7 @@ class StagedFault:
     text: str
 
     def sentence(self, active: int) -> str:
-        """E401 for log and page. active: number of the calibration that stays in use."""
+        """Return E401 for log and page. active: number of the calibration that stays in use."""
         where = "" if self.index == WHOLE else f"index {self.index}, "
         return f"E401 {where}{self.reason.name.lower()}: {self.text}; active set {active} unchanged"
 

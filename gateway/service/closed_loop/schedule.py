@@ -50,6 +50,7 @@ class SetpointSegment:
 
     @property
     def is_step(self) -> bool:
+        """Decide whether the setpoint jumps and is held."""
         return self.from_n == self.to_n
 
     def force_n(self, time_s: float) -> float:
@@ -78,10 +79,12 @@ class SetpointSchedule:
 
     @property
     def duration_s(self) -> float:
+        """Duration of the whole schedule, s."""
         return self.wishes[-1].start_s + self.wishes[-1].hold_s
 
     def around(self, time_s: float) -> Surroundings:
-        """The rig was tared at the reference temperature, where the tool's weight does not press; both move from there."""
+        """Return the surroundings at this time.
+        The rig was tared at the reference temperature, where the tool's weight does not press; both move from there."""
         moving_s, columns, reference = max(0.0, time_s - QUIET_S), self.columns, self.reference
         turn, eased = 2.0 * pi * moving_s, min(1.0, moving_s / EASING_S)
         forth = 0.0 if moving_s == 0.0 else 1.0 if floor(moving_s / 2.5 + self.phase) % 2 else -1.0

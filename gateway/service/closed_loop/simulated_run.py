@@ -24,7 +24,7 @@ BAND_N: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ControlSetup:
-    """What drives the plant: settings, a model that speaks straight volts, and what is compensated on top of it."""
+    """Setup that drives the plant: settings, a model that speaks straight volts, and what is compensated on top of it."""
 
     settings: ControlSettings
     model: Bsfm
@@ -42,6 +42,7 @@ class SimulatedRun:
 
     @property
     def rms_n(self) -> float:
+        """Root mean square of the force error, N."""
         return float(np.sqrt(np.mean(self.error_n**2)))
 
 

@@ -63,8 +63,11 @@ def closed_loop_gain(
     seeds: int = SEEDS,
     inputs: Iterable[str] = ALL_INPUTS,
 ) -> ClosedLoopGain:
-    """rig: whose limits, trim and lead are used, None for the demo rig's; inputs: what the controller is told besides the load
-    cell. ValueError where the base plant gives no model at all."""
+    """Return what knowing the extended plant gains in closed loop.
+
+    rig: whose limits, trim and lead are used, None for the demo rig's; inputs: what the controller is told besides the load
+    cell. ValueError where the base plant gives no model at all.
+    """
     settings, told = (rig or load_rig(DEFAULT_RIG)).control, frozenset(inputs)
     top_v = HEADROOM * settings.limits.voltage_max_v
     before = ControlSetup(settings, identify_model(base, top_v), NO_COMPENSATION)
@@ -155,7 +158,7 @@ def _mean_settled_s(runs: list[SimulatedRun]) -> float:
 
 
 def format_gain(found: ClosedLoopGain) -> list[str]:
-    """For the terminal."""
+    """Return the lines that tell the gain in a terminal."""
     low, high = found.rms_ratio_ci95
     told = [
         f"error in commanded force on the twin, {len(found.seeds)} seeds",

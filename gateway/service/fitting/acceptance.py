@@ -31,7 +31,7 @@ class Acceptance:
     has_walk: bool
 
     def facts(self) -> dict[str, Any]:
-        """For the document."""
+        """Return the decision as entries of the JSON document."""
         return {
             "rms_n": self.error.rms_n,
             "max_n": self.error.max_n,
@@ -45,7 +45,8 @@ class Acceptance:
 
 
 def judge_fit(evaluation: Evaluation, tolerance_n: float | None, in_use: Calibration | None) -> Acceptance:
-    """tolerance_n: the rig's in_band_tolerance_n, None where nobody knows the rig; in_use: what is active on it."""
+    """Decide whether a fit is offered, offered with notes, or kept but not offered.
+    tolerance_n: the rig's in_band_tolerance_n, None where nobody knows the rig; in_use: what is active on it."""
     error = Error.of(measured_error_n(evaluation.model, evaluation.checked))
     other = Error.of(measured_error_n(in_use.model(), evaluation.checked)) if in_use else None
     number, has_walk = in_use.number if in_use else 0, len(evaluation.checked.minor_v) > 1

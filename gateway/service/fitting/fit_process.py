@@ -19,8 +19,11 @@ from gateway.processes import priority
 
 
 def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]:
-    """{"stored": number, "report": path, "document": path}, the same with "rejected" and a sentence in "refused" for a fit that
-    is kept but not offered, or {"refused": sentence}."""
+    """Fit a recorded run, store the calibration and return the answer of the process.
+
+    {"stored": number, "report": path, "document": path}, the same with "rejected" and a sentence in "refused" for a fit that
+    is kept but not offered, or {"refused": sentence}.
+    """
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.ladder.fault import LadderError
     from gateway.calibrations.store import CalibrationStore, StoreError

@@ -105,7 +105,7 @@ def write_report(fit: LadderFit, target: Path) -> None:
 
 
 def write_whole(target: Path, text: str) -> None:
-    """Beside its name, then renamed. OSError, and what was there before stays."""
+    """Write the text beside its name, then rename it. OSError, and what was there before stays."""
     beside = target.with_name(f".{target.name}.{os.getpid()}")
     try:
         beside.write_text(text, encoding="utf-8")

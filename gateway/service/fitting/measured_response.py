@@ -15,8 +15,8 @@ NOT_OURS = (
 
 
 def measure_recorded_response(recording: Recording, evaluation: Evaluation) -> MeasuredResponse:
-    """Dead time and lags by the steps of a run; without a response, and with the reason, where they do not show. A calibration
-    is as good without."""
+    """Return dead time and lags by the steps of a run.
+    Without a response, and with the reason, where they do not show: a calibration is as good without."""
     header = recording.header
     if "ladder" not in header:
         return MeasuredResponse(None, NOT_OURS)

@@ -24,7 +24,7 @@ _VALID: Final = (Accepted, Pressure, Refused, ForceSample)  # a device that refu
 
 @dataclass(frozen=True, slots=True)
 class ProbeResult:
-    """What came at one speed: bytes in all, and lines that the device's grammar knows."""
+    """Answer at one speed: bytes in all, and lines that the device's grammar knows."""
 
     baud: int
     bytes: int

@@ -61,8 +61,11 @@ class CalibrationRuns:
     # -- asked by this machine
 
     def answer(self, request: Answer) -> Answer:
-        """{"plan": {...}, "continues": [numbers], "name": text} starts, with "dry_run": true it is only tried; {"stop": true}
-        stops; neither tells how it is. ValueError refuses."""
+        """Start a run, stop it or tell how it is. ValueError refuses.
+
+        {"plan": {...}, "continues": [numbers], "name": text} starts, with "dry_run": true it is only tried; {"stop": true}
+        stops; neither tells how it is.
+        """
         asked = parse_request(CalibrateRequest, request)
         self._followed_s = self._clock()
         if asked.dry_run:
@@ -136,7 +139,7 @@ class CalibrationRuns:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
-        """The cell's own force, without the payload's weight: that is what the model speaks."""
+        """Record a sample with the cell's own force, without the payload's weight: the model means that force."""
         if self._recording and self._calibrating.running:
             self._payload_n = decision.force_measured_n - self._calibrating.cell_n
             row = replace(decision, force_measured_n=self._calibrating.cell_n)
@@ -156,10 +159,12 @@ class CalibrationRuns:
         return float(self._calibrating.phase), float(group), float(run.done)
 
     def flush(self, now_s: float) -> None:
+        """Write what has been recorded to the file."""
         if self._recording:
             self._recording.recorder.flush(now_s)
 
     def close(self) -> None:
+        """Close the recording and the line to a fit under way."""
         if self._recording:
             self._recording.recorder.close()
         if self._child:

@@ -101,6 +101,7 @@ class ControlLoop:
         self._step(self._clock())
 
     def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
+        """Take bytes of the load cell; a complete sample makes control decide at once."""
         fresh = False
         messages = self._cell.receive(chunk, now_s)
         self._begin(WarningBit.SERIAL_NOISE, self._cell_noise.hear(messages, now_s))
@@ -115,11 +116,13 @@ class ControlLoop:
             self._record()
 
     def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        """Take bytes of the output device."""
         replies = self.output.on_bytes(chunk, now_s)
         self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s))
 
     def on_tick(self, expirations: int, late_s: float) -> None:
-        """expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
+        """Run one period of the loop.
+        expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
         self.health.count(expirations, late_s)
         now_s = self._clock()
         self._begin(WarningBit.SLOW_LOOP, self._slow_loop.tick(now_s, expirations, late_s, self._used_since_tick))
@@ -145,11 +148,12 @@ class ControlLoop:
             self.warnings &= ~WarningBit.SLOW_LOOP
 
     def on_output_opened(self) -> None:
+        """Forget what the output said before: the port has been opened again."""
         self.output.reset()
         self.output_lost = FaultCode.NONE
 
     def on_output_closed(self) -> None:
-        """Decided at once: it may be open again before the next tick, and another device may be behind it then."""
+        """Decide at once that the output is lost: at the next tick another device may be behind the port."""
         self.output.reset()
         self.output_lost = FaultCode.OUTPUT_LOST
         self._step(self._clock())
@@ -159,6 +163,7 @@ class ControlLoop:
         self._step(self._clock())
 
     def on_cell_opened(self) -> None:
+        """Forget what the cell said before: the port has been opened again."""
         self._cell.reset()
         self.cell_lost = False
 

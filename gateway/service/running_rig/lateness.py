@@ -54,7 +54,8 @@ class Lateness:
         self._rig, self._rig_turns = rig, None
 
     def tick(self, now_s: float, waited_s: float | None) -> None:
-        """waited_s: of this process until now, as the kernel counts; None where it does not."""
+        """Count the lateness of one tick.
+        waited_s: of this process until now, as the kernel counts; None where it does not."""
         if self._tick_s is not None:
             waited = waited_s - self._waited_s if waited_s is not None and self._waited_s is not None else 0.0
             self._ours.add(now_s, now_s - self._tick_s - self._period_s, waited)
@@ -90,4 +91,5 @@ class Lateness:
         )
 
     def close(self) -> None:
+        """Close the counters of the simulated rig."""
         self.follow_rig(None)

@@ -81,10 +81,11 @@ class OutputExchange:
 
     @property
     def line(self) -> LineState:
+        """State of the line, for a recorded row."""
         return LineState(self.pressure_pa, self._sent_v, self._setting_s)
 
     def set_voltage(self, voltage_v: float, now_s: float) -> None:
-        """This voltage shall stand on the device, V; sent at once if the wire is free, else as soon as it is."""
+        """Have this voltage stand on the device, V; sent at once if the wire is free, else as soon as it is."""
         self._wanted_v = voltage_v
         self._send_next(now_s)
 

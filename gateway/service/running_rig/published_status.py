@@ -9,7 +9,7 @@ from gateway.registers.command import Status
 
 @dataclass(slots=True)
 class LoopHealth:
-    """How the loop itself is doing: work time of the last step, ticks missed, and a histogram of lateness in powers of 2 us."""
+    """Health of the loop: work time of the last step, ticks missed, and a histogram of lateness in powers of 2 us."""
 
     loop_time_s: float = nan
     ticks: int = 0
@@ -17,12 +17,13 @@ class LoopHealth:
     lateness: list[int] = field(default_factory=lambda: [0] * 32)
 
     def count(self, expirations: int, late_s: float) -> None:
+        """Count one tick. expirations: periods since the last one; late_s: lateness."""
         self.ticks += expirations
         self.missed_ticks += expirations - 1
         self.lateness[min(31, int(max(0.0, late_s) * 1e6).bit_length())] += 1
 
     def lateness_us(self, share: float) -> int:
-        """Upper bound in us of the lateness that this share of the ticks stayed under."""
+        """Return the upper bound in us of the lateness that this share of the ticks stayed under."""
         wanted, seen = share * sum(self.lateness), 0
         for bits, count in enumerate(self.lateness):
             seen += count
@@ -33,7 +34,7 @@ class LoopHealth:
 
 @dataclass(frozen=True, slots=True)
 class BackgroundStatus:
-    """What the service knows beside the loop: calibrations by number, and the residual watch's cause."""
+    """Status that the service knows beside the loop: calibrations by number, and the residual watch's cause."""
 
     calibration_id: int
     calibration_stored: int = 0

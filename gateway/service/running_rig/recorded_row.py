@@ -48,10 +48,11 @@ class RunRecording:
 
     @property
     def recorder(self) -> Recorder:
+        """The recorder of the run's file."""
         return self._recorder
 
     def append(self, sample: ForceSample, decision: Output, line: LineState, *labels: float) -> None:
-        """labels: of the columns that a run adds."""
+        """Append a row. labels: of the columns that a run adds."""
         if self._start_s is None:
             self._start_s = sample.time_s
         self.rows += 1

@@ -13,6 +13,8 @@ from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
 
 
 class Recordings:
+    """Recordings of a rig: at most one open file, each under its time."""
+
     def __init__(self, directory: Path, rig: Rig, log: EventLog) -> None:
         self._directory = directory
         self._rig = rig
@@ -51,11 +53,12 @@ class Recordings:
         return {"recording": str(self._current.recorder.path), "rows": self._current.rows}
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
+        """Append a row to the open recording, if there is one."""
         if self._current:
             self._current.append(sample, decision, line)
 
     def flush(self, now_s: float) -> None:
-        """Once a tick; a recorder that has stopped by itself (disk full) is said once and let go."""
+        """Write what waits, once a tick. A recorder that has stopped (disk full) is logged once and dropped."""
         if self._current:
             recorder = self._current.recorder
             recorder.flush(now_s)

@@ -155,7 +155,7 @@ class RunningRig:
         self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
-        """Ports, first words of both devices, then Modbus: nobody is answered before there is an answer."""
+        """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
         for port in (self._output_port, self._cell_port):
             if not restarted:
@@ -189,7 +189,7 @@ class RunningRig:
         self._lateness.follow_rig(SchedulerCounters(pid) if pid else None)
 
     def move_ports(self, ports: dict[str, str]) -> None:
-        """The simulated rig has been started again, elsewhere: what was lost is opened there."""
+        """Follow the simulated rig to other ports after a restart: what was lost is opened there."""
         self._follow_rig()
         self._output_port.move(ports["output"])
         self._cell_port.move(ports["load_cell"])
@@ -234,14 +234,14 @@ class RunningRig:
         return sentence
 
     async def ramp_down(self) -> None:
-        """Force to 0 along the ramp, then the safe voltage (at most 4.5 s)."""
+        """Ramp the force to 0, then send the safe voltage (at most 4.5 s)."""
         self.controller.stop()
         deadline_s = time.monotonic() + _STOP_BOUND_S
         while not self.controller.has_stopped and time.monotonic() < deadline_s:
             await asyncio.sleep(self._tick.period_s)
 
     async def close(self) -> None:
-        """Safe voltage on the wire, then everything closed; the clean-run flag goes last."""
+        """Send the safe voltage, then close everything; the clean-shutdown marker goes last."""
         self._closing = True
         self._tick.close()
         with contextlib.suppress(PortError):

@@ -45,6 +45,7 @@ class Child:
         guardian_link.send(self.link, guardian_link.ADOPTED)
 
     def kill(self) -> None:
+        """Kill the process, if it still runs."""
         if self.pid and self._code is None:
             with contextlib.suppress(OSError):
                 os.kill(self.pid, signal.SIGKILL)
@@ -68,6 +69,7 @@ class Child:
         self.close()
 
     def close(self) -> None:
+        """Close everything held of the process."""
         self.link.close()
         if self.counters:
             self.counters.close()
@@ -89,7 +91,7 @@ def describe_exit(code: int) -> str:
 
 
 def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int = 0) -> Child:
-    """`python -m MODULE LINK ARGUMENTS` in a session of its own: the terminal's Ctrl-C reaches the guardian alone.
+    """Start `python -m MODULE LINK ARGUMENTS` in a session of its own: Ctrl-C reaches the guardian alone.
 
     shared: descriptors that it inherits under their numbers; room: bytes that the arguments take at least, for a
     process that will show other ones. OSError when there is no process for it.
@@ -130,7 +132,7 @@ def reap_orphans(known: set[int]) -> None:
 
 
 def create_shared_memory() -> int | None:
-    """Memory without a name and without a disk, for the sample ring; None where the kernel has none to give."""
+    """Return memory without a name and without a disk, for the sample ring; None where the kernel has none."""
     try:
         return os.memfd_create("force-gateway-samples")
     except (OSError, AttributeError):

@@ -34,19 +34,22 @@ class ChildStarter:
 
     @property
     def sources(self) -> list[int]:
+        """Return the descriptors to wait for."""
         return [self._server.died] if self._server else []
 
     @property
     def due_s(self) -> float:
+        """Time at which the fork server is started again, s."""
         return self._due_s
 
     @property
     def server_pid(self) -> int | None:
+        """Process number of the fork server, None without one."""
         return self._server.pid if self._server else None
 
     @property
     def start_timeout_s(self) -> float:
-        """How long a requested child may take until it reports its birth: longer from a server that never gave one."""
+        """Time that a requested child may take until it reports its birth: longer from a server that never gave one."""
         return _START_TIMEOUT_S if self._is_proven else _FIRST_START_TIMEOUT_S
 
     def open(self) -> None:
@@ -105,6 +108,7 @@ class ChildStarter:
             self.open()
 
     def end(self) -> None:
+        """End the fork server."""
         if self._server:
             self._server.end()
             self._server = None

@@ -14,7 +14,8 @@ _MOST_SIGNALS: Final = 64
 
 
 def wait_readable(descriptors: list[int], timeout_s: float) -> set[int]:
-    """Those that are readable, or at their end; none when the time is over. Any number of a descriptor (select: 1024)."""
+    """Return the descriptors that are readable or at their end; none when the time is over.
+    A descriptor may have any number (select: 1024)."""
     poll = select.poll()
     for descriptor in descriptors:
         poll.register(descriptor, select.POLLIN)
@@ -32,6 +33,7 @@ class SignalPipe:
 
     @property
     def descriptor(self) -> int:
+        """Descriptor that becomes readable when a signal arrives."""
         return self._reader.fileno()
 
     def take(self) -> int:
@@ -55,5 +57,6 @@ class SignalPipe:
         self.close()
 
     def close(self) -> None:
+        """Close both ends."""
         self._reader.close()
         self._writer.close()

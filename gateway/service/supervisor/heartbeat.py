@@ -27,23 +27,27 @@ class Heartbeat:
 
     @property
     def is_up(self) -> bool:
-        """Whether there is a loop that beats: from READY on."""
+        """Decide whether there is a loop that beats: from READY on."""
         return self._beat_s is not None
 
     @property
     def due_s(self) -> float:
+        """Time at which the silence has lasted too long, s."""
         return (self._beat_s or 0.0) + self.stall_s
 
     def reset(self) -> None:
+        """Forget the last beat: another control process begins."""
         self._beat_s, self._used, self._was_late = None, None, False
 
     def record_beat(self, control: Child, now_s: float) -> None:
+        """Record a beat of control at now_s."""
         self._beat_s = self._heard_s = now_s
         self._was_late = False
         self._used = control.counters.read() if control.counters else None
 
     def is_overdue(self, now_s: float) -> bool:
-        """True after stall_s of silence. Where we woke late ourselves the machine stood still: one more chance."""
+        """Decide whether stall_s of silence are over.
+        Where we woke late ourselves the machine stood still: one more chance."""
         late_s = now_s - self.due_s
         if late_s > _LATE_S and not self._was_late:
             self._was_late, self._beat_s = True, now_s - self.stall_s + _LATE_S

@@ -24,17 +24,17 @@ class OtherChildren:
 
     @property
     def sources(self) -> list[int]:
-        """What becomes readable when one of them says something or has died."""
+        """Descriptors that become readable when a child says something or has died."""
         return [source for one in self._all for source in one.sources]
 
     @property
     def due_s(self) -> float:
-        """When `poll_children` has something to do without an event."""
+        """Time at which `poll_children` has something to do without an event, s."""
         return min(one.due_s for one in self._all)
 
     @property
     def pids(self) -> dict[str, int | None]:
-        """None: it is not there."""
+        """Process numbers by name; None for a child that is not there."""
         return {
             "rig": self._rig.pid if self._rig else None,
             "watch": self._watch.pid if self._watch else None,
@@ -47,14 +47,14 @@ class OtherChildren:
             one.poll_child(readable, now_s)
 
     def provide_rig(self, now_s: float) -> None:
-        """Control asks for the simulated rig's ports."""
+        """Provide the simulated rig's ports, which control asks for."""
         if self._rig is None:
             starter = self._starter
             self._rig = RigSupervisor(lambda first: starter.rig(prepared=first), self._tell, partial(self._log, "rig"))
         self._rig.ask(now_s)
 
     def provide_watch(self, arguments: dict[str, Any], now_s: float) -> None:
-        """Control is ready, and its rig is one that is watched. The first arguments count."""
+        """Start the watch, when control is ready and its rig is a watched one. The first arguments count."""
         if self._watch is None:
             starter = self._starter
             self._watch = WatchSupervisor(lambda: starter.watch(arguments), partial(self._log, "watch"))

@@ -24,6 +24,7 @@ class RestartPolicy:
     _without_ready: int = 0
 
     def came_up(self) -> None:
+        """Forget the failed starts: control has become ready."""
         self._without_ready = 0
 
     def count(self, now_s: float, cause: EndCause) -> float | None:
@@ -38,5 +39,5 @@ class RestartPolicy:
 
     @property
     def causes(self) -> Counter[EndCause]:
-        """Of the ends in the window."""
+        """Causes of the ends in the window."""
         return Counter(cause for _, cause in self._ends)

@@ -21,6 +21,7 @@ class RunOptions:
 
     @property
     def state_directory(self) -> Path:
+        """Directory that holds what the rig keeps between runs."""
         if self.state is not None:
             return self.state
         return default_state_root() / Path(self.rig).stem

@@ -25,6 +25,7 @@ class SafeLine:
     reply: bytes
 
     def close(self) -> None:
+        """Close the descriptor."""
         with contextlib.suppress(OSError):
             os.close(self.descriptor)
 

@@ -37,21 +37,24 @@ class RigSupervisor:
 
     @property
     def pid(self) -> int | None:
+        """Process number of the simulated rig, None without one."""
         return self._child.pid or None if self._child else None
 
     @property
     def due_s(self) -> float:
+        """Time at which the simulated rig is started again, s."""
         return self._due_s
 
     @property
     def sources(self) -> list[int]:
+        """Return the descriptors to wait for."""
         if self._child is None:
             return []
         link_end = [] if self._link_ended else [self._child.link.fileno()]
         return link_end + ([self._child.died] if self._child.died >= 0 else [])
 
     def ask(self, now_s: float) -> None:
-        """Control needs the ports: told at once where they are known, else as soon as they are."""
+        """Tell control the ports: at once where they are known, else as soon as they are."""
         if self._answer is not None:
             self._tell(self._answer)
         elif self._child is None and self._due_s == inf:
@@ -68,6 +71,7 @@ class RigSupervisor:
             self._overdue(now_s)
 
     def end(self) -> None:
+        """End the simulated rig."""
         if self._child is not None:
             self._child.end()
             self._child = None

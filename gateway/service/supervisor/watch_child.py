@@ -28,16 +28,17 @@ class WatchSupervisor:
 
     @property
     def pid(self) -> int | None:
+        """Process number of the watch, None without one."""
         return self._child.pid if self._child else None
 
     @property
     def due_s(self) -> float:
-        """When `poll_child` has something to do without an event; infinite where nothing is planned."""
+        """Time at which `poll_child` has something to do without an event; infinite where nothing is planned."""
         return self._due_s
 
     @property
     def sources(self) -> list[int]:
-        """What becomes readable when the watch has died."""
+        """Descriptors that become readable when the watch has died."""
         return [self._child.died] if self._child else []
 
     def start(self, now_s: float) -> None:
@@ -56,6 +57,7 @@ class WatchSupervisor:
             self._begin(now_s)
 
     def end(self) -> None:
+        """End the watch."""
         if self._child is not None:
             self._child.end()
             self._child = None
