@@ -6,7 +6,7 @@ constraints are sampled for the search (SLSQP, Kraft 1988) with a margin that gr
 is returned is proven, not sampled.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,16 @@ MARGINS = (0.01, 0.1, 0.5)  # of the slope floor; of 0.1 N for the gap
 GAP_N = 0.1
 HANDLES_SHARE = 1.5  # of the largest force: no rig takes coefficients far beyond its cell
 PLACES = np.concatenate([[0.0, 1.0e-4], np.arange(1, 64) / 64, [1.0 - 1.0e-4, 1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """The least squares to solve under constraints, and the free fit that may not be used. ladder: without outliers."""
+
+    problem: ProjectedProblem
+    ladder: Ladder
+    free: FitResult
+    settings: FitSettings
 
 
 class _Search:
@@ -90,8 +100,9 @@ def fit_usable(
     if chosen.outliers == "huber":
         weight = weight * huber_weight(residual_n(used, free.branches))
     problem = ProjectedProblem(split_samples(used, weight, free.form, chosen), order, free.form.tied)
+    task = _Task(problem, used, free, chosen)
     for margin in MARGINS:
-        results = [_fit_constrained(problem, start, margin, used, free, chosen) for start in _starts(problem, free)]
+        results = [_fit_constrained(task, start, margin) for start in _starts(problem, free)]
         usable = [result for result in results if result.verdicts.usable and is_moderate(result.branches)]
         if usable:
             return min(usable, key=lambda result: result.rms_n)
@@ -123,18 +134,17 @@ def _starts(problem: ProjectedProblem, free: FitResult) -> list[Floats]:
     return [np.concatenate([free.log_weights.ravel(), own]), np.concatenate([np.zeros(problem.unknowns), line])]
 
 
-def _fit_constrained(
-    problem: ProjectedProblem, start: Floats, margin: float, ladder: Ladder, free: FitResult, settings: FitSettings
-) -> FitResult:
+def _fit_constrained(task: _Task, start: Floats, margin: float) -> FitResult:
     from scipy.optimize import minimize  # here: whoever only fits freely does not pay for it
 
+    problem, ladder, free, settings = task.problem, task.ladder, task.free, task.settings
     x0_v, x1_v = voltage_range(ladder, settings)
     floor_n = settings.slope_floor_n_per_v * (1.0 + margin) * (x1_v - x0_v)
     search = _Search(problem, floor_n, GAP_N * margin)
     reach = settings.effort.log_weight_max if free.model.rational else 0.0
     most_n = 0.98 * HANDLES_SHARE * float(np.abs(ladder.force_n).max())
     start = np.concatenate([start[: problem.unknowns], np.clip(start[problem.unknowns :], -most_n, most_n)])
-    found = minimize(
+    optimum = minimize(
         search.cost,
         start,
         jac=True,
@@ -143,9 +153,9 @@ def _fit_constrained(
         constraints={"type": "ineq", "fun": search.margins, "jac": search.margin_slopes},
         options={"maxiter": 100, "ftol": 1e-9},
     )
-    weights, handles = problem.weights(found.x[None, : problem.unknowns])[0], found.x[problem.unknowns :]
+    weights, handles = problem.weights(optimum.x[None, : problem.unknowns])[0], optimum.x[problem.unknowns :]
     numbers = zip(weights, problem.columns, strict=True)
     curves = [RationalBezier(x0_v, x1_v, handles[columns].tolist(), w.tolist()) for w, columns in numbers]
-    log_weights = found.x[: problem.unknowns].reshape(-1, problem.order)
+    log_weights = optimum.x[: problem.unknowns].reshape(-1, problem.order)
     result = result_of(ladder, free.form, Branches(curves[0], curves[-1]), log_weights, settings)
     return replace(result, rejected=free.rejected)

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, validate_coefficients
 from gateway.bsfm.fit.evaluation import Evaluation, FitRequest, evaluate
-from gateway.bsfm.fit.response_fit import MeasuredResponse
 from gateway.bsfm.ladder.check import CheckedLadder
 from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
+from gateway.bsfm.response.identification import MeasuredResponse
 from gateway.recording import Recording
 from gateway.reports.fit.document import Document, fit_document
 from gateway.reports.fit.page import fit_page

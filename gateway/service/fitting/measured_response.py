@@ -3,9 +3,10 @@
 from math import inf
 
 from gateway.bsfm.fit.evaluation import Evaluation
-from gateway.bsfm.fit.response_fit import MeasuredResponse, measure_response
 from gateway.bsfm.ladder.fault import LadderError
 from gateway.bsfm.ladder.rows import usable_rows
+from gateway.bsfm.response.identification import MeasuredResponse, measure_response
+from gateway.bsfm.response.step_responses import RecordedRun
 from gateway.recording import Recording
 from gateway.service.fitting.ladder_source import find_rig
 
@@ -28,4 +29,5 @@ def measure_recorded_response(recording: Recording, evaluation: Evaluation) -> M
         return MeasuredResponse(None, f"the response was not measured: {error}")
     day = str(header.get("started_utc", ""))[:10]
     when = f" on {day}" if day else ""
-    return measure_response(rows.time_s, rows.command_v, rows.force_n, evaluation.model, slew_v_per_s, when)
+    run = RecordedRun(rows.time_s, rows.command_v, rows.force_n, slew_v_per_s)
+    return measure_response(run, evaluation.model, when)

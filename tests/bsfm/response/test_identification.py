@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
-from gateway.bsfm.fit.response_fit import MeasuredResponse, measure_response, missing
+from gateway.bsfm.response.identification import MeasuredResponse, measure_response
+from gateway.bsfm.response.step_responses import RecordedRun, missing_share
 
 LEVELS_V = (0.0, 2.0, 4.0, 6.0, 2.0, 6.0, 4.0, 2.0, 4.0, 6.0, 2.0, 6.0, 4.0, 2.0)
 HELD_S = 2.0
@@ -72,7 +73,7 @@ def run(
                 sent.append((now_s, LEVELS_V[level]))
             rows.append((now_s, LEVELS_V[level], force_n + rng.gauss(0.0, noise_n)))
     table = np.array(rows)
-    return measure_response(table[:, 0], table[:, 1], table[:, 2], model(bow_n=1.5))
+    return measure_response(RecordedRun(table[:, 0], table[:, 1], table[:, 2]), model(bow_n=1.5))
 
 
 @pytest.mark.parametrize(
@@ -112,20 +113,20 @@ def test_the_source_tells_from_what_and_how_sure():
 def test_a_record_without_large_steps_gives_no_response_but_a_sentence():
     time_s = np.arange(0.0, 20.0, 0.01)
     command_v = 2.0 + 0.1 * (time_s % 4.0 > 2.0)
-    found = measure_response(time_s, command_v, 15.0 + command_v, model())
-    assert found.response is None
-    assert "not measured: 0 steps" in found.description
+    measured = measure_response(RecordedRun(time_s, command_v, 15.0 + command_v), model())
+    assert measured.response is None
+    assert "not measured: 0 steps" in measured.description
 
 
 def test_a_force_that_does_not_follow_gives_no_response():
     time_s = np.arange(0.0, 40.0, 0.02)
     command_v = np.where(time_s % 4.0 > 2.0, 5.0, 1.0)
-    found = measure_response(time_s, command_v, np.full_like(time_s, 12.0), model())
-    assert found.response is None
+    measured = measure_response(RecordedRun(time_s, command_v, np.full_like(time_s, 12.0)), model())
+    assert measured.response is None
 
 
 def test_the_share_that_is_missing_is_continuous_from_one_lag_to_two_equal_ones():
     since_s = np.linspace(0.0, 1.0, 50)
-    almost, equal = missing(since_s, 0.1, 0.1 * (1.0 - 1.1e-4)), missing(since_s, 0.1, 0.1)
+    almost, equal = missing_share(since_s, 0.1, 0.1 * (1.0 - 1.1e-4)), missing_share(since_s, 0.1, 0.1)
     np.testing.assert_allclose(almost, equal, atol=1.0e-3)
-    np.testing.assert_allclose(missing(since_s, 0.1, 0.0011), missing(since_s, 0.1, 0.0), atol=0.02)
+    np.testing.assert_allclose(missing_share(since_s, 0.1, 0.0011), missing_share(since_s, 0.1, 0.0), atol=0.02)
