@@ -1,6 +1,8 @@
 """Options that several verbs share: where the gateway is, where its state is, JSON."""
 
 from collections.abc import Callable, Sized
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -15,7 +17,7 @@ DEFAULT_ENDPOINT: Final = f"{defaults.HOST}:{defaults.MODBUS_PORT}"
 
 
 def endpoint(context: click.Context, parameter: click.Parameter, value: str | None) -> Endpoint | None:
-    """HOST:PORT, HOST, :PORT or [IPV6]:PORT as (host, port), for an option's callback."""
+    """Return HOST:PORT, HOST, :PORT or [IPV6]:PORT as (host, port), for an option's callback."""
     if value is None:
         return None
     host, port = _split(value)
@@ -37,7 +39,7 @@ def _split(text: str) -> tuple[str, str]:
 
 
 def gateway_options(function: Function) -> Function:
-    """--gateway, --unit and --map: which server to speak to, and by which names."""
+    """Add --gateway, --unit and --map: which server to speak to, and by which names."""
     for option in (
         click.option(
             "--map", "map_name", default=defaults.REGISTER_MAP, metavar="NAME", help="Register map (name or file)."
@@ -59,8 +61,26 @@ def gateway_options(function: Function) -> Function:
     return function
 
 
-def state_options(function: Function) -> Function:
-    """--state and --rig: which state directory."""
+@dataclass(frozen=True, slots=True)
+class StateChoice:
+    """--state and --rig as given: which state directory is meant. path None: the rig's own."""
+
+    path: Path | None
+    rig: str
+
+    @property
+    def directory(self) -> Path:
+        """The directory that `run` would use."""
+        return state_directory(self.path, self.rig)
+
+
+def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add --state and --rig; the function receives both as one argument, `state`, a StateChoice."""
+
+    @wraps(function)
+    def with_choice(*, state: Path | None, rig: str, **options: Any) -> Any:
+        return function(state=StateChoice(state, rig), **options)
+
     for option in (
         click.option(
             "--rig", default=defaults.RIG, show_default=True, help="The rig whose default state directory is meant."
@@ -69,8 +89,8 @@ def state_options(function: Function) -> Function:
             "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway."
         ),
     ):
-        function = option(function)
-    return function
+        option(with_choice)
+    return with_choice
 
 
 def calibration_name(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
@@ -84,11 +104,12 @@ def calibration_name(context: click.Context, parameter: click.Parameter, value: 
 
 
 def name_option(function: Function) -> Function:
-    """--name: what the user calls the calibration."""
+    """Add --name: what the user calls the calibration."""
     return click.option("--name", callback=calibration_name, help="What the calibration is called.")(function)
 
 
 def json_option(function: Function) -> Function:
+    """Add --json; the function receives it as `as_json`."""
     return click.option("--json", "as_json", is_flag=True, help="Print JSON.")(function)
 
 

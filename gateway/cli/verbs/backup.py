@@ -5,21 +5,21 @@ from pathlib import Path
 import click
 
 from gateway.cli.errors import already_exists, no_state_directory
-from gateway.cli.options import count_of, state_directory, state_options
+from gateway.cli.options import StateChoice, count_of, state_options
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--force", is_flag=True, help="Overwrite FILE.")
 @state_options
-def command(*, file: Path, force: bool, state: Path | None, rig: str) -> None:
+def command(*, file: Path, force: bool, state: StateChoice) -> None:
     """Pack a state directory into FILE (tar.gz).
 
     Calibrations, recordings, events. The gateway may be running.
     """
     from gateway.cli.state_archive import pack
 
-    directory = state_directory(state, rig)
+    directory = state.directory
     if not directory.is_dir():
         raise no_state_directory(directory)
     if file.exists() and not force:

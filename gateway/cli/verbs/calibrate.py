@@ -12,7 +12,7 @@ import click
 
 from gateway import defaults
 from gateway.cli.errors import CliError
-from gateway.cli.options import endpoint, json_option, name_option, state_directory, state_options
+from gateway.cli.options import StateChoice, endpoint, json_option, name_option, state_options
 from gateway.processes import exit_codes
 
 _QUESTIONS: Final = (
@@ -69,9 +69,7 @@ _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 )
 @state_options
 @json_option
-def command(
-    *, state: Path | None, rig: str, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **wanted: Any
-) -> None:
+def command(*, state: StateChoice, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **wanted: Any) -> None:
     """Measure a ladder and make a numbered calibration of it, or run and record an experiment (--plan).
 
     Runs on the gateway of this machine. Ctrl-C takes the force to 0 and keeps the data. Nothing is activated: that is
@@ -87,10 +85,10 @@ def command(
             raise click.UsageError("by Modbus (--gateway) the gateway runs its own plan: leave the plan's options out")
         run: LocalRun | RemoteRun = RemoteRun(gateway)
     else:
-        directory = state_directory(state, rig)
+        directory = state.directory
         asked = _plan_wanted(directory, wanted)
         if asked.whole:
-            _tell(_fit_stopped_run(asked.whole, rig, directory), as_json, resumes=False)
+            _tell(_fit_stopped_run(asked.whole, state.rig, directory), as_json, resumes=False)
             return
         run = LocalRun(directory, asked.plan, asked.earlier, asked.name)
         resumes = not is_experiment(asked.plan)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.errors import CliError, already_exists
-from gateway.cli.options import json_option, state_directory, state_options
+from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ def command() -> None:
 @command.command(name="list")
 @state_options
 @json_option
-def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
+def list_command(*, state: StateChoice, as_json: bool) -> None:
     """List the calibrations of a state directory; * is in use, x was rejected."""
     from gateway.calibrations.selection import OWN
     from gateway.cli.calibration.stored import open_store
 
-    store = open_store(state_directory(state, rig), rig)
+    store = open_store(state.directory, state.rig)
     standing, entries = store.find_selected(), store.list()
     if as_json:
         facts = {
@@ -65,12 +65,12 @@ def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
 @click.argument("which", metavar="[N]", required=False)
 @state_options
 @json_option
-def show_command(*, which: str | None, state: Path | None, rig: str, as_json: bool) -> None:
+def show_command(*, which: str | None, state: StateChoice, as_json: bool) -> None:
     """Show calibration N (default: the one in use) with all its numbers."""
     from gateway.calibrations.store import as_text
     from gateway.cli.calibration.stored import find_calibration, in_use, open_store
 
-    store = open_store(state_directory(state, rig), rig)
+    store = open_store(state.directory, state.rig)
     calibration = find_calibration(store, which) if which else in_use(store)
     click.echo(json.dumps(asdict(calibration), indent=2) if as_json else as_text(calibration), nl=as_json)
 
@@ -80,24 +80,24 @@ def show_command(*, which: str | None, state: Path | None, rig: str, as_json: bo
 @click.option("--force", is_flag=True, help="Also one whose fit was rejected.")
 @state_options
 @json_option
-def use_command(*, number: int, force: bool, state: Path | None, rig: str, as_json: bool) -> None:
+def use_command(*, number: int, force: bool, state: StateChoice, as_json: bool) -> None:
     """Use calibration N from now on.
 
     A running gateway swaps it without a bump. `calibration rollback` goes back.
     """
     from gateway.cli.calibration.stored import change
 
-    _tell_change(change(state_directory(state, rig), rig, {"use": number, "force": force}), as_json=as_json)
+    _tell_change(change(state.directory, state.rig, {"use": number, "force": force}), as_json=as_json)
 
 
 @command.command(name="rollback")
 @state_options
 @json_option
-def rollback_command(*, state: Path | None, rig: str, as_json: bool) -> None:
+def rollback_command(*, state: StateChoice, as_json: bool) -> None:
     """Use again what was in use before the last change."""
     from gateway.cli.calibration.stored import change
 
-    _tell_change(change(state_directory(state, rig), rig, {"rollback": True}), as_json=as_json)
+    _tell_change(change(state.directory, state.rig, {"rollback": True}), as_json=as_json)
 
 
 @command.command(name="compare")
@@ -106,7 +106,7 @@ def rollback_command(*, state: Path | None, rig: str, as_json: bool) -> None:
 @click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw both loops into this HTML file.")
 @state_options
 @json_option
-def compare_command(*, a: str, b: str, plot: Path | None, state: Path | None, rig: str, as_json: bool) -> None:
+def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as_json: bool) -> None:
     """Compare calibrations A and B over the voltages that both cover.
 
     Numbers of the store, shipped names or files. Differences are B minus A.
@@ -114,7 +114,7 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: Path | None, ri
     from gateway.cli.calibration.comparison import compare_calibrations, page, table
     from gateway.cli.calibration.stored import find_calibration, open_store
 
-    store = open_store(state_directory(state, rig), rig)
+    store = open_store(state.directory, state.rig)
     first, second = find_calibration(store, a), find_calibration(store, b)
     try:
         comparison = compare_calibrations(first, second)
@@ -132,7 +132,7 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: Path | None, ri
 @click.option("--force", is_flag=True, help="Overwrite.")
 @state_options
 def export_command(
-    *, which: str, yaml_file: Path | None, c_directory: Path | None, force: bool, state: Path | None, rig: str
+    *, which: str, yaml_file: Path | None, c_directory: Path | None, force: bool, state: StateChoice
 ) -> None:
     """Take calibration N along, as YAML (default) or as C."""
     from gateway.calibrations.store import as_text
@@ -140,7 +140,7 @@ def export_command(
 
     if yaml_file and c_directory:
         raise click.UsageError("--yaml or --c, not both")
-    calibration = find_calibration(open_store(state_directory(state, rig), rig), which)
+    calibration = find_calibration(open_store(state.directory, state.rig), which)
     if c_directory:
         _write({c_directory / name: text for name, text in _c_source(calibration).items()}, force=force)
     elif yaml_file and yaml_file != Path("-"):

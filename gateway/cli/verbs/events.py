@@ -4,14 +4,13 @@ import json
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
 from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import no_state_directory
-from gateway.cli.options import json_option, state_directory, state_options
+from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes.event import SEVERITIES, EventRecord, format_event, utc_text
 from gateway.processes.event_file import EventReader
 
@@ -48,25 +47,23 @@ def parse_since(context: click.Context, parameter: click.Parameter, value: str |
 @click.option("--follow", is_flag=True, help="Wait for more; Ctrl-C ends it.")
 @json_option
 @state_options
-def command(
-    *, after: str, severity: str, codes: tuple[str, ...], follow: bool, as_json: bool, state: Path | None, rig: str
-) -> None:
+def command(*, follow: bool, as_json: bool, state: StateChoice, **filters: Any) -> None:
     """Show what the gateway has said: faults, refusals, restarts.
 
     Time (UTC), severity, cause, code, sentence. `force-gateway explain CODE` says what to do.
     """
-    directory = state_directory(state, rig)
+    directory = state.directory
     if not directory.is_dir():
         raise no_state_directory(directory)
     with EventReader(directory) as reader:
-        _show(reader, _event_filter(after, severity, {code.upper() for code in codes}), follow, as_json)
+        _show(reader, _event_filter(**filters), follow, as_json)
 
 
-def _event_filter(after: str, severity: str, codes: set[str]) -> Callable[[EventRecord], bool]:
-    severities = SEVERITIES[SEVERITIES.index(severity) :]
+def _event_filter(after: str, severity: str, codes: tuple[str, ...]) -> Callable[[EventRecord], bool]:
+    severities, chosen = SEVERITIES[SEVERITIES.index(severity) :], {code.upper() for code in codes}
 
     def is_wanted(event: EventRecord) -> bool:
-        return event.time >= after and event.severity in severities and (not codes or event.code in codes)
+        return event.time >= after and event.severity in severities and (not chosen or event.code in chosen)
 
     return is_wanted
 

@@ -4,12 +4,11 @@ Names and units follow Prometheus' custom: base units, `_total` for counters. A 
 """
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, Final
 
 import click
 
-from gateway.cli.options import state_directory, state_options
+from gateway.cli.options import StateChoice, state_options
 
 _PREFIX: Final = "force_gateway_"
 _LOOP: Final = (
@@ -35,11 +34,11 @@ _RESIDUAL: Final = (
 
 @click.command()
 @state_options
-def command(*, state: Path | None, rig: str) -> None:
+def command(*, state: StateChoice) -> None:
     """Print the running gateway's own figures, in Prometheus' text format."""
     from gateway.cli.control_socket import ask
 
-    click.echo("\n".join(exposition(ask(state_directory(state, rig), {"do": "health"}))))
+    click.echo("\n".join(exposition(ask(state.directory, {"do": "health"}))))
 
 
 def exposition(health: dict[str, Any]) -> Iterator[str]:

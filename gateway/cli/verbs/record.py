@@ -1,12 +1,11 @@
 """`record`: start and stop a recording in the gateway that runs."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import click
 
-from gateway.cli.options import json_option, state_directory, state_options
+from gateway.cli.options import StateChoice, json_option, state_options
 
 _ON = {"on": True, "off": False}
 
@@ -15,14 +14,14 @@ _ON = {"on": True, "off": False}
 @click.argument("what", type=click.Choice(["on", "off", "status"]), default="status")
 @state_options
 @json_option
-def command(*, what: str, state: Path | None, rig: str, as_json: bool) -> None:
+def command(*, what: str, state: StateChoice, as_json: bool) -> None:
     """Start or stop a recording in the running gateway."""
     from gateway.cli.control_socket import ask
 
     request: dict[str, Any] = {"do": "record"}
     if what in _ON:
         request["on"] = _ON[what]
-    answer = ask(state_directory(state, rig), request)
+    answer = ask(state.directory, request)
     click.echo(json.dumps(answer) if as_json else _sentence(answer))
 
 

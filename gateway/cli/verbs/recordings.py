@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gateway.cli.errors import already_exists
-from gateway.cli.options import json_option, state_directory, state_options
+from gateway.cli.options import StateChoice, json_option, state_options
 
 if TYPE_CHECKING:
     from gateway.recording import RecordingEntry
@@ -22,11 +22,11 @@ def command() -> None:
 @command.command(name="list")
 @state_options
 @json_option
-def list_command(*, state: Path | None, rig: str, as_json: bool) -> None:
+def list_command(*, state: StateChoice, as_json: bool) -> None:
     """List the recordings of a state directory."""
     from gateway.recording import list_recordings
 
-    directory = state_directory(state, rig)
+    directory = state.directory
     entries = list_recordings(directory)
     if as_json:
         click.echo(json.dumps([_facts(entry) for entry in entries], indent=2))
@@ -73,11 +73,11 @@ def _line(entry: "RecordingEntry") -> str:
 )
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @state_options
-def export_command(*, number: int, form: str, output: Path | None, force: bool, state: Path | None, rig: str) -> None:
+def export_command(*, number: int, form: str, output: Path | None, force: bool, state: StateChoice) -> None:
     """Export recording ID (a number of `recordings list`)."""
     from gateway import recording as room
 
-    recording = room.read_recording(room.find_recording(state_directory(state, rig), number))
+    recording = room.read_recording(room.find_recording(state.directory, number))
     for note in recording.notes:
         click.echo(f"{recording.path}: {note}", err=True)
     if output == Path("-"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from gateway.cli.errors import CliError, already_exists
-from gateway.cli.options import count_of, state_directory, state_options
+from gateway.cli.options import StateChoice, count_of, state_options
 from gateway.processes import exit_codes
 
 
@@ -17,14 +17,14 @@ from gateway.processes import exit_codes
 @click.option("--force", is_flag=True, help="Also into a directory that is not empty; its content is kept beside it.")
 @click.option("--dry-run", is_flag=True, help="Check FILE and say what would be restored.")
 @state_options
-def command(*, file: Path, force: bool, dry_run: bool, state: Path | None, rig: str) -> None:
+def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> None:
     """Unpack a backup into a state directory.
 
     Wholly or not at all. The gateway must not be running.
     """
     from gateway.cli.state_archive import ArchiveError, names_in, unpack
 
-    directory = state_directory(state, rig)
+    directory = state.directory
     try:
         names = names_in(file)
         if directory.is_dir() and any(directory.iterdir()) and not force:
