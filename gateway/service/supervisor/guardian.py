@@ -8,7 +8,6 @@ voltage goes out first. Rejected: a thread inside the control process (dies with
 owners of one truth).
 """
 
-import contextlib
 import fcntl
 import os
 import time
@@ -26,17 +25,13 @@ from gateway.processes.exit_cause import EndCause, Ending
 from gateway.service.supervisor import messages as words
 from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
 from gateway.service.supervisor.child_starter import ChildStarter
+from gateway.service.supervisor.control_child import START_GRACE_S, STOP_BOUND_S, ControlChild
 from gateway.service.supervisor.event_wait import SignalPipe, wait_readable
-from gateway.service.supervisor.heartbeat import Heartbeat
 from gateway.service.supervisor.other_children import OtherChildren
 from gateway.service.supervisor.restart_policy import RestartPolicy
 from gateway.service.supervisor.run_options import RunOptions
-from gateway.service.supervisor.safe_line import SafeLine
 
-_START_GRACE_S: Final = 30.0  # imports on a slow machine; nothing but the safe voltage is written before READY
-_STOP_BOUND_S: Final = 5.0  # from the first signal; from the end of the line of a control process that never was ready
 _DEATH_BOUND_S: Final = 2.0  # of a killed process: milliseconds, unless a driver holds it
-_MOST_MESSAGES: Final = 1000  # of one wait: a child that floods its line does not keep us from the rest
 
 _REFUSED: Final = frozenset({exit_codes.DATA, exit_codes.PERMISSION, exit_codes.CONFIGURATION})
 """Exit codes of a control process that has told the user why it can't work: another start would end the same way."""
@@ -73,24 +68,22 @@ class Guardian:
     clock: Callable[[], float] = time.monotonic
     wait: Callable[[list[int], float], set[int]] = wait_readable
 
-    control: Child | None = None  # None: between a death and the next start
+    control: ControlChild = field(init=False)
     leaving: Child | None = None  # killed and not gone yet: until then no other is started, for there are never two
     others: OtherChildren = field(init=False)
     ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
-    line: SafeLine | None = None
-    heartbeat: Heartbeat = field(default_factory=Heartbeat)
     bound: tuple[str, int] | None = None
-    said_cause: Ending | None = None  # what control gave as its own first cause
     next_start: Ending | None = None  # why control is started again, once it is
-    asked_s: float = 0.0  # when control was asked for, or is to be
     stop_deadline_s: float | None = None
     stops: int = 0
     announced: bool = False
-    link_ended: bool = False
     restarts: RestartPolicy = field(default_factory=RestartPolicy)
 
     def __post_init__(self) -> None:
-        self.others = OtherChildren(self.starter, self.log, lambda answer: self._tell_control(message_link.RIG, answer))
+        self.others = OtherChildren(self.starter, self.log, lambda answer: self.control.tell(message_link.RIG, answer))
+        self.control = ControlChild(
+            self.starter, self.clock, self._announce, lambda: self.others.provide_rig(self.clock())
+        )
 
     def watch(self) -> int:
         """Guard the rig until the end; return the exit code."""
@@ -109,23 +102,19 @@ class Guardian:
         if self.signals.descriptor in readable and (count := self.signals.take()):
             self._on_signal(count)
         control = self.control
-        if control and not self.link_ended and control.link.fileno() in readable:
-            self._on_messages(control)
-            if self.link_ended and not control.pid:
+        if control.has_spoken(readable):
+            control.read_messages()
+            if control.is_link_ended and not (control.process and control.process.pid):
                 self.starter.on_not_born()
                 return self._on_death(Ending(EndCause.NOT_STARTED, "control process ended before its first word"))
-        if control and control.died >= 0 and control.died in readable:
+        if control.has_died(readable):
             return self._on_death(Ending(EndCause.DIED, "control process died"))
         self._poll_others(readable)
         return self._on_deadline()
 
     def _sources(self) -> list[int]:
-        sources = [self.signals.descriptor, *self.others.sources]
-        if self.control:
-            sources += [] if self.link_ended else [self.control.link.fileno()]
-            sources += [self.control.died] if self.control.died >= 0 else []
-        sources += [self.leaving.died] if self.leaving else []
-        return sources
+        leaving = [self.leaving.died] if self.leaving else []
+        return [self.signals.descriptor, *self.others.sources, *self.control.sources, *leaving]
 
     def _patience_s(self) -> float:
         deadlines = [self._deadline_s(), self.others.due_s]
@@ -134,12 +123,8 @@ class Guardian:
         return max(0.0, min(deadlines) - self.clock())
 
     def _deadline_s(self) -> float:
-        """Return when control is overdue: its heartbeat, READY, its birth; or when it is to be started."""
-        if self.control is None:
-            return inf if self.leaving else self.asked_s
-        if self.heartbeat.is_up:
-            return self.heartbeat.due_s
-        return self.asked_s + (_START_GRACE_S if self.control.pid else self.starter.start_timeout_s)
+        """Return when control is overdue, or to be started; never while a killed one is still there."""
+        return inf if self.leaving and self.control.process is None else self.control.due_s
 
     def _poll_others(self, readable: set[int]) -> None:
         if self.leaving and self.leaving.died in readable:
@@ -151,72 +136,19 @@ class Guardian:
     def _on_signal(self, count: int) -> None:
         """The first one asks control to ramp down, where there is a line to ramp on; a second one waits for nothing."""
         self.stops += count
-        is_up = self.line is not None or self.heartbeat.is_up
-        self.stop_deadline_s = self.clock() + (_STOP_BOUND_S if self.stops == 1 and is_up else 0.0)
+        is_up = self.control.safe_line is not None or self.control.heartbeat.is_up
+        self.stop_deadline_s = self.clock() + (STOP_BOUND_S if self.stops == 1 and is_up else 0.0)
         if self.stops == 1:
-            self._tell_control(message_link.STOP)
+            self.control.tell(message_link.STOP)
 
-    def _on_messages(self, control: Child) -> None:
-        """Drain what control has said: a burst must not make a live loop look silent."""
-        try:
-            for _ in range(_MOST_MESSAGES):
-                message = message_link.receive(control.link)
-                if message is None:
-                    self._on_end_of_link()
-                    return
-                self._handle(control, message)
-        except BlockingIOError:
-            return
-        except (ValueError, KeyError, TypeError, OSError) as error:
-            self.said_cause = Ending(
-                EndCause.NONSENSE, f"control process said {error!r}: internal error, please report it"
-            )
-            self.link_ended = True
-            control.kill()
-
-    def _on_end_of_link(self) -> None:
-        """It is about to end: its death, or its silence, is what counts now. Before READY there is no silence yet."""
-        self.link_ended = True
-        self.asked_s = min(self.asked_s, self.clock() - _START_GRACE_S + _STOP_BOUND_S)
-
-    def _handle(self, control: Child, message: message_link.Message) -> None:
-        if message.tag == message_link.HEARTBEAT:
-            if self.heartbeat.is_up:  # before READY the start has its own, longer patience
-                self.heartbeat.record_beat(control, self.clock())
-        elif message.tag == message_link.BORN:
-            with contextlib.suppress(OSError):  # it has died since: the end of its line is behind this message
-                control.adopt(int(message.body["pid"]))
-                self.starter.on_born()
-        elif message.tag == message_link.LINE:
-            self._take_line(message)
-        elif message.tag == message_link.NEED_RIG:
-            self.others.provide_rig(self.clock())
-        elif message.tag == message_link.FIRST_CAUSE:
-            self.said_cause = Ending(EndCause.DEFECT, str(message.body["text"]))
-        elif message.tag == message_link.READY:
-            self._announce(control, message)
-        message.drop_descriptors()
-
-    def _take_line(self, message: message_link.Message) -> None:
-        if not message.descriptors:
-            raise message_link.ProtocolError("a line without its port")
-        frame, reply = bytes.fromhex(message.body["safe_frame"]), bytes.fromhex(message.body["safe_reply"])
-        self._drop_line()
-        self.line = SafeLine(message.descriptors.pop(0), frame, reply)
-
-    def _tell_control(self, tag: str, body: dict[str, Any] | None = None) -> None:
-        if self.control:
-            with contextlib.suppress(OSError):  # one that is gone shows as the end of its line
-                message_link.send(self.control.link, tag, body)
-
-    # -- what others need
-
-    def _announce(self, control: Child, message: message_link.Message) -> None:
+    def _announce(self, message: message_link.Message) -> None:
         info, banner = message.body["info"], message.body["banner"]
-        self.heartbeat.stall_s = float(message.body["stall_s"])
+        heartbeat = self.control.heartbeat
+        heartbeat.stall_s = float(message.body["stall_s"])
         host, port = info["modbus"]
         self.bound = (host, port)  # a restart keeps the port that masters already know
-        self.heartbeat.record_beat(control, self.clock())
+        if self.control.process:
+            heartbeat.record_beat(self.control.process, self.clock())
         self._provide_watch(message.body["watch"])
         if self.options.json:
             words.print_ready(info | {"pids": self._pids()})
@@ -227,8 +159,9 @@ class Guardian:
         self.restarts.came_up()
 
     def _pids(self) -> dict[str, int]:
-        found = {"guardian": os.getpid(), "control": self.control.pid if self.control else None, **self.others.pids}
-        return {name: pid for name, pid in found.items() if pid}
+        control = self.control.process
+        pids = {"guardian": os.getpid(), "control": control.pid if control else None, **self.others.pids}
+        return {name: pid for name, pid in pids.items() if pid}
 
     def _provide_watch(self, wanted: dict[str, Any] | None) -> None:
         """wanted: what the residual watch is told, None where the rig has none."""
@@ -245,31 +178,32 @@ class Guardian:
             return self._on_death(Ending(EndCause.DIED, "stopped")) if now_s >= self.stop_deadline_s else None
         if now_s < self._deadline_s():
             return None
-        if self.control is None:
+        process, heartbeat = self.control.process, self.control.heartbeat
+        if process is None:
             return self._start_control()
-        if not self.heartbeat.is_up:
-            return self._on_no_start(self.control, now_s)
-        if self.heartbeat.is_overdue(now_s):
-            return self._on_death(self.heartbeat.why_silent(self.control, now_s))
+        if not heartbeat.is_up:
+            return self._on_no_start(process, now_s)
+        if heartbeat.is_overdue(now_s):
+            return self._on_death(heartbeat.why_silent(process, now_s))
         return None
 
     def _on_no_start(self, control: Child, now_s: float) -> int | None:
         if not control.pid:  # nothing has been risked: the long way, at once, and it counts as no restart
             control.close()
-            self.control = None
+            self.control.process = None
             self.starter.drop_server("does not answer", now_s)
             return self._start_control()
-        return self._on_death(Ending(EndCause.NOT_STARTED, f"control process not ready within {_START_GRACE_S:g} s"))
+        return self._on_death(Ending(EndCause.NOT_STARTED, f"control process not ready within {START_GRACE_S:g} s"))
 
     def _on_death(self, cause: Ending | Callable[[], Ending]) -> int | None:
         """Safe voltage first, questions later. cause: or how to find it, once nothing is urgent any more."""
-        acknowledged = self._write_final_voltage()
-        control, self.control = self.control, None
+        acknowledged = self.control.write_safe_voltage()
+        control, self.control.process = self.control.process, None
         if control is None:
             return exit_codes.OK  # told to stop while there was none
         is_gone = control.died < 0 or bool(self.wait([control.died], _DEATH_BOUND_S))
-        ending = self.said_cause or (cause if isinstance(cause, Ending) else cause())
-        self.heartbeat.reset()
+        ending = self.control.reported_cause or (cause if isinstance(cause, Ending) else cause())
+        self.control.heartbeat.reset()
         code = control.wait(0.0)
         if is_gone:
             control.close()
@@ -283,19 +217,6 @@ class Guardian:
             return code  # it told the user why
         return self._restart(ending, describe_exit(code) if is_gone else "it does not go", acknowledged)
 
-    def _write_final_voltage(self) -> bool | None:
-        """Kill control and write the safe voltage through the newest line that it has handed over.
-
-        Return whether the device acknowledged it; None where there was no line.
-        """
-        if self.control:
-            self.control.kill()
-            if not self.link_ended:
-                self._on_messages(self.control)
-        acknowledged = self.line.write_safe() if self.line else None
-        self._drop_line()  # our copy of the descriptor carries the port's lock, which the next control process needs
-        return acknowledged
-
     def _restart(self, ending: Ending, how: str, acknowledged: bool | None) -> int | None:
         now_s = self.clock()
         self.log("restart", words.restart_sentence(ending, how, acknowledged))
@@ -303,7 +224,7 @@ class Guardian:
         if pause_s is None:
             self.log("restart", words.too_many_sentence(self.restarts.causes))
             return exit_codes.FAILED
-        self.next_start, self.asked_s = ending, now_s + pause_s
+        self.next_start, self.control.asked_s = ending, now_s + pause_s
         if self.leaving:
             self.log("restart", words.leaving_sentence(self.leaving.pid))
             return None
@@ -316,9 +237,8 @@ class Guardian:
             self.leaving = None
 
     def _start_control(self) -> int | None:
-        self.said_cause, self.link_ended, self.asked_s = None, False, self.clock()
         try:
-            self.control = self.starter.control(
+            self.control.start(
                 {
                     "rig": self.options.rig,
                     "simulate": self.options.simulate,
@@ -337,15 +257,10 @@ class Guardian:
 
     def _close(self) -> None:
         """Whatever ends us, the safe voltage goes first: control would die of the signal without a word."""
-        self._write_final_voltage()
-        if self.control:
-            self.control.end()
+        self.control.write_safe_voltage()
+        if self.control.process:
+            self.control.process.end()
         self.others.end()
         self._forget_leaving()
         if self.ring is not None:
             os.close(self.ring)
-
-    def _drop_line(self) -> None:
-        if self.line:
-            self.line.close()
-            self.line = None

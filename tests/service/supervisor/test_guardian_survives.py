@@ -85,7 +85,7 @@ def scene(tmp_path: Path) -> Iterator[Callable[..., Scene]]:
 
 
 def assert_comes_up(one: Scene) -> None:
-    assert one.run(lambda: one.guardian.heartbeat.is_up) is None, one.said
+    assert one.run(lambda: one.guardian.control.heartbeat.is_up) is None, one.said
 
 
 @pytest.mark.parametrize("code", [-9, 1, 0, None])
@@ -147,7 +147,7 @@ def test_the_nth_call_on_any_line_may_fail_until_none_does(scene, port, error):
             rig_lives(child)
 
         one = scene(script, lives(port), rigs=(rig, rig_lives))
-        assert one.run(lambda one=one: one.now_s > 160.0 or one.guardian.heartbeat.is_up, 400) is None, n
+        assert one.run(lambda one=one: one.now_s > 160.0 or one.guardian.control.heartbeat.is_up, 400) is None, n
         assert_comes_up(one)
         one.signals.send()
         one.signals.send()
@@ -164,7 +164,8 @@ def test_a_dead_childs_last_words_still_count(scene, port):
 
     def script(child: FakeChild) -> None:
         child.say(message_link.BORN, {"pid": 1})
-        one.guardian._on_messages(child)  # heard; what follows comes with the death
+        one.guardian.control.process = child  # as it is once this script is over
+        one.guardian.control.read_messages()  # heard; what follows comes with the death
         child.say(message_link.LINE, {"safe_frame": SAFE_FRAME.hex(), "safe_reply": ""}, port.writer)
         child.say(message_link.FIRST_CAUSE, {"text": "internal error: ZeroDivisionError()"})
         child.dies(1)
