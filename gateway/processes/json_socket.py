@@ -10,7 +10,6 @@ A gateway works without it, so a place where no socket can be made is a sentence
 """
 
 import asyncio
-import contextlib
 import json
 import os
 import socket
@@ -18,10 +17,10 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.processes.json_connection import JsonConnection, SocketLimits, close_with_sentence
 from gateway.processes.json_messages import Answer, encode_answer, error_answer, refuse_constant, why_too_large
 
 Handler = Callable[[dict[str, Any]], Answer]
@@ -30,16 +29,6 @@ _LONGEST_ANSWER: Final = 1 << 20
 _SHARE: Final = 0.1  # of the loop's time
 _LONGEST_REST_S: Final = 0.5
 _NO_DESCRIPTOR_S: Final = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class SocketLimits:
-    """idle_s: from one whole answer to the next whole request. spared_s: nobody who spoke within it makes room for another."""
-
-    callers: int = 32
-    idle_s: float = 30.0
-    spared_s: float = 1.0
-    longest_line: int = 65536
 
 
 class JsonLineServer:
@@ -61,7 +50,7 @@ class JsonLineServer:
         self._handlers = handlers
         self._log = log
         self._listener: socket.socket | None = None
-        self._callers: dict[_Client, None] = {}  # in the order in which they last spoke
+        self._callers: dict[JsonConnection, None] = {}  # in the order in which they last spoke
         self._queue: deque[Callable[[], None]] = deque()
         self._turn: asyncio.TimerHandle | None = None
         self._sweep_timer: asyncio.TimerHandle | None = None
@@ -145,9 +134,9 @@ class JsonLineServer:
         self._await_connection()
         peer.setblocking(False)
         if len(self._callers) >= self.limits.callers and not self._make_room():
-            _say_and_close(peer, f"{self.limits.callers} connections are open, the most allowed: try again")
+            close_with_sentence(peer, f"{self.limits.callers} connections are open, the most allowed: try again")
             return
-        caller = _Client(self, peer)
+        caller = JsonConnection(self, peer)
         self.note_activity(caller)
         caller.listen()
 
@@ -159,13 +148,13 @@ class JsonLineServer:
         silent.dismiss("others are waiting, and nothing was asked here for longest")
         return True
 
-    def note_activity(self, caller: "_Client") -> None:
+    def note_activity(self, caller: JsonConnection) -> None:
         """Make this caller the one that spoke last."""
         caller.spoke_s = self.loop.time()
         self._callers.pop(caller, None)
         self._callers[caller] = None
 
-    def forget_client(self, caller: "_Client") -> None:
+    def forget_connection(self, caller: JsonConnection) -> None:
         """Drop a caller that has left."""
         self._callers.pop(caller, None)
 
@@ -189,8 +178,8 @@ class JsonLineServer:
                 "internal",
                 "A499 internal error in an answer of the control socket, please report it:\n" + traceback.format_exc(),
             )
-            told = f"internal error, please report it with the gateway's log: {type(error).__name__}: {error}"
-            text = encode_answer(error_answer(told))
+            sentence = f"internal error, please report it with the gateway's log: {type(error).__name__}: {error}"
+            text = encode_answer(error_answer(sentence))
         return text.encode() + b"\n"
 
     def _handle_line(self, line: bytes) -> Answer:
@@ -205,125 +194,3 @@ class JsonLineServer:
             return {"ok": True} | handler(request)
         except (ValueError, OSError) as error:
             return error_answer(str(error))
-
-
-class _Client:
-    """One connection: reads, waits for its turn, has one line answered, waits until the answer is taken."""
-
-    def __init__(self, server: JsonLineServer, peer: socket.socket) -> None:
-        self.spoke_s = 0.0
-        self._server = server
-        self._peer = peer
-        self._said = bytearray()
-        self._unsent = b""
-        self._is_last = False  # nothing more comes
-        self._is_deaf = False  # nothing more is wanted: what comes is dropped until the caller ends
-
-    def listen(self) -> None:
-        self._server.loop.add_reader(self._peer, self._on_readable)
-
-    def _on_readable(self) -> None:
-        self._server.loop.remove_reader(self._peer)
-        self._server.enqueue(self._receive)
-
-    def _receive(self) -> None:
-        if self._is_closed:
-            return
-        try:
-            chunk = self._peer.recv(self._server.limits.longest_line)
-        except BlockingIOError:
-            self.listen()
-            return
-        except OSError:
-            self.close()
-            return
-        self._is_last = not chunk
-        if not self._is_deaf:
-            self._said += chunk
-            self._answer_next()
-        elif self._is_last:
-            self.close()
-        else:
-            self.listen()
-
-    def _answer_next(self) -> None:
-        """A text without a newline before the end of the stream is a line too."""
-        if self._is_closed:
-            return
-        longest = self._server.limits.longest_line
-        end = self._said.find(b"\n") + 1 or (len(self._said) if self._is_last else 0)
-        if (end or len(self._said)) > longest:
-            self._stop_listening(f"a line of more than {longest} bytes")
-        elif end:
-            line = bytes(self._said[:end])
-            del self._said[:end]
-            self._send(self._server.answer(line))
-        elif self._is_last:
-            self.close()
-        else:
-            self.listen()
-
-    def _send(self, data: bytes) -> None:
-        try:
-            sent = self._peer.send(data)
-        except BlockingIOError:
-            sent = 0
-        except OSError:
-            self.close()
-            return
-        if sent < len(data):
-            self._unsent = data[sent:]
-            self._server.loop.add_writer(self._peer, self._on_writable)
-        else:
-            self._server.note_activity(self)
-            self._continue()
-
-    def _on_writable(self) -> None:
-        self._server.loop.remove_writer(self._peer)
-        self._server.enqueue(self._send_rest)
-
-    def _send_rest(self) -> None:
-        if not self._is_closed:
-            data, self._unsent = self._unsent, b""
-            self._send(data)
-
-    def _continue(self) -> None:
-        if self._said:
-            self._server.enqueue(self._answer_next)
-        elif self._is_last:
-            self.close()
-        else:
-            self.listen()
-
-    def dismiss(self, why: str) -> None:
-        """Say why, if it takes a line now, and close."""
-        if not self._unsent:
-            with contextlib.suppress(OSError):
-                self._peer.send(encode_answer(error_answer(f"{why}: closed")).encode() + b"\n")
-        self.close()
-
-    def _stop_listening(self, why: str) -> None:
-        """Say why and end our direction. A close now would take the sentence away from a caller that is still writing."""
-        self._said.clear()
-        self._is_deaf = True
-        with contextlib.suppress(OSError):
-            self._peer.send(encode_answer(error_answer(f"{why}: closed")).encode() + b"\n")
-            self._peer.shutdown(socket.SHUT_WR)
-        self.listen()
-
-    @property
-    def _is_closed(self) -> bool:
-        return self._peer.fileno() < 0
-
-    def close(self) -> None:
-        if not self._is_closed:
-            self._server.loop.remove_reader(self._peer)
-            self._server.loop.remove_writer(self._peer)
-            self._peer.close()
-        self._server.forget_client(self)
-
-
-def _say_and_close(peer: socket.socket, sentence: str) -> None:
-    with contextlib.suppress(OSError):
-        peer.send(encode_answer(error_answer(sentence)).encode() + b"\n")
-    peer.close()

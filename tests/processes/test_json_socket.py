@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from gateway.processes.json_socket import JsonLineServer, SocketLimits
+from gateway.processes.json_connection import SocketLimits
+from gateway.processes.json_socket import JsonLineServer
 
 
 def refuse(request: dict[str, Any]) -> dict[str, Any]:
