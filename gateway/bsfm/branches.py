@@ -25,7 +25,9 @@ class Crossing:
 
 @dataclass(frozen=True, slots=True)
 class Branches:
-    """rising: force while the voltage grows; falling: while it shrinks. Both over [x0, x1]; orders may differ."""
+    """Both curves of a loop, force over voltage. rising: force while the voltage grows; falling: while it shrinks. Both
+    over [x0, x1]; orders may differ.
+    """
 
     rising: RationalBezier
     falling: RationalBezier

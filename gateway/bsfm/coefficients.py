@@ -26,7 +26,7 @@ _MEANT: Final = 1.0e-6  # and this may be one
 
 
 class CoefficientReason(IntEnum):
-    """Why coefficients were refused: the numbers go to the failing_reason register."""
+    """Reasons for which coefficients are refused: the numbers go to the failing_reason register."""
 
     NONE = 0
     NOT_FINITE = 1
@@ -48,7 +48,7 @@ class CoefficientReason(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class CoefficientFault:
-    """index: see the module; text: a sentence with the number seen and what is allowed."""
+    """One number that is refused. index: see the module; text: a sentence with the number seen and what is allowed."""
 
     index: int
     reason: CoefficientReason
@@ -57,7 +57,9 @@ class CoefficientFault:
 
 @dataclass(frozen=True, slots=True)
 class CoefficientLimits:
-    """cell_range_n: the load cell's range, bound of |b|; weights are bounded as given and after w0 = 1."""
+    """Bounds of what coefficients may be. cell_range_n: the load cell's range, bound of |b|; weights are bounded as given
+    and after w0 = 1.
+    """
 
     cell_range_n: float
     voltage_min_v: float = 0.0
@@ -136,7 +138,7 @@ class Allowed:
     reason: CoefficientReason
 
     def faults(self, index: int, number: float) -> Iterator[CoefficientFault]:
-        """None or one. A number that makes sense with its words swapped was meant to be that."""
+        """Yield none or one fault. A number that makes sense with its words swapped was meant to be that."""
         tiny = 0.0 < abs(number) < _NO_FIT_GIVES
         if self.low <= number <= self.high and not tiny:
             return

@@ -70,7 +70,7 @@ class RationalBezier:
     @overload
     def value(self, x: "NDArray[np.float64]") -> "NDArray[np.float64]": ...
     def value(self, x: Any) -> Any:
-        """Force in N at x volts; exactly the end handles at and beyond the ends."""
+        """Return the force in N at x volts; exactly the end handles at and beyond the ends."""
         if not isinstance(x, (float, int)):
             return self._of_array(x, self.value, _value)
         if x <= self.x0:
@@ -93,36 +93,38 @@ class RationalBezier:
         return self._slope(self._below, up / down) if up <= down else self._slope(self._above, down / up)
 
     def is_increasing(self) -> bool:
-        """Exactly whether df/dx > 0 all over the open interval (zero slope at an end allowed, a constant is not increasing)."""
+        """Decide exactly whether df/dx > 0 all over the open interval (zero slope at an end allowed, a constant is not
+        increasing).
+        """
         return self._increasing
 
     def slope_is_at_least(self, floor_n_per_v: float) -> bool:
-        """Exactly whether df/dx >= floor on [x0, x1]: numerator - floor (x1 - x0) W^2 is nowhere negative."""
+        """Decide exactly whether df/dx >= floor on [x0, x1]: numerator - floor (x1 - x0) W^2 is nowhere negative."""
         (weights, _), (handles, scale) = map(exact.whole_numbers, (_scale_weights(self.weights), self.handles))
         ((low, high), span_scale), ((floor,), floor_scale) = map(
             exact.whole_numbers, ((self.x0, self.x1), (floor_n_per_v,))
         )
         total = exact.scale_bernstein(weights)
-        wanted = floor * (high - low) * scale
+        least = floor * (high - low) * scale
         steepness = exact.raise_degree_by_two(exact.slope_numerator(weights, handles))
         squares = exact.product(total, total)
-        rest = [c * span_scale * floor_scale - wanted * w for c, w in zip(steepness, squares, strict=True)]
+        rest = [c * span_scale * floor_scale - least * w for c, w in zip(steepness, squares, strict=True)]
         return exact.place_negative(rest) is None
 
     def minimum_slope(self) -> float:
         """Return a proven lower bound of df/dx in N/V on [x0, x1], within 1e-9 of the mean slope below the true minimum."""
-        seen = min(self.slope(self.x0 + (self.x1 - self.x0) * i / 64) for i in range(65))
+        upper = min(self.slope(self.x0 + (self.x1 - self.x0) * i / 64) for i in range(65))
         tolerance = SLOPE_TOLERANCE * (
-            abs(self.handles[-1] - self.handles[0]) / (self.x1 - self.x0) + abs(seen) + 1.0e-300
+            abs(self.handles[-1] - self.handles[0]) / (self.x1 - self.x0) + abs(upper) + 1.0e-300
         )
-        proven, step = seen - tolerance, tolerance
-        while not self.slope_is_at_least(proven):
-            seen, step = proven, 4.0 * step
-            proven -= step
-        while seen - proven > tolerance:
-            middle = (seen + proven) / 2
-            proven, seen = (middle, seen) if self.slope_is_at_least(middle) else (proven, middle)
-        return proven
+        lower, step = upper - tolerance, tolerance
+        while not self.slope_is_at_least(lower):
+            upper, step = lower, 4.0 * step
+            lower -= step
+        while upper - lower > tolerance:
+            middle = (upper + lower) / 2
+            lower, upper = (middle, upper) if self.slope_is_at_least(middle) else (lower, middle)
+        return lower
 
     def _slope(self, side: _Side, r: Any) -> Any:
         """(1+r)^2 P(r) / W(r)^2 / span, for a float or an array r in [0, 1]."""

@@ -23,13 +23,13 @@ def whole_numbers(values: Iterable[float]) -> tuple[list[int], int]:
 
 
 def scale_bernstein(bernstein: Sequence[int]) -> list[int]:
-    """Ordinary Bernstein coefficients -> coefficients on t^k (1-t)^(m-k)."""
+    """Return the coefficients on t^k (1-t)^(m-k) of a polynomial given by its ordinary Bernstein coefficients."""
     degree = len(bernstein) - 1
     return [comb(degree, k) * value for k, value in enumerate(bernstein)]
 
 
 def product(a: Sequence[int], b: Sequence[int]) -> list[int]:
-    """Product of two scaled polynomials."""
+    """Return the product of two scaled polynomials."""
     result = [0] * (len(a) + len(b) - 1)
     for i, left in enumerate(a):
         for j, right in enumerate(b):
@@ -120,7 +120,7 @@ def _halves(piece: list[int]) -> tuple[list[int], list[int]]:
 
 
 def quotient(numerator: int, denominator: int) -> float:
-    """Nearest double; infinite where a double ends."""
+    """Return the nearest double; infinite where a double ends."""
     try:
         return numerator / denominator
     except OverflowError:

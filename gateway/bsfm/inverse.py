@@ -17,7 +17,7 @@ from math import comb, inf, sqrt
 
 
 class InverseStatus(StrEnum):
-    """How an inverse was answered: OK, or clamped at the LOW or HIGH end of the curve."""
+    """Outcome of an inverse: OK, or clamped at the LOW or HIGH end of the curve."""
 
     OK = "ok"
     LOW = "low"

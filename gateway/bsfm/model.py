@@ -97,6 +97,7 @@ class Bsfm:
 
     @property
     def voltage_range_v(self) -> tuple[float, float]:
+        """Lowest and highest voltage of the branches."""
         return self.branches.rising.x0, self.branches.rising.x1
 
 
@@ -147,6 +148,7 @@ class Calibration:
 
     @property
     def reversal(self) -> Reversal:
+        """The policy between the branches: slip stops where the set has them, else the linear blend."""
         if self.slip_radii_v or self.slip_shares:
             return SlipStops(self.slip_radii_v, self.slip_shares)
         return LinearBlend(self.blend_span_n)

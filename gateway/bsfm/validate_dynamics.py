@@ -40,9 +40,9 @@ def _radius_faults(radii_v: tuple[float, ...], limits: CoefficientLimits) -> Ite
     low_v, high_v = limits.slip_radius_min_v, limits.slip_radius_max_v
     for i, radius_v in enumerate(radii_v):
         allowed = Allowed(f"slip radius {i}", low_v, high_v, "V", CoefficientReason.SLIP_RADIUS)
-        found = list(allowed.faults(RADII_FROM + i, radius_v))
-        yield from found
-        if not found and i and not radius_v > radii_v[i - 1]:
+        faults = list(allowed.faults(RADII_FROM + i, radius_v))
+        yield from faults
+        if not faults and i and not radius_v > radii_v[i - 1]:
             text = f"slip radius {i} = {radius_v:g} V, the one before it {radii_v[i - 1]:g} V: ascending is needed"
             yield CoefficientFault(RADII_FROM + i, CoefficientReason.SLIP_RADIUS, text)
 

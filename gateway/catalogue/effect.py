@@ -38,6 +38,7 @@ class Parameter:
 
     @property
     def path(self) -> str:
+        """`section.name` within the plant."""
         return f"{self.section}.{self.name}"
 
 
@@ -167,8 +168,8 @@ class Effect:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Every parameter of every form, once."""
-        found = {parameter.path: parameter for form in self.forms for parameter in form.parameters}
-        return tuple((found | {parameter.path: parameter for parameter in self.marks}).values())
+        by_path = {parameter.path: parameter for form in self.forms for parameter in form.parameters}
+        return tuple((by_path | {parameter.path: parameter for parameter in self.marks}).values())
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -183,7 +184,7 @@ class Effect:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """What it needs and a gateway does not record by itself: somebody has to tell it."""
+        """Columns that it needs and a gateway does not record by itself: somebody has to tell it."""
         return tuple(name for name in self.needs if name not in RECORDED)
 
 

@@ -9,5 +9,5 @@ _DURATION: Final = re.compile(r"(\d+(?:\.\d*)?|\.\d+) ?(ms|s|min|m|h|d|)", re.AS
 
 def parse_duration_s(text: str) -> float | None:
     """Return the seconds that a text means; None where it is no duration."""
-    found = _DURATION.fullmatch(text.strip())
-    return float(found[1]) * _UNITS_S[found[2]] if found else None
+    match = _DURATION.fullmatch(text.strip())
+    return float(match[1]) * _UNITS_S[match[2]] if match else None

@@ -23,27 +23,28 @@ class CliError(click.ClickException):
         self.exit_code = exit_code  # type: ignore[misc]  # click reads the instance's
 
     def show(self, file: IO[Any] | None = None) -> None:
+        """Print the message to stderr, or to a file."""
         click.echo(self.format_message(), file=file or sys.stderr)
 
 
 def already_exists(target: Path, instead: str = "--force overwrites it") -> CliError:
-    """E405: a verb would overwrite something. instead: what to do."""
+    """Return E405: a verb would overwrite something. instead: what to do."""
     return CliError(f"E405 {target} exists and was left alone; {instead}")
 
 
 def no_state_directory(directory: Path) -> CliError:
-    """E106: the verb needs a state directory that is there."""
+    """Return E106: the verb needs a state directory that is there."""
     return CliError(f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA)
 
 
 def no_such_recording(path: Path) -> CliError:
-    """E403: neither a file nor a number of this state directory."""
+    """Return E403: neither a file nor a number of this state directory."""
     return CliError(f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA)
 
 
-def disk_hangs(seen: str) -> CliError:
-    """E431: a store of the gateway's has not come to its end. seen: for how long, and what it was at."""
-    return CliError(f"E431 {seen}: its disk probably hangs; look at its log and at the kernel's (dmesg)")
+def disk_hangs(observation: str) -> CliError:
+    """Return E431: a store of the gateway's has not come to its end. observation: for how long, and what it was at."""
+    return CliError(f"E431 {observation}: its disk probably hangs; look at its log and at the kernel's (dmesg)")
 
 
 def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliError:

@@ -39,16 +39,21 @@ VERBS: Final = (
     "completion",
     "version",
 )
-"""In the order in which a newcomer meets them; each is a module of this package with its `command`."""
+"""In the order in which a newcomer meets them; each is a module of gateway.cli.verbs with its `command`."""
+HELP: Final = """Modbus gateway that holds a constant contact force, and says why the force is off.
+
+Begin with: force-gateway run demo --sim"""
 
 
 class VerbGroup(click.Group):
     """Finds verbs by name, and turns whatever they raise into one message."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of the help."""
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a verb's module only when it is called."""
         if cmd_name not in VERBS:
             return None
         command: click.Command = import_module(f"gateway.cli.verbs.{cmd_name}").command
@@ -57,6 +62,7 @@ class VerbGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the verb, and name the nearest one where there is none of this name."""
         word = args[0]
         if word not in VERBS and not word.startswith("-") and not ctx.resilient_parsing:
             near = get_close_matches(word, VERBS, n=1)
@@ -65,6 +71,7 @@ class VerbGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
+        """Run the verb; turn what it raises into one message."""
         try:
             return super().invoke(ctx)
         except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
@@ -74,16 +81,13 @@ class VerbGroup(click.Group):
             raise translate_error(error, command_line, debug=bool(ctx.params.get("debug"))) from error
 
 
-@click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=VerbGroup, help=HELP, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(VERSION, prog_name="force-gateway", message="%(prog)s %(version)s")
 @click.option("--debug", is_flag=True, help="Show the traceback of a defect.")
 def command(debug: bool) -> None:
-    """Modbus gateway that holds a constant contact force, and says why the force is off.
-
-    Begin with: force-gateway run demo --sim
-    """
+    """Run one verb."""
 
 
 def main() -> None:
-    """Entry point of `force-gateway` and of `python -m gateway`."""
+    """Run `force-gateway` or `python -m gateway`."""
     command(prog_name="force-gateway")

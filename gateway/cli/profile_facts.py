@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def facts(checked: "Checked", *, whole: bool = False) -> dict[str, str]:
-    """Return name -> words. whole: the fingerprint in full."""
+    """Return facts of a profile for the terminal, name -> words. whole: the fingerprint in full."""
     if checked.kind == "rig":
         return _rig(checked.value) | ({"fingerprint": checked.value.fingerprint} if whole else {})
     return {checked.kind: _SAID[checked.kind](checked.value)}
@@ -31,11 +31,11 @@ def _rig(rig: "Rig") -> dict[str, str]:
 
 
 def _device(device: "DeviceProfile") -> str:
-    said = "asked" if device.read_force else f"{device.rate_hz:g} readings/s"
+    words = "asked" if device.read_force else f"{device.rate_hz:g} readings/s"
     if device.set_voltage:
         low_v, high_v = device.voltage_range_v
-        said = f"{low_v:g} .. {high_v:g} V"
-    return f"{device.name}: {device.role}, {device.serial}, {said}; {device.hardware} ({device.certainty})"
+        words = f"{low_v:g} .. {high_v:g} V"
+    return f"{device.name}: {device.role}, {device.serial}, {words}; {device.hardware} ({device.certainty})"
 
 
 def _plant(plant: "PlantProfile") -> str:

@@ -74,11 +74,11 @@ def unpack(source: Path, state: Path) -> Path | None:
         fresh = beside / _TOP
         fresh.mkdir(exist_ok=True)
         fresh.chmod(0o700)
-        kept = _set_aside(state)
+        previous = _set_aside(state)
         fresh.rename(state)
     finally:
         shutil.rmtree(beside)
-    return kept
+    return previous
 
 
 def _read_to_the_end(source: Path) -> None:
@@ -126,6 +126,6 @@ def _set_aside(state: Path) -> Path | None:
         state.rmdir()
         return None
     number = 1
-    while (kept := state.with_name(f"{state.name}.before-restore-{number}")).exists():
+    while (previous := state.with_name(f"{state.name}.before-restore-{number}")).exists():
         number += 1
-    return state.rename(kept)
+    return state.rename(previous)

@@ -80,11 +80,13 @@ class Chart:
         return LEFT + across * self.x.share(x), TOP + down * (1.0 - self.y.share(y))
 
     def line(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str = "") -> None:
+        """Draw a line through the points."""
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in (self.at(x, y) for x, y in zip(xs, ys, strict=True)))
         self._parts.append(f'<polyline class="line {style}" points="{points}"/>')
         self._note(name, "line", style)
 
     def dots(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str = "", radius: float = 1.8) -> None:
+        """Draw a dot at each point."""
         circles = "".join(
             f'<circle cx="{px:.1f}" cy="{py:.1f}" r="{radius}"/>'
             for px, py in (self.at(x, y) for x, y in zip(xs, ys, strict=True))
@@ -93,16 +95,19 @@ class Chart:
         self._note(name, "dot", style)
 
     def bar(self, x: float, low: float, high: float, style: str) -> None:
+        """Draw a vertical bar between two values."""
         (px, bottom), (_, top) = self.at(x, low), self.at(x, high)
         self._parts.append(
             f'<path class="line thin {style}" d="M{px:.1f} {bottom:.1f}V{top:.1f}M{px - 3:.1f} {top:.1f}h6"/>'
         )
 
     def ring(self, x: float, y: float) -> None:
+        """Draw a ring around a point, to mark it."""
         px, py = self.at(x, y)
         self._parts.append(f'<circle class="ring" cx="{px:.1f}" cy="{py:.1f}" r="8"/>')
 
     def level(self, y: float) -> None:
+        """Draw a horizontal line across the chart."""
         self._parts.append(f'<path class="level" d="M{LEFT} {self.at(self.x.low, y)[1]:.1f}H{self.width - RIGHT}"/>')
 
     def svg(self) -> str:
@@ -133,13 +138,13 @@ class Chart:
         return "".join(parts)
 
     def _key(self) -> str:
-        parts, left = [], LEFT + self.key_at * (self.width - LEFT - RIGHT)
+        parts, x = [], LEFT + self.key_at * (self.width - LEFT - RIGHT)
         for k, (name, kind, style) in enumerate(self._legend):
             y = TOP + 16 + 17 * k
             mark = (
-                f'<path class="line {style}" d="M{left + 12:.0f} {y - 4}h18"/>'
+                f'<path class="line {style}" d="M{x + 12:.0f} {y - 4}h18"/>'
                 if kind == "line"
-                else f'<g class="dots {style}"><circle cx="{left + 21:.0f}" cy="{y - 4}" r="3"/></g>'
+                else f'<g class="dots {style}"><circle cx="{x + 21:.0f}" cy="{y - 4}" r="3"/></g>'
             )
-            parts.append(f'{mark}<text class="key" x="{left + 37:.0f}" y="{y}">{escape(name)}</text>')
+            parts.append(f'{mark}<text class="key" x="{x + 37:.0f}" y="{y}">{escape(name)}</text>')
         return "".join(parts)

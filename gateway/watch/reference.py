@@ -35,7 +35,7 @@ _STILL_V: Final = 0.02
 
 @dataclass(slots=True)
 class WatchReference:
-    """plant: without noise. is_settled: what the lines add is known."""
+    """What windows are compared with. plant: without noise. is_settled: what the lines add is known."""
 
     plant: Plant
     is_settled: bool = False
@@ -62,19 +62,20 @@ class WatchReference:
         octave = _octave(window.excitation_v)
         self.floors_n[octave] = max(rms_n, self.floors_n.get(octave, 0.0))
 
-    def take_line_delays(self, found: Diagnosis) -> None:
+    def take_line_delays(self, diagnosis: Diagnosis) -> None:
         """Take what the lines add out of the first judged window, as far as it is of their size."""
         self.is_settled = True
         for path, most in LINES.items():
             section, name = path.split(".")
-            value = getattr(getattr(found.plant, section), name)
+            value = getattr(getattr(diagnosis.plant, section), name)
             if abs(value - getattr(getattr(self.plant, section), name)) <= most:
                 self.plant = with_value(self.plant, section, name, value)
 
 
 def rms_of(measurement: Measurement, plant: Plant) -> float:
-    """Measured minus replayed over the judged rows, N, without its mean and with the start that fits best: a tare is no
-    difference, and neither is what friction remembers from before the window."""
+    """Return the RMS of measured minus replayed over the judged rows, N, without its mean and with the start that fits
+    best: a tare is no difference, and neither is what friction remembers from before the window.
+    """
     bench = bench_of([measurement])
     return bench.rms_n(fit_initial_strains(bench, plant).residual_n)
 

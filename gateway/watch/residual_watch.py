@@ -33,7 +33,9 @@ _TOLERANCE_SHARE: Final = 0.25
 
 @dataclass(frozen=True, slots=True)
 class WatchSettings:
-    """window_s, every_s: of the rig file. tolerance_n: the rig's band, of which a quarter matters."""
+    """How often and how strictly the watch looks. window_s, every_s: of the rig file. tolerance_n: the rig's band, of which
+    a quarter matters.
+    """
 
     window_s: float
     every_s: float
@@ -41,7 +43,9 @@ class WatchSettings:
 
 
 class Watch:
-    """clock: monotonic seconds, for the pauses between searches."""
+    """Looks at the newest window, and publishes what has changed. clock: monotonic seconds, for the pauses between
+    searches.
+    """
 
     def __init__(
         self,
@@ -107,10 +111,10 @@ class Watch:
 
     def _judge(self, window: Window) -> None:
         self.counters["judged"] += 1
-        found = self._diagnose([window.measurement], self._reference.plant)
+        diagnosis = self._diagnose([window.measurement], self._reference.plant)
         if not self._reference.is_settled:
-            self._reference.take_line_delays(found)
-        finding = judge_window(window, found, self._reference, _TOLERANCE_SHARE * self._setup.tolerance_n)
+            self._reference.take_line_delays(diagnosis)
+        finding = judge_window(window, diagnosis, self._reference, _TOLERANCE_SHARE * self._setup.tolerance_n)
         if finding.cause is ResidualCause.NONE:
             self._reference.raise_floor(window, self._reference.rms_n(window))
             self._healthy_s = window.end_s

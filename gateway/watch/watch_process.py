@@ -34,7 +34,7 @@ _FIRST_AMONG_THE_KILLED: Final = "900"
 
 
 def yield_to_others() -> None:
-    """Behind everybody else in processor time and memory; one thread for the mathematics."""
+    """Give way to everybody else in processor time and memory; use one thread for the mathematics."""
     priority.lower_priority()
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))

@@ -50,31 +50,31 @@ def window_of(data: bytes, columns: tuple[str, ...], window_s: float) -> Window 
     first = _first_replayed_row(rows["command_v"], time_s, window_s)
     rows = {name: values[first:].copy() for name, values in rows.items()}
     window = rows["time_s"] >= max(time_s[-1] - window_s, rows["time_s"][0] + _SETTLED_S)
-    judged = window & ~_faulty(rows)
-    if judged.sum() < _ALMOST * window.sum():
+    usable = window & ~_faulty(rows)
+    if usable.sum() < _ALMOST * window.sum():
         return "a fault stood"
-    command_v = rows["command_v"][judged]
+    command_v = rows["command_v"][usable]
     if not np.any(command_v > _OFF_V):
         return "nothing was commanded"
-    measurement = _measurement(rows, judged)
+    measurement = _measurement(rows, usable)
     return (
         measurement if isinstance(measurement, str) else Window(measurement, float(time_s[-1]), *_excitation(command_v))
     )
 
 
-def _measurement(rows: dict[str, Floats], judged: Flags) -> Measurement | str:
+def _measurement(rows: dict[str, Floats], usable: Flags) -> Measurement | str:
     """As a recording of the run would be read, judged where it may be."""
     time_s = rows["time_s"]
     marked = rows | {
         "time_s": time_s - time_s[0],
         "pressure_kpa": np.full(time_s.size, np.nan),
-        "force_n": np.where(judged, rows["force_n"], np.nan),
+        "force_n": np.where(usable, rows["force_n"], np.nan),
     }
     try:
-        found = measurement_of(Recording(Path("window"), {}, marked, time_s.size, False))
+        measurement = measurement_of(Recording(Path("window"), {}, marked, time_s.size, False))
     except RecordingError as error:
         return str(error)
-    return replace(found, force_n=np.where(found.usable, found.force_n, 0.0))
+    return replace(measurement, force_n=np.where(measurement.usable, measurement.force_n, 0.0))
 
 
 def _after_last_gap(rows: dict[str, Floats]) -> dict[str, Floats]:
@@ -90,13 +90,13 @@ def _first_replayed_row(command_v: Floats, time_s: Floats, window_s: float) -> i
     begin_s = time_s[-1] - window_s
     stop = max(1, int(np.searchsorted(time_s, begin_s - _SETTLED_S)))
     start = int(np.searchsorted(time_s, begin_s - LEAD_S))
-    held = max(1, int(np.searchsorted(time_s, time_s[0] + _SETTLED_S)))
+    rows_held = max(1, int(np.searchsorted(time_s, time_s[0] + _SETTLED_S)))
     resting = np.flatnonzero(
-        _moving_sum(command_v[start:stop] <= _OFF_V, held) >= held
+        _moving_sum(command_v[start:stop] <= _OFF_V, rows_held) >= rows_held
     )  # a dip of the command is no rest
     if resting.size:
-        return start + held - 1 + int(resting[-1])
-    return start + int(np.argmax(_moving_sum(command_v[start : stop + held], held)[: stop - start]))
+        return start + rows_held - 1 + int(resting[-1])
+    return start + int(np.argmax(_moving_sum(command_v[start : stop + rows_held], rows_held)[: stop - start]))
 
 
 def _moving_sum(values: Floats | Flags, rows: int) -> Floats:
@@ -113,6 +113,6 @@ def _faulty(rows: dict[str, Floats]) -> Flags:
 
 
 def _excitation(command_v: Floats) -> tuple[float, int]:
-    moved = np.sign(np.diff(command_v))
-    moved = moved[moved != 0.0]
-    return float(np.std(command_v)), int(np.count_nonzero(np.diff(moved)))
+    signs = np.sign(np.diff(command_v))
+    signs = signs[signs != 0.0]
+    return float(np.std(command_v)), int(np.count_nonzero(np.diff(signs)))

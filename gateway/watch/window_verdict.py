@@ -45,16 +45,16 @@ class PlantChange:
     force_n: float = 0.0
 
 
-def judge_window(window: Window, found: Diagnosis, reference: WatchReference, least_n: float) -> WindowVerdict:
+def judge_window(window: Window, diagnosis: Diagnosis, reference: WatchReference, least_n: float) -> WindowVerdict:
     """Return the strongest difference of this window from the reference; least_n: what a difference must do to the force, N."""
     excess_n = excess_of(window, reference)
-    changes = [change for change in weigh_changes(window, found, reference.plant) if change.force_n >= least_n]
+    changes = [change for change in weigh_changes(window, diagnosis, reference.plant) if change.force_n >= least_n]
     if changes and excess_n >= least_n:
         best = max(changes, key=lambda change: change.force_n)
-        sentence = _sentence(best, found.plant, reference.plant)
+        sentence = _sentence(best, diagnosis.plant, reference.plant)
         return WindowVerdict(ResidualCause.of_effect(best.name), sentence, window.excitation_v, best.others)
     if excess_n >= _WITHOUT_A_NAME * least_n:
-        sentence = f"{_DIFFERS} {excess_n:.2f} N (rms): {_describe_leftover(found)}"
+        sentence = f"{_DIFFERS} {excess_n:.2f} N (rms): {_describe_leftover(diagnosis)}"
         return WindowVerdict(ResidualCause.UNKNOWN, sentence, window.excitation_v)
     return WindowVerdict(excitation_v=window.excitation_v)
 
@@ -67,26 +67,26 @@ def excess_of(window: Window, reference: WatchReference) -> float:
     return sqrt(max(rms_n**2 - max(noise_n, usual_n) ** 2, 0.0))
 
 
-def _describe_leftover(found: Diagnosis) -> str:
+def _describe_leftover(diagnosis: Diagnosis) -> str:
     """Return what no effect explains, in the words of the screen."""
-    if found.suspects:
-        return found.suspects[0].sentence
-    if not found.leftover:
+    if diagnosis.suspects:
+        return diagnosis.suspects[0].sentence
+    if not diagnosis.leftover:
         return "no cause of the catalogue explains it"
-    left = max(found.leftover, key=lambda each: each.share)
-    return f"{left.shape}, depending on {left.depends_on}"
+    largest = max(diagnosis.leftover, key=lambda each: each.share)
+    return f"{largest.shape}, depending on {largest.depends_on}"
 
 
-def weigh_changes(window: Window, found: Diagnosis, plant: Plant) -> list[PlantChange]:
+def weigh_changes(window: Window, diagnosis: Diagnosis, plant: Plant) -> list[PlantChange]:
     """Return every change that the diagnosis found, with its weight: no more than it saves in rows that its fit did not see."""
     changes = [PlantChange(name, (parameter,)) for name, parameter in BASE.items()]
-    for cause in found.causes:
+    for cause in diagnosis.causes:
         parameters = tuple((each.section, name, each.unit) for name, each in cause.parameters.items())
         changes.append(PlantChange(_plausible_name(cause.name, cause.group), parameters, cause.group))
-    undone = [_undo_change(found.plant, plant, change) for change in changes]
-    forces = residuals(window.measurement, [found.plant, *undone])
-    refit_n = sqrt(max(rms_of(window.measurement, plant) ** 2 - rms_of(window.measurement, found.plant) ** 2, 0.0))
-    most_n = [refit_n] * len(BASE) + [min(_gain_n(cause.gain), refit_n) for cause in found.causes]
+    undone = [_undo_change(diagnosis.plant, plant, change) for change in changes]
+    forces = residuals(window.measurement, [diagnosis.plant, *undone])
+    refit_n = sqrt(max(rms_of(window.measurement, plant) ** 2 - rms_of(window.measurement, diagnosis.plant) ** 2, 0.0))
+    most_n = [refit_n] * len(BASE) + [min(_gain_n(cause.gain), refit_n) for cause in diagnosis.causes]
     weights = np.minimum(np.std(forces[1:] - forces[0], axis=1), most_n)
     return [
         PlantChange(change.name, change.parameters, change.others, float(weight))
@@ -104,19 +104,19 @@ def _plausible_name(name: str, group: Sequence[str]) -> str:
     return others[0] if name in _OF_TWO_CLOCKS and others else name
 
 
-def _undo_change(found: Plant, plant: Plant, change: PlantChange) -> Plant:
+def _undo_change(plant_with: Plant, reference: Plant, change: PlantChange) -> Plant:
     for section, name, _ in change.parameters:
-        found = with_value(found, section, name, getattr(getattr(plant, section), name))
-    return found
+        plant_with = with_value(plant_with, section, name, getattr(getattr(reference, section), name))
+    return plant_with
 
 
 _DIFFERS: Final = "the force differs from the rig's plant by"
 
 
-def _sentence(change: PlantChange, found: Plant, plant: Plant) -> str:
+def _sentence(change: PlantChange, plant_now: Plant, plant: Plant) -> str:
     """`the force differs from the rig's plant by 0.85 N (rms): coulomb-friction, coulomb_n 1 -> 2.4 N`."""
     values = ", ".join(
-        f"{name} {getattr(getattr(plant, section), name):.4g} -> {getattr(getattr(found, section), name):.4g} {unit}"
+        f"{name} {getattr(getattr(plant, section), name):.4g} -> {getattr(getattr(plant_now, section), name):.4g} {unit}"
         for section, name, unit in change.parameters
     )
     others = [name for name in change.others if name != change.name]

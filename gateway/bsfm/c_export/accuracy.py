@@ -21,7 +21,9 @@ MARGIN = 4.0
 
 @dataclass(frozen=True, slots=True)
 class SelfTest:
-    """points: (V, N rising, N falling); reversals: (N commanded, V); errors as measured, tolerances as allowed."""
+    """What the generated C checks of itself. points: (V, N rising, N falling); reversals: (N commanded, V); errors as
+    measured, tolerances as allowed.
+    """
 
     points: tuple[tuple[float, float, float], ...]
     reversals: tuple[tuple[float, float], ...]
@@ -32,7 +34,7 @@ class SelfTest:
 
 
 def self_test_of(calibration: Calibration, tables: Tables) -> SelfTest:
-    """ValueError if float32 cannot follow this calibration."""
+    """Return the test points of a calibration with the errors of float32 on them. ValueError if float32 cannot follow it."""
     branches, single = calibration.model().branches, Float32Model(tables)
     grid = tuple(_point(branches, tables, i / GRID) for i in range(GRID + 1))
     reversals = tuple(_replay(Bsfm(branches, calibration.reversal), tables))
@@ -65,14 +67,14 @@ def _point(branches: Branches, tables: Tables, share: float) -> tuple[float, flo
 
 def _force_error_n(single: Float32Model, point: tuple[float, float, float]) -> float:
     voltage_v, rising_n, falling_n = point
-    found = single.rising_force(Float32(voltage_v))[0], single.falling_force(Float32(voltage_v))[0]
-    return max(abs(float(found[0]) - rising_n), abs(float(found[1]) - falling_n))
+    forces = single.rising_force(Float32(voltage_v))[0], single.falling_force(Float32(voltage_v))[0]
+    return max(abs(float(forces[0]) - rising_n), abs(float(forces[1]) - falling_n))
 
 
 def _voltage_error_v(single: Float32Model, point: tuple[float, float, float]) -> float:
     voltage_v, rising_n, falling_n = point
-    found = single.rising_voltage(Float32(rising_n))[0], single.falling_voltage(Float32(falling_n))[0]
-    return max(abs(float(found[0]) - voltage_v), abs(float(found[1]) - voltage_v))
+    voltages = single.rising_voltage(Float32(rising_n))[0], single.falling_voltage(Float32(falling_n))[0]
+    return max(abs(float(voltages[0]) - voltage_v), abs(float(voltages[1]) - voltage_v))
 
 
 def _reversal_error_v(single: Float32Model, reversals: tuple[tuple[float, float], ...]) -> float:
@@ -101,6 +103,6 @@ def _commands_n(tables: Tables) -> tuple[float, ...]:
 
 def _tolerance(error: float, size: float) -> float:
     """One digit, rounded up; four roundings of the largest number at least."""
-    wanted = max(MARGIN * error, size * 2.0**-22)
-    digit = 10.0 ** floor(log10(wanted))
-    return digit * (floor(wanted / digit) + 1)
+    allowance = max(MARGIN * error, size * 2.0**-22)
+    digit = 10.0 ** floor(log10(allowance))
+    return digit * (floor(allowance / digit) + 1)

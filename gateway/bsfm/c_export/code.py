@@ -65,9 +65,15 @@ def _comment_text(text: str) -> str:
 
 def _numbers(calibration: Calibration, tables: Tables) -> dict[str, str]:
     (low_n, high_n), (lowest_n, highest_n) = tables.shared_n, tables.reached_n
-    shown = {"x0": tables.x0_v, "x1": tables.x1_v, "force_min": low_n, "force_max": high_n, "span": tables.blend_span_n}
+    figures = {
+        "x0": tables.x0_v,
+        "x1": tables.x1_v,
+        "force_min": low_n,
+        "force_max": high_n,
+        "span": tables.blend_span_n,
+    }
     exact = {
-        **shown,
+        **figures,
         "x_span": tables.x_span_v,
         "lowest": lowest_n,
         "highest": highest_n,
@@ -78,7 +84,7 @@ def _numbers(calibration: Calibration, tables: Tables) -> dict[str, str]:
         "order": str(tables.order),
         "rms": f"{calibration.rms_n:.3g}",
         "largest": f"{calibration.max_n:.3g}",
-        **{name: f"{value:g}" for name, value in shown.items()},
+        **{name: f"{value:g}" for name, value in figures.items()},
         **{f"{name}_f": _literal(value) for name, value in exact.items()},
     }
 
@@ -128,12 +134,12 @@ def _reversal(calibration: Calibration, tables: Tables, names: dict[str, str]) -
         if response
         else ""
     )
-    told = {"response_told": f" *   response     {lags}: not in this code\n" if lags else ""}
+    response_note = {"response_told": f" *   response     {lags}: not in this code\n" if lags else ""}
     filled = {
         name: Template(_template(f"reversal_{policy}{end}")).substitute({**names, **own}).rstrip("\n") + last
         for name, end, last in (("reversal", ".c", "\n"), ("reversal_api", ".h", "\n"))
     }
-    return {**own, **told, **filled, "reversal_told": Template(own["reversal_told"]).substitute(names)}
+    return {**own, **response_note, **filled, "reversal_told": Template(own["reversal_told"]).substitute(names)}
 
 
 _BLEND: Final = {

@@ -164,10 +164,10 @@ class Float32Model:
         distance_v, stiffness = abs(stuck_v), half_v * self.stiffness
         travel_v = distance_v / (_ONE - stiffness)
         for radius, share, place in zip(self.radii, self.shares, state.memory, strict=True):
-            left = _ONE - way * place
-            if travel_v <= radius * left:
+            free = _ONE - way * place
+            if travel_v <= radius * free:
                 break
-            distance_v = distance_v + half_v * share * left
+            distance_v = distance_v + half_v * share * free
             stiffness = stiffness - half_v * share / radius
             travel_v = distance_v / (_ONE - stiffness)
         return way * travel_v

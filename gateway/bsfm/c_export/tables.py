@@ -67,13 +67,15 @@ def round_to_float32(value: float) -> float:
 
 
 def tables_of(calibration: Calibration) -> Tables:
-    """ValueError with a sentence if this is no model, or none that float32 can carry."""
+    """Return a calibration's numbers as float32. ValueError with a sentence if this is no model, or none that float32 can
+    carry.
+    """
     calibration.model()
     _check_range("voltage", "V", (calibration.x0_v, calibration.x1_v), VOLTAGE_LIMIT_V)
     if calibration.blend_span_n > FORCE_LIMIT_N:
         raise ValueError(f"blend span {calibration.blend_span_n:g} N: at most {FORCE_LIMIT_N:g} N is allowed in C")
     x0_v, x1_v = round_to_float32(calibration.x0_v), round_to_float32(calibration.x1_v)
-    found = Tables(
+    tables = Tables(
         order=calibration.order,
         x0_v=x0_v,
         x1_v=x1_v,
@@ -84,10 +86,10 @@ def tables_of(calibration: Calibration) -> Tables:
         radii_v=tuple(map(round_to_float32, calibration.slip_radii_v)),
         shares=tuple(map(round_to_float32, calibration.slip_shares)),
     )
-    low_n, high_n = found.shared_n
+    low_n, high_n = tables.shared_n
     if low_n >= high_n:
         raise ValueError("the branches share no force: one begins where the other ends")
-    return replace(found, stiffness_per_v=_stiffness_per_v(found)) if found.radii_v else found
+    return replace(tables, stiffness_per_v=_stiffness_per_v(tables)) if tables.radii_v else tables
 
 
 def _stiffness_per_v(tables: Tables) -> float:

@@ -45,7 +45,7 @@ def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
 
 
 def choose_span(
-    branches: Branches, voltage_v: Floats, force_n: Floats, seen: NDArray[np.bool_] | None = None
+    branches: Branches, voltage_v: Floats, force_n: Floats, mask: NDArray[np.bool_] | None = None
 ) -> SpanChoice | None:
     """Return the span with the smallest error on the walk, or on those of its points that are seen; None where it is too
     short."""
@@ -54,7 +54,7 @@ def choose_span(
     model = Bsfm(branches, LinearBlend(0.0))
     low_n, high_n = model.force_range_n
     spans_n = np.round((high_n - low_n) * LARGEST_SHARE * np.arange(1, SPANS + 1) / SPANS, 2)
-    counts = np.ones(len(force_n), bool) if seen is None else seen
+    counts = np.ones(len(force_n), bool) if mask is None else mask
     errors = [command_error_n(_with(model, span_n), voltage_v, force_n)[counts[1:]] for span_n in spans_n.tolist()]
     best = min(range(SPANS), key=lambda k: float(np.mean(errors[k] ** 2)))
     switched = command_error_n(model, voltage_v, force_n)[counts[1:]]

@@ -28,7 +28,9 @@ HUBER_ROUNDS = 8  # of reweighting, each from the solution before
 
 @dataclass(frozen=True, slots=True)
 class FitSettings:
-    """outliers: keep all, reject by stair, or Huber's loss; voltage_range_v: of the curves, None for the ladder's own."""
+    """How branches are fitted. outliers: keep all, reject by stair, or Huber's loss; voltage_range_v: of the curves, None
+    for the ladder's own.
+    """
 
     outliers: Literal["keep", "reject", "huber"] = "keep"
     voltage_range_v: tuple[float, float] | None = None
@@ -55,17 +57,17 @@ def fit_orders(
     settings: FitSettings | None = None,
 ) -> list[FitResult]:
     """Fit several orders, ascending; each order starts from the one below it, too."""
-    chosen = settings or FitSettings()
-    used = ladder.part(inlier_mask(ladder)) if chosen.outliers == "reject" else ladder
+    fit_settings = settings or FitSettings()
+    used = ladder.part(inlier_mask(ladder)) if fit_settings.outliers == "reject" else ladder
     results: list[FitResult] = []
     lower: Floats | None = None
     for order in sorted(orders):
         form = ModelForm(ModelName(model), order, Ties(ties))
-        solution, weight = solve_robustly(used, form, chosen, lower)
+        solution, weight = solve_robustly(used, form, fit_settings, lower)
         lower = solution.log_weights
-        result = result_of(used, form, branches_of(solution, *voltage_range(used, chosen)), lower, chosen)
+        result = result_of(used, form, branches_of(solution, *voltage_range(used, fit_settings)), lower, fit_settings)
         rows, residual = curve_rows(used, form), residual_n(used, result.branches)
-        covariance = estimate_covariance(solution, rows, residual, weight, chosen.effort.log_weight_max)
+        covariance = estimate_covariance(solution, rows, residual, weight, fit_settings.effort.log_weight_max)
         results.append(replace(result, covariance=covariance, rejected=len(ladder) - len(used)))
     return results
 

@@ -44,8 +44,11 @@ class FitRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation:
-    """scores: by model, then order; chosen: one of them, or a constrained fit; model: what is to be activated, whose branches
-    a joint fit with slip stops has moved; reversal: None where the span is assumed."""
+    """All fits of a ladder, and the model that is to be activated.
+
+    scores: by model, then order; chosen: one of them, or a constrained fit; model: what is to be activated, whose branches
+    a joint fit with slip stops has moved; reversal: None where the span is assumed.
+    """
 
     checked: CheckedLadder
     scores: tuple[Score, ...]
@@ -57,41 +60,41 @@ class Evaluation:
 
 
 def evaluate(checked: CheckedLadder, question: FitRequest) -> Evaluation:
-    """LadderError where nothing usable can be fitted."""
-    ladder, said = _with_groups(checked.ladder)
+    """Fit every model and order, choose one, and choose how it reverses. LadderError where nothing usable can be fitted."""
+    ladder, notes = _with_groups(checked.ladder)
     if not checked.closed:
         question = replace(question, ties=Ties.FREE)
-        said.append("the loop's top is cut off: each branch gets its own ends")
-    question = replace(question, orders=_possible(ladder, question.orders, said))
+        notes.append("the loop's top is cut off: each branch gets its own ends")
+    question = replace(question, orders=_possible(ladder, question.orders, notes))
     settings = _settings(ladder, question)
     scores = score_orders(ladder, question.models, question.orders, question.ties, settings)
     chosen = choose(scores)
     if _is_poor(chosen, scores):
-        chosen = _fit_constrained(ladder, question, settings, chosen, said)
+        chosen = _fit_constrained(ladder, question, settings, chosen, notes)
     reversal = choose_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)
-    span_n = reversal.span.span_n if reversal else _assume_span(chosen, question, said)
+    span_n = reversal.span.span_n if reversal else _assume_span(chosen, question, notes)
     model = reversal.model if reversal else chosen.result.bsfm(span_n)
     order = model.branches.rising.order
     if order != chosen.result.order:
-        said.append(
+        notes.append(
             f"with the slip stops the branches are fitted anew, to the minor loops as well: of order {order}, which the model "
             "keeps; the table above is of the staircase alone"
         )
-    return Evaluation(checked, tuple(scores), chosen, model, span_n, reversal, (*checked.notes, *said))
+    return Evaluation(checked, tuple(scores), chosen, model, span_n, reversal, (*checked.notes, *notes))
 
 
 def _with_groups(ladder: Ladder) -> tuple[Ladder, list[str]]:
     """Groups that can be left out one at a time."""
     if len(ladder.groups) >= 2:
         return ladder, []
-    said = (
+    note = (
         f"one group only: every {FOLDS}th stair is held out in its place, which flatters the held-out error; repeat the "
         "ladder for an honest one"
     )
-    return replace(ladder, group=np.arange(len(ladder)) % FOLDS), [said]
+    return replace(ladder, group=np.arange(len(ladder)) % FOLDS), [note]
 
 
-def _possible(ladder: Ladder, orders: Sequence[int], said: list[str]) -> tuple[int, ...]:
+def _possible(ladder: Ladder, orders: Sequence[int], notes: list[str]) -> tuple[int, ...]:
     """Orders that the fewest stairs of one branch in any rest can carry with some to spare: the groups visit the same
     voltages, so leaving one out does not show what a curve does between the stairs."""
     rests = [ladder.part(ladder.group != group) for group in ladder.groups]
@@ -102,7 +105,7 @@ def _possible(ladder: Ladder, orders: Sequence[int], said: list[str]) -> tuple[i
             LadderFlaw.TOO_SHORT, f"{stairs} stairs on a branch carry no order of {', '.join(map(str, orders))}"
         )
     if len(possible) < len(orders):
-        said.append(f"{stairs} stairs on a branch: orders above {max(possible)} are not tried")
+        notes.append(f"{stairs} stairs on a branch: orders above {max(possible)} are not tried")
     return possible
 
 
@@ -123,24 +126,24 @@ def _may_drive(score: Score) -> bool:
 
 
 def _fit_constrained(
-    ladder: Ladder, question: FitRequest, settings: FitSettings, free: Score, said: list[str]
+    ladder: Ladder, question: FitRequest, settings: FitSettings, free: Score, notes: list[str]
 ) -> Score:
     """The best BSFM that is held to what may drive a plant, where it beats the best free optimum that may."""
-    found = []
+    results = []
     for order in question.orders[:3]:
         try:
-            found.append(fit_usable(ladder, ModelName.BSFM, order, question.ties, settings))
+            results.append(fit_usable(ladder, ModelName.BSFM, order, question.ties, settings))
         except ValueError:
             continue
-    smallest_n = min((result.rms_n for result in found), default=0.0)
-    best = next((result for result in found if result.rms_n <= NEAR * smallest_n), None)
+    smallest_n = min((result.rms_n for result in results), default=0.0)
+    best = next((result for result in results if result.rms_n <= NEAR * smallest_n), None)
     if best is None and not _may_drive(free):
         raise LadderError(
             LadderFlaw.NO_FIT, "no fit of any model and order may drive a plant: see the verdicts in the table"
         )
     if best is None or (_may_drive(free) and best.rms_n >= POOR_SHARE * free.heldout_rms_n):
         return free
-    said.append(
+    notes.append(
         f"the better free optima may not drive a plant (see the verdicts); chosen is the best BSFM of order {best.order} that "
         f"increases by {settings.slope_floor_n_per_v:g} N/V or more everywhere and does not cross: {best.rms_n:.3f} N RMS"
     )
@@ -155,13 +158,13 @@ def _to_move(chosen: Score, scores: Sequence[Score]) -> Branches:
     return min(lower, key=lambda score: score.heldout_n2).result.branches
 
 
-def _assume_span(chosen: Score, question: FitRequest, said: list[str]) -> float:
+def _assume_span(chosen: Score, question: FitRequest, notes: list[str]) -> float:
     low_n, high_n = chosen.result.bsfm(0.0).force_range_n
     if question.reference_span_n is not None:
-        said.append(
+        notes.append(
             f"no minor-loop part: the blend span of {question.reference_span_n:g} N is that of the active calibration"
         )
         return question.reference_span_n
     span_n = round(DEFAULT_SPAN_SHARE * (high_n - low_n), 1)
-    said.append(f"no minor-loop part: a blend span of {span_n:g} N is assumed, not identified")
+    notes.append(f"no minor-loop part: a blend span of {span_n:g} N is assumed, not identified")
     return span_n

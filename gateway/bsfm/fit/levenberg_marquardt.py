@@ -82,17 +82,17 @@ def polish(problem: ProjectedProblem, starts: Floats, effort: Effort) -> FitLane
     return best
 
 
-def minima(problem: ProjectedProblem, known: Floats, effort: Effort, count: int = 3) -> Floats:
-    """Different minima (count or fewer, d), lowest first, from starts known (k, d) and from the spread ones."""
+def minima(problem: ProjectedProblem, given: Floats, effort: Effort, count: int = 3) -> Floats:
+    """Return different minima, (count or fewer, d), lowest first, from given starts (k, d) and from the spread ones."""
     curves = len(problem.curves)
     seeds = _spread_starts(problem.unknowns, curves * effort.screened, effort.log_weight_max)
-    chosen = lowest(problem.evaluate(seeds), curves * effort.descending).theta
+    best_seeds = lowest(problem.evaluate(seeds), curves * effort.descending).theta
     flat = np.zeros((1, problem.unknowns))
-    found = descend(problem, np.concatenate([flat, known, chosen]), effort.ridge_n2, effort, EXPLORING_STEPS)
-    found = lowest(found, len(found.cost))
-    new = np.ones(len(found.cost), dtype=bool)
-    new[1:] = np.diff(found.cost) > 1.0e-3 * found.cost[1:]
-    return found.theta[new][:count]
+    lanes = descend(problem, np.concatenate([flat, given, best_seeds]), effort.ridge_n2, effort, EXPLORING_STEPS)
+    lanes = lowest(lanes, len(lanes.cost))
+    new = np.ones(len(lanes.cost), dtype=bool)
+    new[1:] = np.diff(lanes.cost) > 1.0e-3 * lanes.cost[1:]
+    return lanes.theta[new][:count]
 
 
 def _spread_starts(unknowns: int, count: int, bound: float) -> Floats:
@@ -114,7 +114,7 @@ def lowest(lanes: FitLanes, count: int) -> FitLanes:
 def descend(
     problem: ProjectedProblem, starts: Floats, ridge: float, effort: Effort, steps: int = STEPS_MAX
 ) -> FitLanes:
-    """Down from each start to a local minimum of cost + ridge |theta|^2 within the box."""
+    """Descend from each start to a local minimum of cost + ridge |theta|^2 within the box."""
     bound = effort.log_weight_max
     at = problem.evaluate(np.clip(starts, -bound, bound))
     damping = np.full(len(starts), 1.0e-3)
@@ -125,9 +125,9 @@ def descend(
         better = after < before
         at = trial.where(better, at)
         damping = np.where(better, np.maximum(damping / 5.0, 1.0e-12), damping * 4.0)
-        done = (better & (before - after <= RELATIVE_GAIN * before)) | (damping > 1.0e8)
-        finished.append(at.pick(done))
-        at, damping = at.pick(~done), damping[~done]
+        is_done = (better & (before - after <= RELATIVE_GAIN * before)) | (damping > 1.0e8)
+        finished.append(at.pick(is_done))
+        at, damping = at.pick(~is_done), damping[~is_done]
         if not len(damping):
             break
     return _join_lanes([*finished, at])

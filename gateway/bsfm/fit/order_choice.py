@@ -28,8 +28,11 @@ CERTAIN: Final = 2.0  # standard errors of the difference: nobody prefers more c
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Score:
-    """heldout_rms_n: root of the mean over groups of the held-out mean square; mean square and its standard error in N^2;
-    groups_n2: mean square of each group, empty where none was held out."""
+    """One fit, and how it predicts what it has not seen.
+
+    heldout_rms_n: root of the mean over groups of the held-out mean square; mean square and its standard error in N^2;
+    groups_n2: mean square of each group, empty where none was held out.
+    """
 
     result: FitResult
     heldout_n2: float
@@ -38,10 +41,12 @@ class Score:
 
     @property
     def heldout_rms_n(self) -> float:
+        """Root of the held-out mean square, N."""
         return float(np.sqrt(self.heldout_n2))
 
     @property
     def coefficients(self) -> int:
+        """Number of free coefficients of the fit."""
         return self.result.form.coefficients
 
 
@@ -55,10 +60,10 @@ def score_orders(
     """Fit every model and order to all groups and to all but each. ValueError with less than two groups."""
     if len(ladder.groups) < 2:
         raise ValueError("leaving a group out needs at least two groups: repeat the ladder")
-    chosen, wanted = settings or FitSettings(), sorted(orders)
-    used = ladder.part(inlier_mask(ladder)) if chosen.outliers == "reject" else ladder
-    results = [result for model in models for result in fit_orders(ladder, model, wanted, ties, chosen)]
-    return [_score(used, result, chosen) for result in results]
+    fit_settings, ascending = settings or FitSettings(), sorted(orders)
+    used = ladder.part(inlier_mask(ladder)) if fit_settings.outliers == "reject" else ladder
+    results = [result for model in models for result in fit_orders(ladder, model, ascending, ties, fit_settings)]
+    return [_score(used, result, fit_settings) for result in results]
 
 
 def choose(scores: Sequence[Score], usable_only: bool = True) -> Score:

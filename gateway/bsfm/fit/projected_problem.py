@@ -35,7 +35,9 @@ def merge_samples(t: Floats, force_n: Floats, weight: Floats) -> Samples:
 
 
 def bernstein(t: Floats, order: int) -> Floats:
-    """B_i(t), shape (m, order + 1), by the recurrence of degrees: sums of positive terms only."""
+    """Return the Bernstein polynomials B_i(t), shape (m, order + 1), by the recurrence of degrees: sums of positive terms
+    only.
+    """
     basis = np.ones((len(t), 1))
     for _ in range(order):
         higher = np.zeros((len(t), basis.shape[1] + 1))
@@ -61,11 +63,11 @@ class FitLanes:
         """Return the chosen lanes."""
         return FitLanes(*(getattr(self, field.name)[lanes] for field in fields(self)))
 
-    def where(self, chosen: NDArray[np.bool_], other: "FitLanes") -> "FitLanes":
-        """Lane by lane: this one where chosen, else the other's."""
+    def where(self, mask: NDArray[np.bool_], other: "FitLanes") -> "FitLanes":
+        """Pick lane by lane: this one where the mask is true, else the other's."""
         names = [field.name for field in fields(self)]
         pairs = ((getattr(self, name), getattr(other, name)) for name in names)
-        return FitLanes(*(np.where(chosen.reshape(-1, *(1,) * (a.ndim - 1)), a, b) for a, b in pairs))
+        return FitLanes(*(np.where(mask.reshape(-1, *(1,) * (a.ndim - 1)), a, b) for a, b in pairs))
 
 
 class ProjectedProblem:
@@ -84,6 +86,7 @@ class ProjectedProblem:
 
     @property
     def unknowns(self) -> int:
+        """Number d of log weights, over all curves."""
         return len(self.curves) * self.order
 
     def weights(self, theta: Floats) -> Floats:
@@ -102,7 +105,7 @@ class ProjectedProblem:
         return shares, design
 
     def evaluate(self, theta: Floats) -> FitLanes:
-        """Best handles for each lane's weights, by QR of the weighted design with columns of equal length."""
+        """Solve for the best handles of each lane's weights, by QR of the weighted design with columns of equal length."""
         shares, design = self.designs(theta)
         lengths = np.sqrt((design * design).sum(axis=1))
         q, r = np.linalg.qr(design / lengths[:, None, :])
@@ -118,7 +121,9 @@ class ProjectedProblem:
         return np.asarray(at.q @ inner - direct)
 
     def at_fixed(self, theta: Floats, handles: Floats) -> tuple[Floats, Floats]:
-        """Residual (m,) and its Jacobian (m, d + p) with respect to log weights (d,) and handles (p,), both free."""
+        """Return the residual (m,) and its Jacobian (m, d + p) with respect to log weights (d,) and handles (p,), both
+        free.
+        """
         shares, design = self.designs(theta[None])
         slopes = self.sensitivity(shares, handles[None])[0]
         return self._force - design[0] @ handles, -np.concatenate([slopes, design[0]], axis=1)

@@ -26,15 +26,19 @@ class ModelName(StrEnum):
 
     @property
     def rational(self) -> bool:
+        """True where its curves have weights."""
         return self in (ModelName.BFM, ModelName.BSFM)
 
     @property
     def per_direction(self) -> bool:
+        """True where each direction has a curve of its own."""
         return self in (ModelName.PSFM, ModelName.BSFM)
 
 
 class Ties(StrEnum):
-    """tied: the continuous form, both branches share their end handles. free: each has its own."""
+    """How two branches meet at their ends. tied: the continuous form, both branches share their end handles. free: each has
+    its own.
+    """
 
     TIED = "tied"
     FREE = "free"
@@ -50,10 +54,12 @@ class ModelForm:
 
     @property
     def curves(self) -> int:
+        """Number of curves: 2 with one per direction, else 1."""
         return 2 if self.model.per_direction else 1
 
     @property
     def tied(self) -> bool:
+        """True where two curves share their end handles."""
         return self.model.per_direction and self.ties is Ties.TIED
 
     @property
@@ -93,20 +99,21 @@ class Verdicts:
 
     @property
     def usable(self) -> bool:
+        """True where all exact tests have passed."""
         return self.rising_monotone and self.falling_monotone and self.crossing is None and self.steep
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What speaks against it, if anything."""
-        said = []
+        """Sentences that speak against it, if anything does."""
+        sentences = []
         for name, monotone in (("rising", self.rising_monotone), ("falling", self.falling_monotone)):
             if not monotone:
-                said.append(f"the {name} branch is not increasing")
+                sentences.append(f"the {name} branch is not increasing")
         if self.crossing is not None:
-            said.append(str(self.crossing))
+            sentences.append(str(self.crossing))
         if not self.steep:
-            said.append(f"the slope falls below {self.slope_floor_n_per_v:g} N/V")
-        return tuple(said)
+            sentences.append(f"the slope falls below {self.slope_floor_n_per_v:g} N/V")
+        return tuple(sentences)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,22 +138,27 @@ class FitResult:
 
     @property
     def model(self) -> ModelName:
+        """Name of the model."""
         return self.form.model
 
     @property
     def order(self) -> int:
+        """Order of its curves."""
         return self.form.order
 
     @property
     def rms_n(self) -> float:
+        """RMS of all residuals, N."""
         return self.overall.rms_n
 
     @property
     def max_n(self) -> float:
+        """Largest residual, N."""
         return self.overall.max_n
 
     @property
     def count(self) -> int:
+        """Number of samples that were fitted."""
         return self.overall.count
 
     def bsfm(self, blend_span_n: float) -> Bsfm:

@@ -27,11 +27,11 @@ class Solution:
 
     def curves(self, x0_v: float, x1_v: float) -> list[RationalBezier]:
         """Return one curve per direction, or the only one, over x0_v .. x1_v."""
-        found = []
+        curves = []
         for problem, at in zip(self.problems, self.lanes, strict=True):
             for columns, weights in zip(problem.columns, problem.weights(at.theta)[0], strict=True):
-                found.append(RationalBezier(x0_v, x1_v, at.handles[0][columns].tolist(), weights.tolist()))
-        return found
+                curves.append(RationalBezier(x0_v, x1_v, at.handles[0][columns].tolist(), weights.tolist()))
+        return curves
 
 
 def explore_starts(samples: tuple[Samples, ...], form: ModelForm, lower: Floats | None, effort: Effort) -> Solution:
@@ -48,10 +48,10 @@ def explore_starts(samples: tuple[Samples, ...], form: ModelForm, lower: Floats 
     ]
     if not form.tied:
         return _solution(samples, form, single, effort)
-    known = pairs_of(*single)
+    starts = pairs_of(*single)
     if raised_lower is not None:
-        known = np.concatenate([known, raised_lower.reshape(1, -1)])
-    return _solution(samples, form, [minima(ProjectedProblem(coarse, form.order, True), known, effort)], effort)
+        starts = np.concatenate([starts, raised_lower.reshape(1, -1)])
+    return _solution(samples, form, [minima(ProjectedProblem(coarse, form.order, True), starts, effort)], effort)
 
 
 def refine_solution(samples: tuple[Samples, ...], form: ModelForm, log_weights: Floats, effort: Effort) -> Solution:

@@ -91,16 +91,16 @@ def fit_usable(
 
     Residuals are honest: those of the curves returned. ValueError with the free fit's verdicts if nothing usable is found.
     """
-    chosen = settings or FitSettings()
-    free = fit(ladder, model, order, ties, chosen)
+    fit_settings = settings or FitSettings()
+    free = fit(ladder, model, order, ties, fit_settings)
     if free.verdicts.usable and is_moderate(free.branches):
         return free
-    used = ladder.part(inlier_mask(ladder)) if chosen.outliers == "reject" else ladder
+    used = ladder.part(inlier_mask(ladder)) if fit_settings.outliers == "reject" else ladder
     weight = own_weight(used)
-    if chosen.outliers == "huber":
+    if fit_settings.outliers == "huber":
         weight = weight * huber_weight(residual_n(used, free.branches))
-    problem = ProjectedProblem(split_samples(used, weight, free.form, chosen), order, free.form.tied)
-    task = _Task(problem, used, free, chosen)
+    problem = ProjectedProblem(split_samples(used, weight, free.form, fit_settings), order, free.form.tied)
+    task = _Task(problem, used, free, fit_settings)
     for margin in MARGINS:
         results = [_fit_constrained(task, start, margin) for start in _starts(problem, free)]
         usable = [result for result in results if result.verdicts.usable and is_moderate(result.branches)]

@@ -69,20 +69,20 @@ def check_ladder(
     columns: Mapping[str, Floats], facts: Mapping[str, object], expected: Expectation = NOTHING_KNOWN
 ) -> CheckedLadder:
     """Return the ladder in a table of the recording contract. LadderError with one sentence if it must not be fitted."""
-    said = _check_rig(facts, expected)
+    notes = _check_rig(facts, expected)
     rows = usable_rows(columns, facts, expected.force_unit)
     labels = Labels.of(columns)
     labels = labels.part(rows.row) if labels else None
     points = _points(rows, labels)
     slope_n_per_v = _slope(points)
-    said += [*rows.notes, *points.notes]
+    notes += [*rows.notes, *points.notes]
     _check_moves(points)
     _check_sign(points, slope_n_per_v)
     walk = split_by_labels(points, labels, by_check=_is_only_walk(facts)) if labels else split_by_sweeps(points)
     ladder = _whole_groups(walk)
-    said += [*walk.left_out, *_check_scale(rows, slope_n_per_v, expected)]
+    notes += [*walk.left_out, *_check_scale(rows, slope_n_per_v, expected)]
     ladder, clipped = _without_saturated(ladder, expected.saturation_n)
-    said += [*clipped, *_warn_of_unsettled(points)]
+    notes += [*clipped, *_warn_of_unsettled(points)]
     _check_increasing(ladder)
     return CheckedLadder(
         ladder,
@@ -90,7 +90,7 @@ def check_ladder(
         walk.minor_n,
         points.noise_n,
         slope_n_per_v,
-        tuple(said),
+        tuple(notes),
         not clipped,
         _is_only_walk(facts),
     )
@@ -100,8 +100,8 @@ def join_ladders(parts: Sequence[CheckedLadder]) -> CheckedLadder:
     """Return the groups of several recordings as one ladder; walk, noise and slope are the last one's."""
     ladders = [part.ladder for part in parts if not part.only_walk]
     if not ladders:
-        said = "only the reversal part of a resumed run: the recordings with its groups must lie beside it"
-        raise LadderError(LadderFlaw.CUT_SHORT, said)
+        sentence = "only the reversal part of a resumed run: the recordings with its groups must lie beside it"
+        raise LadderError(LadderFlaw.CUT_SHORT, sentence)
     if len(parts) == 1:
         return parts[0]
     firsts = np.cumsum([0, *(int(ladder.group.max()) + 1 for ladder in ladders[:-1])])
@@ -225,17 +225,17 @@ def _without_saturated(ladder: Ladder, saturation_n: float | None) -> tuple[Ladd
     if len(apart) < FEWEST_CLIPPED:
         return ladder, []
     clipped = ladder.voltage_v >= apart[0] - 1.0e-9  # the falling branch above that voltage starts from the clipped one
-    said = (
+    note = (
         f"force stands at {top_n:.2f} N on {len(apart)} stairs from {apart[0]:.2f} V up: saturated load cell, or no more "
         "supply pressure"
     )
-    left = ladder.part(~clipped)
-    ways = [int((left.direction == way).sum()) for way in (RISING, FALLING)]
+    usable = ladder.part(~clipped)
+    ways = [int((usable.direction == way).sum()) for way in (RISING, FALLING)]
     if clipped.mean() > 0.5 or min(ways) < 6:
         raise LadderError(
-            LadderFlaw.SATURATED, f"{said}: too little is left to fit; lower --v-max or use a larger cell"
+            LadderFlaw.SATURATED, f"{note}: too little is left to fit; lower --v-max or use a larger cell"
         )
-    return left, [f"{said}: these stairs are left out, the calibration ends at {left.voltage_v.max():.2f} V"]
+    return usable, [f"{note}: these stairs are left out, the calibration ends at {usable.voltage_v.max():.2f} V"]
 
 
 def _warn_of_unsettled(points: Points) -> list[str]:
@@ -245,11 +245,11 @@ def _warn_of_unsettled(points: Points) -> list[str]:
     moving = np.abs(points.drift_n) > limit_n
     if moving.mean() < UNSETTLED_SHARE:
         return []
-    said = (
+    warning = (
         f"on {int(moving.sum())} of {len(points)} stairs the force still moved by more than {limit_n:.1f} N at the end: "
         "dwells too short, the branches look further apart than they are"
     )
-    return [said]
+    return [warning]
 
 
 def _check_increasing(ladder: Ladder) -> None:

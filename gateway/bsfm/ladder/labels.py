@@ -35,13 +35,13 @@ class Labels:
 
     @classmethod
     def of(cls, columns: Mapping[str, Floats]) -> "Labels | None":
-        """None where the table has none, or not on every row."""
+        """Return the labels of a table; None where it has none, or not on every row."""
         if not set(LABELS) <= set(columns):
             return None
-        found = [columns[name] for name in LABELS]
-        if not all(len(column) and np.isfinite(column).all() for column in found):
+        label_columns = [columns[name] for name in LABELS]
+        if not all(len(column) and np.isfinite(column).all() for column in label_columns):
             return None
-        return cls(*(column.astype(np.int64) for column in found))
+        return cls(*(column.astype(np.int64) for column in label_columns))
 
     def part(self, keep: NDArray[np.bool_] | Integers) -> "Labels":
         """Return the labels of the rows to keep."""
@@ -49,6 +49,7 @@ class Labels:
 
     @property
     def last_stair(self) -> int:
+        """Number of the newest stair."""
         return int(self.stair.max())
 
     def stairs_of(self, mask: NDArray[np.bool_]) -> Integers:
@@ -60,11 +61,13 @@ class Labels:
 
     @property
     def whole_groups(self) -> list[int]:
+        """Numbers of the groups of which no stair is missing."""
         groups = np.unique(self.group[self.group > NO_GROUP])
         return [int(group) for group in groups if len(self.stairs_of(self.group == group))]
 
     @property
     def cut_groups(self) -> list[int]:
+        """Numbers of the groups that were begun and not finished."""
         whole = self.whole_groups
         return [int(group) for group in np.unique(self.group[self.group > NO_GROUP]) if group not in whole]
 
@@ -81,7 +84,7 @@ class Labels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelSplit:
-    """ladder: whole groups, or the check's cycle where it is asked for; None where there are none."""
+    """What the labels show. ladder: whole groups, or the check's cycle where it is asked for; None where there are none."""
 
     ladder: Ladder | None
     minor_v: Floats
@@ -94,12 +97,12 @@ def split_by_labels(points: Points, labels: Labels, *, by_check: bool = False) -
     left."""
     at = {int(labels.stair[row]): k for k, row in enumerate(points.row.tolist())}  # the last point of a stair counts
     masks = [labels.phase == CHECK] if by_check else [labels.group == group for group in labels.whole_groups]
-    found = [[at[stair] for stair in labels.stairs_of(mask).tolist() if stair in at] for mask in masks]
+    groups = [[at[stair] for stair in labels.stairs_of(mask).tolist() if stair in at] for mask in masks]
     walk = [at[stair] for stair in labels.stairs_of(labels.phase == WALK).tolist() if stair in at]
     walk = (
         [*range(walk[0] - 1, walk[0]), *walk] if walk and walk[0] > 0 else walk
     )  # its first point says where it began
-    return LabelSplit(_ladder(points, found), points.voltage_v[walk], points.force_n[walk], _describe_left_out(labels))
+    return LabelSplit(_ladder(points, groups), points.voltage_v[walk], points.force_n[walk], _describe_left_out(labels))
 
 
 def _ladder(points: Points, groups: list[list[int]]) -> Ladder | None:
@@ -119,9 +122,9 @@ def _directions(voltage_v: Floats) -> Integers:
 
 
 def _describe_left_out(labels: Labels) -> tuple[str, ...]:
-    said = [
+    notes = [
         f"group {group + 1} was cut after {len(np.unique(labels.stair[labels.group == group]))} stairs: left out"
         for group in labels.cut_groups
     ]
     begun = (labels.phase == WALK).any()
-    return (*said, *(["the reversal part was cut: left out"] if begun and not labels.has_walk else []))
+    return (*notes, *(["the reversal part was cut: left out"] if begun and not labels.has_walk else []))

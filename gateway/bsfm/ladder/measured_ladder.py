@@ -55,6 +55,7 @@ class Ladder:
 
     @property
     def groups(self) -> tuple[int, ...]:
+        """Numbers of the groups, ascending."""
         return tuple(int(group) for group in np.unique(self.group))
 
     def part(self, mask: NDArray[np.bool_]) -> "Ladder":
@@ -64,11 +65,11 @@ class Ladder:
 
 
 def _column(name: str, values: Any, kind: type[np.generic]) -> NDArray[Any]:
-    given = np.asarray(values)
-    if given.ndim != 1 or not np.all(np.isfinite(given)):
+    array = np.asarray(values)
+    if array.ndim != 1 or not np.all(np.isfinite(array)):
         raise ValueError(f"ladder {name}: one finite number per sample is needed")
-    column = given.astype(kind)
-    if not np.array_equal(column, given):
+    column = array.astype(kind)
+    if not np.array_equal(column, array):
         raise ValueError(f"ladder {name}: whole numbers are needed")
     column.flags.writeable = False
     return column

@@ -11,7 +11,9 @@ RISING, FALLING = 1, -1
 
 @dataclass(frozen=True, slots=True)
 class LadderPlan:
-    """Where to go, in order: voltages, the direction in which each is reached, and its group (one way up and down), from 0."""
+    """The stairs of a ladder in order: voltages, the direction in which each is reached, and its group (one way up and
+    down), from 0.
+    """
 
     voltage_v: tuple[float, ...]
     direction: tuple[int, ...]

@@ -43,7 +43,7 @@ class Rows:
 
 def usable_rows(columns: Mapping[str, Floats], facts: Mapping[str, object], force_unit: str | None = None) -> Rows:
     """Return the rows that can be used. force_unit: what the caller says the force is in. LadderError where there are none."""
-    force_name, factor, unit_known, said = _force_column(columns, facts, force_unit)
+    force_name, factor, unit_known, notes = _force_column(columns, facts, force_unit)
     missing = [name for name in ("time_s", "command_v") if name not in columns]
     if missing:
         raise LadderError(
@@ -65,7 +65,7 @@ def usable_rows(columns: Mapping[str, Floats], facts: Mapping[str, object], forc
         None if pressure is None else pressure[keep],
         np.flatnonzero(keep).astype(np.int64),
         unit_known,
-        (*said, *dropped),
+        (*notes, *dropped),
     )
     _check_roles(rows)
     return rows
@@ -94,8 +94,8 @@ def _force_column(
     if unit.lower() not in FORCE_UNITS:
         raise LadderError(LadderFlaw.UNIT, f"force unit {unit!r} is none of {', '.join(FORCE_UNITS)}")
     factor = FORCE_UNITS[unit.lower()]
-    said = [] if factor == 1.0 else [f"forces are in {unit} and were turned into newtons (1 {unit} = {factor:.5g} N)"]
-    return name, factor, True, said
+    notes = [] if factor == 1.0 else [f"forces are in {unit} and were turned into newtons (1 {unit} = {factor:.5g} N)"]
+    return name, factor, True, notes
 
 
 def _select_rows(
@@ -106,7 +106,7 @@ def _select_rows(
     latest = np.maximum.accumulate(np.where(finite, time_s, -np.inf))
     forward = np.append(True, time_s[1:] > latest[:-1])
     overloaded = columns["quality"] >= OVERLOADED if "quality" in columns else np.zeros(len(finite), dtype=bool)
-    said = []
+    notes = []
     for bad, what in (
         (~finite, "without a number in time, command or force"),
         (finite & overloaded, "with the load cell overloaded"),
@@ -114,15 +114,15 @@ def _select_rows(
     ):
         if bad.any():
             first = int(np.flatnonzero(bad)[0]) + 1
-            said.append(f"{int(bad.sum())} of {len(bad)} rows {what}, the first is data row {first}: left out")
+            notes.append(f"{int(bad.sum())} of {len(bad)} rows {what}, the first is data row {first}: left out")
     keep = finite & forward & ~overloaded
     if (~finite).mean() > LARGEST_BAD_SHARE:
         raise LadderError(
-            LadderFlaw.NOT_FINITE, f"{said[0].removesuffix(': left out')}: too many to guess around; record again"
+            LadderFlaw.NOT_FINITE, f"{notes[0].removesuffix(': left out')}: too many to guess around; record again"
         )
     if int(keep.sum()) < FEWEST_ROWS:
-        raise LadderError(LadderFlaw.TOO_SHORT, f"{int(keep.sum())} usable rows are left: {'; '.join(said)}")
-    return keep, said
+        raise LadderError(LadderFlaw.TOO_SHORT, f"{int(keep.sum())} usable rows are left: {'; '.join(notes)}")
+    return keep, notes
 
 
 def _check_roles(rows: Rows) -> None:

@@ -68,18 +68,18 @@ def _starts_of_stairs(command_v: Floats, stair: Integers) -> Integers:
 
 def _dwells(time_s: Floats, command_v: Floats, force_n: Floats, starts: Integers) -> Points:
     ends = np.append(starts[1:], len(time_s) - 1)  # the row of the next command still reads this one's force
-    found, squares, readings = [], 0.0, 0
+    dwells, squares, readings = [], 0.0, 0
     for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
         if time_s[end] - time_s[start] < SHORTEST_DWELL_S:
             continue
         tail = _tail(force_n[start + 1 : end + 1])
         half = len(tail) // 2
         drift_n = float(tail[half:].mean() - tail[:half].mean()) if half else 0.0
-        found.append((command_v[start], tail.mean(), start, drift_n))
+        dwells.append((command_v[start], tail.mean(), start, drift_n))
         squares, readings = squares + float(np.sum((tail - tail.mean()) ** 2)), readings + max(0, len(tail) - 1)
-    if not found:
+    if not dwells:
         raise ValueError(f"no command is held for {SHORTEST_DWELL_S:g} s: this is a ramp, not a ladder of stairs")
-    voltage_v, mean_n, row, drift = (np.array(column) for column in zip(*found, strict=True))
+    voltage_v, mean_n, row, drift = (np.array(column) for column in zip(*dwells, strict=True))
     noise_n = float(np.sqrt(squares / readings)) if readings >= 20 else float("nan")
     return Points(voltage_v, mean_n, row.astype(np.int64), drift, noise_n)
 

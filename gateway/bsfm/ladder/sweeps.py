@@ -31,6 +31,7 @@ class Sweep:
 
     @property
     def stairs(self) -> int:
+        """Number of stairs from the turning point on."""
         return self.last - self.first
 
 
@@ -54,7 +55,7 @@ def split_by_sweeps(points: Points) -> SweepSplit:
     fine, coarse = _without_coarse(sweeps)
     pairs, others = _pair_sweeps(fine)
     minor = _minor_sweeps(others, pairs)
-    said = [
+    notes = [
         *_describe_coarse(coarse, points),
         *_describe_cut([sweep for sweep in others if sweep not in minor], points),
     ]
@@ -65,7 +66,7 @@ def split_by_sweeps(points: Points) -> SweepSplit:
         points.force_n[walk],
         _count(sweeps, RISING),
         _count(sweeps, FALLING),
-        tuple(said),
+        tuple(notes),
     )
 
 
@@ -135,11 +136,11 @@ def _minor_sweeps(others: list[Sweep], pairs: list[tuple[Sweep, Sweep]]) -> list
     return walk if pairs and len(walk) >= FEWEST_MINOR_SWEEPS else []
 
 
-def _describe_cut(left: list[Sweep], points: Points) -> list[str]:
+def _describe_cut(sweeps: list[Sweep], points: Points) -> list[str]:
     return [
         f"from row {points.row[sweep.first]} the voltage goes {'up' if sweep.direction == RISING else 'down'} from "
         f"{points.voltage_v[sweep.first]:.3g} to {points.voltage_v[sweep.last]:.3g} V only: a group cut short, left out"
-        for sweep in left
+        for sweep in sweeps
     ]
 
 

@@ -26,7 +26,9 @@ NOT_MEASURED: Final = "the response was not measured: "
 
 @dataclass(frozen=True, slots=True)
 class MeasuredResponse:
-    """response: None where it could not be measured; why_not: then the sentence."""
+    """The response of a plant, where it could be measured. response: None where it could not be measured; why_not: then the
+    sentence.
+    """
 
     response: Response | None
     why_not: str = ""

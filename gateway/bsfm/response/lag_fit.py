@@ -98,8 +98,8 @@ def _refine(steps: Sequence[StepResponse], ratios: Sequence[float], best: LagFit
     at = list(ratios).index(best.ratio)
     near = (ratios[max(0, at - 1)], ratios[min(len(ratios) - 1, at + 1)])
     for ratio in (0.5 * (near[0] + best.ratio), 0.5 * (near[1] + best.ratio)):
-        tried = _fit_at_ratio(steps, ratio, scale_n, (best.dead_time_s, best.lags_s))
-        best = tried if tried.loss < best.loss else best
+        trial = _fit_at_ratio(steps, ratio, scale_n, (best.dead_time_s, best.lags_s))
+        best = trial if trial.loss < best.loss else best
     return best
 
 
@@ -115,13 +115,13 @@ def _fit_at_ratio(steps: Sequence[StepResponse], ratio: float, scale_n: float, g
         step = np.linalg.solve(
             normal + damping * np.diag(np.diag(normal) + 1.0e-12), -(slopes * weight[:, None]).T @ error_n
         )
-        tried = np.maximum(place + np.clip(step, -0.1, 0.1), (0.0, 2.0 * SHORTEST_LAG_S))
-        tried_n = residual(tried)
-        tried_loss = _loss(tried_n, scale_n)
-        if tried_loss < loss:
-            done = loss - tried_loss < 1.0e-5 * loss
-            place, error_n, loss, damping = tried, tried_n, tried_loss, 0.3 * damping
-            if done:
+        trial = np.maximum(place + np.clip(step, -0.1, 0.1), (0.0, 2.0 * SHORTEST_LAG_S))
+        trial_n = residual(trial)
+        trial_loss = _loss(trial_n, scale_n)
+        if trial_loss < loss:
+            is_done = loss - trial_loss < 1.0e-5 * loss
+            place, error_n, loss, damping = trial, trial_n, trial_loss, 0.3 * damping
+            if is_done:
                 break
         else:
             damping = 10.0 * max(damping, 1.0e-3)

@@ -40,7 +40,7 @@ def voltage_by_numbers(curve: RationalBezier, voltage_v: Floats, gentlest_n_per_
 
 
 def in_free_numbers(rising: Floats, falling: Floats) -> Floats:
-    """Two branches' columns (handles, log weights) put at their places among gateway.bsfm.slip.problem.free_numbers.
+    """Put two branches' columns (handles, log weights) at their places among gateway.bsfm.slip.problem.free_numbers.
 
     (N, 2 n + 1) each, of the two added in rows that both move -> (N, 4 n + 1).
     """

@@ -45,16 +45,17 @@ class Walk:
 
     @property
     def trusts(self) -> Floats:
+        """Weight of each point, (N,); 1 where none was given."""
         return np.ones(len(self.voltage_v)) if self.trust is None else self.trust
 
 
 def places(voltage_v: Floats, radii_v: Floats) -> Floats:
     """Return stop / r along a walk that starts fallen: shape (N, radii)."""
-    place, found = np.full(len(radii_v), -1.0), []
+    place, rows = np.full(len(radii_v), -1.0), []
     for step_v in np.diff(voltage_v, prepend=voltage_v[:1]):
         place = np.clip(place + step_v / radii_v, -1.0, 1.0)
-        found.append(place)
-    return np.array(found)
+        rows.append(place)
+    return np.array(rows)
 
 
 def inverses(curve: RationalBezier, force_n: Floats) -> Floats:
@@ -99,8 +100,8 @@ class SlipProblem:
         """Return the best c of a system, (shares,): non-negative least squares."""
         rows = np.column_stack([self.weight[:, None] * system.matrix, np.zeros(len(system.matrix))])
         bound = np.concatenate([rows, self.heavy_rows(system)])
-        found, _ = nnls(bound, np.append(self.weight * system.wanted, [HEAVY, HEAVY]))
-        shares: Floats = found[:-1] / found[:-1].sum()
+        solution, _ = nnls(bound, np.append(self.weight * system.wanted, [HEAVY, HEAVY]))
+        shares: Floats = solution[:-1] / solution[:-1].sum()
         return shares
 
     def heavy_rows(self, system: System) -> Floats:
@@ -115,7 +116,9 @@ class SlipProblem:
         return errors
 
     def system(self, branches: Branches, slope: Floats | None = None) -> System:
-        """slope: N/V that tell each row's volts in newtons, None for these branches' own."""
+        """Return the linear system of the shares for these branches. slope: N/V that turn each row's volts into newtons,
+        None for these branches' own.
+        """
         rows = len(self.force_n)
         forces = np.append(self.force_n, _forces_of(branches))
         rising_v, falling_v = inverses(branches.rising, forces), inverses(branches.falling, forces)
@@ -125,12 +128,12 @@ class SlipProblem:
         rising_v, falling_v, half_v = rising_v[:rows], falling_v[:rows], half_v[:rows]
         if slope is None:
             slope = np.asarray(0.5 * (branches.rising.slope(rising_v) + branches.falling.slope(falling_v)))
-        wanted = slope * (self.voltage_v - 0.5 * (rising_v + falling_v))
-        return System(rising_v, falling_v, slope, (slope * half_v)[:, None] * self.places, wanted, widest_v)
+        target = slope * (self.voltage_v - 0.5 * (rising_v + falling_v))
+        return System(rising_v, falling_v, slope, (slope * half_v)[:, None] * self.places, target, widest_v)
 
 
 def free_numbers(branches: Branches) -> Floats:
-    """Common low end, both tops, inner handles, log weights with w_0 = 1: what a joint fit may move."""
+    """Return the numbers that a joint fit may move: common low end, both tops, inner handles, log weights with w_0 = 1."""
     rising, falling = branches.rising, branches.falling
     return np.array(
         [
@@ -146,7 +149,9 @@ def free_numbers(branches: Branches) -> Floats:
 
 
 def branches_of(numbers: Floats, frame: Branches) -> Branches:
-    """`free_numbers` backwards; frame gives voltages and order (of both branches)."""
+    """Return the branches of such numbers, the inverse of `free_numbers`; frame gives voltages and order (of both
+    branches).
+    """
     order = frame.rising.order
     low_n, rising_n, falling_n, *inner = numbers[: 2 * order + 1].tolist()
     weights = np.exp(numbers[2 * order + 1 :]).tolist()

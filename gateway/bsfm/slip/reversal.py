@@ -38,12 +38,14 @@ class Reversal(Protocol):
         """Return the memory after the force has gone from one value to another without turning round in between."""
 
     def check(self, branches: Branches) -> None:
-        """ValueError with a sentence where this policy and these branches make no unique voltage."""
+        """Raise ValueError with a sentence where this policy and these branches make no unique voltage."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinearBlend:
-    """span_n: change of force that leads from one branch to the other. 0 switches at once, as the paper does."""
+    """Leads linearly from one branch to the other. span_n: change of force that leads from one branch to the other. 0
+    switches at once, as the paper does.
+    """
 
     span_n: float
 
@@ -52,15 +54,19 @@ class LinearBlend:
             raise ValueError(f"blend span {self.span_n!r} N: 0 or more is needed")
 
     def start(self) -> Memory:
+        """Return the memory of a vented tool: on the rising branch."""
         return (RISING,)
 
     def at(self, branch_share: float) -> Memory:
+        """Return a memory with this branch share."""
         return (branch_share,)
 
     def branch_share(self, memory: Memory) -> float:
+        """Return s in [-1, 1]."""
         return memory[0]
 
     def memory_after(self, branches: Branches, memory: Memory, from_n: float, to_n: float) -> Memory:
+        """Return the memory after the force has gone from one value to another."""
         return (self.advance(memory[0], to_n - from_n),)
 
     def check(self, branches: Branches) -> None:

@@ -24,8 +24,11 @@ BETTER_SHARE: Final = 0.9  # held-out error of the stops, of the blend's
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReversalChoice:
-    """span: of the blend on the model's own branches. slip: None where the blend is used. *_heldout_n: RMS on the points
-    of the walk by a fit to the others, nan where it was not tried."""
+    """The reversal that predicts a walk best.
+
+    span: of the blend on the model's own branches. slip: None where the blend is used. *_heldout_n: RMS on the points of
+    the walk by a fit to the others, nan where it was not tried.
+    """
 
     model: Bsfm
     span: SpanChoice
@@ -35,7 +38,7 @@ class ReversalChoice:
 
 
 def choose_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> ReversalChoice | None:
-    """None where the walk is too short for anything."""
+    """Choose between blend and slip stops by a walk of partial reversals; None where it is too short for anything."""
     span = choose_span(branches, volts, newtons)
     if span is None:
         return None
@@ -62,7 +65,7 @@ def _held_out_errors(branches: Branches, ladder: Ladder, volts: Floats, newtons:
             return 0.0, float("inf")
         span = choose_span(branches, volts, newtons, halves != half)
         blend = Bsfm(branches, LinearBlend(span.span_n if span else 0.0))
-        for found, model in zip(errors, (blend, slip.model), strict=True):
-            found.append(command_error_n(model, volts, newtons)[halves[1:] == half])
-    rms = [float(np.sqrt(np.mean(np.concatenate(found) ** 2))) for found in errors]
+        for model_errors, model in zip(errors, (blend, slip.model), strict=True):
+            model_errors.append(command_error_n(model, volts, newtons)[halves[1:] == half])
+    rms = [float(np.sqrt(np.mean(np.concatenate(model_errors) ** 2))) for model_errors in errors]
     return rms[0], rms[1]

@@ -43,8 +43,8 @@ class SlipSearch:
     def best(self) -> Branches:
         """Return the branches at the minimum."""
         first = free_numbers(self._start)
-        found = least_squares(self.residuals, first, self.jacobian, x_scale="jac", ftol=CLOSE, max_nfev=STEPS_MAX)
-        return branches_of(found.x, self._start)
+        minimum = least_squares(self.residuals, first, self.jacobian, x_scale="jac", ftol=CLOSE, max_nfev=STEPS_MAX)
+        return branches_of(minimum.x, self._start)
 
     def residuals(self, numbers: Floats) -> Floats:
         """Return weighted errors, penalties, ridge: (rows + 3 grid + log weights,)."""

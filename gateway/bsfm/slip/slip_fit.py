@@ -59,6 +59,7 @@ class SlipFit:
 
     @property
     def model(self) -> Bsfm:
+        """The model for control."""
         return Bsfm(self.branches, self.stops)
 
 
@@ -96,9 +97,9 @@ def fit_joint(branches: Branches, walks: Sequence[Walk], highest_order: int = HI
         return best
     starts = [branches, _elevated(branches)] if branches.rising.order < highest_order else [branches]
     for start in starts:
-        found = _usable_joint(start, walks)
-        if found and (_is_worth_an_order(found, best) if best.joint else found.rms_n < best.rms_n):
-            best = found
+        joint = _usable_joint(start, walks)
+        if joint and (_is_worth_an_order(joint, best) if best.joint else joint.rms_n < best.rms_n):
+            best = joint
     return best
 
 
@@ -106,12 +107,12 @@ def _usable_joint(start: Branches, walks: Sequence[Walk]) -> SlipFit | None:
     """With the smallest margin that leads to what may drive a plant."""
     for margin in MARGINS:
         problem = SlipProblem(list(walks), _radii_v(start))
-        trust, moved = problem.weight, start
+        trust, branches = problem.weight, start
         for _ in range(2):
-            moved = SlipSearch(problem, moved, margin).best()
-            problem.weight = trust * _huber(problem, problem.errors_n(moved))
-        if verdicts_of(moved, SLOPE_FLOOR_N_PER_V).usable and is_moderate(moved):
-            return _result(problem, moved, joint=True)
+            branches = SlipSearch(problem, branches, margin).best()
+            problem.weight = trust * _huber(problem, problem.errors_n(branches))
+        if verdicts_of(branches, SLOPE_FLOOR_N_PER_V).usable and is_moderate(branches):
+            return _result(problem, branches, joint=True)
     return None
 
 

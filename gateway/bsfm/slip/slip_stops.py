@@ -28,7 +28,9 @@ SUM_TOLERANCE: Final = 1.0e-6
 
 @dataclass(frozen=True, slots=True)
 class SlipStops:
-    """radii_v: ascending; shares: c_j >= 0 with sum 1, one per radius. ValueError otherwise."""
+    """A reversal by slip stops that give way one after the other. radii_v: ascending; shares: c_j >= 0 with sum 1, one per
+    radius. ValueError otherwise.
+    """
 
     radii_v: tuple[float, ...]
     shares: tuple[float, ...]
@@ -47,7 +49,7 @@ class SlipStops:
 
     @property
     def stiffness_per_v(self) -> float:
-        """How fast s moves right after a reversal."""
+        """Rate of s right after a reversal, 1/V."""
         return sum(share / radius for share, radius in zip(self.shares, self.radii_v, strict=True))
 
     def start(self) -> Memory:
@@ -91,16 +93,16 @@ class SlipStops:
         distance_v, stiffness = abs(stuck_v), half_v * self.stiffness_per_v
         travel_v = distance_v / (1.0 - stiffness)
         for radius, share, place in zip(self.radii_v, self.shares, memory, strict=True):
-            left = 1.0 - way * place
-            if travel_v <= radius * left:
+            free = 1.0 - way * place
+            if travel_v <= radius * free:
                 break
-            distance_v += half_v * share * left  # this stop gives way: what it could still add is added
+            distance_v += half_v * share * free  # this stop gives way: what it could still add is added
             stiffness -= half_v * share / radius
             travel_v = distance_v / (1.0 - stiffness)
         return way * travel_v
 
     def check(self, branches: Branches) -> None:
-        """ValueError where the voltage would not be unique, or nearly so, right after a reversal."""
+        """Raise ValueError where the voltage would not be unique, or nearly so, right after a reversal."""
         widest_v = half_width_bound_v(branches)
         if self.stiffness_per_v * widest_v > STIFFEST:
             raise ValueError(
@@ -117,7 +119,7 @@ def middle_and_half(branches: Branches, force_n: float) -> tuple[float, float]:
 
 
 def half_width_bound_v(branches: Branches) -> float:
-    """Nowhere is the loop wider than this, in V, half of it; at most BOUND_SHARE too much.
+    """Return a bound of half the loop's width, V: nowhere is it wider; at most BOUND_SHARE too much.
 
     Both inverses grow, so the ends of a range of forces bound all of it: rise(high) - fall(low). Ranges are halved until
     that is close to the widest place seen. An uploaded set waits for this, so no voltage is reckoned twice.

@@ -23,10 +23,12 @@ class BranchDifference:
 
     @property
     def difference_n(self) -> Forces:
+        """B minus A at each voltage, N."""
         return tuple(b - a for a, b in zip(self.a_n, self.b_n, strict=True))
 
     @property
     def rms_n(self) -> float:
+        """RMS of the differences, N."""
         return sqrt(sum(gap * gap for gap in self.difference_n) / len(self.difference_n))
 
     @property
@@ -37,7 +39,7 @@ class BranchDifference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """voltage_v: evenly over the common range."""
+    """Both branches of two calibrations, side by side. voltage_v: evenly over the common range."""
 
     a: Calibration
     b: Calibration
@@ -45,13 +47,14 @@ class Comparison:
     branches: dict[str, BranchDifference]
 
     def facts(self) -> dict[str, Any]:
+        """Return the comparison as a JSON object."""
         return {
             "a": {"number": self.a.number, "name": self.a.name},
             "b": {"number": self.b.number, "name": self.b.name},
             "voltage_range_v": [self.voltage_v[0], self.voltage_v[-1]],
             **{
-                name: {"rms_n": found.rms_n, "max_n": found.max_n, "at_v": self.place_v(found)}
-                for name, found in self.branches.items()
+                name: {"rms_n": difference.rms_n, "max_n": difference.max_n, "at_v": self.place_v(difference)}
+                for name, difference in self.branches.items()
             },
             "reversal": [self.a.reversal_kind, self.b.reversal_kind],
             "blend_span_n": [self.a.blend_span_n, self.b.blend_span_n],
@@ -63,7 +66,7 @@ class Comparison:
 
 
 def compare_calibrations(a: Calibration, b: Calibration) -> Comparison:
-    """ValueError when the two have no voltage in common."""
+    """Compare the branches of two calibrations. ValueError when the two have no voltage in common."""
     low_v, high_v = max(a.x0_v, b.x0_v), min(a.x1_v, b.x1_v)
     if low_v >= high_v:
         raise ValueError(f"{_title(a)} and {_title(b)} have no voltage in common")
@@ -76,19 +79,21 @@ def compare_calibrations(a: Calibration, b: Calibration) -> Comparison:
 
 
 def table(comparison: Comparison) -> str:
-    """For the terminal: the figures, then the branches at a few voltages."""
+    """Return text for the terminal: the figures, then the branches at a few voltages."""
     lines = [
         f"{name}  {_title(each)}, {each.reversal_kind}" for name, each in (("A", comparison.a), ("B", comparison.b))
     ]
     lines.append("")
-    for name, found in comparison.branches.items():
-        place_v = comparison.place_v(found)
-        lines.append(f"{name:<8} B - A  {found.rms_n:7.3f} N RMS, at most {found.max_n:+.3f} N at {place_v:.2f} V")
+    for name, difference in comparison.branches.items():
+        place_v = comparison.place_v(difference)
+        lines.append(
+            f"{name:<8} B - A  {difference.rms_n:7.3f} N RMS, at most {difference.max_n:+.3f} N at {place_v:.2f} V"
+        )
     lines += ["", "     V   rising A  rising B   B - A   falling A falling B   B - A"]
     for k in range(0, _POINTS, (_POINTS - 1) // (_SHOWN - 1)):
         forces = (
-            f"{found.a_n[k]:9.2f} {found.b_n[k]:9.2f} {found.difference_n[k]:+8.3f}"
-            for found in comparison.branches.values()
+            f"{difference.a_n[k]:9.2f} {difference.b_n[k]:9.2f} {difference.difference_n[k]:+8.3f}"
+            for difference in comparison.branches.values()
         )
         lines.append(f"{comparison.voltage_v[k]:6.2f}  {'   '.join(forces)}")
     return "\n".join(lines)
@@ -101,15 +106,15 @@ def page(comparison: Comparison) -> str:
 
     volts = comparison.voltage_v
     across = Axis(volts[0], volts[-1], "command (V)")
-    forces = [force for found in comparison.branches.values() for force in (*found.a_n, *found.b_n)]
+    forces = [force for difference in comparison.branches.values() for force in (*difference.a_n, *difference.b_n)]
     loops = Chart(across, Axis(*spread(forces), "force (N)"), "Both loops")
-    gaps = [gap for found in comparison.branches.values() for gap in found.difference_n]
+    gaps = [gap for difference in comparison.branches.values() for gap in difference.difference_n]
     differences = Chart(across, Axis(*spread(gaps, around=0.0), "B − A (N)"), "Difference of the branches")
     differences.level(0.0)
-    for name, found in comparison.branches.items():
-        loops.line(volts, found.a_n, f"{name} faint", f"A, {name}")
-        loops.line(volts, found.b_n, name, f"B, {name}")
-        differences.line(volts, found.difference_n, name, name)
+    for name, difference in comparison.branches.items():
+        loops.line(volts, difference.a_n, f"{name} faint", f"A, {name}")
+        loops.line(volts, difference.b_n, name, f"B, {name}")
+        differences.line(volts, difference.difference_n, name, name)
     title = escape(f"A: {_title(comparison.a)} · B: {_title(comparison.b)}")
     figures = "".join(f"<figure>{chart.svg()}</figure>" for chart in (loops, differences))
     return (

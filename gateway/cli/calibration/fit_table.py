@@ -83,15 +83,15 @@ def summary(document: dict[str, Any]) -> list[Text]:
 
 def _describe_error(measured: dict[str, Any]) -> str:
     """Return the error on all that was measured, and what it is to be compared with."""
-    said = (
+    words = (
         f"{measured['rms_n']:.3f} N RMS, {measured['max_n']:.2f} N max on all {measured['points']} measured points, "
         f"{'reversals included' if measured['reversals'] else 'no reversals measured'}"
     )
     if measured["allowed_rms_n"] is not None:
-        said += f"; allowed {measured['allowed_rms_n']:.3f} N"
+        words += f"; allowed {measured['allowed_rms_n']:.3f} N"
     if measured["in_use_rms_n"] is not None:
-        said += f"; calibration {measured['in_use']} in use has {measured['in_use_rms_n']:.3f} N on them"
-    return said
+        words += f"; calibration {measured['in_use']} in use has {measured['in_use_rms_n']:.3f} N on them"
+    return words
 
 
 def _describe_storing(document: dict[str, Any]) -> Text:

@@ -12,5 +12,5 @@ def fields_of(path: Path) -> dict[str, Any]:
 
 
 def is_experiment(fields: dict[str, Any]) -> bool:
-    """Else it is a ladder, of which a calibration is made."""
+    """Return whether these are an experiment's fields, not those of a ladder, of which a calibration is made."""
     return "parts" in fields

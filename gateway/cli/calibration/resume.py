@@ -20,8 +20,11 @@ _NO_PLAN: Final = ("stairs", "top_v")  # what the header says beside the plan's 
 
 @dataclass(frozen=True, slots=True)
 class RestOfLadder:
-    """plan: fields of the whole run; groups: climbed so far; earlier: numbers of the recordings that have them; finished: the
-    last recording came to its own end; fingerprint: of the rig's files then."""
+    """What a stopped ladder has left to climb.
+
+    plan: fields of the whole run; groups: climbed so far; earlier: numbers of the recordings that have them; finished: the
+    last recording came to its own end; fingerprint: of the rig's files then.
+    """
 
     plan: dict[str, Any]
     groups: int
@@ -38,7 +41,7 @@ class RestOfLadder:
         return plan | {"first_group": min(self.groups, last_start)}
 
     def is_whole(self, plan: dict[str, Any]) -> bool:
-        """Nothing is left of this plan but the fit."""
+        """Return whether nothing is left of this plan but the fit."""
         wants_walk = plan["minor_points"] and not self.plan["minor_points"]
         return self.finished and self.groups >= int(plan["groups"]) and not wants_walk
 

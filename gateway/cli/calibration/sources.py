@@ -34,7 +34,9 @@ class RunStatus:
 
 
 class LocalRun:
-    """plan: fields of CalibrationPlan or ExperimentPlan; earlier: recordings that it goes on from; name: of the calibration."""
+    """A run on the gateway of this machine, by its control socket. plan: fields of CalibrationPlan or ExperimentPlan;
+    earlier: recordings that it goes on from; name: of the calibration.
+    """
 
     def __init__(self, state: Path, plan: dict[str, Any], earlier: list[int], name: str = "") -> None:
         self._state = state
@@ -44,13 +46,16 @@ class LocalRun:
         self._last: dict[str, Any] = {}
 
     def preview(self) -> dict[str, Any]:
+        """Return what the gateway would do, without a motion."""
         return ask(self._state, {"do": "calibrate", "plan": self._plan, "dry_run": True})
 
     def begin(self) -> None:
+        """Start the run."""
         request = {"do": "calibrate", "plan": self._plan, "continues": self._earlier, "name": self._name}
         self._last = ask(self._state, request)
 
     def look(self) -> RunStatus:
+        """Ask how far the run is."""
         self._last = last = ask(self._state, {"do": "calibrate"})
         group = f" {last['group']} of {last['groups']}" if last["phase"] == "ladder" else ""
         part = f": {last['part_name']} ({last['part']} of {last['parts']})" if last["phase"] == "experiment" else ""
@@ -64,6 +69,7 @@ class LocalRun:
         )
 
     def stop(self) -> None:
+        """Stop the run; the force goes to 0."""
         ask(self._state, {"do": "calibrate", "stop": True})
 
     def end(self) -> dict[str, Any]:
@@ -85,13 +91,16 @@ class RemoteRun:
         self._before = ""
 
     def preview(self) -> dict[str, Any]:
+        """Return nothing: by Modbus nobody says beforehand what will happen."""
         return {}
 
     def begin(self) -> None:
+        """Start the run by the control word."""
         self._before = self.look().phase
         self._command(int(ControlBit.START_CALIBRATION))
 
     def look(self) -> RunStatus:
+        """Read from the registers how far the run is."""
         with explain_refusals(self._client):
             self._values = [reading.value for reading in self._client.read_values(self._registers)]
         phase, progress, _, force_n, output_mv = self._values
@@ -103,9 +112,11 @@ class RemoteRun:
         return RunStatus(name, progress / 1000.0, nan, force_n, output_mv / 1000.0)
 
     def stop(self) -> None:
+        """Stop the run; the force goes to 0."""
         self._command(0)
 
     def end(self) -> dict[str, Any]:
+        """Return how it ended: phase and number of the stored calibration."""
         phase = CalibrationPhase(int(self._values[0])).name.lower()
         return {"phase": phase, "stored": int(self._values[2])}
 

@@ -81,13 +81,15 @@ def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, A
     before = store.find_selected().calibration
     try:
         force = bool(request.get("force"))
-        taken = activation.roll_back() if "rollback" in request else activation.use_offered(request["use"], force=force)
+        selected = (
+            activation.roll_back() if "rollback" in request else activation.use_offered(request["use"], force=force)
+        )
     except UnusableCalibration as error:
         sentence = error.fault.sentence(before.number if before else 0)
         raise CliError(sentence, exit_codes.DATA) from None
     except StoreError as error:
         raise CliError(str(error), exit_codes.FAILED if error.code == "E431" else exit_codes.DATA) from None
-    calibration, active = taken.calibration, taken.pointer.active
+    calibration, active = selected.calibration, selected.pointer.active
     return {
         "active": calibration.number,
         "name": calibration.name,

@@ -12,8 +12,11 @@ from gateway.twin.plant import with_value
 
 
 def measured_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoopGain | str:
-    """The gain, or a sentence that says why it could not be measured. The cell makes the noise of the plant at the start:
-    the diagnosis has taken it away, and control takes a cell without any for a frozen one."""
+    """Return the gain, or a sentence that says why it could not be measured.
+
+    The cell makes the noise of the plant at the start: the diagnosis has taken it away, and control takes a cell without
+    any for a stuck one.
+    """
     noise_n = sources.plant.plant.cell.noise_n
     base, extended = (with_value(plant, "cell", "noise_n", noise_n) for plant in (diagnosis.base, diagnosis.plant))
     try:
@@ -23,9 +26,10 @@ def measured_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoopGain | st
 
 
 def document(gain: ClosedLoopGain | str) -> dict[str, Any]:
-    """For the JSON, beside the contract's fields."""
+    """Return the gain as JSON fields that go beside the contract's."""
     return {"error": gain} if isinstance(gain, str) else asdict(gain)
 
 
 def sentences(gain: ClosedLoopGain | str) -> Iterator[str]:
+    """Yield the gain, or why there is none, as sentences."""
     yield from [gain] if isinstance(gain, str) else study.format_gain(gain)

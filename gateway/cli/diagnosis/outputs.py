@@ -9,18 +9,19 @@ import click
 
 
 def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """UsageError where two outputs, or an output and an input, are one file. FileNotFoundError where no directory is."""
-    taken = {path.resolve(): f"{path} is read" for path in inputs if path.exists()}
+    """Raise UsageError where two outputs, or an output and an input, are one file, FileNotFoundError where no directory is."""
+    occupied = {path.resolve(): f"{path} is read" for path in inputs if path.exists()}
     for target in targets:
-        if target.resolve() in taken:
-            raise click.UsageError(f"{target} would be overwritten: {taken[target.resolve()]}")
-        taken[target.resolve()] = f"{target} is written by another option"
+        if target.resolve() in occupied:
+            raise click.UsageError(f"{target} would be overwritten: {occupied[target.resolve()]}")
+        occupied[target.resolve()] = f"{target} is written by another option"
         if not target.parent.is_dir():
             raise FileNotFoundError(errno.ENOENT, "no such directory", str(target.parent))
 
 
 def write_all(texts: Mapping[Path, str]) -> None:
-    """Each beside its name first; only when all are on the disk are they renamed. OSError, and no file has changed.
+    """Write each text beside its name first, and rename them only when all are on the disk. OSError, and no file has
+    changed.
 
     A device (/dev/null, a terminal) is written to in the end: nobody wants it replaced by a file.
     """

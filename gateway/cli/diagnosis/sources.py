@@ -25,9 +25,12 @@ _ANY_STATE: Final = defaults.RIG  # whose state directory is meant where neither
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """paths: of the recordings, as found; rig: its name, empty for none; known_rig: where it is known here; notes: what was
-    decided; late_s: how late the wires may have made the readings; quantum_n: their known step; is_own: the plant
-    is that of the rig that the recordings were made on."""
+    """Everything that the diagnosis takes.
+
+    paths: of the recordings, as given; rig: its name, empty for none; known_rig: where it is known here; notes: what was
+    decided; late_s: how late the wires may have made the readings; quantum_n: their known step; is_own: the plant is that
+    of the rig that the recordings were made on.
+    """
 
     paths: tuple[Path, ...]
     measurements: tuple[Measurement, ...]
@@ -47,7 +50,7 @@ class Sources:
 
 
 def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, state: Path | None) -> Sources:
-    """Everything that the diagnosis takes. RecordingError and CliError (65) for data, ProfileError for a rig."""
+    """Read everything that the diagnosis takes. RecordingError and CliError (65) for data, ProfileError for a rig."""
     paths = tuple(_path(name, rig, state) for name in names)
     known = load_rig(rig) if rig else None
     mapping = column_mapping(columns)

@@ -25,8 +25,8 @@ _MOST_NAMES = 4
 def render_diagnosis(
     diagnosis: Diagnosis, notes: tuple[str, ...] = (), loop: tuple[str, ...] = (), run: str = ""
 ) -> Iterator[RenderableType]:
-    """In reading order, columns that are wrong before all else; every paragraph hangs behind its keyword, so that it wraps at
-    any width.
+    """Yield the diagnosis in reading order, columns that are wrong before all else; every paragraph hangs behind its
+    keyword, so that it wraps at any width.
 
     loop: sentences on the gain in commanded force; run: how to run what to record next, where a plan of it is written.
     """
@@ -48,8 +48,8 @@ def render_diagnosis(
     yield from _rejected_line(diagnosis)
     for keyword, sentence in zip(("control", *[""] * len(loop)), loop, strict=False):
         yield _line(keyword, sentence)
-    said = {suspect.sentence for suspect in diagnosis.suspects}
-    for note in (note for note in words.all_notes(diagnosis, notes) if note not in said):
+    sentences = {suspect.sentence for suspect in diagnosis.suspects}
+    for note in (note for note in words.all_notes(diagnosis, notes) if note not in sentences):
         yield _line("note", note, "dim")
     yield from _next_lines(diagnosis, run)
 
@@ -93,9 +93,9 @@ def _cause_table(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     yield table
     yield Text()
     for cause in diagnosis.causes:
-        for name, found in cause.parameters.items():
-            told = f"{found.section}.{name} = {words.estimate(found)}{words.previous_value(diagnosis, name, found)}"
-            yield Padding(Text(told), (0, 0, 0, 2))
+        for name, estimate in cause.parameters.items():
+            texts = f"{estimate.section}.{name} = {words.estimate(estimate)}{words.previous_value(diagnosis, name, estimate)}"
+            yield Padding(Text(texts), (0, 0, 0, 2))
     yield Text()
 
 
@@ -117,9 +117,9 @@ def _cells(cause: Cause) -> tuple[str | Text, ...]:
 
 
 def _rejected_line(diagnosis: Diagnosis) -> Iterator[RenderableType]:
-    ranked = sorted(diagnosis.rejected, key=lambda lost: -lost.gain)[:_MOST_REJECTED]
+    ranked = sorted(diagnosis.rejected, key=lambda cause: -cause.gain)[:_MOST_REJECTED]
     if ranked:
-        gains = ", ".join(f"{lost.name} ({words.force(lost.gain)} N)" for lost in ranked)
+        gains = ", ".join(f"{cause.name} ({words.force(cause.gain)} N)" for cause in ranked)
         yield _line("rejected", f"{gains}, nearest first")
 
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from gateway import defaults
 from gateway.cli.errors import CliError
-from gateway.cli.force_hold.sequence import HoldRun, HoldWrite, SeenStatus, seen_of
+from gateway.cli.force_hold.sequence import HoldRun, HoldWrite, StatusReading, status_reading_of
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.codes.refusals import RefusalReason
@@ -43,7 +43,7 @@ class KnownLease:
 
 
 class HeartbeatThread(threading.Thread):
-    """Runs a HoldRun against a gateway until it ends. `seen` is the newest status; `failure` what went wrong, if anything.
+    """Runs a HoldRun against a gateway until it ends. `status` is the newest one read; `failure` what went wrong, if anything.
 
     lease: None where nobody has said what the rig's is.
     """
@@ -53,7 +53,7 @@ class HeartbeatThread(threading.Thread):
     ) -> None:
         super().__init__(daemon=True, name="heartbeat")
         self.hold = run
-        self.seen: SeenStatus | None = None
+        self.status: StatusReading | None = None
         self.warned = WarningBit(0)  # every warning that there was
         self.failure: CliError | None = None
         self.stopping = threading.Event()
@@ -69,6 +69,7 @@ class HeartbeatThread(threading.Thread):
         }
 
     def run(self) -> None:
+        """Look, then beat until the hold has ended or the gateway is gone."""
         try:
             self._look()
             while self.hold.end is None:
@@ -86,9 +87,9 @@ class HeartbeatThread(threading.Thread):
             self.dropping.wait(max(0.0, seconds))
 
     def _step(self, now_s: float) -> None:
-        assert self.seen
+        assert self.status
         write = self.hold.at_once() if self.dropping.is_set() else None
-        write = write or self.hold.next(self.seen, now_s, stops=self.stopping.is_set())
+        write = write or self.hold.next(self.status, now_s, stops=self.stopping.is_set())
         if write is None:
             return
         try:
@@ -133,11 +134,11 @@ class HeartbeatThread(threading.Thread):
     def _look(self) -> None:
         with explain_refusals(self._client):
             readings = self._client.read_block("status")
-        self.seen = seen_of({reading.register.name: float(reading.value) for reading in readings})
-        self.warned |= self.seen.warnings
+        self.status = status_reading_of({reading.register.name: float(reading.value) for reading in readings})
+        self.warned |= self.status.warnings
         self._looked_s = self._clock()
 
-    def _find_again(self, lost: CliError) -> None:
+    def _find_again(self, error: CliError) -> None:
         """The connection is gone: while the lease may still run, try to have it back; the next step sees what has happened."""
         length_s = self._lease.length_s if self._lease else None
         end_s = self._clock() + (length_s or _LOOKS_AFTER_A_LOSS_S)
@@ -147,20 +148,20 @@ class HeartbeatThread(threading.Thread):
                 return
             except CliError:
                 if self._clock() >= end_s:
-                    raise CliError(f"E180 {self._lost_words(lost)}", exit_codes.DEVICE) from None
+                    raise CliError(f"E180 {self._lost_words(error)}", exit_codes.DEVICE) from None
             self._wait(_SHORTEST_PERIOD_S)
 
-    def _lost_words(self, lost: CliError) -> str:
-        seen = f"the gateway at {self._client.where} is lost ({lost.format_message().partition(':')[0]})"
+    def _lost_words(self, error: CliError) -> str:
+        what = f"the gateway at {self._client.where} is lost ({error.format_message().partition(':')[0]})"
         if not self.hold.is_pressing:
-            return f"{seen}; nothing had been enabled"
+            return f"{what}; nothing had been enabled"
         if self._lease is None:
             return (
-                f"{seen}. Where the rig has a lease, it ends now as the rig file says (fault, hold or ramp); without one the "
+                f"{what}. Where the rig has a lease, it ends now as the rig file says (fault, hold or ramp); without one the "
                 f"gateway goes on pressing {self.hold.force_n:g} N: look at it"
             )
         if self._lease.length_s is None:
             words = "this rig has no lease: if the gateway lives, it goes on pressing"
-            return f"{seen}; {words} {self.hold.force_n:g} N until it is told otherwise"
+            return f"{what}; {words} {self.hold.force_n:g} N until it is told otherwise"
         action = _ACTIONS.get(self._lease.action, self._lease.action)
-        return f"{seen}; the lease of {self._lease.length_s * 1e3:.0f} ms is over: {action}"
+        return f"{what}; the lease of {self._lease.length_s * 1e3:.0f} ms is over: {action}"

@@ -20,7 +20,7 @@ _ENABLE, _RESET = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT)
 
 
 @dataclass(frozen=True, slots=True)
-class SeenStatus:
+class StatusReading:
     """The status registers, in their units; nan where the gateway has no value."""
 
     state: State
@@ -34,9 +34,9 @@ class SeenStatus:
     voltage_v: float = nan
 
 
-def seen_of(values: Mapping[str, float]) -> SeenStatus:
-    """Return what is seen, from the status block's values by register name."""
-    return SeenStatus(
+def status_reading_of(values: Mapping[str, float]) -> StatusReading:
+    """Return the status from the status block's values by register name."""
+    return StatusReading(
         state=State(int(values["state"])),
         fault=FaultCode(int(values["fault_code"])),
         bits=StatusBit(int(values["status_word"])),
@@ -87,31 +87,34 @@ class HoldRun:
 
     @property
     def is_pressing(self) -> bool:
-        """Whether the output has been enabled by us."""
+        """True once this run has enabled the output."""
         return self._phase in (_Phase.HOLDING, _Phase.LOWERING)
 
-    def next(self, seen: SeenStatus, now_s: float, *, stops: bool) -> HoldWrite | None:
-        """seen: read after the last write that was more than a beat. stops: whether to let go."""
-        if seen.state is State.FAULT and not (self._resets and self._phase.value <= _Phase.RESETTING.value):
+    def next(self, status: StatusReading, now_s: float, *, stops: bool) -> HoldWrite | None:
+        """Return the next write, None where the heartbeat has nothing to write any more.
+
+        status: read after the last write that was more than a beat. stops: whether to let go.
+        """
+        if status.state is State.FAULT and not (self._resets and self._phase.value <= _Phase.RESETTING.value):
             self.end = HoldEnd.FAULT
             return None
         match self._phase:
             case _Phase.HOLDING:
-                return self._hold(seen, now_s, stops=stops)
+                return self._hold(status, now_s, stops=stops)
             case _Phase.LOWERING:
-                return self._lower(seen, now_s)
+                return self._lower(status, now_s)
         if stops:
             self.end = HoldEnd.STOPPED
             return None
-        return self._begin(seen)
+        return self._begin(status)
 
     def at_once(self) -> HoldWrite:
         """Clear enable without a ramp."""
         self.end = HoldEnd.STOPPED
         return self._write(0)
 
-    def _begin(self, seen: SeenStatus) -> HoldWrite:
-        if self._phase is _Phase.BEGINNING and seen.state is State.FAULT:
+    def _begin(self, status: StatusReading) -> HoldWrite:
+        if self._phase is _Phase.BEGINNING and status.state is State.FAULT:
             self._phase = _Phase.RESETTING
             return self._write(0)
         if self._phase is _Phase.RESETTING:
@@ -120,8 +123,8 @@ class HoldRun:
         self._phase = _Phase.HOLDING
         return self._write(_ENABLE, self.force_n)
 
-    def _hold(self, seen: SeenStatus, now_s: float, *, stops: bool) -> HoldWrite | None:
-        if seen.state is State.OFF:
+    def _hold(self, status: StatusReading, now_s: float, *, stops: bool) -> HoldWrite | None:
+        if status.state is State.OFF:
             self.end = HoldEnd.STOPPED if stops else HoldEnd.DISABLED
             return None
         if not stops:
@@ -129,13 +132,13 @@ class HoldRun:
         self._phase, self._moved_s = _Phase.LOWERING, now_s
         return self._write(_ENABLE, 0.0)
 
-    def _lower(self, seen: SeenStatus, now_s: float) -> HoldWrite | None:
-        if seen.state is State.OFF:
+    def _lower(self, status: StatusReading, now_s: float) -> HoldWrite | None:
+        if status.state is State.OFF:
             self.end = HoldEnd.STOPPED
             return None
-        if seen.applied_n != self._applied_n:
-            self._applied_n, self._moved_s = seen.applied_n, now_s
-        if isnan(seen.applied_n) or seen.applied_n <= 0.0 or now_s - self._moved_s > _STUCK_S:
+        if status.applied_n != self._applied_n:
+            self._applied_n, self._moved_s = status.applied_n, now_s
+        if isnan(status.applied_n) or status.applied_n <= 0.0 or now_s - self._moved_s > _STUCK_S:
             return self.at_once()
         return self._beat()
 

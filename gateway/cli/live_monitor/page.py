@@ -70,9 +70,9 @@ def _describe_run(track: Track) -> str:
     if "calibration_phase" not in track.readings:
         return ""
     phase = track.readings["calibration_phase"].register.values.get(int(track.value("calibration_phase")), "?")
-    told = f"{phase.replace('_', ' ')} {track.value('calibration_progress') / 10:.0f} %"
+    words = f"{phase.replace('_', ' ')} {track.value('calibration_progress') / 10:.0f} %"
     left_s = track.value("calibration_time_left")
-    return told if isnan(left_s) else f"{told}, {int(left_s) // 60}:{int(left_s) % 60:02d} left"
+    return words if isnan(left_s) else f"{words}, {int(left_s) // 60}:{int(left_s) % 60:02d} left"
 
 
 def _describe_settling(track: Track) -> str:

@@ -15,7 +15,7 @@ POLL_S: Final = 0.1
 
 
 class Poller:
-    """One poll is two requests: the command block and the status block."""
+    """Reads a gateway: one poll is two requests, the command block and the status block."""
 
     def __init__(self, client: GatewayClient, state: Path | None, clock: Callable[[], float]) -> None:
         self.track = Track()
@@ -38,6 +38,7 @@ class Poller:
             self.trouble = str(error)
 
     def view(self, width: int, height: int) -> View:
+        """Return what a frame of this size is drawn from."""
         return View(self.track, self._client.where, width, height, self.trouble, self._writers())
 
     def _writers(self) -> dict[str, Writer] | None:

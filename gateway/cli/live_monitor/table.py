@@ -65,7 +65,7 @@ class View:
 
 
 def register_table(view: View, rows: int) -> Table:
-    """As many registers as fit; two side by side where the terminal is wide."""
+    """Return a table of as many registers as fit; two side by side where the terminal is wide."""
     names: list[str] = [name for name in _FIRST if name in view.track.readings]
     names += [name for name in view.track.readings if name not in names]
     columns = max(1, view.width // 78) if view.writers is None else max(1, view.width // 104)

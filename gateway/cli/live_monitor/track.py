@@ -18,6 +18,8 @@ WINDOW_S: Final = 60.0
 
 @dataclass(frozen=True, slots=True)
 class TrackPoint:
+    """Setpoint and measured force of one poll, N; time in s."""
+
     time_s: float
     measured_n: float
     setpoint_n: float
@@ -72,6 +74,7 @@ class Track:
 
     @property
     def is_calibrating(self) -> bool:
+        """True while a run, not a master, moves the force."""
         return self.value("state") == State.CALIBRATING
 
     @property
@@ -85,13 +88,14 @@ class Track:
         return None if changed_s is None else self.time_s - changed_s
 
     def has_status(self, bit: StatusBit) -> bool:
+        """Return whether a bit of the status word is set; False before the first poll."""
         word = self.value("status_word")
         return not isnan(word) and bool(int(word) & bit)
 
     def _note_change(self, name: str, words: tuple[int, ...]) -> None:
-        seen = self._seen.setdefault(name, _Seen(words))
-        if seen.words != words:
-            seen.words, seen.changed_s = words, self.time_s
+        values = self._seen.setdefault(name, _Seen(words))
+        if values.words != words:
+            values.words, values.changed_s = words, self.time_s
 
     def _settle(self, point: TrackPoint) -> None:
         last, settling = (self.points[-1] if self.points else None), self.settling
@@ -106,7 +110,7 @@ class Track:
         self.settling = settling
 
     def largest_error_n(self, window_s: float) -> float:
-        """Largest |measured - setpoint| of the last window_s since it settled, N; NaN when it has not."""
+        """Return the largest |measured - setpoint| of the last window_s since it settled, N; NaN when it has not."""
         if not self.settling.is_settled:
             return nan
         begin_s = max(self.settling.since_s, self.time_s - window_s)

@@ -44,6 +44,7 @@ class RegisterReading:
 
     @property
     def is_available(self) -> bool:
+        """True where the gateway has a value."""
         return not isnan(self.value)
 
 
@@ -101,12 +102,12 @@ class GatewayClient:
 
     def read_values(self, registers: Sequence[Register]) -> list[RegisterReading]:
         """Return the registers in the order asked for; those close together come from one request."""
-        found: dict[int, RegisterReading] = {}
+        readings: dict[int, RegisterReading] = {}
         for group in _groups(registers):
             first, last = group[0].address, group[-1].address + group[-1].words
             words = self.read_words(first, last - first)
-            found |= {register.address: _reading(register, words, first) for register in group}
-        return [found[register.address] for register in registers]
+            readings |= {register.address: _reading(register, words, first) for register in group}
+        return [readings[register.address] for register in registers]
 
     def frames(self, assignments: Sequence[Assignment]) -> list[Frame]:
         """Return what `write_values` sends: one FC16 per block, more where it is too long or a read-only register lies
@@ -120,6 +121,7 @@ class GatewayClient:
         return [self._frame(run) for run in runs]
 
     def write(self, frame: Frame) -> None:
+        """Send one FC16."""
         request = f"write {len(frame.words)} at {frame.address}"
         self._ask("write_registers", request, frame.address, list(frame.words))
 
@@ -146,8 +148,8 @@ class GatewayClient:
         return Frame(first, tuple(words), tuple(register.name for register in self._registers_at(gap)))
 
     def _registers_at(self, addresses: Sequence[int]) -> list[Register]:
-        wanted = set(addresses)
-        return [register for register in self.register_map.registers if not wanted.isdisjoint(_addresses(register))]
+        chosen = set(addresses)
+        return [register for register in self.register_map.registers if not chosen.isdisjoint(_addresses(register))]
 
     def _ask(self, method: str, request: str, *arguments: Any, **options: Any) -> Any:
         from pymodbus.exceptions import ModbusException
@@ -180,13 +182,14 @@ class GatewayClient:
 
 def _no_connection(where: str, error: OSError) -> CliError:
     if isinstance(error, TimeoutError):
-        seen, probably = f"no answer within {TIMEOUT_S:g} s", "wrong address, or a firewall"
+        symptom, probably = f"no answer within {TIMEOUT_S:g} s", "wrong address, or a firewall"
     elif isinstance(error, socket.gaierror):
-        seen, probably = "no such host name", "a typo in --gateway"
+        symptom, probably = "no such host name", "a typo in --gateway"
     else:
-        seen, probably = error.strerror or str(error), "not running, or on another port"
+        symptom, probably = error.strerror or str(error), "not running, or on another port"
     return CliError(
-        f"E130 no gateway at {where}: {seen}; {probably}. Start one (force-gateway run demo --sim) or give --gateway HOST:PORT",
+        f"E130 no gateway at {where}: {symptom}; {probably}. Start one (force-gateway run demo --sim) or give "
+        "--gateway HOST:PORT",
         exit_codes.DEVICE,
     )
 
@@ -195,9 +198,9 @@ def _no_answer(where: str, unit: int, error: Exception) -> CliError:
     from pymodbus.exceptions import ConnectionException
 
     reset = isinstance(error, (OSError, ConnectionException))
-    seen = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
+    cause = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
     return CliError(
-        f"E131 {where} {seen}: not a Modbus server, another unit id, or this machine is not on its allow-list",
+        f"E131 {where} {cause}: not a Modbus server, another unit id, or this machine is not on its allow-list",
         exit_codes.DEVICE,
     )
 

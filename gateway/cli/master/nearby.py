@@ -11,7 +11,7 @@ _LOCAL: Final = "localhost"
 
 
 def sockets_near(host: str, root: Path) -> list[Path]:
-    """State directories below root with a control socket, none where host is another machine."""
+    """Find state directories below root with a control socket, none where host is another machine."""
     try:
         is_here = host == _LOCAL or ip_address(host.strip("[]")).is_loopback
     except ValueError:
@@ -22,8 +22,8 @@ def sockets_near(host: str, root: Path) -> list[Path]:
 def running_at(host: str, port: int, root: Path) -> dict[str, Any] | None:
     """Return what the gateway that serves this port says of itself (`running`); None where it is elsewhere, nobody
     says, or two do."""
-    told = [one for directory in sockets_near(host, root) if (one := _said_by(directory)).get("port") == port]
-    return told[0] if len(told) == 1 else None
+    answer = [one for directory in sockets_near(host, root) if (one := _said_by(directory)).get("port") == port]
+    return answer[0] if len(answer) == 1 else None
 
 
 def _said_by(directory: Path) -> dict[str, Any]:

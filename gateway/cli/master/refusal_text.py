@@ -35,9 +35,9 @@ def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], 
     if reason is RefusalReason.NONE:
         return f"{exception} to {refused.request}"
     entry = reason.explanation
-    seen = f"{entry.code} {entry.title}: {exception} to {refused.request}; {where}"
+    values = f"{entry.code} {entry.title}: {exception} to {refused.request}; {where}"
     own = _own_sentence(client, at, reason, state).removeprefix(f"{entry.code} ")
-    return "\n  ".join(part for part in (seen, own, f"{entry.do} (force-gateway explain {entry.code})") if part)
+    return "\n  ".join(part for part in (values, own, f"{entry.do} (force-gateway explain {entry.code})") if part)
 
 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:
@@ -49,11 +49,11 @@ def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, st
     states = [state] if state else sockets_near(client.where.rpartition(":")[0], default_state_root())
     for directory in states:
         try:
-            told = ask(directory, {"do": "last-refusal"})
+            sentence = ask(directory, {"do": "last-refusal"})
         except CliError:
             continue
-        if (told.get("address"), told.get("reason")) == (address, int(reason)):
-            return str(told["sentence"])
+        if (sentence.get("address"), sentence.get("reason")) == (address, int(reason)):
+            return str(sentence["sentence"])
     return ""
 
 

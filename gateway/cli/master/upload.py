@@ -28,6 +28,7 @@ class UploadClient(GatewayClient):
     """CliError for whatever goes wrong: no answer (69), a refusal (1), a set that fails a check (65)."""
 
     def send(self, requests: Iterable[Request]) -> None:
+        """Send the requests in order. CliError when one is refused."""
         for request in requests:
             with explain_refusals(self, [Frame(request.address, request.words)]):
                 if request.function == WRITE_REGISTER:
@@ -37,6 +38,7 @@ class UploadClient(GatewayClient):
                     self.write(Frame(request.address, request.words))
 
     def calibration_id(self) -> int:
+        """Read the number of the calibration in use."""
         with explain_refusals(self):
             return int(self.read_values([self.register_map.find("calibration_id")])[0].value)
 
@@ -64,17 +66,17 @@ class UploadClient(GatewayClient):
 
     def check_active(self, upload: UploadFrames, slot: int) -> None:
         """Check that the active block holds what was sent, word for word."""
-        sent = struct.unpack(f">{len(upload.set_words) // 2}H", upload.set_words)
+        expected = struct.unpack(f">{len(upload.set_words) // 2}H", upload.set_words)
         first = self.register_map.find("order@active").address
         places = [*range(first, first + HEAD_WORDS)]
-        places += range(first + TAIL_FROM, first + TAIL_FROM + len(sent) - HEAD_WORDS)
+        places += range(first + TAIL_FROM, first + TAIL_FROM + len(expected) - HEAD_WORDS)
         with explain_refusals(self):
             words = self.read_words(first, HEAD_WORDS)
-            words += self.read_words(first + TAIL_FROM, len(sent) - HEAD_WORDS)
-            (seen,) = self.read_words(self.register_map.find("active_slot").address, 1)
-        different = [at for at, own, found in zip(places, sent, words, strict=True) if own != found]
-        if different or seen != slot:
-            where = f"{len(different)} words differ, the first at {different[0]}" if different else f"slot {seen}"
+            words += self.read_words(first + TAIL_FROM, len(expected) - HEAD_WORDS)
+            (active,) = self.read_words(self.register_map.find("active_slot").address, 1)
+        different = [at for at, own, held_words in zip(places, expected, words, strict=True) if own != held_words]
+        if different or active != slot:
+            where = f"{len(different)} words differ, the first at {different[0]}" if different else f"slot {active}"
             raise CliError(
                 f"E434 committed, but another set is in use now ({where}): probably another master's; agree on one"
             )
@@ -88,7 +90,7 @@ class UploadClient(GatewayClient):
 
 
 def place(index: int) -> str:
-    """failing_index in words: `index 50, falling weight 2`."""
+    """Return failing_index in words: `index 50, falling weight 2`."""
     if not 0 <= index < 16 * len(_PLACES):
         return "the whole set"
     name = f"{_PLACES[index // 16]} {index % 16}"

@@ -43,6 +43,7 @@ class Request:
 
     @property
     def pdu(self) -> bytes:
+        """Bytes of the request without framing."""
         if self.function == READ_HOLDING_REGISTERS:
             return read_request(self.function, self.address, self.count)
         if self.function == WRITE_REGISTER:
@@ -50,14 +51,17 @@ class Request:
         return write_registers_request(self.address, struct.pack(f">{len(self.words)}H", *self.words))
 
     def frame(self, transaction: int, unit: int) -> bytes:
-        """As it goes over TCP."""
+        """Return the request as it goes over TCP."""
         return encode(Adu(transaction, unit, self.pdu))
 
 
 @dataclass(frozen=True, slots=True)
 class UploadFrames:
-    """set_words: what the active block must read back; commit is the last request; poll is repeated until commit_status tells
-    the end."""
+    """All requests of an upload.
+
+    set_words: what the active block must read back; commit is the last request; poll is repeated until commit_status tells
+    the end.
+    """
 
     set_words: bytes
     staging: tuple[Request, ...]
@@ -66,6 +70,7 @@ class UploadFrames:
 
     @property
     def requests(self) -> tuple[Request, ...]:
+        """Staging, then the commit."""
         return (*self.staging, self.commit)
 
 
@@ -138,7 +143,7 @@ def listing(upload: UploadFrames, register_map: RegisterMap, unit: int) -> Itera
 
 
 def facts(upload: UploadFrames, unit: int) -> list[dict[str, Any]]:
-    """Return the same for --json."""
+    """Return every request as JSON objects, for --json."""
     return [
         {
             "text": request.text,

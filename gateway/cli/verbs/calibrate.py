@@ -69,7 +69,9 @@ _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 )
 @state_options
 @json_option
-def command(*, state: StateChoice, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **wanted: Any) -> None:
+def command(
+    *, state: StateChoice, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **plan_options: Any
+) -> None:
     """Measure a ladder and make a numbered calibration of it, or run and record an experiment (--plan).
 
     Runs on the gateway of this machine. Ctrl-C takes the force to 0 and keeps the data. Nothing is activated: that is
@@ -81,20 +83,20 @@ def command(*, state: StateChoice, gateway: tuple[str, int] | None, yes: bool, a
 
     resumes = True
     if gateway:
-        if any(wanted.values()):
+        if any(plan_options.values()):
             raise click.UsageError("by Modbus (--gateway) the gateway runs its own plan: leave the plan's options out")
         run: LocalRun | RemoteRun = RemoteRun(gateway)
     else:
         directory = state.directory
-        asked = _plan_wanted(directory, wanted)
-        if asked.whole:
-            _tell(_fit_stopped_run(asked.whole, state.rig, directory), as_json, resumes=False)
+        run_request = _plan_wanted(directory, plan_options)
+        if run_request.whole:
+            _tell(_fit_stopped_run(run_request.whole, state.rig, directory), as_json, resumes=False)
             return
-        run = LocalRun(directory, asked.plan, asked.earlier, asked.name)
-        resumes = not is_experiment(asked.plan)
+        run = LocalRun(directory, run_request.plan, run_request.earlier, run_request.name)
+        resumes = not is_experiment(run_request.plan)
     preview = run.preview()
     if gateway is None:
-        _warn_of_another_rig(asked, preview)
+        _warn_of_another_rig(run_request, preview)
     _ask(preview, yes)
     _tell(follow(run), as_json, resumes=resumes)
 
@@ -111,21 +113,21 @@ class _WantedRun:
     fingerprint: str = ""
 
 
-def _plan_wanted(directory: Path, wanted: dict[str, Any]) -> _WantedRun:
+def _plan_wanted(directory: Path, plan_options: dict[str, Any]) -> _WantedRun:
     from gateway.control.runs.ladder_stairs import QUICK
 
     fields: dict[str, Any] = {}
-    if wanted["quick"]:
+    if plan_options["quick"]:
         fields |= {name: getattr(QUICK, name) for name in ("step_v", "groups", "minor_points", "response_steps")}
-    if wanted["plan_file"]:
-        fields |= _from_file(wanted["plan_file"], wanted)
+    if plan_options["plan_file"]:
+        fields |= _from_file(plan_options["plan_file"], plan_options)
     names = ("groups", "step_v", "v_max_v", "minor_points", "response_steps")
-    fields |= {name: wanted[name] for name in names if wanted[name] is not None}
-    if wanted["tare"]:
+    fields |= {name: plan_options[name] for name in names if plan_options[name] is not None}
+    if plan_options["tare"]:
         fields["tare"] = True
-    if wanted["resume"]:
-        return _resume(directory, fields, wanted["name"] or "")
-    return _WantedRun(fields, name=wanted["name"] or "")
+    if plan_options["resume"]:
+        return _resume(directory, fields, plan_options["name"] or "")
+    return _WantedRun(fields, name=plan_options["name"] or "")
 
 
 def _resume(directory: Path, fields: dict[str, Any], name: str) -> _WantedRun:
@@ -159,8 +161,8 @@ def _fit_stopped_run(recording: Path, rig: str, directory: Path) -> dict[str, An
     return {"phase": phase, "recording": str(recording), "sentence": sentence} | result
 
 
-def _warn_of_another_rig(asked: _WantedRun, preview: dict[str, Any]) -> None:
-    if asked.fingerprint and asked.fingerprint != preview["rig_fingerprint"]:
+def _warn_of_another_rig(run_request: _WantedRun, preview: dict[str, Any]) -> None:
+    if run_request.fingerprint and run_request.fingerprint != preview["rig_fingerprint"]:
         click.echo(
             f"the files of rig {preview['rig']} have changed since the first part was recorded: if cell, cylinder or regulator "
             "are others now, begin anew without --resume",
@@ -168,13 +170,13 @@ def _warn_of_another_rig(asked: _WantedRun, preview: dict[str, Any]) -> None:
         )
 
 
-def _from_file(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
+def _from_file(path: Path, plan_options: dict[str, Any]) -> dict[str, Any]:
     """Return the plan's fields; UsageError where options of a ladder stand beside an experiment."""
     from gateway.cli.calibration.plans import fields_of, is_experiment
 
     fields = fields_of(path)
     options = ("groups", "step_v", "v_max_v", "minor_points", "response_steps", "quick", "resume", "name")
-    if is_experiment(fields) and any(wanted[name] for name in options):
+    if is_experiment(fields) and any(plan_options[name] for name in options):
         raise click.UsageError(
             f"{path} is an experiment: --groups, --step, --v-max, --minor, --response, --quick, --resume, --name are a ladder's"
         )

@@ -34,31 +34,31 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
     from gateway.cli.calibration.stored import open_store
 
     store = open_store(state.directory, state.rig)
-    standing, entries = store.find_selected(), store.list()
+    selected, entries = store.find_selected(), store.list()
     if as_json:
         facts = {
-            "active": _number(standing),
-            "notes": standing.notes,
-            "built_in": _built_in(store.built_in, standing),
-            "calibrations": [_facts(entry, standing) for entry in entries],
+            "active": _number(selected),
+            "notes": selected.notes,
+            "built_in": _built_in(store.built_in, selected),
+            "calibrations": [_facts(entry, selected) for entry in entries],
         }
         click.echo(json.dumps(facts, indent=2))
         return
-    for note in standing.notes:
+    for note in selected.notes:
         click.echo(note, err=True)
     click.echo("  NUMBER  made        model     reversal        forces              rms N   max N  slots  name")
     if store.built_in:
-        mark = "*" if standing.selection.number is None else " "
-        click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, _slots(standing, OWN))} (the rig's own)")
+        mark = "*" if selected.selection.number is None else " "
+        click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, _slots(selected, OWN))} (the rig's own)")
     for entry in entries:
         is_rejected = entry.calibration is not None and bool(entry.calibration.rejected)
-        mark = "*" if standing.selection.number == entry.number else "x" if is_rejected else " "
-        told = (
-            _line(entry.calibration, _slots(standing, entry.number))
+        mark = "*" if selected.selection.number == entry.number else "x" if is_rejected else " "
+        description = (
+            _line(entry.calibration, _slots(selected, entry.number))
             if entry.calibration
             else f"unusable: {entry.fault}"
         )
-        click.echo(f"{mark} {entry.number:<8}{told}")
+        click.echo(f"{mark} {entry.number:<8}{description}")
 
 
 @command.command(name="show")
@@ -169,37 +169,37 @@ def _write(texts: dict[Path, str], *, force: bool) -> None:
         click.echo(f"wrote {path}", err=True)
 
 
-def _number(standing: "SelectedCalibration") -> int | None:
-    return standing.calibration.number if standing.calibration else None
+def _number(selected: "SelectedCalibration") -> int | None:
+    return selected.calibration.number if selected.calibration else None
 
 
-def _built_in(own: "Calibration | None", standing: "SelectedCalibration") -> dict[str, Any] | None:
+def _built_in(own: "Calibration | None", selected: "SelectedCalibration") -> dict[str, Any] | None:
     """Return the rig's own calibration, which is no file of the store."""
     from gateway.calibrations.selection import OWN
     from gateway.registers.upload.coefficients import model_hash
 
     if own is None:
         return None
-    active, slots = standing.selection.number is None, _slots(standing, OWN)
+    active, slots = selected.selection.number is None, _slots(selected, OWN)
     return {"number": own.number, "name": own.name, "active": active, "slots": slots, "model_hash": model_hash(own)}
 
 
-def _facts(entry: "CalibrationEntry", standing: "SelectedCalibration") -> dict[str, Any]:
+def _facts(entry: "CalibrationEntry", selected: "SelectedCalibration") -> dict[str, Any]:
     from gateway.registers.upload.coefficients import model_hash
 
     return {
         "number": entry.number,
-        "active": standing.selection.number == entry.number,
-        "slots": _slots(standing, entry.number),
+        "active": selected.selection.number == entry.number,
+        "slots": _slots(selected, entry.number),
         "model_hash": entry.calibration and model_hash(entry.calibration),
         "fault": entry.fault or None,
         "calibration": asdict(entry.calibration) if entry.calibration else None,
     }
 
 
-def _slots(standing: "SelectedCalibration", number: int) -> list[int]:
+def _slots(selected: "SelectedCalibration", number: int) -> list[int]:
     """Return the slots that hold this calibration."""
-    return [slot for slot, held in enumerate(standing.pointer.slots) if held == number]
+    return [slot for slot, number_there in enumerate(selected.pointer.slots) if number_there == number]
 
 
 def _line(calibration: "Calibration", slots: list[int]) -> str:

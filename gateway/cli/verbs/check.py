@@ -62,14 +62,14 @@ def _document(checked: "Checked") -> dict[str, Any]:
     """Of a rig: its facts under `rig`; of anything else: one sentence under its kind."""
     from gateway.cli.profile_facts import facts
 
-    told: dict[str, Any] = {"kind": checked.kind, "rig": None}
+    documents: dict[str, Any] = {"kind": checked.kind, "rig": None}
     if not checked.faults:
-        told |= facts(checked) if checked.kind != "rig" else {"rig": facts(checked, whole=True)}
+        documents |= facts(checked) if checked.kind != "rig" else {"rig": facts(checked, whole=True)}
     return {
         "ok": not checked.faults,
         "faults": [_fault(fault) for fault in checked.faults],
         "warnings": [_fault(warning) for warning in checked.warnings],
-        **told,
+        **documents,
     }
 
 

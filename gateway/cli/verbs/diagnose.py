@@ -123,7 +123,7 @@ def _run_diagnosis(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagno
     from gateway.diagnosis import Options, diagnose
     from gateway.diagnosis.input_checks import name_options
 
-    asked = Options(
+    engine_options = Options(
         without=options["without"],
         noise_floor_n=options["noise_floor_n"],
         late_s=sources.late_s,
@@ -132,7 +132,7 @@ def _run_diagnosis(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagno
     )
     began_s = time.perf_counter()
     with Console(stderr=True).status("diagnosing"):
-        diagnosis = diagnose(sources.measurements, sources.plant.plant, asked)
+        diagnosis = diagnose(sources.measurements, sources.plant.plant, engine_options)
     diagnosis = replace(diagnosis, suspects=name_options(diagnosis.suspects, options["columns"] or ""))
     return diagnosis, time.perf_counter() - began_s
 

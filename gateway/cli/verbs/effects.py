@@ -68,12 +68,12 @@ def _table(family: str, effects: "list[Effect]") -> "Table":
     for effect in effects:
         parameters = ", ".join(f"{parameter.name} ({parameter.unit or '1'})" for parameter in effect.parameters)
         needs = f"; needs the column {' and '.join(effect.needs)}" if effect.needs else ""
-        told = Text(effect.what)
+        texts = Text(effect.what)
         for keyword, text in (
             ("seen as", effect.signature),
             ("record", effect.excitation + needs),
             ("sized by", parameters),
         ):
-            told.append(f"\n{keyword}: {text}", style="dim")
-        table.add_row(Text(effect.name, style="bold"), told)
+            texts.append(f"\n{keyword}: {text}", style="dim")
+        table.add_row(Text(effect.name, style="bold"), texts)
     return table

@@ -48,7 +48,7 @@ def _describe_unknown_code(code: str) -> str:
     """Return the sentence about a code that does not exist, with those that are near."""
     from gateway.codes.all_codes import CATALOGUE
 
-    known = [*CATALOGUE, *(entry.name for entry in CATALOGUE.values() if entry.name)]
-    near = get_close_matches(code.upper().replace("-", "_"), known, n=2, cutoff=0.6)
+    codes = [*CATALOGUE, *(entry.name for entry in CATALOGUE.values() if entry.name)]
+    near = get_close_matches(code.upper().replace("-", "_"), codes, n=2, cutoff=0.6)
     meant = f"; did you mean {' or '.join(near)}?" if near else ";"
     return f"{code} is not a code{meant} `force-gateway explain` lists them all"

@@ -135,7 +135,7 @@ def _store(fit: "LadderFit", options: dict[str, Any]) -> int:
 
 
 def show(document: dict[str, Any]) -> None:
-    """Table and sentences, for a terminal."""
+    """Print the fits as a table, and sentences on them."""
     from rich.console import Console
 
     from gateway.cli.calibration.fit_table import fit_table, summary

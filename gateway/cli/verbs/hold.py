@@ -82,10 +82,10 @@ def _find_gateway_lease(host: str, port: int) -> "KnownLease | None":
     from gateway.cli.master.nearby import running_at
     from gateway.service.supervisor.run_options import default_state_root
 
-    told = running_at(host, port, default_state_root())
-    if told is None or not {"lease_s", "lease_action"} <= told.keys():
+    answer = running_at(host, port, default_state_root())
+    if answer is None or not {"lease_s", "lease_action"} <= answer.keys():
         return None
-    return KnownLease(told["lease_s"], str(told["lease_action"]))
+    return KnownLease(answer["lease_s"], str(answer["lease_action"]))
 
 
 def _check_force(register_map: Any, newton: float) -> float:
@@ -101,7 +101,7 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
     """Show the line until the beat ends; what stops it comes as a signal, as the end of its time, or as a closed pipe."""
     from gateway.cli.force_hold.state_line import StateLine
 
-    shown, began_s = StateLine(as_json=as_json), time.monotonic()
+    state_line, began_s = StateLine(as_json=as_json), time.monotonic()
     with _handle_signals(beat):
         beat.start()
         while beat.is_alive():
@@ -110,14 +110,14 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
             if for_s is not None and now_s >= for_s:
                 beat.stopping.set()
             try:
-                if beat.seen:
-                    shown.show(beat.seen, now_s)
+                if beat.status:
+                    state_line.show(beat.status, now_s)
             except BrokenPipeError:
                 beat.stopping.set()
                 beat.join()
                 sys.stdout = open("/dev/null", "w")  # noqa: PTH123, SIM115 - nobody reads what would follow
     with suppress(BrokenPipeError):
-        shown.close()
+        state_line.close()
 
 
 @contextmanager
@@ -165,8 +165,8 @@ def _describe_disabled(beat: "HeartbeatThread") -> str:
 
 def _describe_fault(beat: "HeartbeatThread") -> str:
     """Return the fault's sentence, and how to go on."""
-    assert beat.seen
-    entry = beat.seen.fault.explanation
+    assert beat.status
+    entry = beat.status.fault.explanation
     when = f"while holding {beat.hold.force_n:g} N" if beat.hold.is_pressing else "is latched"
     return (
         f"{entry.code} {entry.title}, {when}: {entry.seen} The output is at the safe voltage\n"

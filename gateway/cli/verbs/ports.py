@@ -20,13 +20,13 @@ def command(*, as_json: bool) -> None:
     """List serial ports, by id as rig files want them."""
     from gateway.ports import list_ports
 
-    found = list_ports()
+    ports = list_ports()
     if as_json:
-        click.echo(json.dumps([{"path": port.path} | asdict(port) for port in found], indent=2))
+        click.echo(json.dumps([{"path": port.path} | asdict(port) for port in ports], indent=2))
         return
-    if not found:
+    if not ports:
         click.echo("no serial port of a device found; plug the adapter in (dmesg | tail shows whether it is seen)")
-    for port in found:
+    for port in ports:
         click.echo(port.path)
         click.echo(f"  {_line(port)}")
 

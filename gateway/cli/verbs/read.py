@@ -51,13 +51,13 @@ def _find_registers(register_map: "RegisterMap", names: tuple[str, ...]) -> "lis
     from gateway.registers import UnknownRegister
 
     blocks = {block.name for block in register_map.blocks}
-    found: list[Register] = []
+    registers: list[Register] = []
     for name in names:
         try:
-            found += register_map.registers_of(name) if name in blocks else [register_map.find(name)]
+            registers += register_map.registers_of(name) if name in blocks else [register_map.find(name)]
         except UnknownRegister as error:
             raise click.UsageError(str(error)) from None
-    return found
+    return registers
 
 
 def _facts(reading: "RegisterReading") -> dict[str, Any]:

@@ -33,11 +33,12 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
             click.echo("\n".join([*names, f"{count_of(names, 'file')} would be restored to {directory}"]))
             return
         with _not_running(directory):
-            kept = unpack(file, directory)
+            previous = unpack(file, directory)
     except ArchiveError as error:
         raise CliError(f"E404 {error}; nothing was changed", exit_codes.DATA) from None
     click.echo(
-        f"restored {count_of(names, 'file')} to {directory}" + (f"; what was there is in {kept}" if kept else "")
+        f"restored {count_of(names, 'file')} to {directory}"
+        + (f"; what was there is in {previous}" if previous else "")
     )
 
 

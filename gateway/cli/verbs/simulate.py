@@ -75,8 +75,8 @@ def _simulate(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Flo
     answers = [replay.run([profile.plant]).reading_n[0] for replay in replays]
     errors = [float(np.mean((measurement.force_n - answer)[measurement.usable] ** 2)) for answer in answers]
     best = int(np.argmin(errors))
-    told = [_MOTION_NOTES[ways[best]]] if measurement.position_m is not None else []
-    return np.asarray(answers[best]), [*told, *replays[best].notes]
+    notes = [_MOTION_NOTES[ways[best]]] if measurement.position_m is not None else []
+    return np.asarray(answers[best]), [*notes, *replays[best].notes]
 
 
 def _facts(measurement: "Measurement", simulated_n: "Floats") -> dict[str, Any]:

@@ -42,12 +42,12 @@ def command(*, file: str, map_name: str, as_json: bool, **options: Any) -> None:
     only_print = options["print_frames"] and options["dry_run"]
     if options["print_frames"] and not as_json:
         click.echo("\n".join(listing(upload, register_map, unit)))
-    told = {} if only_print else _send(upload, register_map, options)
+    sentence = {} if only_print else _send(upload, register_map, options)
     if as_json:
         frames = {"frames": facts(upload, unit)} if options["print_frames"] else {}
-        click.echo(json.dumps({"sent": not only_print, **told, **frames}))
+        click.echo(json.dumps({"sent": not only_print, **sentence, **frames}))
     elif not only_print:
-        click.echo(_sentence(calibration, told))
+        click.echo(_sentence(calibration, sentence))
 
 
 def _load(file: str) -> "Calibration":
@@ -82,19 +82,19 @@ def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str
     with master:
         master.send(upload.requests)
         master.outcome(upload)
-        committed, known = not options["dry_run"], False
+        committed, is_known = not options["dry_run"], False
         if committed:
             master.check_active(upload, options["slot"])
-            known = master.is_known_set()
+            is_known = master.is_known_set()
         active = master.calibration_id()
-        return {"committed": committed, "active": active, "slot": options["slot"], "known": known}
+        return {"committed": committed, "active": active, "slot": options["slot"], "known": is_known}
 
 
-def _sentence(calibration: "Calibration", told: dict[str, Any]) -> str:
-    if not told["committed"]:
-        return f"{calibration.name} passes every check; nothing was stored, active set {told['active']} unchanged"
-    known = "; the gateway knew it, and keeps its number and name" if told["known"] else ""
+def _sentence(calibration: "Calibration", sentence: dict[str, Any]) -> str:
+    if not sentence["committed"]:
+        return f"{calibration.name} passes every check; nothing was stored, active set {sentence['active']} unchanged"
+    is_known = "; the gateway knew it, and keeps its number and name" if sentence["known"] else ""
     return (
-        f"{calibration.name} is in use as calibration {told['active']}, slot {told['slot']}: "
-        f"{calibration.reversal_kind}, durable, and read back word by word{known}"
+        f"{calibration.name} is in use as calibration {sentence['active']}, slot {sentence['slot']}: "
+        f"{calibration.reversal_kind}, durable, and read back word by word{is_known}"
     )

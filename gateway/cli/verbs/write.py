@@ -34,15 +34,15 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, 
     from gateway.profiles import load_register_map
 
     register_map = load_register_map(options["map_name"])
-    wanted = [_assignment(register_map, text) for text in assignments]
-    _refuse_doubles(wanted)
+    writes = [_assignment(register_map, text) for text in assignments]
+    _refuse_doubles(writes)
     with GatewayClient(*endpoint, options["unit"], register_map) as client:
         with explain_refusals(client):
-            frames = client.frames(wanted)
+            frames = client.frames(writes)
         with explain_refusals(client, frames, options["state"]):
             for frame in [] if dry_run else frames:
                 client.write(frame)
-    _tell(frames, wanted, dry_run=dry_run, as_json=as_json)
+    _tell(frames, writes, dry_run=dry_run, as_json=as_json)
 
 
 def _assignment(register_map: "RegisterMap", text: str) -> "Assignment":
@@ -64,24 +64,26 @@ def _assignment(register_map: "RegisterMap", text: str) -> "Assignment":
         raise click.UsageError(f"{name}: {error}") from None
 
 
-def _refuse_doubles(wanted: "list[Assignment]") -> None:
-    addresses = [assignment.register.address for assignment in wanted]
-    for assignment in wanted:
+def _refuse_doubles(assignments: "list[Assignment]") -> None:
+    addresses = [assignment.register.address for assignment in assignments]
+    for assignment in assignments:
         if addresses.count(assignment.register.address) > 1:
             raise click.UsageError(f"{assignment.register.name} is given twice")
 
 
-def _tell(frames: "list[Frame]", wanted: "list[Assignment]", *, dry_run: bool, as_json: bool) -> None:
+def _tell(frames: "list[Frame]", assignments: "list[Assignment]", *, dry_run: bool, as_json: bool) -> None:
     if as_json:
-        sent = [{"address": frame.address, "words": list(frame.words), "kept": list(frame.kept)} for frame in frames]
-        click.echo(json.dumps({"sent": not dry_run, "frames": sent}))
+        documents = [
+            {"address": frame.address, "words": list(frame.words), "kept": list(frame.kept)} for frame in frames
+        ]
+        click.echo(json.dumps({"sent": not dry_run, "frames": documents}))
         return
-    for assignment in wanted:
+    for assignment in assignments:
         click.echo(f"{assignment.register.name} = {_as_shown(assignment)}")
     for frame in frames:
         words = " ".join(f"{word:04X}" for word in frame.words)
-        kept = f", {', '.join(frame.kept)} kept as read" if frame.kept else ""
-        click.echo(f"{'would send' if dry_run else 'sent'} FC16 address {frame.address}: {words}{kept}")
+        unchanged = f", {', '.join(frame.kept)} kept as read" if frame.kept else ""
+        click.echo(f"{'would send' if dry_run else 'sent'} FC16 address {frame.address}: {words}{unchanged}")
 
 
 def _as_shown(assignment: "Assignment") -> str:

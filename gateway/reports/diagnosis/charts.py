@@ -61,11 +61,11 @@ def force_over_time(
     trace: Trace, after: bool, window: tuple[float, float] | None = None, *, wide: bool = True
 ) -> Drawing:
     """Draw measured and simulated force over time; window: (start, end), s, of a closer look."""
-    left = TraceResiduals.of(trace)
-    start, end = window or (float(left.time_s[0]), float(left.time_s[-1]))
-    shown = (left.time_s >= start) & (left.time_s <= end)
-    time_s, measured_n = left.time_s[shown], left.measured_n[shown]
-    both = [measured_n - left_n[shown] for left_n in (left.before_n, left.after_n)]
+    residuals = TraceResiduals.of(trace)
+    start, end = window or (float(residuals.time_s[0]), float(residuals.time_s[-1]))
+    in_window = (residuals.time_s >= start) & (residuals.time_s <= end)
+    time_s, measured_n = residuals.time_s[in_window], residuals.measured_n[in_window]
+    both = [measured_n - left_n[in_window] for left_n in (residuals.before_n, residuals.after_n)]
     chart = SeriesChart(
         Axis(start, max(end, start + 1e-9), "time (s)"),
         Axis(*limits(measured_n, *both), "force (N)"),
@@ -82,27 +82,27 @@ def force_over_time(
 
 def residual_over_time(trace: Trace) -> Drawing:
     """Return the chart of the residual over time, before and after."""
-    left = TraceResiduals.of(trace)
+    residuals = TraceResiduals.of(trace)
     chart = SeriesChart(
         Axis(0.0, max(trace.measurement.duration_s, 1e-9), "time (s)"),
-        Axis(*limits(left.before_n, left.after_n, around=0.0), "measured − simulated (N)"),
+        Axis(*limits(residuals.before_n, residuals.after_n, around=0.0), "measured − simulated (N)"),
         "Residual over time, before and after",
         width=_WIDE,
         height=_WIDE_HIGH,
     )
-    for left_n, name in ((left.before_n, "before"), (left.after_n, "after")):
-        chart.envelope(series.envelope(left.time_s, left_n, _COLUMNS), name, name)
+    for left_n, name in ((residuals.before_n, "before"), (residuals.after_n, "after")):
+        chart.envelope(series.envelope(residuals.time_s, left_n, _COLUMNS), name, name)
     chart.level(0.0)
     return _drawing(chart)
 
 
 def residual_against(rows: ResidualRows, quantity: str, *, wide: bool = False) -> Drawing:
-    """Clouds before and after, with the means over bins."""
+    """Draw the residual over a quantity: clouds before and after, with the means over bins."""
     x = rows.quantities[quantity]
-    held = np.isfinite(x)
-    chart = _residual_chart(x[held], rows, quantity, wide)
+    finite = np.isfinite(x)
+    chart = _residual_chart(x[finite], rows, quantity, wide)
     for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
-        chart.cloud(x[held], left_n[held], name)
+        chart.cloud(x[finite], left_n[finite], name)
     for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
         means = series.bin_means(x, left_n)
         chart.line(means.x.tolist(), means.mean.tolist(), f"{name} halo")
@@ -112,7 +112,7 @@ def residual_against(rows: ResidualRows, quantity: str, *, wide: bool = False) -
 
 
 def residual_by_direction(rows: ResidualRows, quantity: str, after: bool, *, wide: bool = False) -> Drawing:
-    """Against the drive, rows of rising and of falling motion apart."""
+    """Draw the residual over the drive, rows of rising and of falling motion apart."""
     x, left_n = rows.quantities[quantity], rows.after_n if after else rows.before_n
     ways = ((RISING, "rising"), (FALLING, "falling"))
     chart = _residual_chart(x, rows, quantity, wide)
@@ -139,31 +139,31 @@ def _residual_chart(x: Floats, rows: ResidualRows, quantity: str, wide: bool) ->
 
 
 def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing:
-    """Force against the drive, measured and simulated."""
+    """Draw the force over the drive, measured and simulated."""
     label = series.drive(traces[0].measurement)[0]
     alike = [trace for trace in traces if series.drive(trace.measurement)[0] == label]
     x = np.concatenate([series.drive(trace.measurement)[1][trace.measurement.usable] for trace in alike])
     parts = [TraceResiduals.of(trace) for trace in alike]
     measured_n = np.concatenate([part.measured_n for part in parts])
-    left = [np.concatenate([getattr(part, name) for part in parts]) for name in ("before_n", "after_n")]
+    residuals = [np.concatenate([getattr(part, name) for part in parts]) for name in ("before_n", "after_n")]
     name = "after" if after else "before"
     chart = SeriesChart(
         Axis(*limits(x, margin=0.02), label),
-        Axis(*limits(measured_n, measured_n - left[0], measured_n - left[1]), "force (N)"),
+        Axis(*limits(measured_n, measured_n - residuals[0], measured_n - residuals[1]), "force (N)"),
         f"Force against {label}, {name}",
         width=_width(wide),
         height=_HIGH,
         cell_px=2.0,
     )
     chart.cloud(x, measured_n, "measured wider", "measured")
-    chart.cloud(x, measured_n - left[int(after)], f"{name} strong", f"simulated, {name}")
+    chart.cloud(x, measured_n - residuals[int(after)], f"{name} strong", f"simulated, {name}")
     return _drawing(chart)
 
 
 def spectra(trace: Trace, *, wide: bool = False) -> Drawing:
-    """Amplitude density of the residual, before and after; NOTHING for a recording that is too short."""
-    left = TraceResiduals.of(trace)
-    both = [series.spectrum(left.time_s, left_n) for left_n in (left.before_n, left.after_n)]
+    """Draw the amplitude density of the residual, before and after; NOTHING for a recording that is too short."""
+    residuals = TraceResiduals.of(trace)
+    both = [series.spectrum(residuals.time_s, left_n) for left_n in (residuals.before_n, residuals.after_n)]
     frequency_hz, before = both[0]
     densities = np.concatenate([before, both[1][1]])
     densities = densities[densities > 0.0]

@@ -29,7 +29,7 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
             {"name": unseen.name, "why": unseen.why, "experiment": unseen.experiment}
             for unseen in diagnosis.not_identifiable
         ],
-        "rejected": [{"name": lost.name, "gain": finite_or_none(lost.gain)} for lost in diagnosis.rejected],
+        "rejected": [{"name": loser.name, "gain": finite_or_none(loser.gain)} for loser in diagnosis.rejected],
         "extended": {
             "held_out_rms_n": finite_or_none(diagnosis.extended.held_out_rms_n),
             "reaches_noise_floor": bool(diagnosis.extended.reaches_noise_floor),
@@ -70,8 +70,8 @@ def _cause(cause: Cause) -> Document:
         "group": list(cause.group),
         "confidence": finite_or_none(cause.confidence),
         "parameters": {
-            name: {"value": finite_or_none(found.value), "unit": found.unit, "ci95": _interval(found.ci95)}
-            for name, found in cause.parameters.items()
+            name: {"value": finite_or_none(estimate.value), "unit": estimate.unit, "ci95": _interval(estimate.ci95)}
+            for name, estimate in cause.parameters.items()
         },
         "gain": {
             "held_out_rms_before_n": finite_or_none(gain.held_out_rms_before_n),

@@ -26,16 +26,18 @@ def extended_plant(diagnosis: Diagnosis, start: PlantProfile, recording: str, da
     """
     plant = with_value(diagnosis.plant, "cell", "noise_n", start.plant.cell.noise_n)
     before = {f"{section}.{name}": value for section, name, value in values(start.plant)}
-    found_too = {f"{found.section}.{name}" for cause in diagnosis.causes for name, found in cause.parameters.items()}
-    for name, found in diagnosis.base_parameters.items():
-        path = f"{found.section}.{name}"
-        if path not in found_too and not _is_new_value(path, found, before[path]):
-            plant = with_value(plant, found.section, name, before[path])
-    moved = [f"{section}.{name}" for section, name, value in values(plant) if before[f"{section}.{name}"] != value]
-    sources = dict.fromkeys(moved, f"refitted to {recording}, {date}")
+    diagnosed = {
+        f"{estimate.section}.{name}" for cause in diagnosis.causes for name, estimate in cause.parameters.items()
+    }
+    for name, estimate in diagnosis.base_parameters.items():
+        path = f"{estimate.section}.{name}"
+        if path not in diagnosed and not _is_new_value(path, estimate, before[path]):
+            plant = with_value(plant, estimate.section, name, before[path])
+    changed = [f"{section}.{name}" for section, name, value in values(plant) if before[f"{section}.{name}"] != value]
+    sources = dict.fromkeys(changed, f"refitted to {recording}, {date}")
     for cause in diagnosis.causes:
-        for name, found in cause.parameters.items():
-            sources[f"{found.section}.{name}"] = _source_of_diagnosed(found, recording, date)
+        for name, estimate in cause.parameters.items():
+            sources[f"{estimate.section}.{name}"] = _source_of_diagnosed(estimate, recording, date)
     return replace(with_origins(start, plant, sources), description=_description(diagnosis, start, recording))
 
 
@@ -46,8 +48,8 @@ def _is_new_value(path: str, refitted: Estimate, before: float) -> bool:
     return path != _DETERMINED_BY_LINES and is_sure and not low <= before <= high
 
 
-def _source_of_diagnosed(found: Estimate, recording: str, date: str) -> str:
-    low, high = found.ci95
+def _source_of_diagnosed(estimate: Estimate, recording: str, date: str) -> str:
+    low, high = estimate.ci95
     return f"diagnosed from {recording}, {date}, ci95 [{low:.6g}, {high:.6g}]"
 
 

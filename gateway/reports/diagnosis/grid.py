@@ -23,20 +23,20 @@ class Panel:
 
 
 def figure(title: str, drawing: Drawing, caption: str = "", style: str = "") -> str:
-    """Empty where there is nothing to draw."""
+    """Return one figure as HTML; empty where there is nothing to draw."""
     if not drawing:
         return ""
-    told = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
-    return f"<figure class='{style}'><h3>{escape(title)}</h3>{drawing.key}{drawing.svg}{told}</figure>"
+    text = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    return f"<figure class='{style}'><h3>{escape(title)}</h3>{drawing.key}{drawing.svg}{text}</figure>"
 
 
 def grid(*panels: Panel) -> str:
-    """Empty without panels; those that draw nothing take no place."""
-    drawn = [(panel, drawing) for panel in panels if (drawing := panel.draw(wide=False))]
-    if not drawn:
+    """Return the panels as HTML in two columns; empty without panels. Those that draw nothing take no place."""
+    drawings = [(panel, drawing) for panel in panels if (drawing := panel.draw(wide=False))]
+    if not drawings:
         return ""
-    figures = [figure(panel.title, drawing, panel.caption) for panel, drawing in drawn]
-    if len(drawn) % 2:
-        last = drawn[-1][0]
+    figures = [figure(panel.title, drawing, panel.caption) for panel, drawing in drawings]
+    if len(drawings) % 2:
+        last = drawings[-1][0]
         figures[-1] = figure(last.title, last.draw(wide=True), last.caption, "across")
     return f"<div class='pair'>{''.join(figures)}</div>"

@@ -71,10 +71,10 @@ def _summary(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str
 
 def _heading(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
     names = [trace.measurement.name for trace in diagnosis.traces]
-    shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+    listed = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     baseline = diagnosis.baseline
     facts = (
-        shown,
+        listed,
         f"rig {circumstances.rig}",
         f"plant {circumstances.plant}",
         _extent(baseline.samples, baseline.duration_s),
@@ -125,14 +125,14 @@ def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
     if not traces:
         return
     worst = sorted(traces, key=lambda trace: -float((TraceResiduals.of(trace).before_n ** 2).mean()))
-    drawn = worst[:_MOST_TRACES]
+    top = worst[:_MOST_TRACES]
     changed = bool(diagnosis.causes)
-    for trace in drawn:
+    for trace in top:
         yield from _over_time(trace, f" · {trace.measurement.name}" if len(traces) > 1 else "", changed)
-    if len(traces) > len(drawn):
-        yield f"<p class='small'>The {len(drawn)} recordings with the greatest error are drawn over time, of {len(traces)}.</p>"
+    if len(traces) > len(top):
+        yield f"<p class='small'>The {len(top)} recordings with the greatest error are drawn over time, of {len(traces)}.</p>"
     rows = join_traces(traces)
-    yield from _dependences(rows, drive(drawn[0].measurement)[0], diagnosis)
+    yield from _dependences(rows, drive(top[0].measurement)[0], diagnosis)
     yield "<h2>Spectrum and loop</h2>"
     longest = max(traces, key=lambda trace: trace.measurement.rows)
     caption = "Greatest density in each band; a flat line is white noise, a peak is an oscillation."
@@ -175,7 +175,7 @@ def _dependences(rows: ResidualRows, axis: str, diagnosis: Diagnosis) -> Iterato
     covariates = sorted(
         (name for name in moving if name != axis), key=lambda name: (name not in named, -max(strength[name]))
     )
-    shown = ([axis] if axis in moving else []) + covariates[:_MOST_COVARIATES]
+    quantities = ([axis] if axis in moving else []) + covariates[:_MOST_COVARIATES]
     yield grid(
         *(
             Panel(
@@ -183,7 +183,7 @@ def _dependences(rows: ResidualRows, axis: str, diagnosis: Diagnosis) -> Iterato
                 partial(charts.residual_against, rows, name),
                 _dependence_caption(*strength[name]),
             )
-            for name in shown
+            for name in quantities
         )
     )
     yield _not_drawn(rows, covariates)
@@ -195,13 +195,13 @@ def _dependence_caption(before: float, after: float) -> str:
 
 def _not_drawn(rows: ResidualRows, covariates: Sequence[str]) -> str:
     still = [name for name, values in rows.quantities.items() if is_constant(values)]
-    said = []
+    sentences = []
     if len(covariates) > _MOST_COVARIATES:
-        said.append(f"{len(covariates) - _MOST_COVARIATES} more columns carry less than these.")
+        sentences.append(f"{len(covariates) - _MOST_COVARIATES} more columns carry less than these.")
     if still:
         names = words.join_words(still[:8] + ([f"{len(still) - 8} more"] if len(still) > 8 else []))
-        said.append(f"Constant, so nothing can be said about: {names}.")
-    return f"<p class='small'>{escape(' '.join(said))}</p>" if said else ""
+        sentences.append(f"Constant, so nothing can be said about: {names}.")
+    return f"<p class='small'>{escape(' '.join(sentences))}</p>" if sentences else ""
 
 
 def _outlook(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str]:

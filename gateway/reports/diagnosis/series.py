@@ -36,9 +36,9 @@ class Envelope:
 
 
 def envelope(x: Floats, y: Floats, columns: int) -> Envelope:
-    """x rising, shape (rows,); y may hold NaN, which is left out."""
-    held = np.isfinite(x) & np.isfinite(y)
-    x, y = x[held], y[held]
+    """Return the band of y over x. x: rising, shape (rows,); y may hold NaN, which is left out."""
+    finite = np.isfinite(x) & np.isfinite(y)
+    x, y = x[finite], y[finite]
     if x.size <= columns:
         return Envelope(x, y, y, _split_at_gaps(x, _usual_step(x) * _GAP_STEPS))
     width = max((x[-1] - x[0]) / columns, 1e-300)
@@ -69,7 +69,7 @@ class TraceResiduals:
 
     @classmethod
     def of(cls, trace: Trace) -> "TraceResiduals":
-        """Return those of one recording, before and after."""
+        """Return the residuals of one recording, before and after."""
         measurement = trace.measurement
         usable = measurement.usable
         measured_n = measurement.force_n[usable]
@@ -92,7 +92,9 @@ class ResidualRows:
 
 
 def join_traces(traces: Sequence[Trace]) -> ResidualRows:
-    """quantities: the drive, the time and every covariate, by name; NaN where a recording does not have it."""
+    """Join the judged rows of all recordings. quantities: the drive, the time and every covariate, by name; NaN where a
+    recording does not have it.
+    """
     parts = [_quantities(trace.measurement) for trace in traces]
     names = dict.fromkeys(name for part in parts for name in part)
     usable = [trace.measurement.usable for trace in traces]
@@ -122,25 +124,28 @@ def drive(measurement: Measurement) -> tuple[str, Floats]:
 
 def _quantities(measurement: Measurement) -> dict[str, Floats]:
     label, values = drive(measurement)
-    found = {label: values}
+    quantities = {label: values}
     if measurement.pressure_pa is not None and measurement.command_v is not None:
-        found["pressure (kPa)"] = measurement.pressure_pa / 1e3
+        quantities["pressure (kPa)"] = measurement.pressure_pa / 1e3
     if measurement.position_m is not None:
-        found["position_mm"] = measurement.position_m * 1e3
-    return found | dict(measurement.covariates)
+        quantities["position_mm"] = measurement.position_m * 1e3
+    return quantities | dict(measurement.covariates)
 
 
 def direction(measurement: Measurement) -> Floats:
-    """+1 rising, -1 falling, 0 before the first move, shape (rows,): of the slide's position where that was measured, else
-    of the drive. Play of a hundredth of the range keeps noise from being a reversal."""
+    """Return +1 where rising, -1 where falling, 0 before the first move, shape (rows,): of the slide's position where that
+    was measured, else of the drive. Play of a hundredth of the range keeps noise from being a reversal.
+    """
     driven = _direction_signs(drive(measurement)[1])
     if measurement.position_m is None or not driven.size:
         return driven
-    moved = _direction_signs(measurement.position_m)
+    position_signs = _direction_signs(measurement.position_m)
     if measurement.command_v is None:
-        return moved
-    alike = float(np.mean(driven * moved))  # a position that ignores the command is the tool's, along the workpiece
-    return driven if abs(alike) < _LEAST_ALIKE else moved
+        return position_signs
+    alike = float(
+        np.mean(driven * position_signs)
+    )  # a position that ignores the command is the tool's, along the workpiece
+    return driven if abs(alike) < _LEAST_ALIKE else position_signs
 
 
 def _direction_signs(values: Floats) -> Floats:
@@ -153,12 +158,12 @@ def _play_operator(values: Floats) -> Floats:
     finite = values[np.isfinite(values)]
     if finite.size == 0:
         return ways
-    held, play = float(finite[0]), _PLAY_SHARE * float(np.ptp(finite))
+    output, play = float(finite[0]), _PLAY_SHARE * float(np.ptp(finite))
     for row, value in enumerate(values.tolist()):
-        if value > held + play:
-            held, way = value - play, float(RISING)
-        elif value < held - play:
-            held, way = value + play, float(FALLING)
+        if value > output + play:
+            output, way = value - play, float(RISING)
+        elif value < output - play:
+            output, way = value + play, float(FALLING)
         ways[row] = way
     return ways
 
@@ -173,8 +178,8 @@ class BinMeans:
 
 def bin_means(x: Floats, y: Floats, bins: int = 30, least: int = 5) -> BinMeans:
     """Return the means of y over equal bins of x that hold at least so many rows; NaN is left out."""
-    held = np.isfinite(x) & np.isfinite(y)
-    x, y = x[held], y[held]
+    finite = np.isfinite(x) & np.isfinite(y)
+    x, y = x[finite], y[finite]
     if x.size == 0 or is_constant(x):
         return BinMeans(np.zeros(0), np.zeros(0))
     place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
@@ -185,15 +190,15 @@ def bin_means(x: Floats, y: Floats, bins: int = 30, least: int = 5) -> BinMeans:
 
 
 def is_constant(values: Floats) -> bool:
-    """No two different numbers in it, or none at all."""
+    """Return whether there are no two different numbers in it, or none at all."""
     finite = values[np.isfinite(values)]
     return finite.size == 0 or float(np.ptp(finite)) <= _CONSTANT * max(1.0, float(np.abs(finite).max()))
 
 
 def dependence(x: Floats, y: Floats, bins: int = 20) -> float:
-    """Share of the variance of y that its mean over bins of x carries, 0..1."""
-    held = np.isfinite(x) & np.isfinite(y)
-    x, y = x[held], y[held]
+    """Return the share of the variance of y that its mean over bins of x carries, 0..1."""
+    finite = np.isfinite(x) & np.isfinite(y)
+    x, y = x[finite], y[finite]
     if x.size < 2 * bins or is_constant(x) or is_constant(y):
         return 0.0
     place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
@@ -209,18 +214,18 @@ def occupied_cells(
     """Return the cells (column, row) of a picture that hold at least one point, shape (n, 2). limits: x
     low, high, y low, high."""
     x_low, x_high, y_low, y_high = limits
-    held = np.isfinite(x) & np.isfinite(y)
-    across = np.clip((x[held] - x_low) / (x_high - x_low) * cells[0], 0, cells[0] - 1).astype(np.int64)
-    up = np.clip((y[held] - y_low) / (y_high - y_low) * cells[1], 0, cells[1] - 1).astype(np.int64)
+    finite = np.isfinite(x) & np.isfinite(y)
+    across = np.clip((x[finite] - x_low) / (x_high - x_low) * cells[0], 0, cells[0] - 1).astype(np.int64)
+    up = np.clip((y[finite] - y_low) / (y_high - y_low) * cells[1], 0, cells[1] - 1).astype(np.int64)
     place = np.unique(across * cells[1] + up)
     return np.stack([place // cells[1], place % cells[1]], axis=1)
 
 
 def spectrum(time_s: Floats, values: Floats, points: int = 140) -> tuple[Floats, Floats]:
-    """(frequency Hz, amplitude density N/sqrt(Hz)) by Welch's method over the stretches without gaps.
+    """Return (frequency Hz, amplitude density N/sqrt(Hz)) by Welch's method over the stretches without gaps.
 
     The greatest of each of `points` bands that are equally wide on a logarithmic axis: no line is lost. Empty where no
-    stretch is long enough. ResidualRows are brought to equal steps by linear interpolation, which dampens the top of the band.
+    stretch is long enough. Rows are brought to equal steps by linear interpolation, which dampens the top of the band.
     """
     if time_s.size < 32:
         return np.zeros(0), np.zeros(0)
@@ -234,9 +239,9 @@ def spectrum(time_s: Floats, values: Floats, points: int = 140) -> tuple[Floats,
     long_enough = [stretch for stretch in stretches if stretch.size >= rows]
     if rows < 16:
         return np.zeros(0), np.zeros(0)
-    found = [signal.welch(stretch, 1.0 / step_s, nperseg=rows, detrend="constant") for stretch in long_enough]
-    power = np.average([density for _, density in found], axis=0, weights=[stretch.size for stretch in long_enough])
-    return _peak_per_band(np.asarray(found[0][0])[1:], np.sqrt(power)[1:], points)
+    spectra = [signal.welch(stretch, 1.0 / step_s, nperseg=rows, detrend="constant") for stretch in long_enough]
+    power = np.average([density for _, density in spectra], axis=0, weights=[stretch.size for stretch in long_enough])
+    return _peak_per_band(np.asarray(spectra[0][0])[1:], np.sqrt(power)[1:], points)
 
 
 def _peak_per_band(frequency_hz: Floats, density: Floats, points: int) -> tuple[Floats, Floats]:
@@ -248,9 +253,9 @@ def _peak_per_band(frequency_hz: Floats, density: Floats, points: int) -> tuple[
     return frequency_hz[at], peaks
 
 
-def most_improved_window(left: TraceResiduals, share: float = 0.08) -> tuple[float, float]:
-    """(start, end), s: the stretch in which the extended model gains most, or where the error is greatest."""
-    time_s, before_n, after_n = left.time_s, left.before_n, left.after_n
+def most_improved_window(residuals: TraceResiduals, share: float = 0.08) -> tuple[float, float]:
+    """Return (start, end), s, of the stretch in which the extended model gains most, or where the error is greatest."""
+    time_s, before_n, after_n = residuals.time_s, residuals.before_n, residuals.after_n
     span_s = share * float(time_s[-1] - time_s[0])
     gain = np.nan_to_num(before_n**2 - after_n**2)
     if not np.any(gain > 0.0):

@@ -15,7 +15,7 @@ _LEAST_SPREAD: Final = 1e-6
 
 
 def limits(*arrays: Floats, margin: float = 0.06, around: float | None = None) -> tuple[float, float]:
-    """Like `spread`, of arrays that may hold NaN or one value only."""
+    """Return limits as `spread` does, of arrays that may hold NaN or one value only."""
     finite = np.concatenate([array[np.isfinite(array)] for array in arrays] or [np.zeros(1)])
     ends = [float(finite.min()), float(finite.max())] if finite.size else [0.0, 1.0]
     if around is None and ends[1] - ends[0] < _LEAST_SPREAD * max(1.0, abs(ends[0])):

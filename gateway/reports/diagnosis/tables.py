@@ -16,7 +16,7 @@ _MOST_REJECTED: Final = 12
 
 
 def table(heads: Iterable[str], rows: Iterable[Iterable[str]], style: str = "") -> str:
-    """Cells are HTML; the first of each row is its heading. Empty without rows."""
+    """Return an HTML table. Cells are HTML; the first of each row is its heading. Empty without rows."""
     body = "".join(_row(list(row)) for row in rows)
     head = "".join(f"<th>{name}</th>" for name in heads)
     return f"<div class='wide'><table class='{style}'><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
@@ -27,7 +27,7 @@ def _row(cells: list[str]) -> str:
 
 
 def causes_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
-    """Strongest first. about: what each effect is, by name."""
+    """Return the table of causes, strongest first. about: what each effect is, by name."""
     if not diagnosis.causes:
         return ""
     heads = ("cause", "confidence", "held-out RMS", "gain", "of the excess", "parameters [95 %]")
@@ -46,8 +46,8 @@ def _cause(diagnosis: Diagnosis, cause: Cause, about: Mapping[str, str]) -> tupl
         f"{words.force(won_n)} N<br><small>[{words.force(low_n)}, {words.force(high_n)}]</small>",
         f"<span class='meter'><i style='width:{100.0 * share:.0f}%'></i></span> {words.percent(gain.share_of_excess)}",
         "<br>".join(
-            escape(f"{name} {words.estimate(found)}{words.previous_value(diagnosis, name, found)}")
-            for name, found in cause.parameters.items()
+            escape(f"{name} {words.estimate(estimate)}{words.previous_value(diagnosis, name, estimate)}")
+            for name, estimate in cause.parameters.items()
         ),
     )
 
@@ -66,11 +66,11 @@ def leftover_table(diagnosis: Diagnosis) -> str:
 
 
 def rejected_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
-    """Return those that competed and lost, the nearest first."""
-    ranked = sorted(diagnosis.rejected, key=lambda lost: -lost.gain)
+    """Return the table of causes that competed and lost, the nearest first."""
+    ranked = sorted(diagnosis.rejected, key=lambda cause: -cause.gain)
     rows = (
-        (escape(lost.name), f"{words.force(lost.gain)} N", escape(about.get(lost.name, "")))
-        for lost in ranked[:_MOST_REJECTED]
+        (escape(cause.name), f"{words.force(cause.gain)} N", escape(about.get(cause.name, "")))
+        for cause in ranked[:_MOST_REJECTED]
     )
     more = len(ranked) - _MOST_REJECTED
     rest = f"<p class='small'>{more} more gain less than these.</p>" if more > 0 else ""
@@ -87,14 +87,14 @@ def unseen_table(diagnosis: Diagnosis) -> str:
 def base_table(parameters: Mapping[str, Estimate]) -> str:
     """Return the base model's refitted parameters."""
     rows = (
-        (escape(f"{found.section}.{name}" if found.section else name), escape(words.estimate(found)))
-        for name, found in parameters.items()
+        (escape(f"{estimate.section}.{name}" if estimate.section else name), escape(words.estimate(estimate)))
+        for name, estimate in parameters.items()
     )
     return table(("parameter of the base model", "refitted [95 %]"), rows, "facts") if parameters else ""
 
 
 def directions_table(rows: ResidualRows) -> str:
-    """Mean and RMS of the residual by the direction of motion."""
+    """Return mean and RMS of the residual by the direction of motion."""
     ways = (
         ("rising", rows.direction == RISING),
         ("falling", rows.direction == FALLING),

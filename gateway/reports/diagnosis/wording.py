@@ -37,7 +37,7 @@ _PARTIAL: Final = (
 
 
 def title(diagnosis: Diagnosis) -> str:
-    """`Partial: creep or warm-up; mains-hum`."""
+    """Return the verdict with its causes: `Partial: creep or warm-up; mains-hum`."""
     names = "; ".join(label(cause) for cause in diagnosis.causes)
     word = "Nothing can be told" if why_blind(diagnosis) else _TITLES[diagnosis.verdict]
     return f"{word}: {names}" if names else word
@@ -49,16 +49,16 @@ def sentence(diagnosis: Diagnosis) -> str:
         return "The columns are not what their names say: no cause was looked for. Fix this first, then run it again."
     if why := why_blind(diagnosis):
         return f"{why}."
-    told = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_missing_evidence(diagnosis)]
-    return _use_plural(told) if len(diagnosis.causes) > 1 else told
+    words = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_missing_evidence(diagnosis)]
+    return _use_plural(words) if len(diagnosis.causes) > 1 else words
 
 
 def why_blind(diagnosis: Diagnosis) -> str:
     """Return why the recordings say nothing, where they do not and nothing else was found."""
-    found = (
+    has_findings = (
         diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
     )
-    return "" if found else notes.uninformative_force([trace.measurement for trace in diagnosis.traces])
+    return "" if has_findings else notes.uninformative_force([trace.measurement for trace in diagnosis.traces])
 
 
 def _missing_evidence(diagnosis: Diagnosis) -> int:
@@ -67,11 +67,11 @@ def _missing_evidence(diagnosis: Diagnosis) -> int:
     return 0 if any(others(cause) for cause in diagnosis.causes) else 1
 
 
-def _use_plural(told: str) -> str:
+def _use_plural(sentence: str) -> str:
     """Return the same of several causes."""
     for one, several in _PLURAL.items():
-        told = told.replace(one, several)
-    return told
+        sentence = sentence.replace(one, several)
+    return sentence
 
 
 def label(cause: Cause) -> str:
@@ -85,7 +85,7 @@ def others(cause: Cause) -> list[str]:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """`0.031`, `−12.4`, `1 250 000`, `4.1e-06`: so many digits that count, none that are made up."""
+    """Return `0.031`, `−12.4`, `1 250 000`, `4.1e-06`: so many digits that count, none that are made up."""
     if not isfinite(value):
         return "–"
     if value == 0.0:
@@ -125,29 +125,29 @@ def _digits(size: float, width: float) -> int:
     return min(8, max(3, 2 + floor(log10(size / width)))) if size > 0.0 else 3
 
 
-def estimate(found: Estimate) -> str:
-    """`0.031 N/N [0.029, 0.033]`."""
-    unit = f" {found.unit}" if found.unit not in ("", "1") else ""
-    low, high = found.ci95
+def estimate(value: Estimate) -> str:
+    """Return `0.031 N/N [0.029, 0.033]`."""
+    unit = f" {value.unit}" if value.unit not in ("", "1") else ""
+    low, high = value.ci95
     wide = isfinite(high - low) and high > low
     digits = _digits(max(abs(low), abs(high)), high - low) if wide else 3
-    return f"{number(found.value, digits)}{unit} {interval(found.ci95)}"
+    return f"{number(value.value, digits)}{unit} {interval(value.ci95)}"
 
 
-def previous_value(diagnosis: Diagnosis, name: str, found: Estimate) -> str:
-    """` (0.08 before)`, where the plant that was given has the effect already, in another size."""
-    before = getattr(getattr(diagnosis.base, found.section), name) if found.section else 0.0
-    null = getattr(getattr(Plant(), found.section), name) if found.section else 0.0
+def previous_value(diagnosis: Diagnosis, name: str, value: Estimate) -> str:
+    """Return ` (0.08 before)`, where the plant that was given has the effect already, in another size."""
+    before = getattr(getattr(diagnosis.base, value.section), name) if value.section else 0.0
+    null = getattr(getattr(Plant(), value.section), name) if value.section else 0.0
     return "" if before == null else f" ({number(before)} before)"
 
 
 def gain_text(cause: Cause) -> str:
-    """`0.830 → 0.310 N`."""
+    """Return `0.830 → 0.310 N`."""
     return f"{force(cause.gain.held_out_rms_before_n)} → {force(cause.gain.held_out_rms_after_n)} N"
 
 
 def explained_share(diagnosis: Diagnosis) -> float:
-    """Share of the squared error above the noise floor that the causes take away, 0..1; nan where there is none.
+    """Return the share of the squared error above the noise floor that the causes take away, 0..1; nan where there is none.
 
     The model's share, or that of the strongest cause: spikes are taken out of the readings before any model is fitted.
     """
@@ -166,7 +166,7 @@ def excess_n(diagnosis: Diagnosis) -> float:
 
 
 def next_recordings(diagnosis: Diagnosis) -> list[tuple[str, tuple[str, ...]]]:
-    """(what to record, the effects that it would show), the diagnosis' own proposals first; no proposal twice."""
+    """Return (what to record, the effects that it would show), the diagnosis' own proposals first; no proposal twice."""
     by_experiment: dict[str, list[str]] = {proposal: [] for proposal in diagnosis.experiments}
     for unseen in diagnosis.not_identifiable:
         by_experiment.setdefault(unseen.experiment, []).append(unseen.name)
@@ -187,6 +187,6 @@ def all_notes(diagnosis: Diagnosis, before: Iterable[str] = ()) -> list[str]:
 
 
 def join_words(words: Iterable[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
+    """Return `a`, `a and b`, `a, b and c`."""
     *most, last = list(words) or [""]
     return f"{', '.join(most)} and {last}" if most else last

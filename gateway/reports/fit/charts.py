@@ -107,21 +107,21 @@ def draw_minor_errors(evaluation: Evaluation) -> str:
     checked, reversal = evaluation.checked, evaluation.reversal
     if reversal is None:
         return ""
-    chosen = command_error_n(evaluation.model, checked.minor_v, checked.minor_n)
-    switched = command_error_n(evaluation.chosen.result.bsfm(0.0), checked.minor_v, checked.minor_n)
+    chosen_n = command_error_n(evaluation.model, checked.minor_v, checked.minor_n)
+    switched_n = command_error_n(evaluation.chosen.result.bsfm(0.0), checked.minor_v, checked.minor_n)
     policy = (
         f"{len(reversal.slip.stops.radii_v)} slip stops" if reversal.slip else f"blend over {evaluation.span_n:g} N"
     )
-    steps = list(range(1, len(chosen) + 1))
+    steps = list(range(1, len(chosen_n) + 1))
     chart = Chart(
         Axis(0, len(steps) + 1, "step of the walk"),
         Axis(
-            *spread([*chosen.tolist(), *switched.tolist()], margin=_ERROR_MARGIN, around=0.0),
+            *spread([*chosen_n.tolist(), *switched_n.tolist()], margin=_ERROR_MARGIN, around=0.0),
             "error of the command (N)",
         ),
         "Command error along the partial reversals",
     )
     chart.level(0.0)
-    chart.line(steps, switched.tolist(), "faint switched", f"branches switched: {rms_n(switched):.2f} N RMS")
-    chart.line(steps, chosen.tolist(), "walk", f"{policy}: {rms_n(chosen):.2f} N RMS")
+    chart.line(steps, switched_n.tolist(), "faint switched", f"branches switched: {rms_n(switched_n):.2f} N RMS")
+    chart.line(steps, chosen_n.tolist(), "walk", f"{policy}: {rms_n(chosen_n):.2f} N RMS")
     return chart.svg()

@@ -17,8 +17,11 @@ Document = dict[str, Any]
 
 
 def fit_document(evaluation: Evaluation, recording: Path, facts: dict[str, Any]) -> Document:
-    """format 1: recording, rig, ladder, fits (one per model and order), chosen (of the fits), reversal, model
-    (what is to be activated), notes. Forces in N, voltages in V."""
+    """Return the JSON document of a fit, format 1.
+
+    recording, rig, ladder, fits (one per model and order), chosen (of the fits), reversal, model (what is to be activated),
+    notes. Forces in N, voltages in V.
+    """
     return {
         "format": FORMAT,
         "recording": str(recording),

@@ -136,14 +136,14 @@ def _why(document: Document) -> str:
             "those that may drive a plant: increasing on both branches, no crossing, at least 0.5 N per volt."
         )
     branches = f"Rising branch {chosen['rising_rms_n']:.3f} N RMS, falling {chosen['falling_rms_n']:.3f} N."
-    known = (
+    certainty = (
         "identifiable"
         if chosen["identifiable"]
         else "not identifiable from these data, though the curve is: never compare fits by them"
     )
     return (
         f"<h3>Why {escape(_model(chosen))}</h3><p>{words}</p>"
-        f"<p>{branches} Its {chosen['coefficients']} coefficients are {known}.</p>{_coefficients(chosen)}"
+        f"<p>{branches} Its {chosen['coefficients']} coefficients are {certainty}.</p>{_coefficients(chosen)}"
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
-from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, seen_of
+from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, status_reading_of
 from gateway.cli.master.client import GatewayClient
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
@@ -35,7 +35,10 @@ class Master:
 
     def _look(self) -> None:
         status = self.wired.rig.register_map.registers_of("status")
-        self._seen, self._looked_s = seen_of({one.name: self.wired.value(one.name) for one in status}), self.wired.now_s
+        self._seen, self._looked_s = (
+            status_reading_of({one.name: self.wired.value(one.name) for one in status}),
+            self.wired.now_s,
+        )
 
     def keep(self, seconds: float = 60.0, until: Callable[[], bool] = lambda: False) -> "Master":
         end_s = self.wired.now_s + seconds
