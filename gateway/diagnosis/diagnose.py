@@ -26,6 +26,7 @@ from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
 from gateway.diagnosis.search.initial_friction import drop_unfelt_strains
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.search.line_lengths import fit_line_lengths
 from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.diagnosis.search.recording_drive import MOTIONS
 from gateway.diagnosis.search.search import search_effects
@@ -84,6 +85,7 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
     bench, base, evidence = _take_direct_evidence(bench, base, whiten, quantum_n)
     if options.late_s > 0.0 or any(each.even_s for each in measurements):
         base, whiten = _doubt_times(bench, base, whiten, options.late_s)
+        bench, base = fit_line_lengths(bench, base, whiten, given.regulator.command_step_v)
     effects = _effects_to_search(base.free, hidden, options.late_s)
     found = search_effects(bench, base, effects, whiten)
     left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])

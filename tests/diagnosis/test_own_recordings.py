@@ -83,7 +83,7 @@ class Ring:
 
 
 def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list[ResidualCause], Watch]:
-    """What stands after each look, a look every half a window."""
+    """What is published after each look, a look every half a window."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     ring, plant = Ring(rows_of(kind, seed, lasts_s)), load_rig("demo").plant
     assert plant is not None
@@ -93,8 +93,8 @@ def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list
     stood = []
     for now_s in np.arange(1.3 * window_s, ring.last_s, 0.5 * window_s):
         ring.now_s = now_s
-        watch.look()
-        stood.append(watch.standing.cause)
+        watch.check_newest_window()
+        stood.append(watch.published.cause)
     return stood, watch
 
 
@@ -103,4 +103,4 @@ def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list
 def test_the_watch_says_nothing_of_any_kind_of_clean_work(kind: str) -> None:
     """tests/watch/test_watch_in_virtual_time.py asks the same, with a stub for the search, in the push gate."""
     stood, watch = watched(kind, 5, 190.0, 60.0)
-    assert set(stood) <= {ResidualCause.NONE}, watch.standing
+    assert set(stood) <= {ResidualCause.NONE}, watch.published

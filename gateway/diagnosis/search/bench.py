@@ -112,6 +112,14 @@ class Bench:
         """Return the same bench where nothing counts that these columns (k, rows) explain."""
         return replace(self, taken_out=(*self.taken_out, *columns))
 
+    def with_measurements(self, measurements: Sequence[Measurement]) -> "Bench":
+        """Return the same bench driven by other commands: measurements that are alike but for these."""
+        return replace(
+            self,
+            measurements=tuple(measurements),
+            replays=tuple(replay_of(each, self.motion) for each in measurements),
+        )
+
     def slope_n_per_s(self, simulated_n: Floats) -> Floats:
         """Return the rate of the simulated force, per channel."""
         slope = np.zeros(self.rows)
