@@ -23,11 +23,12 @@ from gateway.control.compensation.command_map import CommandMap, apply_command_m
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation, OutsideForce, TimingCompensation
 from gateway.control.controller import Controller
 from gateway.control.decision import safe_output
-from gateway.control.inputs import LineStatus, Output
+from gateway.control.inputs import CalibrationInUse, LineStatus, Output
 from gateway.control.settings import ControlSettings, Defaults, LeadSettings, LeaseAction, Limits, Supervision, Trim
 
 __all__ = [
     "NO_COMPENSATION",
+    "CalibrationInUse",
     "CellMap",
     "CommandMap",
     "Compensation",

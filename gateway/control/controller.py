@@ -8,21 +8,18 @@ taken and comes all the same is an internal error: the safe voltage and a latche
 The controller asks its own parts and none of theirs: commands, conditioner, faults, contact, loop, run, machine.
 """
 
-from gateway.bsfm import Bsfm
-from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
-from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.decision import ControllerStatus, output_of, safe_output, warning_bits
 from gateway.control.demand import Demand, ramp_down_demand
-from gateway.control.edge_checks import EdgeCheck, Situation
+from gateway.control.edge_checks import EdgeCheck, Readiness, Situation
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
 from gateway.control.force_loop.response_timing import timing_of
-from gateway.control.inputs import LineStatus, LoopInputs, Output
+from gateway.control.inputs import CalibrationInUse, LineStatus, LoopInputs, Output
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.control.sample_conditioning import NO_READING, Reading, SampleConditioner, at_time
+from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.contact_detection import ContactDetector
@@ -44,18 +41,16 @@ class Controller:
     def __init__(
         self,
         settings: ControlSettings,
-        model: Bsfm,
+        calibration: CalibrationInUse,
         *,
-        calibration_id: int,
         unclean_restart: bool = False,
         compensation: Compensation = NO_COMPENSATION,
-        response: Response | None = None,
     ) -> None:
-        """model: as volts are sent (`apply_command_map`), here as in `use`; response: as the calibration measured it."""
+        model = calibration.model
         self._rig_settings = compensation.settings(settings)
-        self._settings = settings = timing_of(response, self._rig_settings)
+        self._settings = settings = timing_of(calibration.response, self._rig_settings)
         self._compensation, self._outside_n = compensation, 0.0
-        self.calibration_id = calibration_id
+        self.calibration_id = calibration.number
         self._commands = CommandTracker(settings)
         self._commands.use(model)
         self.active_run = ActiveRun(settings, model)
@@ -68,9 +63,9 @@ class Controller:
         self._reading = NO_READING
         self._last_s: float | None = None
         self._line = LineStatus()
-        self._stopping = False
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
+        self._readiness = Readiness(parts, self._machine)
 
     # -- for the service
 
@@ -82,7 +77,7 @@ class Controller:
     @property
     def has_stopped(self) -> bool:
         """Decide whether a `stop` has led to a disabled output."""
-        return self._stopping and not self._machine.is_enabled
+        return self._machine.is_stopping and not self._machine.is_enabled
 
     @property
     def zero_n(self) -> float:
@@ -91,19 +86,19 @@ class Controller:
 
     def stop(self) -> None:
         """Ramp the force to 0 in the following steps, then stay OFF; no enable is accepted any more."""
-        self._stopping = True
+        self._machine.is_stopping = True
 
-    def use(self, model: Bsfm, calibration_id: int, response: Response | None = None) -> None:
+    def use(self, calibration: CalibrationInUse) -> None:
         """Swap the calibration; while enabled the voltage difference fades instead of jumping, and a force above the new
         set's limits is left by the ramp. What was measured with it sets the pace from now on."""
-        self._loop.use(model, self._given_n, timing_of(response, self._rig_settings))
-        self.active_run.use(model)
-        self._commands.use(model)
-        self.calibration_id = calibration_id
+        self._loop.use(calibration.model, self._given_n, timing_of(calibration.response, self._rig_settings))
+        self.active_run.use(calibration.model)
+        self._commands.use(calibration.model)
+        self.calibration_id = calibration.number
 
     def refusal_of(self, now_s: float, asked: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
-        is_busy = self.state is State.CALIBRATING or self._machine.is_ramping_down or self._stopping
+        is_busy = self.state is State.CALIBRATING or self._machine.is_ramping_down or self._machine.is_stopping
         if not is_busy and not self._commands.edges_of(asked.command).rises:
             return None  # most writes: a setpoint, a heartbeat
         return self._edge_check.refusal(asked, self._situation(now_s, line))
@@ -163,19 +158,7 @@ class Controller:
     def _situation(self, now_s: float, line: LineStatus) -> Situation:
         later_s = now_s - (now_s if self._last_s is None else self._last_s)
         reading = at_time(self._reading, later_s, self._settings.supervision)
-        block = self._block_in_off(now_s, reading, line)
-        return Situation(
-            now_s=now_s,
-            state=self.state,
-            faulted_s=self._machine.faulted_s,
-            reading=reading,
-            block=block,
-            excuse=self._faults.excuse(block, now_s, reading, line),
-            voltage_v=self._loop.voltage_v,
-            applied_n=self._loop.applied_n,
-            expected_n=self._loop.expected_rise_n,
-            ramps_down=self._machine.is_ramping_down or self._stopping,
-        )
+        return self._readiness.situation(now_s, reading, line)
 
     def _obey(self, now_s: float, edges: Edges) -> None:
         """What the bank has let through, in the order in which it was judged."""
@@ -192,7 +175,7 @@ class Controller:
         if edges.rises & _CALIBRATE:
             self._machine.begin_run(now_s, CalibrationPlan(), self._commands.who)
         self._obey_this_machine(now_s)
-        self._machine.is_ramping_down = self._machine.is_ramping_down or self._stopping
+        self._machine.is_ramping_down = self._machine.is_ramping_down or self._machine.is_stopping
 
     def _obey_this_machine(self, now_s: float) -> None:
         """A run that was asked for at this machine; refused, it leaves everything as it is."""
@@ -210,19 +193,6 @@ class Controller:
     def _tare(self) -> None:
         self._faults.shift_zero(self._conditioner.take_zero(self._commands.gravity_n))
         self._machine.tell(f"tare: zero at {self.zero_n:.2f} N")
-
-    def _block(self, now_s: float, line: LineStatus) -> RefusalReason:
-        """Why an enable would be refused now."""
-        if self.state is State.FAULT:
-            return RefusalReason.FAULT_LATCHED
-        if self.state is State.CALIBRATING:
-            return RefusalReason.CALIBRATING
-        if self.state is not State.OFF:
-            return RefusalReason.NONE
-        return self._block_in_off(now_s, self._reading, line)
-
-    def _block_in_off(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
-        return RefusalReason.NOT_READY if self._stopping else self._faults.enable_block(now_s, reading, line)
 
     # -- supervision
 
@@ -304,7 +274,7 @@ class Controller:
         return ControllerStatus(
             state=self.state,
             fault=self._machine.fault,
-            block=self._block(now_s, line),
+            block=self._readiness.enable_block(now_s, self._reading, line),
             warnings=warning_bits(
                 int(line.warnings), self._loop, self._machine.is_restarted, self._machine.is_master_lost
             ),

@@ -12,10 +12,12 @@ from typing import Final
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
+from gateway.control.inputs import LineStatus
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading, SampleConditioner
 from gateway.control.state_table import ENABLED_STATES
+from gateway.control.transitions import ControllerParts, Transitions
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
@@ -41,6 +43,47 @@ class Situation:
     applied_n: float
     expected_n: float
     ramps_down: bool
+
+
+class Readiness:
+    """Tells whether an enable would be accepted now, and where the controller stands; changes nothing of what it is given."""
+
+    def __init__(self, parts: ControllerParts, machine: Transitions) -> None:
+        self._parts, self._machine = parts, machine
+
+    def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
+        """Return why an enable would be refused now; NONE where it would be accepted, or has been."""
+        match self._machine.state:
+            case State.FAULT:
+                return RefusalReason.FAULT_LATCHED
+            case State.CALIBRATING:
+                return RefusalReason.CALIBRATING
+            case State.OFF:
+                return self._block_in_off(now_s, reading, line)
+            case _:
+                return RefusalReason.NONE
+
+    def situation(self, now_s: float, reading: Reading, line: LineStatus) -> Situation:
+        """Return where the controller stands. reading: as old as it is now."""
+        loop, machine = self._parts.loop, self._machine
+        block = self._block_in_off(now_s, reading, line)
+        return Situation(
+            now_s=now_s,
+            state=machine.state,
+            faulted_s=machine.faulted_s,
+            reading=reading,
+            block=block,
+            excuse=self._parts.faults.excuse(block, now_s, reading, line),
+            voltage_v=loop.voltage_v,
+            applied_n=loop.applied_n,
+            expected_n=loop.expected_rise_n,
+            ramps_down=machine.is_ramping_down or machine.is_stopping,
+        )
+
+    def _block_in_off(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
+        if self._machine.is_stopping:
+            return RefusalReason.NOT_READY
+        return self._parts.faults.enable_block(now_s, reading, line)
 
 
 class EdgeCheck:

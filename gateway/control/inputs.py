@@ -1,9 +1,11 @@
-"""What one step is told about the world besides the command and the sample, and what it answers."""
+"""What control is told besides settings, command and sample, and what a step answers."""
 
 from dataclasses import dataclass
 from math import nan
 from typing import Final
 
+from gateway.bsfm import Bsfm
+from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
@@ -13,6 +15,16 @@ from gateway.registers.words import LimitedBy, State, StatusBit
 
 _NO_WARNING: Final = WarningBit(0)
 _NO_STATUS: Final = StatusBit(0)
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationInUse:
+    """A calibration as control uses it. model: as volts are sent (`apply_command_map`); response: as the calibration measured
+    it, None where the rig file's timing counts."""
+
+    model: Bsfm
+    number: int
+    response: Response | None = None
 
 
 @dataclass(frozen=True, slots=True)

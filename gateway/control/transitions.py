@@ -32,14 +32,14 @@ class ControllerParts:
 
 class Transitions:
     """Holds the present state; the latched fault, and when it came (monotonic s, -inf before the first); whether the force is
-    on its way to 0 and then off; whether the master is lost; whether nobody has acknowledged a restart; and what the
-    present step wants besides the voltage."""
+    on its way to 0 and then off, and whether it stays off then (is_stopping); whether the master is lost; whether nobody
+    has acknowledged a restart; and what the present step wants besides the voltage."""
 
     def __init__(self, parts: ControllerParts, *, is_restarted: bool) -> None:
         self.state = State.OFF
         self.fault = FaultCode.NONE
         self.faulted_s = -inf
-        self.is_ramping_down = self.is_master_lost = False
+        self.is_ramping_down = self.is_master_lost = self.is_stopping = False
         self.is_restarted = is_restarted
         self.outcome = StepOutcome()
         self._parts = parts

@@ -13,7 +13,7 @@ from random import Random
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.codes.faults import FaultCode
-from gateway.control import Controller, ControlSettings, Limits, LineStatus, Output, Supervision, Trim
+from gateway.control import CalibrationInUse, Controller, ControlSettings, Limits, LineStatus, Output, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
@@ -96,7 +96,7 @@ class Bench:
         self.settings = control or settings()
         self.rng = Random(seed)
         self.plant = SmallPlant(self.rng, **plant)  # type: ignore[arg-type]
-        self.controller = Controller(self.settings, bsfm(), calibration_id=1)
+        self.controller = Controller(self.settings, CalibrationInUse(bsfm(), 1))
         self.line = LineStatus(acknowledged_v=0.0)
         self.command = Command()
         self.sample: ForceSample | None = None

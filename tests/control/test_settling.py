@@ -7,7 +7,7 @@ from math import cos, e, pi, radians
 import pytest
 
 from gateway.codes.warning_bits import WarningBit
-from gateway.control import Trim
+from gateway.control import CalibrationInUse, Trim
 from gateway.control.force_loop.feedforward import Feedforward
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.registers.words import LimitedBy, Mode, State, StatusBit
@@ -221,7 +221,7 @@ def test_a_calibration_is_swapped_without_a_bump():
     bench.force(20.0)
     bench.run(1.0)
     before_v, fed_v = bench.last.voltage_v, bench.last.feedforward_v
-    bench.controller.use(bsfm(scale=1.1), 2)
+    bench.controller.use(CalibrationInUse(bsfm(scale=1.1), 2))
     assert bench.step().voltage_v == pytest.approx(before_v, abs=0.02)
     first = len(bench.history)
     bench.run(2.0)
@@ -238,7 +238,7 @@ def test_the_residual_is_that_of_the_set_in_use():
     bench.voltage(3.0)
     bench.run(2.0)
     before_n = bench.last.model_residual_n
-    bench.controller.use(bsfm(scale=1.2), 2)
+    bench.controller.use(CalibrationInUse(bsfm(scale=1.2), 2))
     after_n = bench.step().model_residual_n
     changed_n = bsfm().force_n(3.0, 1.0) - bsfm(scale=1.2).force_n(3.0, 1.0)
     assert after_n - before_n == pytest.approx(changed_n, abs=0.3)
@@ -250,13 +250,13 @@ def test_a_set_with_a_lower_force_limit_is_swapped_in_by_the_ramp_and_out_again(
     bench.force(20.0)
     bench.run(1.0)
     before_v = bench.last.voltage_v
-    bench.controller.use(replace(bsfm(), limits_n=(1.0, 15.0)), 2)
+    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(1.0, 15.0)), 2))
     assert bench.step().voltage_v == pytest.approx(before_v, abs=0.5), "2 N of the ramp at most"
     output = bench.run(1.5)
     assert output.force_accepted_n == 15.0
     assert output.limited_by is LimitedBy.FORCE_RANGE
     assert abs(bench.plant.force_n - 15.0) < 1.0
-    bench.controller.use(bsfm(), 3)
+    bench.controller.use(CalibrationInUse(bsfm(), 3))
     output = bench.run(1.5)
     assert (output.force_accepted_n, output.limited_by) == (20.0, LimitedBy.NONE)
     assert abs(bench.plant.force_n - 20.0) < 1.0
@@ -264,7 +264,7 @@ def test_a_set_with_a_lower_force_limit_is_swapped_in_by_the_ramp_and_out_again(
 
 def test_the_smallest_force_of_a_set_does_not_keep_the_tool_from_its_first_contact():
     bench = enabled()
-    bench.controller.use(replace(bsfm(), limits_n=(5.0, 40.0)), 2)
+    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(5.0, 40.0)), 2))
     bench.force(10.0)
     bench.run(1.5)
     assert bench.last.state is State.HOLDING

@@ -3,7 +3,7 @@
 import pytest
 
 from gateway.bsfm import Bsfm, SlipStops
-from gateway.control import Controller
+from gateway.control import CalibrationInUse, Controller
 from gateway.control.force_loop.feedforward import Feedforward
 from tests.control.bench import Bench, bsfm, settings
 
@@ -14,7 +14,7 @@ def slip() -> Bsfm:
 
 def enabled(**plant: float) -> Bench:
     bench = Bench(seed=2, **plant)
-    bench.controller = Controller(bench.settings, slip(), calibration_id=1)
+    bench.controller = Controller(bench.settings, CalibrationInUse(slip(), 1))
     bench.run(0.1)
     bench.enable(0.0)
     return bench

@@ -5,6 +5,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
+from gateway.control import CalibrationInUse
 from gateway.control.controller import Controller
 from gateway.control.state_table import ENABLED_STATES, TRANSITIONS, StateEvent, TransitionError, next_state
 from gateway.registers.command import Command
@@ -205,7 +206,7 @@ def test_while_off_a_broken_line_is_no_fault_but_blocks_enable(change, reason):
 def test_an_unclean_restart_warns_until_somebody_enables():
     bench = ready()
     bench.controller = Controller(
-        settings(), bench.controller._loop.feedforward.model, calibration_id=1, unclean_restart=True
+        settings(), CalibrationInUse(bench.controller._loop.feedforward.model, 1), unclean_restart=True
     )
     output = bench.run(0.1)
     assert output.warnings & WarningBit.RESTARTED

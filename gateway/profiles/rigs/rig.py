@@ -10,6 +10,7 @@ from gateway import defaults
 from gateway.bsfm.model import Bsfm, Calibration, Response
 from gateway.control.compensation.command_map import apply_command_map
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
+from gateway.control.inputs import CalibrationInUse
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.profiles.kinds.plants import PlantProfile
@@ -112,6 +113,11 @@ class Rig:
             *([f"twin of plant {self.plant_profile.name}"] if self.simulated and self.plant_profile else []),
         ]
         return calibration.response if calibration.rig in own_names else None
+
+    def calibration_in_use(self, calibration: Calibration, model: Bsfm | None = None) -> CalibrationInUse:
+        """Return the calibration as control uses it here. model: its model, where that has been made already."""
+        model = self.model_of(calibration, model or calibration.model())
+        return CalibrationInUse(model, calibration.number, self.response_of(calibration))
 
     def ports(self) -> dict[str, str]:
         """Return the serial ports of a real rig, by line; empty for a simulated one."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.projected_problem import Floats
-from gateway.control import Compensation, Controller, ControlSettings, LineStatus, apply_command_map
+from gateway.control import CalibrationInUse, Compensation, Controller, ControlSettings, LineStatus, apply_command_map
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -54,8 +54,7 @@ class SimulatedLoop:
         self._voltage_v = 0.0
         self._controller = Controller(
             driver.settings,
-            apply_command_map(driver.model, driver.compensation.command),
-            calibration_id=1,
+            CalibrationInUse(apply_command_map(driver.model, driver.compensation.command), 1),
             compensation=driver.compensation,
         )
         self._inputs = inputs

@@ -131,11 +131,9 @@ class RunningRig:
         self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer.host}", f"{sentence}   ({peer})")
         self.controller = Controller(
             rig.control,
-            rig.model_of(rig.calibration, rig.calibration.model()),
-            calibration_id=rig.calibration.number,
+            rig.calibration_in_use(rig.calibration),
             unclean_restart=bool(cause),
             compensation=rig.compensation,
-            response=rig.response_of(rig.calibration),
         )
         self.loop = ControlLoop(
             self.bank,
@@ -275,9 +273,7 @@ class RunningRig:
 
     def _on_calibration(self, taken: ActiveCalibration) -> None:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
-        rig, calibration = self._rig, taken.calibration
-        model, response = rig.model_of(calibration, taken.model), rig.response_of(calibration)
-        self.controller.use(model, calibration.number, response)
+        self.controller.use(self._rig.calibration_in_use(taken.calibration, taken.model))
         self._recordings.calibration_number = taken.calibration.number
         lowered = self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
         if lowered:

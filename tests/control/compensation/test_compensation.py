@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from gateway.control import (
     NO_COMPENSATION,
+    CalibrationInUse,
     CellMap,
     CommandMap,
     Compensation,
@@ -30,7 +31,9 @@ def voltages(compensation: Compensation | None) -> list[tuple[float, float]]:
     bench = Bench(seed=3)
     if compensation is not None:
         bench.controller = Controller(
-            bench.settings, apply_command_map(bsfm(), compensation.command), calibration_id=1, compensation=compensation
+            bench.settings,
+            CalibrationInUse(apply_command_map(bsfm(), compensation.command), 1),
+            compensation=compensation,
         )
     bench.run(0.1)
     bench.enable()
@@ -156,7 +159,7 @@ def test_a_trim_that_knows_the_delay_does_not_overshoot_what_it_waits_for():
     def worst_n(timing: TimingCompensation | None) -> float:
         bench = Bench(seed=4, delay_s=0.2, friction_n=0.5)
         compensation = Compensation(timing=timing)
-        bench.controller = Controller(bench.settings, bsfm(), calibration_id=1, compensation=compensation)
+        bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), compensation=compensation)
         bench.run(0.1)
         bench.enable(10.0)
         bench.run(3.0)

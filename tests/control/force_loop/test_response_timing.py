@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.bsfm.model import Response
-from gateway.control import Trim
+from gateway.control import CalibrationInUse, Trim
 from gateway.control.force_loop.lag_inverse import LagInverse
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.settings import LeadSettings, ResponseSource
@@ -77,7 +77,7 @@ def test_without_a_response_or_by_the_rigs_word_nothing_changes():
 
 def pressing(response: Response | None, **plant: float) -> Bench:
     bench = Bench(settings(), **plant)
-    bench.controller.use(bsfm(), 1, response)
+    bench.controller.use(CalibrationInUse(bsfm(), 1, response))
     bench.run(0.1)
     bench.enable(20.0)
     bench.run(2.0)
@@ -89,7 +89,7 @@ def test_a_response_is_taken_into_use_and_out_of_it_without_a_bump():
     bench = pressing(None, gain_n_per_v=7.0)
     for response in (own, None, own):
         before_v = bench.last.voltage_v
-        bench.controller.use(bsfm(), 2, response)
+        bench.controller.use(CalibrationInUse(bsfm(), 2, response))
         assert bench.step().voltage_v == pytest.approx(before_v, abs=0.03)
         first = len(bench.history)
         bench.run(1.5)
@@ -99,7 +99,7 @@ def test_a_response_is_taken_into_use_and_out_of_it_without_a_bump():
 def test_a_trim_of_gain_nothing_stays_off():
     off = replace(settings(), trim=Trim())
     bench = Bench(off, gain_n_per_v=6.8)
-    bench.controller.use(bsfm(), 1, Response(dead_time_s=0.03, lag_s=0.08))
+    bench.controller.use(CalibrationInUse(bsfm(), 1, Response(dead_time_s=0.03, lag_s=0.08)))
     bench.run(0.1)
     bench.enable(20.0)
     bench.run(3.0)

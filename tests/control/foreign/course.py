@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.model import Calibration
-from gateway.control import Controller, ControlSettings
+from gateway.control import CalibrationInUse, Controller, ControlSettings
 from tests.control.foreign.machine import Machine
 from tests.control.foreign.stand import Stand, settings
 
@@ -104,7 +104,7 @@ def course(
 ) -> Course:
     """All of it. measured: the response of the calibration is used; tracks: sines and a ramp as well."""
     response = calibration.response if measured else None
-    controller = Controller(control, calibration.model(), calibration_id=1, response=response)
+    controller = Controller(control, CalibrationInUse(calibration.model(), 1, response))
     stand = Stand(machine, controller, seed).worked()
     stand.run(0.3)
     stand.force(5.0)

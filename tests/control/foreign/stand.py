@@ -11,7 +11,17 @@ import numpy as np
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.evaluation import FitRequest
 from gateway.bsfm.model import Calibration, Response
-from gateway.control import Controller, ControlSettings, Defaults, Limits, LineStatus, Output, Supervision, Trim
+from gateway.control import (
+    CalibrationInUse,
+    Controller,
+    ControlSettings,
+    Defaults,
+    Limits,
+    LineStatus,
+    Output,
+    Supervision,
+    Trim,
+)
 from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import Recording
@@ -147,7 +157,7 @@ def calibrated(machine: Machine, started_with: Bsfm, plan: CalibrationPlan = QUI
     the calibration that a run starts with may expect more than a weak machine makes."""
     rig = settings()
     rig = replace(rig, limits=replace(rig.limits, force_max_n=CALIBRATED_TO_N))
-    controller = Controller(rig, started_with, calibration_id=1)
+    controller = Controller(rig, CalibrationInUse(started_with, 1))
     stand = Stand(machine, controller, seed)
     stand.run(0.3)
     top_v = next(tenths / 10 for tenths in range(85, 0, -1) if machine.drive_n(tenths / 10) < MOST_N)

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gateway.control import Controller, Trim
+from gateway.control import CalibrationInUse, Controller, Trim
 from gateway.profiles import load_rig
 from gateway.registers.words import State
 from tests.control.foreign.course import SHORT_N, Course, allowed_s, course
@@ -95,7 +95,7 @@ def test_the_kept_calibrations_are_what_a_run_gives(seed):
 @pytest.mark.parametrize("seed", [5, 7, 9])
 def test_a_vented_tool_reaches_the_work_although_friction_kept_more_at_the_ladders_lowest_stair(seed):
     one = machine(seed)
-    controller = Controller(settings(), one.calibration.model(), calibration_id=1, response=one.response)
+    controller = Controller(settings(), CalibrationInUse(one.calibration.model(), 1, one.response))
     stand = Stand(one.machine, controller)
     stand.run(0.5)
     stand.force(12.0)
@@ -107,7 +107,7 @@ def test_a_vented_tool_reaches_the_work_although_friction_kept_more_at_the_ladde
 def test_what_friction_kept_at_rest_is_no_wrong_unit_of_a_vented_tools_first_rise():
     one = machine(5)
     assert one.calibration.rising_handles_n[0] > 3.0, "the ladder's lowest stair stays pressed"
-    controller = Controller(settings(Trim()), one.calibration.model(), calibration_id=1, response=one.response)
+    controller = Controller(settings(Trim()), CalibrationInUse(one.calibration.model(), 1, one.response))
     stand = Stand(one.machine, controller)
     stand.worked().run(0.5)
     stand.force(5.0)

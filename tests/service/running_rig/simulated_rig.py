@@ -10,7 +10,7 @@ from random import Random
 from struct import pack
 
 from gateway.codes.faults import FaultCode
-from gateway.control import Controller, ControlSettings
+from gateway.control import CalibrationInUse, Controller, ControlSettings
 from gateway.devices.messages import ForceSample, Quality
 from gateway.modbus import Peer
 from gateway.profiles import load_register_map
@@ -77,7 +77,7 @@ class SmallRig:
             supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION,
         )
         self.bank = RegisterBank(MAP, rules, now=self.now)
-        self.controller = Controller(self.settings, bsfm(), calibration_id=1)
+        self.controller = Controller(self.settings, CalibrationInUse(bsfm(), 1))
         self.loop = ControlLoop(
             self.bank,
             self.controller,

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
-from gateway.control import LeaseAction
+from gateway.control import CalibrationInUse, LeaseAction
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles import load_calibration
@@ -331,7 +331,7 @@ def test_a_calibration_with_a_smaller_limit_lowers_the_setpoint_in_the_registers
     rig = SmallRig().holding(20.0)
     less = replace(load_calibration("demo"), number=17, force_limits_n=(1.0, 8.0))
     said = rig.bank.set_active_model(less)
-    rig.controller.use(less.model(), 17)
+    rig.controller.use(CalibrationInUse(less.model(), 17))
     assert said == "W314 force_setpoint lowered from 20.00 N to 8.00 N: calibration 17 allows no more"
     for _ in range(2):
         rig.run(0.1)

@@ -9,7 +9,17 @@ from typing import Final, Protocol
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.model import Bsfm
-from gateway.control import Controller, ControlSettings, Defaults, LeadSettings, Limits, LineStatus, Supervision, Trim
+from gateway.control import (
+    CalibrationInUse,
+    Controller,
+    ControlSettings,
+    Defaults,
+    LeadSettings,
+    Limits,
+    LineStatus,
+    Supervision,
+    Trim,
+)
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -63,7 +73,7 @@ class Ours:
     """The gateway's controller on one lane."""
 
     def __init__(self, model: Bsfm, chosen: ControlSettings | None = None) -> None:
-        self._controller = Controller(chosen or settings(RESPONSE_LAG_S, TRIM), model, calibration_id=1)
+        self._controller = Controller(chosen or settings(RESPONSE_LAG_S, TRIM), CalibrationInUse(model, 1))
         self._voltage_v, self._ticks, self._command = 0.0, 0, Command()
 
     def command_v(self, desired_n: float, measured_n: float) -> float:
