@@ -9,7 +9,6 @@ thrust on its way, which is counted as come.
 """
 
 from collections.abc import Callable
-from math import inf
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
@@ -26,7 +25,7 @@ from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, stron
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause
-from gateway.control.supervision.in_band import InBandTimer
+from gateway.control.supervision.in_band import SettlingCheck
 from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.registers.words import LimitedBy, Mode
 
@@ -36,7 +35,6 @@ QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
 LANDING_SHARE: Final = 0.2  # of a step's landing time: so late is the lags' inverse on a ramp, on the drawn machines
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
-_ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
 
 class ForceLoop:
@@ -51,8 +49,7 @@ class ForceLoop:
         self.feedforward_v = 0.0
         self.limited_by = LimitedBy.NONE
         self._approach = Approach()
-        self._band = InBandTimer(settings.supervision.unreachable_s)
-        self._answer = InBandTimer(settings.supervision.unreachable_s)
+        self._settling = SettlingCheck(settings.supervision.unreachable_s)
         self._was_touching = False
         self._wanted_v = 0.0
 
@@ -142,13 +139,13 @@ class ForceLoop:
 
     @property
     def in_band(self) -> bool:
-        """Decide whether the force is within the tolerance of the setpoint."""
-        return self._band.in_band
+        """Decide whether the force has been within the tolerance of the setpoint for the in-band time."""
+        return self._settling.in_band
 
     @property
     def unreachable(self) -> bool:
         """Decide whether the setpoint cannot be reached."""
-        return self._band.unreachable or self._answer.unreachable
+        return self._settling.unreachable
 
     def elapse(self, dt_s: float, line: LineStatus) -> None:
         """Advance the models: dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags
@@ -165,8 +162,7 @@ class ForceLoop:
         self.feedforward.reset()
         self._trim.reset()
         self._approach = Approach()
-        self._band.restart()
-        self._answer.restart()
+        self._settling.restart()
         self.feedforward_v, self.limited_by = 0.0, LimitedBy.NONE
 
     def step(self, demand: Demand, inputs: LoopInputs) -> Moved:
@@ -197,8 +193,7 @@ class ForceLoop:
 
     def _drive_by_model(self, voltage_v: float, expected_n: float, branch_share: float) -> None:
         self._trim.reset()
-        self._band.restart()
-        self._answer.restart()
+        self._settling.restart()
         self.feedforward.take_over(expected_n, branch_share)
         self.feedforward_v = voltage_v
         self.limited_by = self._limiter.drive(voltage_v)
@@ -230,8 +225,7 @@ class ForceLoop:
         self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
         by_stage = self._limiter.drive(wanted_v + push_v if has_model else 0.0)
         self.limited_by = strongest(by_stage, self._trim.limited_by, by_model, demand.force_limited_by)
-        self._answer.restart()
-        return self._judge_force(demand, inputs, goal_n)
+        return self._settling.judge_force(demand, inputs, goal_n, law.applied_n)
 
     def _compensated_v(self, wanted_v: float) -> float:
         self._wanted_v = wanted_v
@@ -270,34 +264,12 @@ class ForceLoop:
         free = self.limited_by is LimitedBy.NONE or self.limited_by is LimitedBy.TRIM_RANGE  # of the step before
         return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free
 
-    def _judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float) -> StateEvent:
-        applied_n, tolerance_n = self.feedforward.applied_n, demand.tolerance_n
-        if demand.force_n <= 0.0:
-            self._band.restart()
-            return StateEvent.WAIT if applied_n <= 0.0 else StateEvent.MOVE
-        if abs(goal_n - applied_n) > tolerance_n:
-            self._band.restart()
-            return StateEvent.MOVE
-        inside = inputs.touching and abs(demand.force_n - applied_n) <= tolerance_n
-        inside = inside and abs(inputs.reading.contact_n - demand.force_n) <= tolerance_n
-        self._band.update(inputs.now_s, inside, demand.in_band_time_s)
-        if self._band.in_band:
-            return StateEvent.SETTLE
-        return StateEvent.MOVE if inputs.touching or applied_n != goal_n else StateEvent.WAIT
-
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()
         self.feedforward.take_over(inputs.expected_n)
         self.feedforward_v = demand.voltage_v
         self.limited_by = self._limiter.drive(demand.voltage_v)
-        moving = self.limited_by is LimitedBy.VOLTAGE_SLEW
-        answered = moving or inputs.touching or inputs.expected_n < _ANSWER_N
-        self._answer.update(inputs.now_s, answered, inf)
-        if moving or demand.voltage_v <= 0.0:
-            self._band.restart()
-            return StateEvent.MOVE if moving else StateEvent.WAIT
-        self._band.update(inputs.now_s, True, demand.in_band_time_s)
-        return StateEvent.SETTLE if self._band.in_band else StateEvent.MOVE
+        return self._settling.judge_voltage(demand, inputs, is_slewing=self.limited_by is LimitedBy.VOLTAGE_SLEW)
 
 
 def _or_fault(move: Callable[[], StateEvent]) -> Moved:

@@ -1,4 +1,4 @@
-"""Time how long the force has been in band, and how long it has not: two timers on the same comparison.
+"""Decide whether the output moves, waits or holds, by how long the force has been in band and how long it has not.
 
 In band means: target at its goal, contact, and the measured force within the tolerance, for the in-band time without a
 break. Without contact there is no band: a reading of 0.2 N in free air is not a held force. Target-unreachable means
@@ -8,6 +8,13 @@ Bounds: Supervision.unreachable_s, Defaults.in_band_time_s and Defaults.in_band_
 """
 
 from math import inf
+from typing import Final
+
+from gateway.control.demand import Demand
+from gateway.control.inputs import LoopInputs
+from gateway.control.state_table import StateEvent
+
+_ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
 
 class InBandTimer:
@@ -34,3 +41,55 @@ class InBandTimer:
             self._in_since_s = inf
             self.unreachable = now_s - self._out_since_s >= self._unreachable_s
         self.in_band = now_s - self._in_since_s >= in_band_time_s
+
+
+class SettlingCheck:
+    """Decides which event of the state table a step of the force loop is. Times are monotonic seconds.
+
+    unreachable_s: how long out of band, or without an answer in voltage mode, until the target counts as unreachable.
+    """
+
+    def __init__(self, unreachable_s: float) -> None:
+        self._band = InBandTimer(unreachable_s)
+        self._answer = InBandTimer(unreachable_s)
+
+    @property
+    def in_band(self) -> bool:
+        """Decide whether the force has been within the tolerance of the setpoint for the in-band time."""
+        return self._band.in_band
+
+    @property
+    def unreachable(self) -> bool:
+        """Decide whether the target has been missed, or the cell silent in voltage mode, for too long."""
+        return self._band.unreachable or self._answer.unreachable
+
+    def restart(self) -> None:
+        """Restart all timers: no setpoint is pursued."""
+        self._band.restart()
+        self._answer.restart()
+
+    def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
+        """Return the event of a step in force mode. goal_n: where the ramp of the applied force leads."""
+        self._answer.restart()
+        if demand.force_n <= 0.0:
+            self._band.restart()
+            return StateEvent.WAIT if applied_n <= 0.0 else StateEvent.MOVE
+        if abs(goal_n - applied_n) > demand.tolerance_n:
+            self._band.restart()
+            return StateEvent.MOVE
+        inside = inputs.touching and abs(demand.force_n - applied_n) <= demand.tolerance_n
+        inside = inside and abs(inputs.reading.contact_n - demand.force_n) <= demand.tolerance_n
+        self._band.update(inputs.now_s, inside, demand.in_band_time_s)
+        if self._band.in_band:
+            return StateEvent.SETTLE
+        return StateEvent.MOVE if inputs.touching or applied_n != goal_n else StateEvent.WAIT
+
+    def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
+        """Return the event of a step in voltage mode. is_slewing: the output is still on its way."""
+        answered = is_slewing or inputs.touching or inputs.expected_n < _ANSWER_N
+        self._answer.update(inputs.now_s, answered, inf)
+        if is_slewing or demand.voltage_v <= 0.0:
+            self._band.restart()
+            return StateEvent.MOVE if is_slewing else StateEvent.WAIT
+        self._band.update(inputs.now_s, True, demand.in_band_time_s)
+        return StateEvent.SETTLE if self._band.in_band else StateEvent.MOVE
