@@ -16,5 +16,6 @@ numbers, and imports run one way. It is data without arithmetic and imports no m
 that reading it costs no numpy; parts of experiments stand here by name, and diagnosis/experiments/blocks.py says what each
 does.
 
-To add an effect: its term in gateway/twin, one entry in the file of its family, an example in tests/diagnosis/hidden.py.
+To add an effect: its term in gateway/twin, one entry in the file of its family (contact and tool has two: contact.py and
+tool_motion.py), an example in tests/diagnosis/hidden.py. What entries of several families need is in shared.py.
 """

@@ -1,6 +1,6 @@
 """What the recording of our own run says about its rows: which stair each command belongs to, of which group and part.
 
-A table from elsewhere has to be taken apart by its shape (ladder_sweeps), which is a guess: a run that was cut in its first
+A table from elsewhere has to be taken apart by its shape (sweeps.py), which is a guess: a run that was cut in its first
 group leaves nothing but the coarse cycle of the check as a whole loop. Our recorder writes the columns LABELS, so that nothing
 is guessed. A stair is finished where a later row has a later stair; a group is whole where all of its stairs are.
 """
@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
+from gateway.bsfm.ladder.plan import LABELS
 from gateway.bsfm.ladder.settled_points import Points
 
-LABELS: Final = ("phase", "group", "stair")
-"""Columns: CalibrationPhase, group from 0 (-1 outside the ladder), and stair from 0 of this run; the row after the last
-stair has the number of stairs."""
 CHECK, WALK, DONE = 2, 4, 5  # of CalibrationPhase, which this room cannot import; a test compares
 NO_GROUP: Final = -1
 

@@ -5,8 +5,12 @@ Defaults: LADDER_STEP_V and LADDER_GROUPS in gateway/defaults.py, by Calibration
 
 from dataclasses import dataclass
 from math import ceil, isfinite
+from typing import Final
 
 RISING, FALLING = 1, -1
+LABELS: Final = ("phase", "group", "stair")
+"""Columns in which a run records where it is: CalibrationPhase, group from 0 (-1 outside the ladder), and stair from 0 of
+this run; the row after the last stair has the number of stairs. Read by gateway.bsfm.ladder.labels."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,5 @@
-"""Names of a recording's columns: those of the contract, and what our recorder writes beside them.
+"""Names of a recording's columns: those of the contract, and what our recorder writes beside them; what it adds to a
+calibration ladder is gateway.bsfm.ladder.plan.LABELS.
 
 What is around the tool stands in the contract under the names of the twin's Surroundings; edges do not import the twin, so
 a test holds the two together.
@@ -33,9 +34,6 @@ DERIVED: Final = (
     "model_residual_n",
 )
 """What our recorder writes beside the contract. The trim and the residual hold the measured force."""
-
-LADDER: Final = ("phase", "group", "stair")
-"""What it adds to a calibration ladder: where the run is, by its plan (gateway.bsfm.ladder.labels)."""
 
 SENT: Final = ("sent_v", "sent_age_s")
 """What our recorder writes since it knows the wire: the last voltage sent, and how long before the row."""

@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.bsfm.ladder.plan import LABELS
 from gateway.recording.tables.column_mapping import join_names
-from gateway.recording.tables.columns import CONTRACT, DERIVED, LADDER, SENT
+from gateway.recording.tables.columns import CONTRACT, DERIVED, SENT
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ def extract_covariates(
     names = [
         name
         for name in columns
-        if name not in MEASUREMENT_COLUMNS and not (ours and name in (*DERIVED, *LADDER, *SENT))
+        if name not in MEASUREMENT_COLUMNS and not (ours and name in (*DERIVED, *LABELS, *SENT))
     ]
     dropped: dict[str, list[str]] = {}
     found: dict[str, Floats] = {}

@@ -11,6 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.bsfm.ladder.plan import LABELS
 from gateway.control import Controller
 from gateway.control.inputs import Output
 from gateway.control.runs.active_run import AnyPlan, AnyRun
@@ -20,7 +21,6 @@ from gateway.devices.messages import ForceSample
 from gateway.profiles import Rig
 from gateway.profiles.kinds.plans import plan_document, plan_of
 from gateway.recording import Recorder
-from gateway.recording.tables.columns import LADDER
 from gateway.registers.words import CalibrationPhase
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.output_line import LineState
@@ -150,7 +150,7 @@ class CalibrationRuns:
             self._close_ladder()
 
     def _labels(self) -> tuple[float, ...]:
-        """Return where a ladder is, in the columns LADDER."""
+        """Return where a ladder is, in the columns LABELS."""
         run = self._calibrating.run
         if run is None or isinstance(run, ExperimentRun):
             return ()
@@ -187,7 +187,7 @@ class CalibrationRuns:
             "name": self._name,
             "zero_n": self._controller.zero_n,
         }
-        columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LADDER)
+        columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LABELS)
         try:
             recorder = Recorder(self._state / "recordings", header, columns)
         except OSError as error:

@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.bsfm.ladder.labels import CHECK, DONE, LABELS, WALK, Labels
+from gateway.bsfm.ladder.labels import CHECK, DONE, WALK, Labels
 from gateway.calibrations.store import CalibrationStore
 from gateway.cli.calibration.resume import find_rest_of_ladder
 from gateway.cli.errors import CliError
 from gateway.profiles import load_rig
 from gateway.recording import Recorder, Recording, read_recording
-from gateway.recording.tables.columns import LADDER
 from gateway.registers.words import CalibrationPhase
 from gateway.service.fitting.fit_process import fit_and_store
 from gateway.service.fitting.ladder_source import RigContext, check_source
@@ -90,7 +89,6 @@ def groups_left_behind(recording: Recording, rows: int) -> int:
 
 def test_the_labels_are_the_registers_words() -> None:
     assert (CalibrationPhase.CHECK, CalibrationPhase.MINOR_LOOPS, CalibrationPhase.FITTING) == (CHECK, WALK, DONE)
-    assert LADDER == LABELS
 
 
 def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbed_again(runs, tmp_path: Path) -> None:
