@@ -19,14 +19,14 @@ import pty
 import select
 import socket
 import struct
-import subprocess
-import sys
 import tempfile
 import threading
 import time
 import tty
 from collections.abc import Iterator
 from pathlib import Path
+
+from running_gateway import RunningGateway, running_gateway
 
 GOAL_P99_S = 434e-6
 GOAL_MISSED = 0.005
@@ -89,31 +89,17 @@ class Devices(threading.Thread):
 
 
 @contextlib.contextmanager
-def gateway(rig: str, *options: str) -> Iterator[tuple[str, int, Path]]:
-    """A running gateway: its Modbus address and its state directory."""
-    with tempfile.TemporaryDirectory() as state:
-        command = [
-            sys.executable,
-            "-m",
-            "gateway",
-            "run",
-            rig,
-            "--json",
-            "--bind",
-            "127.0.0.1:0",
-            "--state",
-            state,
-            *options,
-        ]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        assert process.stdout
-        try:
-            host, port = json.loads(process.stdout.readline())["modbus"]
-            yield host, port, Path(state)
-        finally:
-            process.terminate()
-            process.wait()
-            process.stdout.close()
+def gateway_on_devices(loop_hz: int) -> Iterator[tuple[Devices, RunningGateway]]:
+    """Run a gateway whose devices this program serves, at this rate."""
+    devices = Devices()
+    devices.start()
+    with tempfile.TemporaryDirectory() as folder:
+        rig = Path(folder) / "bench.yaml"
+        rig.write_text(RIG.format(loop_hz=loop_hz, output=devices.paths[0], cell=devices.paths[1]))
+        with running_gateway(str(rig)) as gateway:
+            yield devices, gateway
+    devices.stop.set()
+    devices.join()
 
 
 def write_request(address: int, *words: int) -> bytes:
@@ -201,15 +187,10 @@ def bare_hops(count: int) -> list[float]:
     return hops
 
 
-def bench_latency(loop_hz: int, count: int, rigs: Path) -> None:
-    devices = Devices()
-    devices.start()
-    rig = rigs / "bench.yaml"
-    rig.write_text(RIG.format(loop_hz=loop_hz, output=devices.paths[0], cell=devices.paths[1]))
-    with gateway(str(rig)) as (host, port, _):
-        seconds = latencies(devices, (host, port), count)
-    devices.stop.set()
-    devices.join()
+def bench_latency(loop_hz: int, count: int) -> None:
+    """Print how long a setpoint takes to the wire."""
+    with gateway_on_devices(loop_hz) as (devices, gateway):
+        seconds = latencies(devices, (gateway.host, gateway.port), count)
     p50, p99 = quantile(seconds, 0.5), quantile(seconds, 0.99)
     verdict = "reached" if p99 <= GOAL_P99_S else "MISSED"
     print(f"setpoint to first byte, idle unpaced pty, {len(seconds)} of {count} setpoints:")
@@ -221,17 +202,12 @@ def bench_latency(loop_hz: int, count: int, rigs: Path) -> None:
     print(f"  goal p99 <= {GOAL_P99_S * 1e6:.0f} us: {verdict}; ratio to the goal {p99 / GOAL_P99_S:.2f}")
 
 
-def bench_load(loop_hz: int, seconds: float, rigs: Path) -> None:
-    devices = Devices()
-    devices.start()
-    rig = rigs / "load.yaml"
-    rig.write_text(RIG.format(loop_hz=loop_hz, output=devices.paths[0], cell=devices.paths[1]))
-    with gateway(str(rig)) as (host, port, state):
-        before = health(state)
-        answered = load((host, port), seconds, 2000)
-        after = health(state)
-    devices.stop.set()
-    devices.join()
+def bench_load(loop_hz: int, seconds: float) -> None:
+    """Print how late the loop is while masters read."""
+    with gateway_on_devices(loop_hz) as (_, gateway):
+        before = health(gateway.state)
+        answered = load((gateway.host, gateway.port), seconds, 2000)
+        after = health(gateway.state)
     ticks, missed = after["ticks"] - before["ticks"], after["missed_ticks"] - before["missed_ticks"]
     verdict = "reached" if missed <= GOAL_MISSED * ticks else "MISSED"
     print(f"loop {loop_hz} Hz under {answered / seconds:.0f} requests/s for {seconds:g} s:")
@@ -246,9 +222,8 @@ def main() -> None:
     parser.add_argument("--setpoints", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=10.0)
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as rigs:
-        bench_latency(100, options.setpoints, Path(rigs))
-        bench_load(250, options.seconds, Path(rigs))
+    bench_latency(100, options.setpoints)
+    bench_load(250, options.seconds)
     wire_s = 9 * 10 / 9600
     print(
         f"on a real wire at 9600 baud the nine bytes of `SET 512` alone take {wire_s * 1e3:.1f} ms more to arrive whole"

@@ -13,8 +13,6 @@ import contextlib
 import json
 import re
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -22,6 +20,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from pymodbus.client import ModbusTcpClient
+from running_gateway import running_gateway
 
 STEPS_N = (5, 10, 15, 20, 25, 30, 35, 40, 35, 30, 25, 20, 15, 10, 5, 20, 12, 26, 16, 30, 8)
 DWELL_S = 2.0
@@ -36,32 +35,13 @@ class Settling:
 
 
 @contextlib.contextmanager
-def gateway(rig: Path) -> Iterator[ModbusTcpClient]:
-    with tempfile.TemporaryDirectory() as state:
-        command = [
-            sys.executable,
-            "-m",
-            "gateway",
-            "run",
-            str(rig),
-            "--json",
-            "--bind",
-            "127.0.0.1:0",
-            "--state",
-            state,
-        ]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        assert process.stdout
-        try:
-            host, port = json.loads(process.stdout.readline())["modbus"]
-            client = ModbusTcpClient(host, port=port, timeout=1, retries=0)
-            client.connect()
-            yield client
-            client.close()
-        finally:
-            process.terminate()
-            process.wait()
-            process.stdout.close()
+def connect(rig: Path) -> Iterator[ModbusTcpClient]:
+    """Run a gateway on a rig and connect to it."""
+    with running_gateway(str(rig), quiet=True) as gateway:
+        client = ModbusTcpClient(gateway.host, port=gateway.port, timeout=1, retries=0)
+        client.connect()
+        yield client
+        client.close()
 
 
 def measured_n(client: ModbusTcpClient) -> float:
@@ -93,7 +73,7 @@ def demo_rig(directory: Path, gain: float) -> Path:
 
 
 def run(gain: float) -> list[Settling]:
-    with tempfile.TemporaryDirectory() as directory, gateway(demo_rig(Path(directory), gain)) as client:
+    with tempfile.TemporaryDirectory() as directory, connect(demo_rig(Path(directory), gain)) as client:
         return [settle(client, setpoint_n) for setpoint_n in STEPS_N]
 
 

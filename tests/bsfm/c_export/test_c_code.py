@@ -3,82 +3,27 @@
 gcc is a test tool only. Without it the tests that need it skip, and say what was not proved.
 """
 
-import ctypes
 import math
 import shutil
-import subprocess
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from gateway.bsfm import Calibration, SlipStops
-from gateway.bsfm.c_export.code import c_source
 from gateway.bsfm.c_export.float32_model import ROUNDS_MAX, Code, Float32, Float32Model
 from gateway.bsfm.c_export.tables import tables_of
-from gateway.bsfm.slip.slip_stops import STIFFEST, half_width_bound_v
-from gateway.profiles import load_calibration
+from tests.bsfm.c_export.compiled_c import Library, compile_c
+from tests.bsfm.c_export.made_up_calibrations import CASES, HARD, ORDINARY, SLIP
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="NO gcc: the generated C was NOT compared")
 
-STRICT = (
-    "-std=c99 -Wall -Wextra -Werror -pedantic -Wconversion -Wdouble-promotion -Wfloat-equal -Wshadow "
-    "-Wstrict-prototypes -Wmissing-prototypes -Wcast-qual -Wundef"
-).split()
-EXACT = "-ffp-contract=off"
 LEVELS = ("-O0", "-O2")
 POINTS = 1000
 INF, NAN = math.inf, math.nan
 
 
-def calibration(order: int, seed: int, spread: float = 1.2, **changes: object) -> Calibration:
-    """A made-up loop with tied ends, 0.5 .. 40 N: random increasing handles, weights within exp(+-spread)."""
-    rng = np.random.default_rng(seed)
-    facts: dict[str, Any] = {}
-    for branch in ("rising", "falling"):
-        shares = np.cumsum(rng.uniform(0.4, 1.0, order))
-        facts[f"{branch}_handles_n"] = (0.5, *(0.5 + 39.5 * shares / shares[-1]).tolist())
-        facts[f"{branch}_weights"] = tuple(np.exp(rng.uniform(-spread, spread, order + 1)).tolist())
-    texts = {"date_utc": "2026-01-01", "source": "made up", "rig": "none", "data_sha256": "00"}
-    facts |= {"number": seed, "order": order, "x0_v": 0.0, "x1_v": 5.0, "blend_span_n": 3.0, "rms_n": 0.1, "max_n": 0.4}
-    return Calibration(**{"name": f"order_{order}", **facts, **texts, **changes})
-
-
-def stops(count: int, first_v: float) -> dict[str, Any]:
-    shares = np.random.default_rng(count).uniform(0.0, 1.0, count)
-    radii_v = first_v * np.geomspace(1.0, 4.0, count)
-    return {"slip_radii_v": tuple(radii_v.tolist()), "slip_shares": tuple((shares / shares.sum()).tolist())}
-
-
-def stiffest(given: Calibration, radii: tuple[float, ...], shares: tuple[float, ...]) -> dict[str, Any]:
-    """Stops with nearly the least radii that these branches bear."""
-    widest_v = half_width_bound_v(given.model().branches)
-    scale = 1.0001 * widest_v * SlipStops(radii, shares).stiffness_per_v / STIFFEST
-    return {"slip_radii_v": tuple(scale * radius for radius in radii), "slip_shares": shares}
-
-
-ORDINARY = {"demo": load_calibration("demo"), **{f"order_{n}": calibration(n, seed=n) for n in (1, 2, 3, 5, 15)}}
-HARD = {
-    "free_ends": calibration(3, 31, x0_v=-2.0, x1_v=7.7, blend_span_n=0.0, falling_handles_n=(-3.0, 8.0, 9.5, 33.0)),
-    "pole_near_the_end": calibration(5, 32, rising_weights=(1.0, 1.0, 1.0, 1.0, 1.0, 2e-3)),
-    "spread_weights": calibration(15, 33, spread=4.0),
-    "flat_end": calibration(4, 34, falling_handles_n=(0.5, 0.5, 0.5, 20.0, 40.0)),
-    "straight": calibration(2, 35, rising_handles_n=(0.0, 18.0, 36.0), rising_weights=(1.0, 1.0, 1.0)),
-}
-SLIP = {
-    "one_stop": calibration(1, 41, slip_radii_v=(1.5,), slip_shares=(1.0,)),
-    "sixteen_stops": calibration(3, 42, 0.3, **stops(16, 1.2)),
-    "stops_of_order_15": calibration(15, 43, 0.3, **stops(10, 1.0)),
-    "stiffest_stops": calibration(2, 44, 0.3, **stiffest(calibration(2, 44, 0.3), (0.3, 0.5, 2.0), (0.6, 0.3, 0.1))),
-    "stops_with_free_ends": calibration(3, 45, 0.3, falling_handles_n=(-3.0, 8.0, 25.0, 44.0), **stops(5, 2.0)),
-}
-ORDINARY |= SLIP
-CASES = {**ORDINARY, **HARD}
 every_case = pytest.mark.parametrize("name", CASES)
 every_level = pytest.mark.parametrize("level", LEVELS)
 
@@ -122,66 +67,11 @@ def expected(name: str, function: str) -> list[tuple[float, Code]]:
     return [(float(value), code) for value, code in (answer(Float32(x)) for x in FUNCTIONS[function](name))]
 
 
-def state_of(stops: int) -> type[ctypes.Structure]:
-    """The caller-owned struct; memory is the blend where there are no stops."""
-    memory = ctypes.c_float * max(1, stops)
-
-    class State(ctypes.Structure):
-        _fields_ = (("force_n", ctypes.c_float), ("memory", memory), ("voltage_v", ctypes.c_float))
-
-    return State
-
-
-@dataclass
-class Library:
-    """The compiled C with the model's function names; each call gives (value, status)."""
-
-    loaded: ctypes.CDLL
-    prefix: str
-    stops: int
-
-    def each(self, function: str, rows: Iterable[tuple[float, ...]], *first: object) -> list[tuple[float, int]]:
-        found, result = [], ctypes.c_float()
-        call = self.loaded[f"{self.prefix}_{function}"]
-        for row in rows:
-            code = call(*first, *map(ctypes.c_float, row), ctypes.byref(result))
-            found.append((result.value, code))
-        return found
-
-    def reset(self) -> Any:
-        state = state_of(self.stops)()
-        self.loaded[f"{self.prefix}_reset"](ctypes.byref(state))
-        return state
-
-    def command(self, state: Any, forces_n: Iterable[float]) -> list[tuple[float, int]]:
-        return self.each("command", ((force_n,) for force_n in forces_n), ctypes.byref(state))
-
-    def share(self, state: Any) -> float:
-        call = self.loaded[f"{self.prefix}_share"]
-        call.restype = ctypes.c_float
-        return float(call(ctypes.byref(state)))
-
-    def blend(self, blend: float, delta_n: float) -> float:
-        call = self.loaded[f"{self.prefix}_blend"]
-        call.restype = ctypes.c_float
-        return float(call(ctypes.c_float(blend), ctypes.c_float(delta_n)))
-
-
-def compiled(directory: Path, name: str, level: str) -> Library:
-    for file, text in c_source(CASES[name]).items():
-        (directory / file).write_text(text, encoding="ascii")
-    prefix = file.removesuffix(".c")
-    command = ["gcc", *STRICT, level, EXACT, "-shared", "-fPIC", "-o", "code.so", f"{prefix}.c", "-lm"]
-    done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return Library(ctypes.CDLL(str(directory / "code.so")), prefix, len(CASES[name].slip_radii_v))
-
-
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Library]:
     @cache
     def build(name: str, level: str) -> Library:
-        return compiled(tmp_path_factory.mktemp(name), name, level)
+        return compile_c(tmp_path_factory.mktemp(name), name, level)
 
     return build
 
