@@ -8,6 +8,7 @@ from gateway.ports.errors import PortError
 from gateway.ports.holders import Holder, holders_of
 from gateway.ports.listing import PortInfo, list_ports
 from gateway.ports.paced_pty import PacedPty
+from gateway.ports.port import PortEvents
 from gateway.ports.pseudo_terminal import Pty
 from gateway.ports.serial_port import SerialPort
 
@@ -15,6 +16,7 @@ __all__ = [
     "Holder",
     "PacedPty",
     "PortError",
+    "PortEvents",
     "PortInfo",
     "Pty",
     "SerialPort",

@@ -28,7 +28,6 @@ class PacedPty:
         self._on_bytes = on_bytes
         self._bits_per_character = bits_per_character
         self._pty: Pty | None = None
-        self.lost_bytes = 0  # sent while nobody read: a UART would have lost them too
 
     @property
     def path(self) -> str:
@@ -85,11 +84,9 @@ class PacedPty:
         asyncio.get_running_loop().add_reader(self._open_pty.fd, self._on_readable)
         self._on_bytes(data, now_s)
 
-    def _write(self, data: bytes, now_s: float) -> None:
-        written = 0
-        with contextlib.suppress(BlockingIOError):
-            written = os.write(self._open_pty.fd, data)
-        self.lost_bytes += len(data) - written
+    def _write(self, data: bytes, _now_s: float) -> None:
+        with contextlib.suppress(BlockingIOError):  # what nobody reads is lost, as behind a UART
+            os.write(self._open_pty.fd, data)
 
 
 class _Flow:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from gateway.ports.errors import PortError
@@ -9,6 +10,16 @@ from gateway.ports.errors import PortError
 OnBytes = Callable[[bytes, float], None]  # chunk, monotonic time of its arrival
 OnLost = Callable[[PortError], None]
 OnOpen = Callable[[int], None]  # descriptor
+
+
+@dataclass(frozen=True, slots=True)
+class PortEvents:
+    """Callbacks of a serial port: bytes with their time of arrival, the loss of the port, each opening with its descriptor."""
+
+    on_bytes: OnBytes
+    on_lost: OnLost
+    on_open: OnOpen
+
 
 WRITE_DEADLINE_S: Final = 0.5
 """Longest time for a write to leave the machine: a setting is a few dozen bytes, some 30 ms at 9600 baud, so a port that

@@ -20,7 +20,7 @@ from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_loss
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
 from gateway.ports.opening import open_descriptor
-from gateway.ports.port import WRITE_DEADLINE_S, OnBytes, OnLost, OnOpen, monotonic_s
+from gateway.ports.port import WRITE_DEADLINE_S, PortEvents, monotonic_s
 
 MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here is longer than 40 bytes
 _CHUNK_BYTES: Final = 4096
@@ -29,24 +29,15 @@ _CLOSE_DEADLINE_S: Final = 0.25
 
 
 class SerialPort:
-    """See port.Port. All callbacks run in the loop; on_lost is never called from inside `write`.
+    """All callbacks of `events` run in the loop; on_lost is never called from inside `write`.
 
     is_simulated: a lost pty is not looked for under its number; `move` will tell where its device is from then on.
     """
 
-    def __init__(
-        self,
-        path: str,
-        settings: SerialSettings,
-        *,
-        on_bytes: OnBytes,
-        on_lost: OnLost,
-        on_open: OnOpen,
-        is_simulated: bool = False,
-    ) -> None:
+    def __init__(self, path: str, settings: SerialSettings, events: PortEvents, *, is_simulated: bool = False) -> None:
         self._path = path
         self._settings = settings
-        self._on_bytes, self._on_lost, self._on_open = on_bytes, on_lost, on_open
+        self._on_bytes, self._on_lost, self._on_open = events.on_bytes, events.on_lost, events.on_open
         self._descriptor = -1
         self._is_wanted = False  # from `open` to `close`
         self._identity = PtyIdentity(is_kept=is_simulated)
@@ -70,12 +61,6 @@ class SerialPort:
     def unsent_bytes(self) -> int:
         """Bytes that are not on the wire yet: ours and the driver's."""
         return len(self._unsent) + _queued_bytes(self._descriptor) if self._descriptor >= 0 else 0
-
-    def fileno(self) -> int:
-        """Return the raw descriptor; PortError E102 while the port is lost."""
-        if not self.is_open:
-            raise PortError("E102", f"{self._path} is not open")
-        return self._descriptor
 
     async def open(self) -> None:
         """Open the port and keep it open from now on. PortError when it cannot be opened."""

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, TypeVar
 
 from annotated_types import Ge, Le, MaxLen
 
+from gateway import defaults
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles.strict_yaml.text import Document
@@ -19,7 +20,7 @@ from gateway.profiles.strict_yaml.typed import adapter, build
 Shape = TypeVar("Shape")
 Number = Annotated[int, Ge(0), Le(999_999)]
 
-_STRICT: Final = {"extra": "forbid", "allow_inf_nan": False}
+_STRICT: Final = defaults.STRICT | {"allow_inf_nan": False}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from gateway.devices import DeviceProfile, SerialSettings
-from gateway.ports import PortError, Pty, SerialPort
+from gateway.ports import PortError, PortEvents, Pty, SerialPort
 from tests.profile_files import load_device
 
 
@@ -53,9 +53,7 @@ class Ear:
         return SerialPort(
             path,
             settings or SerialSettings(baud=9600),
-            on_bytes=self.on_bytes,
-            on_lost=self.on_lost,
-            on_open=self.on_open,
+            PortEvents(self.on_bytes, self.on_lost, self.on_open),
             is_simulated=is_simulated,
         )
 

@@ -18,7 +18,7 @@ from gateway.devices.messages import (
     ReadPressure,
     SetVoltage,
 )
-from gateway.ports import PacedPty, SerialPort
+from gateway.ports import PacedPty, PortEvents, SerialPort
 
 FASTEST_BAUD = 4_000_000  # paced, but quick: 9600 baud would take five seconds here too
 
@@ -72,7 +72,7 @@ async def converse(profile: DeviceProfile, messages: list[OutputRequest], ear: A
 
 def _client(ear: Any, on_bytes: Callable[[bytes, float], None], path: str, profile: DeviceProfile, baud: int) -> Any:
     settings = profile.serial.at(baud)
-    return SerialPort(path, settings, on_bytes=on_bytes, on_lost=ear.on_lost, on_open=ear.on_open)
+    return SerialPort(path, settings, PortEvents(on_bytes, ear.on_lost, ear.on_open))
 
 
 def test_two_hundred_settings_and_readings_of_the_regulator(ear: Any, itv: DeviceProfile) -> None:

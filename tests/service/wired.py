@@ -21,7 +21,7 @@ from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers import RegisterBank
 from gateway.registers.words import State
 from gateway.service.running_rig.bank_rules import bank_rules
-from gateway.service.running_rig.control_loop import ControlLoop
+from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.simulated_rig import SimulatedRig
@@ -127,8 +127,7 @@ class Wired:
                 self._ask_cell,
                 rig.load_cell.device,
             ),
-            clock=clock,
-            log=lambda cause, sentence: self.log.append((self.now_s, sentence)),
+            LoopProcess(clock, lambda cause, sentence: self.log.append((self.now_s, sentence))),
         )
         self.loop.pressure_pa_per_v = rig.output.device.pressure_pa_per_v
 

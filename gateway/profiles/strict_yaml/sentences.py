@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
 from gateway.profiles.strict_yaml.faults import closest, one_of
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
 _UNITS: Final = {
     "n": "N", "v": "V", "s": "s", "ms": "ms", "us": "us", "hz": "Hz", "kg": "kg", "g": "g", "pa": "Pa", "kpa": "kPa",
@@ -15,7 +16,7 @@ _UNITS: Final = {
 _SCALES: Final = (
     {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     {"v": 1.0, "mv": 1e-3},
-    {"n": 1.0, "kn": 1e3, "kgf": 9.80665},
+    {"n": 1.0, "kn": 1e3, "kgf": STANDARD_GRAVITY_M_PER_S2},
     {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "bar": 1e5},
     {"kg": 1.0, "g": 1e-3},
     {"m": 1.0, "mm": 1e-3},

@@ -10,6 +10,7 @@ import numpy as np
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.control import CalibrationInUse, Compensation, Controller, ControlSettings, LineStatus, apply_command_map
+from gateway.defaults import TICK_S
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -18,7 +19,6 @@ from gateway.service.closed_loop.schedule import SETTLED_S, SetpointSchedule, Se
 from gateway.twin import Plant
 from gateway.twin.surroundings import Surroundings
 
-TICK_S: Final = 0.01
 BAND_N: Final = 1.0
 
 

@@ -6,7 +6,7 @@ seeds: same wishes, same surroundings, same noise. Trim and lead are on in both,
 back anyway is not counted as a gain.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -58,36 +58,39 @@ def closed_loop_gain(
     base: Plant,
     extended: Plant,
     rig: Rig | None = None,
-    seed: int = 0,
     *,
-    seeds: int = SEEDS,
+    seeds: Sequence[int] = range(SEEDS),
     inputs: Iterable[str] = ALL_INPUTS,
 ) -> ClosedLoopGain:
     """Return what knowing the extended plant gains in closed loop.
 
-    rig: whose limits, trim and lead are used, None for the demo rig's; inputs: what the controller is told besides the load
-    cell. ValueError where the base plant gives no model at all.
+    rig: whose limits, trim and lead are used, None for the demo rig's; seeds: of the schedules and the noise, at least one;
+    inputs: what the controller is told besides the load cell. ValueError where the base plant gives no model at all.
     """
-    settings, told = (rig or load_rig(DEFAULT_RIG)).control, frozenset(inputs)
+    settings, known_inputs = (rig or load_rig(DEFAULT_RIG)).control, frozenset(inputs)
     top_v = HEADROOM * settings.limits.voltage_max_v
     before = ControlSetup(settings, identify_model(base, top_v), NO_COMPENSATION)
-    after = _compensate(before, base, extended, told, seed + TRIAL_SEED_OFFSET)
+    after = _compensate(before, base, extended, known_inputs, seeds[0] + TRIAL_SEED_OFFSET)
     notes = () if after.model is before.model else ("the model was identified anew on the extended plant",)
     force_max_n = _reach_n(settings, (before.model, after.model))
     if force_max_n < LARGEST_N:
         notes = (*notes, f"the schedule goes up to {force_max_n:.1f} N: model and limits allow no more")
-    chosen = tuple(range(seed, seed + seeds))
     runs = [
-        [simulate_run(driver, extended, draw_schedule(base, extended, one, force_max_n), one, told) for one in chosen]
+        [
+            simulate_run(driver, extended, draw_schedule(base, extended, one, force_max_n), one, known_inputs)
+            for one in seeds
+        ]
         for driver in ((before,) if base == extended else (before, after))
     ]
-    return _summarize(runs[0], runs[-1], chosen, after.compensation, notes)
+    return _summarize(runs[0], runs[-1], tuple(seeds), after.compensation, notes)
 
 
-def _compensate(before: ControlSetup, base: Plant, extended: Plant, told: frozenset[str], seed: int) -> ControlSetup:
+def _compensate(
+    before: ControlSetup, base: Plant, extended: Plant, known_inputs: frozenset[str], seed: int
+) -> ControlSetup:
     """With everything that can be known. A model that the extended plant does not give, or that does worse on a trial run of
     its own seed, is not used: some friction (rigid, and wide) is beyond what the model's stops can follow."""
-    whole, kept = (compensation_of(base, extended, told, new_model=new) for new in (True, False))
+    whole, kept = (compensation_of(base, extended, known_inputs, new_model=new) for new in (True, False))
     old = ControlSetup(before.settings, before.model, kept)
     try:
         model = identify_model(remove_compensated(extended, whole), HEADROOM * before.settings.limits.voltage_max_v)
@@ -97,7 +100,7 @@ def _compensate(before: ControlSetup, base: Plant, extended: Plant, told: frozen
     if model is before.model:
         return new
     wishes = draw_schedule(base, extended, seed, _reach_n(before.settings, (model, before.model)))
-    rms_n = [simulate_run(driver, extended, wishes, seed, told).rms_n for driver in (old, new)]
+    rms_n = [simulate_run(driver, extended, wishes, seed, known_inputs).rms_n for driver in (old, new)]
     return (
         new if rms_n[1] <= rms_n[0] else _without_model(old, "a model identified on the extended plant does no better")
     )
@@ -160,7 +163,7 @@ def _mean_settled_s(runs: list[SimulatedRun]) -> float:
 def format_gain(found: ClosedLoopGain) -> list[str]:
     """Return the lines that tell the gain in a terminal."""
     low, high = found.rms_ratio_ci95
-    told = [
+    lines = [
         f"error in commanded force on the twin, {len(found.seeds)} seeds",
         f"  RMS {_change(found.before_rms_n, found.after_rms_n)} N",
         f"  after / before: {found.rms_ratio:.2f}, 95 % interval {low:.2f} .. {high:.2f}",
@@ -177,8 +180,8 @@ def format_gain(found: ClosedLoopGain) -> list[str]:
     for when, faults in (("before", found.before_faults), ("after", found.after_faults)):
         if faults:
             stopped = f"{len(faults)} of {len(found.seeds)} runs {when}"
-            told.append(f"stopped by supervision: {stopped} ({', '.join(sorted(set(faults)))})")
-    return [*told, *found.notes]
+            lines.append(f"stopped by supervision: {stopped} ({', '.join(sorted(set(faults)))})")
+    return [*lines, *found.notes]
 
 
 def _change(before: float, after: float) -> str:

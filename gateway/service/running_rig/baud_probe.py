@@ -11,7 +11,7 @@ from typing import Final
 
 from gateway.devices import DeviceProfile, SerialSettings, cell_host, output_host
 from gateway.devices.messages import Accepted, ForceSample, OutputRequest, Pressure, Refused, SetVoltage
-from gateway.ports import PortError, SerialPort
+from gateway.ports import PortError, PortEvents, SerialPort
 from gateway.profiles import CellLine, OutputLine
 
 BAUDS: Final = (9600, 19200, 38400, 57600, 115200)
@@ -69,7 +69,7 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int) -> ProbeR
             enough.set()
 
     settings: SerialSettings = line.settings.at(baud)
-    port = SerialPort(path, settings, on_bytes=on_bytes, on_lost=lambda _: None, on_open=lambda _: None)
+    port = SerialPort(path, settings, PortEvents(on_bytes, on_lost=lambda _: None, on_open=lambda _: None))
     await port.open()
     try:
         for _ in range(_QUESTIONS):  # the first one may end half a line that somebody left in the device

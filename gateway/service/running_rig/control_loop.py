@@ -9,7 +9,7 @@ standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
 
 import traceback
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import nan
 from typing import Final
 
@@ -42,11 +42,21 @@ Log = Callable[[str, str], None]
 """log(cause, sentence): the cause groups lines for rate limits, the sentence is for people."""
 
 
+@dataclass(frozen=True, slots=True)
+class LoopProcess:
+    """Process that the loop runs in. clock: monotonic seconds; period_s: of the tick; processor_time: what the process has had
+    of a processor until now, None where the machine does not count that; lateness: None where nobody counts it."""
+
+    clock: Callable[[], float]
+    log: Log
+    period_s: float = 1.0 / defaults.LOOP_HZ
+    processor_time: Callable[[], ProcessorTime | None] = lambda: None
+    lateness: Lateness | None = None
+
+
 class ControlLoop:
     """Runs one step of control at each event: reads the bank's command and the newest sample, lets the controller decide, hands
     the voltage to the output line, publishes the status in the bank and the row to recordings. Owns no file and no socket.
-
-    clock: monotonic seconds; log(cause, sentence): for people; period_s: of the tick.
     """
 
     def __init__(
@@ -55,10 +65,7 @@ class ControlLoop:
         controller: Controller,
         output: OutputExchange,
         cell: CellExchange,
-        *,
-        clock: Callable[[], float],
-        log: Log,
-        period_s: float = 1.0 / defaults.LOOP_HZ,
+        process: LoopProcess,
     ) -> None:
         self.bank = bank
         self.controller = controller
@@ -79,14 +86,11 @@ class ControlLoop:
         self.restart_cause = FaultCode.NONE
         self.residual_cause = ResidualCause.NONE
         self._cell = cell
-        self._clock = clock
-        self._log = log
-        self.processor_time: Callable[[], ProcessorTime | None] = lambda: None
-        """What this process has had of a processor until now, where the machine counts that."""
-        self.lateness: Lateness | None = None
+        self._clock, self._log = process.clock, process.log
+        self.processor_time, self._lateness = process.processor_time, process.lateness
         self._last_tick_s: float | None = None
         self._last_processor_time: ProcessorTime | None = None
-        self._slow_loop = SlowLoop(period_s)
+        self._slow_loop = SlowLoop(process.period_s)
         self._cell_noise, self._output_noise = LineNoise("load cell's line"), LineNoise("output's line")
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
@@ -131,8 +135,8 @@ class ControlLoop:
         self._cell.tick(now_s)
         self._step(now_s)
         self._last_tick_s, self._last_processor_time = now_s, self.processor_time()
-        if self.lateness:
-            self.lateness.tick(now_s, _waited_s(self._last_processor_time))
+        if self._lateness:
+            self._lateness.tick(now_s, _waited_s(self._last_processor_time))
 
     def _begin(self, bit: WarningBit, sentence: str) -> None:
         if sentence:
@@ -179,9 +183,9 @@ class ControlLoop:
 
     def _processor_held(self, since_s: float | None, now_s: float) -> Held:
         """Asked of the kernel only once a device has not been heard for a while."""
-        if self.lateness is None or since_s is None or not _LONG_SILENCE_S <= now_s - since_s <= _LONGEST_SILENCE_S:
+        if self._lateness is None or since_s is None or not _LONG_SILENCE_S <= now_s - since_s <= _LONGEST_SILENCE_S:
             return NOT_HELD
-        return self.lateness.since(since_s, now_s, _waited_s(self.processor_time()))
+        return self._lateness.since(since_s, now_s, _waited_s(self.processor_time()))
 
     def _line(self, now_s: float) -> LineStatus:
         return LineStatus(

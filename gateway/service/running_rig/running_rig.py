@@ -15,7 +15,7 @@ from gateway.control.blame_for_silence import cause_of_silence
 from gateway.devices import cell_host, output_host
 from gateway.fieldbus import ModbusTcpServer
 from gateway.modbus import Peer
-from gateway.ports import PortError, SerialPort
+from gateway.ports import SerialPort
 from gateway.processes.clock_tick import ClockTick
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
@@ -31,12 +31,13 @@ from gateway.service.running_rig.bank_rules import bank_rules, server_settings
 from gateway.service.running_rig.baud_probe import explain_silent_device
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.calibrations import RigCalibrations
-from gateway.service.running_rig.control_loop import ControlLoop
+from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.recordings import Recordings
-from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, listen, open_again, warning_notes
+from gateway.service.running_rig.rig_ports import RigPorts
+from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, listen, warning_notes
 from gateway.service.watch_reports import WatchReports
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
@@ -57,8 +58,6 @@ class RunningRig:
         self._guardian = guardian
         self._log = log
         self._shutdown_marker = CleanShutdownMarker(state)
-        self._closing = False
-        self._not_opened: dict[str, PortError] = {}  # after a restart, by path
         self._spoke = asyncio.Event()
         supervision = rig.control.supervision
         self._running: dict[str, Any] = {
@@ -71,29 +70,16 @@ class RunningRig:
         asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
         host = output_host(rig.output.device)
         self._safe_frame = host.safe_frame(rig.control.limits.safe_voltage_v)
-        self._safe_reply = host.safe_reply
-        self._output_port = SerialPort(
-            ports["output"],
-            rig.output.settings,
-            on_bytes=self._on_output_bytes,
-            on_lost=self._on_output_lost,
-            on_open=self._on_output_open,
-            is_simulated=rig.simulated,
-        )
-        self._cell_port = SerialPort(
-            ports["load_cell"],
-            rig.load_cell.settings,
-            on_bytes=self._on_cell_bytes,
-            on_lost=self._on_cell_lost,
-            on_open=self._on_cell_open,
-            is_simulated=rig.simulated,
-        )
-        self._line = OutputExchange(host, self._write_output, rig.output.device.reply_timeout_s)
+        frame, reply = self._safe_frame, host.safe_reply
+        self._ports = RigPorts(rig, ports, lambda descriptor: guardian.hand_over(descriptor, frame, reply), log)
+        self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s)
         self._counters = SchedulerCounters(os.getpid())
         self._lateness = Lateness(1.0 / rig.loop_hz)
         self._follow_rig()
         cell = rig.load_cell
-        self._cell_line = CellExchange(cell_host(cell.device, cell.sign, cell.unit), self._write_cell, cell.device)
+        self._cell_line = CellExchange(
+            cell_host(cell.device, cell.sign, cell.unit), self._ports.write_cell, cell.device
+        )
         self._tick = ClockTick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
 
@@ -140,26 +126,19 @@ class RunningRig:
             self.controller,
             self._line,
             self._cell_line,
-            clock=time.monotonic,
-            log=self._log,
-            period_s=self._tick.period_s,
+            LoopProcess(time.monotonic, self._log, self._tick.period_s, self._counters.read, self._lateness),
         )
+        self._ports.loop = self.loop
         self.loop.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
         self.loop.recordings = self._recordings
         self.loop.ring = self.ring
         self.loop.restart_cause = cause
-        self.loop.processor_time = self._counters.read
-        self.loop.lateness = self._lateness
         self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
-        for port in (self._output_port, self._cell_port):
-            if not restarted:
-                await port.open()
-            elif error := await open_again(port):
-                self._not_opened[port.path] = error
+        await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
@@ -175,8 +154,8 @@ class RunningRig:
         return banner.Ready(
             rig=self._rig,
             modbus=modbus,
-            output_port=self._output_port.path,
-            cell_port=self._cell_port.path,
+            output_port=self._ports.output.path,
+            cell_port=self._ports.cell.path,
             voltage_v=self._line.acknowledged_v,
             force_n=self.loop.sample.force_n if self.loop.sample else None,
             notes=notes,
@@ -189,8 +168,7 @@ class RunningRig:
     def move_ports(self, ports: dict[str, str]) -> None:
         """Follow the simulated rig to other ports after a restart: what was lost is opened there."""
         self._follow_rig()
-        self._output_port.move(ports["output"])
-        self._cell_port.move(ports["load_cell"])
+        self._ports.move(ports)
 
     def _record_from_the_start(self) -> tuple[str, ...]:
         """Begin a recording; a sentence where the disk takes none, which is no reason not to control."""
@@ -207,9 +185,9 @@ class RunningRig:
         else:
             notes += warning_notes(self._rig)
         if self._line.acknowledged_v is None:
-            notes.append(await self._why_silent(self._output_port, self._rig.output, restarted))
+            notes.append(await self._why_silent(self._ports.output, self._rig.output, restarted))
         if self.loop.sample is None:
-            notes.append(await self._why_silent(self._cell_port, self._rig.load_cell, restarted))
+            notes.append(await self._why_silent(self._ports.cell, self._rig.load_cell, restarted))
         return tuple(notes)
 
     async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, restarted: Ending | None) -> str:
@@ -218,8 +196,8 @@ class RunningRig:
         Not after a restart: seconds of listening would tell what the start has told already. Nor where the machine did not
         let us, or a simulated rig, run.
         """
-        if restarted and port.path in self._not_opened:
-            return str(self._not_opened[port.path])
+        if restarted and port.path in self._ports.not_opened:
+            return str(self._ports.not_opened[port.path])
         waited_s, now_s = _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S, time.monotonic()
         held = self._lateness.since(now_s - waited_s, now_s, self._counters.waited_s())
         _, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, waited_s, held, "")
@@ -240,16 +218,13 @@ class RunningRig:
 
     async def close(self) -> None:
         """Send the safe voltage, then close everything; the clean-shutdown marker goes last."""
-        self._closing = True
         self._tick.close()
-        with contextlib.suppress(PortError):
-            await self._output_port.write_last(self._safe_frame)
+        await self._ports.write_last(self._safe_frame)
         await self._server.close()
         await self._control_socket.close()
         self._recordings.stop()
         self._calibration_runs.close()
-        self._output_port.close()
-        self._cell_port.close()
+        self._ports.close()
         self._upload.close()
         self._counters.close()
         self._lateness.close()
@@ -279,43 +254,6 @@ class RunningRig:
         if lowered:
             self._log("calibration", lowered)
         self.loop.refresh()
-
-    def _write_output(self, data: bytes) -> None:
-        if not self._closing:
-            self._output_port.flush_input()  # at most one question is out: whatever is there answers none of ours
-            self._output_port.write(data)
-
-    def _write_cell(self, data: bytes) -> None:
-        if not self._closing:
-            self._cell_port.flush_input()
-            self._cell_port.write(data)
-
-    def _on_output_bytes(self, chunk: bytes, now_s: float) -> None:
-        self.loop.on_output_bytes(chunk, now_s)
-
-    def _on_output_open(self, descriptor: int) -> None:
-        self._guardian.hand_over(descriptor, self._safe_frame, self._safe_reply)
-        self.loop.on_output_opened()
-        self._warn_of_latency(self._output_port)
-
-    def _on_output_lost(self, error: PortError) -> None:
-        self._log("port", str(error))
-        self.loop.on_output_closed()
-
-    def _on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
-        self.loop.on_cell_bytes(chunk, now_s)
-
-    def _on_cell_open(self, descriptor: int) -> None:
-        self.loop.on_cell_opened()
-        self._warn_of_latency(self._cell_port)
-
-    def _warn_of_latency(self, port: SerialPort) -> None:
-        if port.warning:
-            self._log("port", port.warning)
-
-    def _on_cell_lost(self, error: PortError) -> None:
-        self._log("port", str(error))
-        self.loop.cell_lost = True
 
     def _on_peer_closed(self, peer: Peer) -> None:
         if peer.host == self.bank.owner:

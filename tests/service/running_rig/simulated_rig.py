@@ -17,7 +17,7 @@ from gateway.profiles import load_register_map
 from gateway.registers import BankRules, Refusal, RegisterBank
 from gateway.registers.rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State
-from gateway.service.running_rig.control_loop import ControlLoop
+from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from tests.control.bench import SmallPlant, bsfm, settings
 
 OWNER, OTHER = Peer("10.0.0.5", 4001), Peer("10.0.0.6", 4002)
@@ -83,8 +83,7 @@ class SmallRig:
             self.controller,
             self.wire,
             self.samples,
-            clock=self.now,
-            log=self.note,  # type: ignore[arg-type]
+            LoopProcess(self.now, self.note),  # type: ignore[arg-type]
         )
         self.run(0.5)
 

@@ -122,10 +122,10 @@ def test_a_restart_whose_port_stays_held_comes_up_without_it_and_takes_it_when_i
     holder = held(str(devices.output.link))
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
-        assert not rig._output_port.is_open
+        assert not rig._ports.output.is_open
         assert rig.loop.output_lost is FaultCode.OUTPUT_LOST
         os.close(holder)
-        await until(lambda: rig._output_port.is_open)
+        await until(lambda: rig._ports.output.is_open)
         heard = len(devices.heard)
         await until(lambda: len(devices.heard) > heard)
 

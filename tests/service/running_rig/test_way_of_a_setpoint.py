@@ -17,7 +17,7 @@ from typing import Final
 
 import gateway
 from gateway.modbus.mbap import Adu, encode
-from gateway.ports import Pty, SerialPort
+from gateway.ports import PortEvents, Pty, SerialPort
 from tests.fieldbus.conftest import Stand, put
 from tests.service.wired import ENABLE, Wired
 
@@ -31,8 +31,8 @@ _STATIONS: Final = {
     "ports/serial_port.py": "write",  # the characters go to the wire
 }
 """File and function (None: any) at which the stack of calls is noted."""
-_WIRING: Final = "service/running_rig/running_rig.py"
-"""On the way of a real rig, too: its `_write_output` stands between the output's exchange and the port."""
+_WIRING: Final = "service/running_rig/rig_ports.py"
+"""On the way of a real rig, too: its `write_output` stands between the output's exchange and the port."""
 
 
 @dataclass
@@ -78,9 +78,7 @@ async def trace_one_write(wired: Wired, data: bytes) -> Trace:
     port = SerialPort(
         pty.path,
         wired.rig.output.settings,
-        on_bytes=lambda chunk, now_s: None,
-        on_lost=lambda error: None,
-        on_open=lambda descriptor: None,
+        PortEvents(on_bytes=lambda *_: None, on_lost=lambda _: None, on_open=lambda _: None),
     )
     await port.open()
 

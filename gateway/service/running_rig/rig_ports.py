@@ -1,0 +1,101 @@
+"""The two serial ports of a running rig: output and load cell, opened, lost, found again and closed.
+
+Their bytes go to the control loop; the output's descriptor goes to the guardian, which writes the last safe voltage to it.
+"""
+
+import contextlib
+from collections.abc import Callable
+
+from gateway.ports import PortError, PortEvents, SerialPort
+from gateway.profiles import Rig
+from gateway.service.running_rig.control_loop import ControlLoop, Log
+from gateway.service.running_rig.starting import open_again
+
+
+class RigPorts:
+    """paths: by line, `output` and `load_cell`. hand_over: called with the descriptor of each opened output.
+
+    loop: to be set before `open`.
+    """
+
+    loop: ControlLoop
+
+    def __init__(self, rig: Rig, paths: dict[str, str], hand_over: Callable[[int], None], log: Log) -> None:
+        self._hand_over, self._log = hand_over, log
+        self._is_closing = False
+        self.not_opened: dict[str, PortError] = {}  # after a restart, by path
+        self.output = SerialPort(
+            paths["output"],
+            rig.output.settings,
+            PortEvents(self._on_output_bytes, self._on_output_lost, self._on_output_open),
+            is_simulated=rig.simulated,
+        )
+        self.cell = SerialPort(
+            paths["load_cell"],
+            rig.load_cell.settings,
+            PortEvents(self._on_cell_bytes, self._on_cell_lost, self._on_cell_open),
+            is_simulated=rig.simulated,
+        )
+
+    async def open(self, *, is_restart: bool) -> None:
+        """Open both ports. PortError where one cannot be opened; after a restart such a port is a lost one."""
+        for port in (self.output, self.cell):
+            if not is_restart:
+                await port.open()
+            elif error := await open_again(port):
+                self.not_opened[port.path] = error
+
+    def move(self, paths: dict[str, str]) -> None:
+        """Move to where the devices are now: what was lost is opened there."""
+        self.output.move(paths["output"])
+        self.cell.move(paths["load_cell"])
+
+    async def write_last(self, safe_frame: bytes) -> None:
+        """Write the safe frame, as far as the output takes it, and nothing after it."""
+        self._is_closing = True
+        with contextlib.suppress(PortError):
+            await self.output.write_last(safe_frame)
+
+    def close(self) -> None:
+        """Close both ports."""
+        self.output.close()
+        self.cell.close()
+
+    def write_output(self, data: bytes) -> None:
+        """Write a request to the output device."""
+        if not self._is_closing:
+            self.output.flush_input()  # at most one question is out: whatever is there answers none of ours
+            self.output.write(data)
+
+    def write_cell(self, data: bytes) -> None:
+        """Write a question to a load cell that speaks only when asked."""
+        if not self._is_closing:
+            self.cell.flush_input()
+            self.cell.write(data)
+
+    def _on_output_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.loop.on_output_bytes(chunk, now_s)
+
+    def _on_output_open(self, descriptor: int) -> None:
+        self._hand_over(descriptor)
+        self.loop.on_output_opened()
+        self._warn_of_latency(self.output)
+
+    def _on_output_lost(self, error: PortError) -> None:
+        self._log("port", str(error))
+        self.loop.on_output_closed()
+
+    def _on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.loop.on_cell_bytes(chunk, now_s)
+
+    def _on_cell_open(self, descriptor: int) -> None:
+        self.loop.on_cell_opened()
+        self._warn_of_latency(self.cell)
+
+    def _on_cell_lost(self, error: PortError) -> None:
+        self._log("port", str(error))
+        self.loop.cell_lost = True
+
+    def _warn_of_latency(self, port: SerialPort) -> None:
+        if port.warning:
+            self._log("port", port.warning)
