@@ -24,8 +24,8 @@ SEED = 11
 ROW_S = 0.005
 
 
-def generated() -> Measurement:
-    """60 s of steps and ramps with a hidden transport delay of 40 ms."""
+def make_measurement() -> Measurement:
+    """Return 60 s of steps and ramps with a hidden transport delay of 40 ms."""
     rng = np.random.default_rng(SEED)
     time_s = np.arange(0.0, 60.0, ROW_S)
     levels = np.repeat(rng.uniform(0.3, 6.0, 60), 200)
@@ -44,11 +44,12 @@ def generated() -> Measurement:
 
 
 def main() -> None:
+    """Diagnose a made-up recording, and print where the time goes."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("recording", nargs="?", type=Path)
     given = parser.parse_args().recording
     began = time.perf_counter()
-    measurement = measurement_of(read_table(given)) if given else generated()
+    measurement = measurement_of(read_table(given)) if given else make_measurement()
     read_s = time.perf_counter() - began
     diagnosis = diagnose([measurement], None, Options(clock=time.perf_counter))
     print(f"{measurement.name}: {measurement.rows} rows, {measurement.duration_s:.0f} s, seed {SEED}")

@@ -62,6 +62,7 @@ class Devices(threading.Thread):
         self.stop = threading.Event()
 
     def run(self) -> None:
+        """Answer both lines until `stop` is set."""
         due_s = time.perf_counter()
         line = b""
         while not self.stop.is_set():
@@ -103,17 +104,21 @@ def gateway_on_devices(loop_hz: int) -> Iterator[tuple[Devices, RunningGateway]]
 
 
 def write_request(address: int, *words: int) -> bytes:
+    """Return one FC16 as it goes over TCP."""
     pdu = struct.pack(f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *words)
     return struct.pack(">HHHB", 1, 0, len(pdu) + 1, 1) + pdu
 
 
 def ask(master: socket.socket, request: bytes) -> bytes:
+    """Send a request and return the bytes of its answer."""
     master.sendall(request)
     return master.recv(512)
 
 
 def latencies(devices: Devices, address: tuple[str, int], count: int) -> list[float]:
-    """Voltage mode steps up and down, one every 50 ms: each one moves the output by many counts at once."""
+    """Return the seconds to the wire of voltage mode steps up and down, one every 50 ms: each moves the output by many
+    counts at once.
+    """
     seconds = []
     with socket.create_connection(address) as master:
         master.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -131,7 +136,7 @@ def latencies(devices: Devices, address: tuple[str, int], count: int) -> list[fl
 
 
 def load(address: tuple[str, int], seconds: float, per_second: int, connections: int = 4) -> int:
-    """per_second reads of the status block, evenly spread over the connections; the number answered."""
+    """Send per_second reads of the status block, evenly spread over the connections; return the number answered."""
     request = struct.pack(">HHHBBHH", 1, 0, 6, 1, 3, 100, 26)
     with contextlib.ExitStack() as stack:
         masters = [stack.enter_context(socket.create_connection(address)) for _ in range(connections)]
@@ -146,6 +151,7 @@ def load(address: tuple[str, int], seconds: float, per_second: int, connections:
 
 
 def health(state: Path) -> dict[str, float]:
+    """Return the running gateway's own figures."""
     with socket.socket(socket.AF_UNIX) as control:
         control.connect(str(state / "control.sock"))
         control.sendall(b'{"do": "health"}\n')
@@ -154,11 +160,14 @@ def health(state: Path) -> dict[str, float]:
 
 
 def quantile(values: list[float], share: float) -> float:
+    """Return the value below which about this share of all lies."""
     return sorted(values)[min(len(values) - 1, int(share * len(values)))]
 
 
 def bare_hops(count: int) -> list[float]:
-    """From a write on a pty until another thread sees it, nothing else: what the machine itself takes at this moment."""
+    """Return the seconds from a write on a pty until another thread sees it, nothing else: what the machine itself takes at
+    this moment.
+    """
     master, client = pty.openpty()
     tty.setraw(client)
     arrivals_s: list[float] = []
@@ -218,6 +227,7 @@ def bench_load(loop_hz: int, seconds: float) -> None:
 
 
 def main() -> None:
+    """Print both benchmarks."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--setpoints", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=10.0)

@@ -33,7 +33,7 @@ YARDSTICK = "libmodbus (C)"
 
 
 def real_bank() -> object:
-    """The bank of the demo rig, as the service builds it."""
+    """Return the bank of the demo rig, as the service builds it."""
     from gateway.profiles import load_rig
     from gateway.registers import RegisterBank
     from gateway.service.running_rig.bank_rules import bank_rules
@@ -43,6 +43,7 @@ def real_bank() -> object:
 
 
 async def serve_ours(bank: str) -> None:
+    """Serve the bank by the gateway's own server."""
     from gateway.fieldbus import ModbusTcpServer, ServerSettings
     from tests.modbus.memory_bank import MemoryBank
 
@@ -56,6 +57,7 @@ async def serve_ours(bank: str) -> None:
 
 
 async def serve_pymodbus() -> None:
+    """Serve the same registers by pymodbus."""
     from pymodbus.server import ModbusTcpServer
     from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -67,7 +69,7 @@ async def serve_pymodbus() -> None:
 
 
 def serve(which: str, loop: str, bank: str) -> None:
-    """The server process: prints its port, serves until it is ended."""
+    """Be the server process: print its port, serve until it is ended."""
     main = serve_pymodbus() if which == "pymodbus" else serve_ours(bank)
     if loop == "uvloop":
         import uvloop
@@ -79,6 +81,8 @@ def serve(which: str, loop: str, bank: str) -> None:
 
 @dataclass
 class Contender:
+    """One server in a process of its own, and what was measured of it."""
+
     name: str
     command: list[str]
     process: subprocess.Popen[str] | None = None
@@ -90,6 +94,7 @@ class Contender:
     faulty: int = 0
 
     def start(self, stack: ExitStack) -> None:
+        """Start the server and read its port."""
         self.process = stack.enter_context(
             subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=self.stderr, text=True, cwd=ROOT)
         )
@@ -100,11 +105,13 @@ class Contender:
             raise SystemExit(f"{self.name}: the server did not start")
 
     def cpu_now_s(self) -> float:
+        """Return the processor time that its process has taken, s."""
         assert self.process is not None
         after_name = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(after_name[11]) + int(after_name[12])) / os.sysconf("SC_CLK_TCK")
 
     def round(self, load: Path, seconds: float, connections: int, kind: str) -> None:
+        """Load it once; note rate and processor time."""
         before_s = self.cpu_now_s()
         command = [str(load), str(self.port), str(seconds), str(connections), kind]
         words = subprocess.run(command, check=True, capture_output=True, text=True, timeout=seconds + 30).stdout.split()
@@ -114,18 +121,22 @@ class Contender:
         self.faulty += int(words[2])
 
     def clear(self) -> None:
+        """Forget the rounds so far."""
         self.rates, self.requests, self.cpu_s, self.faulty = [], 0, 0.0, 0
 
     @property
     def rate_per_s(self) -> float:
+        """Requests per second, median of the rounds."""
         return statistics.median(self.rates)
 
     @property
     def cpu_us(self) -> float:
+        """Processor time per request, us."""
         return 1e6 * self.cpu_s / max(self.requests, 1)
 
 
-def compiled(source: str, into: Path, *libraries: str) -> Path | None:
+def compile_c(source: str, into: Path, *libraries: str) -> Path | None:
+    """Compile a C program with gcc; where that fails, say so and return None."""
     program = into / source.removesuffix(".c")
     command = ["gcc", "-O2", "-o", str(program), str(HERE / source), *libraries]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -134,7 +145,8 @@ def compiled(source: str, into: Path, *libraries: str) -> Path | None:
     return None if done.returncode else program
 
 
-def importable(module: str) -> bool:
+def is_importable(module: str) -> bool:
+    """Return whether a module is installed; say so where it is not."""
     import importlib.util
 
     is_there = importlib.util.find_spec(module) is not None
@@ -144,22 +156,25 @@ def importable(module: str) -> bool:
 
 
 def contenders(into: Path, bank: str) -> list[Contender]:
+    """Return the servers that this machine can run."""
     me = [sys.executable, str(Path(__file__).resolve())]
     servers: list[Contender] = []
-    if (server := compiled("libmodbus_server.c", into, "-lmodbus")) is not None:
+    if (server := compile_c("libmodbus_server.c", into, "-lmodbus")) is not None:
         servers.append(Contender(YARDSTICK, [str(server)]))
-    if importable("uvloop"):
+    if is_importable("uvloop"):
         servers.append(Contender("ours on uvloop", [*me, "--serve", "ours", "--loop", "uvloop", "--bank", bank]))
     servers.append(Contender("ours on asyncio", [*me, "--serve", "ours", "--loop", "asyncio", "--bank", bank]))
-    if importable("pymodbus"):
+    if is_importable("pymodbus"):
         servers.append(
             Contender("stock pymodbus", [*me, "--serve", "pymodbus", "--loop", "asyncio"], stderr=subprocess.DEVNULL)
         )
     return servers
 
 
-def measured(load: Path, servers: list[Contender], arguments: argparse.Namespace, kind: str) -> list[dict[str, object]]:
-    """One row for each server. The first, short round warms up and is thrown away."""
+def measure_servers(
+    load: Path, servers: list[Contender], arguments: argparse.Namespace, kind: str
+) -> list[dict[str, object]]:
+    """Measure every server and return one row for each. The first, short round warms up and is thrown away."""
     for server in servers:
         server.clear()
         server.round(load, 0.3, arguments.connections, kind)
@@ -172,6 +187,7 @@ def measured(load: Path, servers: list[Contender], arguments: argparse.Namespace
 
 
 def row(server: Contender, yardstick: Contender | None, kind: str) -> dict[str, object]:
+    """Return a server's figures beside those of the yardstick."""
     goal = GOALS.get(server.name)
     rate = server.rate_per_s / yardstick.rate_per_s if yardstick else None
     cpu = server.cpu_us / yardstick.cpu_us if yardstick and yardstick.cpu_us else None
@@ -189,7 +205,8 @@ def row(server: Contender, yardstick: Contender | None, kind: str) -> dict[str, 
     }
 
 
-def shown(rows: list[dict[str, object]], title: str) -> None:
+def print_rows(rows: list[dict[str, object]], title: str) -> None:
+    """Print the rows as a table."""
     print(f"\n{title}\n{'server':<18}{'requests/s':>12}{'x libmodbus':>13}{'CPU us/req':>12}{'x libmodbus':>13}  goal")
     for result in rows:
         goal, reached = result["rate_goal"], result["goal_reached"]
@@ -201,6 +218,7 @@ def shown(rows: list[dict[str, object]], title: str) -> None:
 
 
 def main() -> int:
+    """Serve where asked to, else compare."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=3.0, help="load on each server in each of the two runs")
     parser.add_argument("--rounds", type=int, default=5)
@@ -220,22 +238,23 @@ def main() -> int:
 
 
 def compare(arguments: argparse.Namespace) -> int:
+    """Compare all servers and print what was measured."""
     started_s = monotonic()
     with ExitStack() as stack:
         into = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        load = compiled("modbus_load.c", into)
+        load = compile_c("modbus_load.c", into)
         if load is None:
             return 1
         servers = contenders(into, arguments.bank)
         for server in servers:
             server.start(stack)
         titles = {"read": "FC03, 32 registers", "write": "FC16, 13 registers"}
-        results = {kind: measured(load, servers, arguments, kind) for kind in titles}
+        results = {kind: measure_servers(load, servers, arguments, kind) for kind in titles}
     if arguments.json:
         print(json.dumps([result for rows in results.values() for result in rows], indent=1))
         return 0
     for kind, title in titles.items():
-        shown(results[kind], f"{title}, {arguments.connections} connections, bank {arguments.bank}")
+        print_rows(results[kind], f"{title}, {arguments.connections} connections, bank {arguments.bank}")
     print(f"\n{monotonic() - started_s:.0f} s on {os.cpu_count()} cores")
     return 0
 

@@ -43,12 +43,13 @@ class Cost:
 
 
 def curve(order: int) -> RationalBezier:
+    """Return an increasing curve of this order."""
     handles = [0.5 + 37.5 * i / order + (1.5 if 0 < i < order else 0.0) for i in range(order + 1)]
     return RationalBezier(0.0, 5.0, handles, [1.0 + 0.15 * (i % 3) for i in range(order + 1)])
 
 
 def cubic(x: float) -> float:
-    """What the polynomial model would cost: Horner, clamped to the range."""
+    """Return the force by a polynomial model, clamped to the range (Horner): what one call of it would cost."""
     if x < 0.0:
         x = 0.0
     elif x > 5.0:
@@ -57,16 +58,19 @@ def cubic(x: float) -> float:
 
 
 def bare_cubic(x: float) -> float:
+    """Return the cubic without the clamp."""
     return ((0.013 * x - 0.21) * x + 8.1) * x + 0.5
 
 
 def nanoseconds(call: Callable[[Any], object], argument: Any, rounds: int) -> float:
+    """Return the time of one call, ns: the best of several rounds."""
     timer = timeit.Timer("call(argument)", globals={"call": call, "argument": argument})
     number = max(1, int(0.02 / max(timer.timeit(1), 1e-7)))
     return min(timer.repeat(rounds, number)) / number * 1e9
 
 
 def plain_python(rounds: int) -> Iterator[Cost]:
+    """Yield the costs of one call in plain Python."""
     yield Cost("python", "cubic", 3, nanoseconds(cubic, FORWARD_V, rounds))
     yield Cost("python", "cubic without clamp", 3, nanoseconds(bare_cubic, FORWARD_V, rounds))
     for order in ORDERS:
@@ -76,6 +80,7 @@ def plain_python(rounds: int) -> Iterator[Cost]:
 
 
 def numpy_scalars(rounds: int) -> Iterator[Cost]:
+    """Yield the costs of one call with a numpy scalar."""
     yield Cost("numpy scalar", "cubic", 3, nanoseconds(cubic, np.float64(FORWARD_V), rounds))
     for order in ORDERS:
         one = curve(order)
@@ -84,13 +89,14 @@ def numpy_scalars(rounds: int) -> Iterator[Cost]:
 
 
 def numpy_arrays(rounds: int) -> Iterator[Cost]:
+    """Yield the costs per element of an array."""
     places = np.linspace(0.0, 5.0, ELEMENTS)
     for order in ORDERS:
         yield Cost("numpy array", "forward", order, nanoseconds(curve(order).value, places, rounds) / ELEMENTS)
 
 
 def numba_compiled(rounds: int) -> Iterator[Cost]:
-    """The same formulas compiled, if numba is here: cubic, forward by Horner in r, order-2 inverse."""
+    """Return the costs of the same formulas compiled, if numba is here: cubic, forward by Horner in r, order-2 inverse."""
     if find_spec("numba") is None:
         return
     compiled = import_module("numba").njit(cache=False)
@@ -115,7 +121,7 @@ def numba_compiled(rounds: int) -> Iterator[Cost]:
 
 
 def compiled_c(_rounds: int) -> Iterator[Cost]:
-    """The exported C, gcc -O2; nothing where there is no compiler, and said."""
+    """Return the costs of the exported C, gcc -O2; nothing where there is no compiler, and say so."""
     if which("gcc") is None:
         print("SKIPPED: C needs gcc", file=sys.stderr)
         return
@@ -136,12 +142,14 @@ SOURCES: tuple[Callable[[int], Iterator[Cost]], ...] = (
 
 
 def measure(rounds: int) -> list[Cost]:
+    """Measure everything."""
     costs = [cost for source in SOURCES for cost in source(rounds)]
     base = costs[0].nanoseconds
     return [Cost(cost.way, cost.what, cost.order, cost.nanoseconds, cost.nanoseconds / base) for cost in costs]
 
 
 def main() -> None:
+    """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--rounds", type=int, default=7)

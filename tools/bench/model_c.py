@@ -118,8 +118,8 @@ class Cost:
     command_ns: float
 
 
-def made_up(order: int) -> Calibration:
-    """A loop of this order, 0 .. 5 V, 0.5 .. 38 N: handles and weights that bend either way, tied ends."""
+def make_up_calibration(order: int) -> Calibration:
+    """Return a loop of this order, 0 .. 5 V, 0.5 .. 38 N: handles and weights that bend either way, tied ends."""
     shares = [i / order for i in range(order + 1)]
     rising = tuple(0.5 + 37.5 * (share - 0.25 * share * (1.0 - share)) for share in shares)
     falling = tuple(0.5 + 37.5 * (share + 0.25 * share * (1.0 - share)) for share in shares)
@@ -132,7 +132,7 @@ def made_up(order: int) -> Calibration:
 
 
 def cost(calibration: Calibration, compiler: str) -> Cost:
-    """Generates, compiles and runs; the program's own self-test must pass."""
+    """Generate, compile and run the C of a calibration; the program's own self-test must pass."""
     sources = c_source(calibration)
     prefix = next(name for name in sources if name.endswith(".h")).removesuffix(".h")
     main = MAIN.replace("@p@", prefix).replace("@P@", prefix.upper()).replace("@rounds@", str(ROUNDS))
@@ -147,13 +147,16 @@ def cost(calibration: Calibration, compiler: str) -> Cost:
 
 
 def costs(compiler: str = "gcc") -> list[Cost]:
-    """All of them. FileNotFoundError without the compiler."""
+    """Return the costs of all orders. FileNotFoundError without the compiler."""
     if shutil.which(compiler) is None:
         raise FileNotFoundError(f"{compiler} is not installed: the C part of the benchmark needs a C compiler")
-    return [cost(calibration, compiler) for calibration in (load_calibration("demo"), *map(made_up, ORDERS))]
+    return [
+        cost(calibration, compiler) for calibration in (load_calibration("demo"), *map(make_up_calibration, ORDERS))
+    ]
 
 
 def table(rows: list[Cost]) -> str:
+    """Return the costs as text."""
     lines = [f"{'C, ns per call':<14}{'order':>6}{'cubic':>8}{'forward':>16}{'inverse':>16}{'command':>16}"]
     for cost in rows:
         cells = (
@@ -164,6 +167,7 @@ def table(rows: list[Cost]) -> str:
 
 
 def main() -> int:
+    """Print the table, or JSON."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--json", action="store_true", help="one object per calibration instead of the table")
     options.add_argument("--compiler", default="gcc")

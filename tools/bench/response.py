@@ -34,7 +34,7 @@ FIXED: Final = LeadSettings(lag_s=0.072, second_lag_s=0.072)
 
 
 def ways() -> dict[str, tuple[ControlSettings, bool]]:
-    """Name -> settings, and whether the measured response is used."""
+    """Return name -> settings, and whether the measured response is used."""
     off = Trim()
     return {
         "fixed, no trim": (settings(off, lead=FIXED), False),
@@ -44,7 +44,8 @@ def ways() -> dict[str, tuple[ControlSettings, bool]]:
     }
 
 
-def described(one: Calibrated) -> str:
+def describe_machine(one: Calibrated) -> str:
+    """Return a machine in one line, with what was measured of it."""
     machine, response = one.machine, one.response
     late_s = machine.dead_time_s + machine.wire_s + machine.cell_lag_s
     true = f"{late_s * 1e3:.0f} + {machine.lag_s * 1e3:.0f} + {machine.second_lag_s * 1e3:.0f} ms"
@@ -57,6 +58,7 @@ def described(one: Calibrated) -> str:
 
 
 def row(name: str, one: Calibrated, done: Course) -> dict[str, object]:
+    """Return one way's figures on one machine."""
     ratios = [step.settled_s / allowed_s(one.machine, step) for step in done.steps]
     return {
         "machine": one.machine.name,
@@ -76,7 +78,8 @@ def row(name: str, one: Calibrated, done: Course) -> dict[str, object]:
     }
 
 
-def shown(result: dict[str, object]) -> str:
+def format_row(result: dict[str, object]) -> str:
+    """Return the figures as a line of the table."""
     numbers = "hold_n after_1_s_n still_n settled_s of_bound within_1_5 sine_0_5_n sine_0_2_n ramp_n".split()
     cells = "".join(f"{float(str(result[name])):>9.2f}" for name in numbers)
     return f"  {result['way']!s:<18}{cells}{result['never']!s:>7}"
@@ -87,10 +90,11 @@ def write(seeds: Iterable[int], demo: Bsfm) -> None:
     for seed in seeds:
         one = calibrated(drawn(seed), demo)
         KEPT.write_text(stored(dict(sorted((kept() | {seed: one}).items()))), encoding="utf-8")
-        print(described(one), flush=True)
+        print(describe_machine(one), flush=True)
 
 
 def main() -> None:
+    """Print how each way holds, steps and tracks on the drawn machines."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=8)
     parser.add_argument("--first", type=int, default=0)
@@ -108,11 +112,11 @@ def main() -> None:
     for seed in seeds:
         one = known.get(seed) or calibrated(drawn(seed), demo)
         if not options.json:
-            print(described(one), flush=True)
+            print(describe_machine(one), flush=True)
         for name, (control, measured) in ways().items():
             rows.append(row(name, one, course(one.machine, one.calibration, control, measured=measured)))
             if not options.json:
-                print(shown(rows[-1]), flush=True)
+                print(format_row(rows[-1]), flush=True)
     if options.json:
         print(json.dumps(rows))
 

@@ -67,8 +67,8 @@ class Score:
     first_study: tuple[tuple[tuple[float, float], ...], float] | None
 
 
-def calibrated(plant: Plant, seed: int) -> dict[str, Bsfm]:
-    """Every policy's model of this copy, from the same noisy data."""
+def calibrate_policies(plant: Plant, seed: int) -> dict[str, Bsfm]:
+    """Return every policy's model of this copy, from the same noisy data."""
     one, whole = (ladder_plan(LADDER_TOP_V, LADDER_STEP_V, groups) for groups in (1, GROUPS))
     twin, minor_v = quiet_twin(plant), stairs_between(TURNS_V, STAIR_V)
     group_n, minor_n = (staircase(twin, voltages_v, READ_ONCE) for voltages_v in (one.voltage_v, minor_v))
@@ -83,12 +83,12 @@ def calibrated(plant: Plant, seed: int) -> dict[str, Bsfm]:
 
 
 def between(turns_n: Sequence[float]) -> list[float]:
-    """Setpoints 1 N apart from turn to turn."""
+    """Return setpoints 1 N apart from turn to turn."""
     return stairs_between(turns_n, 1.0)
 
 
-def commanded(model: Bsfm, plant: Plant, setpoints_n: Sequence[float]) -> tuple[Floats, Floats]:
-    """(true force - setpoint, voltage) at each setpoint, settled, from a vented tool on the workpiece."""
+def run_commands(model: Bsfm, plant: Plant, setpoints_n: Sequence[float]) -> tuple[Floats, Floats]:
+    """Return (true force - setpoint, voltage) at each setpoint, settled, from a vented tool on the workpiece."""
     twin, memory, last_n = quiet_twin(plant), model.reversal.start(), 0.0
     errors_n, voltages_v = [], []
     for setpoint_n in setpoints_n:
@@ -101,24 +101,25 @@ def commanded(model: Bsfm, plant: Plant, setpoints_n: Sequence[float]) -> tuple[
 
 
 def run(model: Bsfm, plant: Plant) -> tuple[list[Floats], float]:
-    """Errors of each exercise and the largest voltage step of all."""
+    """Return the errors of each exercise and the largest voltage step of all."""
     skipped = {EXERCISES[2]: len(APPROACH_N)}  # the way to the chatter is no chatter
     walks = {
         EXERCISES[0]: FULL_N,
         EXERCISES[1]: between(PARTIAL_TURNS_N),
         EXERCISES[2]: (*APPROACH_N, *CHATTER_N),
     }
-    results = {name: commanded(model, plant, setpoints_n) for name, setpoints_n in walks.items()}
+    results = {name: run_commands(model, plant, setpoints_n) for name, setpoints_n in walks.items()}
     step_v = max(float(np.abs(np.diff(voltages_v)).max()) for _, voltages_v in results.values())
     return [errors_n[skipped.get(name, 0) :] for name, (errors_n, _) in results.items()], step_v
 
 
 def scores(seeds: Sequence[int]) -> list[Score]:
+    """Return every policy's score over the copies."""
     errors: dict[str, list[list[Floats]]] = {policy: [] for policy in FIRST_STUDY}
     steps_v = dict.fromkeys(FIRST_STUDY, 0.0)
     for seed in seeds:
         plant = copy_of(seed)
-        for policy, model in calibrated(plant, seed).items():
+        for policy, model in calibrate_policies(plant, seed).items():
             exercise_errors, step_v = run(model, plant)
             errors[policy].append(exercise_errors)
             steps_v[policy] = max(steps_v[policy], step_v)
@@ -133,6 +134,7 @@ def _score(policy: str, copies: list[list[Floats]], step_v: float) -> Score:
 
 
 def table(rows: Sequence[Score]) -> str:
+    """Return the scores as text."""
     lines = [f"{'RMS / max error in N':24}" + "".join(f"{name:>22}" for name in EXERCISES) + f"{'largest step':>16}"]
     for score in rows:
         lines.append(_line(score.policy, score.errors_n, score.largest_step_v))
@@ -147,6 +149,7 @@ def _line(name: str, figures: Sequence[tuple[float, float]], step_v: float) -> s
 
 
 def main() -> int:
+    """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description="errors of the reversal policies on the twin, without feedback")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4], help="copies of the rig; 0 is the rig")
     parser.add_argument("--json", action="store_true")

@@ -29,6 +29,8 @@ BAND_N = 1.0
 
 @dataclass
 class Settling:
+    """How one setpoint settled."""
+
     setpoint_n: float
     settled_s: float | None
     error_n: float
@@ -45,11 +47,13 @@ def connect(rig: Path) -> Iterator[ModbusTcpClient]:
 
 
 def measured_n(client: ModbusTcpClient) -> float:
+    """Read the measured force, N."""
     (word,) = client.read_holding_registers(102, count=1, device_id=1).registers
     return (word - 65536 if word >= 32768 else word) / 100
 
 
 def settle(client: ModbusTcpClient, setpoint_n: float) -> Settling:
+    """Command a setpoint and watch it settle."""
     client.write_registers(0, [1, round(setpoint_n * 100)], device_id=1)
     began_s = time.perf_counter()
     trace = []
@@ -63,7 +67,7 @@ def settle(client: ModbusTcpClient, setpoint_n: float) -> Settling:
 
 
 def demo_rig(directory: Path, gain: float) -> Path:
-    """The shipped demo rig with another trim gain; 0 is feedforward alone."""
+    """Write the shipped demo rig with another trim gain; 0 is feedforward alone."""
     text = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text()
     text, count = re.subn(r"gain_v_per_n_s: [0-9.]+", f"gain_v_per_n_s: {gain:g}", text)
     assert count == 1
@@ -73,16 +77,19 @@ def demo_rig(directory: Path, gain: float) -> Path:
 
 
 def run(gain: float) -> list[Settling]:
+    """Return how every setpoint settles with this gain."""
     with tempfile.TemporaryDirectory() as directory, connect(demo_rig(Path(directory), gain)) as client:
         return [settle(client, setpoint_n) for setpoint_n in STEPS_N]
 
 
-def shown(result: Settling) -> str:
+def format_settling(result: Settling) -> str:
+    """Return a settling as two columns."""
     settled = "never" if result.settled_s is None else f"{result.settled_s:.2f} s"
     return f"{settled:>8}  {result.error_n:+6.2f} N"
 
 
 def main() -> None:
+    """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
@@ -93,7 +100,7 @@ def main() -> None:
     print("setpoint    with trim            feedforward alone")
     print("            within 1 N  error    within 1 N  error")
     for trimmed, plain in zip(with_trim, alone, strict=True):
-        print(f"{trimmed.setpoint_n:6.1f} N  {shown(trimmed)}   {shown(plain)}")
+        print(f"{trimmed.setpoint_n:6.1f} N  {format_settling(trimmed)}   {format_settling(plain)}")
     worst = max(abs(result.error_n) for result in with_trim)
     print(f"largest steady error: {worst:.2f} N with trim, {max(abs(result.error_n) for result in alone):.2f} N alone")
 

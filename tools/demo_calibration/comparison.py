@@ -18,8 +18,9 @@ SAME_N, SAME_V, SAME_S = (
 
 
 def differences(committed: dict[str, Any], again: Calibration) -> list[str]:
-    """What is not the same. The date is not compared, and coefficients are by what they answer (never judge or
-    compare by parameters): forces of both branches, and voltages along a walk with reversals."""
+    """Return what is not the same, as sentences. The date is not compared, and coefficients are by what they answer (never
+    judge or compare by parameters): forces of both branches, and voltages along a walk with reversals.
+    """
     faults, coefficients = [], ("handles_n", "weights", "slip_radii_v", "slip_shares")
     for name, value in asdict(again).items():
         if name == "date_utc" or value in ((), "") or name.endswith(coefficients):
@@ -37,14 +38,14 @@ def differences(committed: dict[str, Any], again: Calibration) -> list[str]:
 
 
 def response_differences(committed: dict[str, Any] | None, again: dict[str, Any]) -> list[str]:
-    """The sentence of its source is not compared."""
+    """Return the difference of two responses as a sentence; that of their source is not compared."""
     times = {name: value for name, value in again.items() if name != "source"}
     same = committed is not None and all(abs(committed[name] - value) <= SAME_S for name, value in times.items())
     return [] if same else [f"response: committed {committed}, now {again}"]
 
 
 def answers(model: Bsfm) -> tuple[Floats, Floats]:
-    """(N of both branches on a grid, V along the turns of the validation)."""
+    """Return (N of both branches on a grid, V along the turns of the validation)."""
     grid_v = np.linspace(*model.voltage_range_v, 201)
     path_n = model.branches.rising.value(np.array(stairs_between(OTHER_TURNS_V)))
     curves = (model.branches.rising, model.branches.falling)
@@ -52,7 +53,7 @@ def answers(model: Bsfm) -> tuple[Floats, Floats]:
 
 
 def voltages_along(model: Bsfm, path_n: list[float]) -> list[float]:
-    """What the model commands for these forces in turn, from a vented tool."""
+    """Return what the model commands for these forces in turn, V, from a vented tool."""
     memory, last_n, voltages_v = model.reversal.start(), path_n[0], []
     for force_n in path_n:
         memory, last_n = model.memory_after(memory, last_n, force_n), force_n
@@ -61,4 +62,5 @@ def voltages_along(model: Bsfm, path_n: list[float]) -> list[float]:
 
 
 def close(old: Any, new: float) -> bool:
+    """Return whether two numbers of a calibration are the same to SAME_N."""
     return isinstance(old, float) and bool(np.isclose(old, new, rtol=0.0, atol=SAME_N))

@@ -14,6 +14,7 @@ from matplotlib import pyplot
 
 
 def plot_loop(calibration: Calibration, ladder: Ladder, file: Path) -> None:
+    """Draw the ladder over the calibration's branches, and one cycle of the model between them."""
     model = calibration.model()
     figure, axes = pyplot.subplots(figsize=(7.2, 4.8), dpi=120)
     axes.plot(
@@ -36,7 +37,7 @@ def plot_loop(calibration: Calibration, ladder: Ladder, file: Path) -> None:
 
 
 def loop_of(model: Bsfm) -> tuple[list[float], list[float]]:
-    """(V, N) of the model on one cycle of forces from a vented tool."""
+    """Return (V, N) of the model on one cycle of forces from a vented tool."""
     low_n, high_n = model.force_range_n
     up = np.linspace(low_n, high_n, 200).tolist()
     path_n = up + up[::-1]

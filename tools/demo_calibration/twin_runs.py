@@ -24,8 +24,8 @@ TURNS_V = (0.0, 7.0, 2.0, 5.0, 3.0, 4.5, 1.0, 6.0, 3.5, 5.5, 0.5, 2.5, 1.5, 3.0)
 OTHER_TURNS_V = (0.0, 6.5, 3.5, 5.0, 1.5, 4.0, 2.5, 7.5, 5.5, 6.5)  # for the validation
 
 
-def conditioned(plant: Plant, seed: int) -> Twin:
-    """A twin whose friction remembers a full cycle, as in every group of a ladder but the first."""
+def conditioned_twin(plant: Plant, seed: int) -> Twin:
+    """Return a twin whose friction remembers a full cycle, as in every group of a ladder but the first."""
     twin = Twin(plant, seed)
     for voltage_v in (TOP_V, 0.0):
         twin.command(voltage_v)
@@ -34,13 +34,14 @@ def conditioned(plant: Plant, seed: int) -> Twin:
 
 
 def run_ladder(plant: Plant, seed: int, groups: int) -> Ladder:
+    """Climb the ladder on the twin, one reading a stair."""
     plan = ladder_plan(TOP_V, STEP_V, groups)
-    force_n = staircase(conditioned(plant, seed), plan.voltage_v, READ_ONCE)
+    force_n = staircase(conditioned_twin(plant, seed), plan.voltage_v, READ_ONCE)
     return Ladder(np.array(plan.voltage_v), force_n, np.array(plan.direction), np.array(plan.group))
 
 
 def stairs_between(turns_v: Iterable[float], step_v: float = 0.25) -> list[float]:
-    """Even stairs from turn to turn."""
+    """Return even stairs from turn to turn."""
     stairs: list[float] = []
     for turn_v in turns_v:
         start_v = stairs[-1] if stairs else turn_v
@@ -50,17 +51,18 @@ def stairs_between(turns_v: Iterable[float], step_v: float = 0.25) -> list[float
 
 
 def run_minor_loops(plant: Plant, seed: int, turns_v: Iterable[float]) -> Walk:
-    """A walk with partial reversals."""
+    """Walk through partial reversals."""
     voltages_v = stairs_between(turns_v)
-    return Walk(np.array(voltages_v), staircase(conditioned(plant, seed), voltages_v, READ_WELL))
+    return Walk(np.array(voltages_v), staircase(conditioned_twin(plant, seed), voltages_v, READ_WELL))
 
 
 def run_steps(plant: Plant, seed: int, model: Bsfm) -> Response:
-    """The steps that a calibration run ends with, read every 10 ms, and what they tell. A command acts when its last byte is
-    through the wire at the demo rig's speed."""
+    """Measure the response from the steps that a calibration run ends with, read every 10 ms. A command acts when its last
+    byte is through the wire at the demo rig's speed.
+    """
     line = load_rig(RIG).output
     wire_s = 10.0 * len(output_host(line.device).request(SetVoltage(TOP_V))) / line.baud
-    twin, rows = conditioned(plant, seed), []
+    twin, rows = conditioned_twin(plant, seed), []
     for share in (0.0, *RESPONSE_SHARES * 2):
         for k in range(round(STEP_HELD_S / SAMPLE_S)):
             rows.append((SAMPLE_S * len(rows), share * TOP_V, float(twin.read())))

@@ -18,7 +18,7 @@ from paper.study import Study
 
 
 def bound(study: Study, comparison: Comparison) -> str:
-    """`0.33: dead time, 0.40 N`: of the paper's figure, unless it says of what."""
+    """Return what no law can beat, as text: `0.33: dead time, 0.40 N`: of the paper's figure, unless it says of what."""
     name, paper = comparison.name, comparison.means["bsfm"]
     if "time to stay" in name:
         return f"{allowed_ratio(study, band_of(comparison)):.2f}: the fastest command there is"
@@ -35,12 +35,14 @@ def bound(study: Study, comparison: Comparison) -> str:
 
 
 def band_of(comparison: Comparison) -> float:
-    """Of a settling time."""
+    """Return the band of a settling time, N."""
     return next(band for band in SETTLING_S if f"within {band:g} N" in comparison.name)
 
 
 def allowed_ratio(study: Study, band_n: float) -> float:
-    """Fastest command over the paper's law on the paper's rig, mean over the targets at which the latter settles."""
+    """Return the fastest command over the paper's law on the paper's rig, mean over the targets at which the latter
+    settles.
+    """
     times_s = study.steps.score(settled_s(band_n), "bsfm")[0]
     best_s = np.array([row.settled_s for row in study.limits if row.band_n == band_n])
     settles = ~np.isnan(times_s)
@@ -48,7 +50,9 @@ def allowed_ratio(study: Study, band_n: float) -> float:
 
 
 def shaken_n(study: Study) -> float:
-    """Largest error faster than 50 ms with the spindle on, under the paper's constant command: mean over the seeds."""
+    """Return the largest error faster than 50 ms with the spindle on, under the paper's constant command: mean over the
+    seeds.
+    """
     cases = [case for case, condition in enumerate(exercises.CONDITIONS) if condition[2]]
     seeds = range(len(study.tracking.seeds))
     return float(np.mean([max(_fast_n(study, seed_at, case) for case in cases) for seed_at in seeds]))
@@ -60,9 +64,12 @@ def _fast_n(study: Study, seed_at: int, case: int) -> float:
 
 
 def unheard_share(feed_m_per_s: float) -> float:
-    """What is left of the path's waves by a law that cancels all it measures, once the dead time is over: |1 - exp(-i w T)|."""
+    """Return what is left of the path's waves by a law that cancels all it measures, once the dead time is over: |1 -
+    exp(-i w T)|.
+    """
     return 2.0 * sin(pi * feed_m_per_s / PATH_LENGTH_M * delay_s())
 
 
 def delay_s() -> float:
+    """Return the dead time of the paper's rig, s."""
     return paper_plant().regulator.delay_s

@@ -41,12 +41,12 @@ class Comparison:
     goal: float | None = None
 
     def meets(self, law: str) -> bool:
-        """Is the whole interval within the goal?"""
+        """Return whether the whole interval is within the goal."""
         return self.goal is not None and self.ratios[law].high <= self.goal
 
 
 def interval(ratios: Floats) -> Interval:
-    """ratios: one per seed."""
+    """Return the geometric mean of ratios, one per seed, with its 95 % bootstrap interval."""
     logs = np.log(ratios)
     picks = np.random.default_rng(0).integers(0, len(logs), (RESAMPLES, len(logs)))
     low, high = np.percentile(np.mean(logs[picks], axis=1), [2.5, 97.5])
@@ -54,13 +54,13 @@ def interval(ratios: Floats) -> Interval:
 
 
 def compare_scores(name: str, unit: str, scores: dict[str, Floats], goal: float | None = None) -> Comparison:
-    """scores: per law one number per seed."""
+    """Compare each law's scores with the paper's. scores: per law one number per seed."""
     ratios = {law: interval(scores[law] / scores["bsfm"]) for law in scores if law != "bsfm"}
     return Comparison(name, unit, {law: float(np.mean(values)) for law, values in scores.items()}, ratios, goal)
 
 
 def errors(name: str, trial: Trial, part: Callable[[Floats], Floats], case: int = 0) -> list[Comparison]:
-    """Largest and RMS error of the part of a run that counts, in one case."""
+    """Compare largest and RMS error of the part of a run that counts, in one case."""
     rows = []
     for kind, measure, goal in (("largest error", largest_n, ERROR_GOAL), ("RMS error", rms_n, None)):
         scores = {law: trial.score(lambda f, d, m=measure: m(part(f), part(d)), law)[:, case] for law in LAWS}
@@ -69,7 +69,9 @@ def errors(name: str, trial: Trial, part: Callable[[Floats], Floats], case: int 
 
 
 def settling(name: str, times_s: dict[str, Floats], bands_n: tuple[float, ...]) -> list[Comparison]:
-    """times_s: per law (seeds, targets, bands). The mean over the targets at which every law settles, per seed."""
+    """Compare settling times: the mean over the targets at which every law settles, per seed. times_s: per law (seeds,
+    targets, bands).
+    """
     rows = []
     for at, band_n in enumerate(bands_n):
         grids = {law: times[:, :, at] for law, times in times_s.items()}
@@ -82,6 +84,7 @@ def settling(name: str, times_s: dict[str, Floats], bands_n: tuple[float, ...]) 
 
 
 def steps_from_no_load(trial: Trial) -> list[Comparison]:
+    """Compare the steps of Fig. 8."""
     bands_n = tuple(SETTLING_S)
     times_s = {law: np.stack([trial.score(settled_s(band), law) for band in bands_n], axis=-1) for law in LAWS}
     rest = {law: trial.score(lambda f, d: largest_n(f[-300:], d[-300:]), law).max(axis=1) for law in LAWS}
@@ -93,6 +96,7 @@ def steps_from_no_load(trial: Trial) -> list[Comparison]:
 
 
 def steps_in_contact(trial: Trial) -> list[Comparison]:
+    """Compare the steps that begin with the pad on the workpiece."""
     bands_n = tuple(SETTLING_S)
 
     def per_target(force_n: Floats, desired_n: Floats) -> Floats:
@@ -112,7 +116,7 @@ def steps_in_contact(trial: Trial) -> list[Comparison]:
 
 
 def tracking(trial: Trial) -> list[Comparison]:
-    """Largest error while the plate is fed: at both forces; with the spindle on, at both feeds, too."""
+    """Compare the largest error while the plate is fed: at both forces; with the spindle on, at both feeds, too."""
     slow, fast = TRACKING_FEEDS_M_PER_S
     title = "tracking (Fig. 9), spindle"
     rows = [
@@ -134,7 +138,7 @@ def tracking(trial: Trial) -> list[Comparison]:
 def fed_errors(
     trial: Trial, name: str, chosen: Callable[[tuple[float, float, bool]], bool], part: Callable[[Floats], Floats]
 ) -> Comparison:
-    """The worst of the chosen conditions, of a part of each error."""
+    """Return the worst of the chosen conditions, of a part of each error."""
     cases = [case for case, condition in enumerate(exercises.CONDITIONS) if chosen(condition)]
     scores = {}
     for law in LAWS:

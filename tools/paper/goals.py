@@ -26,6 +26,7 @@ class GoalResult:
 
 
 def judge_goals(study: Study) -> list[GoalResult]:
+    """Say of every comparison whether its goal is met, and if not, why."""
     return [_judge(study, comparison) for comparison in study.comparisons]
 
 
@@ -87,7 +88,7 @@ REASONS: Final = (
 
 
 def summary(study: Study) -> list[str]:
-    """The goal in sentences."""
+    """Return the goal in sentences."""
     rows = [row for row in judge_goals(study) if row.ours]
     sentences = []
     for goal, words in (

@@ -53,14 +53,17 @@ LIMIT_HEAD: Final = (
 
 
 def spread(value: Interval) -> str:
+    """Return a ratio with its interval as text."""
     return f"{value.mean:.2f} [{value.low:.2f}, {value.high:.2f}]"
 
 
 def verdict_cells(line: Verdict) -> tuple[str, ...]:
+    """Return a verdict's cells of the table."""
     return (line.where, line.statement, line.paper, line.ours, line.verdict, line.why)
 
 
 def ratio_cells(row: GoalResult) -> tuple[str, ...]:
+    """Return a comparison's cells of the table."""
     comparison = row.comparison
     digits = 3 if comparison.unit == "s" else 2
     means = tuple(f"{comparison.means[law]:.{digits}f} {comparison.unit}" for law in ("bsfm", "ours"))
@@ -76,7 +79,7 @@ def ratio_cells(row: GoalResult) -> tuple[str, ...]:
 
 
 def limit_cells(study: Study) -> list[tuple[str, ...]]:
-
+    """Return the rows of the table of limits: settling times beside the fastest that the regulator allows."""
     times_s = {
         band_n: {law: study.steps.score(settled_s(band_n), law)[0] for law in ("bsfm", "ours")} for band_n in (2.0, 1.0)
     }
@@ -91,11 +94,12 @@ def limit_cells(study: Study) -> list[tuple[str, ...]]:
 
 
 def seconds(value_s: float) -> str:
+    """Return a time as text."""
     return "never" if value_s != value_s else f"{value_s:.3f} s"
 
 
 def assumptions(study: Study) -> list[str]:
-    """What was run, and what is ours rather than the paper's."""
+    """Say what was run, and what is ours rather than the paper's."""
     return [*_rig(study), *_laws(), *_exercises(study.quick)]
 
 
@@ -142,6 +146,7 @@ def _exercises(quick: bool) -> list[str]:
 
 
 def html_table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as HTML."""
     titles = "".join(f"<th>{escape(title)}</th>" for title in head)
     body = "\n".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>" for row in rows)
     return f'<div class="scroll"><table><thead><tr>{titles}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
@@ -159,13 +164,14 @@ def _cell(text: str) -> str:
 
 
 def html_figure(name: str, png: bytes) -> str:
+    """Return a picture with its caption as HTML."""
     caption, data = escape(FIGURES[name][0]), base64.b64encode(png).decode("ascii")
     image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
     return f'<figure id="{name}">{image}<figcaption>{caption}</figcaption></figure>'
 
 
 def html(study: Study, pictures: dict[str, bytes]) -> str:
-    """The whole page. pictures: PNG bytes by short name."""
+    """Return the whole page. pictures: PNG bytes by short name."""
     lines, rows = verdicts(study), judge_goals(study)
     shown = {name: html_figure(name, png) for name, png in pictures.items()}
     paper_figures = "\n".join(text for name, text in shown.items() if name.startswith("fig"))
@@ -205,7 +211,7 @@ The first bound holds for every command; the second is the best of all bang-bang
 
 
 def print_tables(study: Study, console: Console) -> None:
-    """The same tables as text."""
+    """Print the same tables as text."""
     lines = verdicts(study)
     _print(console, f"the paper on the twin: {counts(lines)}", TABLE_HEAD, map(verdict_cells, lines))
     _print(

@@ -40,7 +40,7 @@ class Study:
 
 
 def study(seed_count: int, quick: bool, say: Callable[[str], None] = lambda text: None) -> Study:
-    """Virtual time only; `say` hears what is going on. quick: fewer groups and orders."""
+    """Run all of it in virtual time; `say` hears what is going on. quick: fewer groups and orders."""
     started_s, seeds = time.monotonic(), tuple(range(seed_count))
     say("ladder of the paper's rig, and fits of all orders")
     ladder = paper_ladder(paper_plant(), 0, FEW_GROUPS if quick else GROUPS)
@@ -61,7 +61,7 @@ def study(seed_count: int, quick: bool, say: Callable[[str], None] = lambda text
 
 
 def compare(validation: Trial, reversals: Trial, steps: Trial, in_contact: Trial, tracking: Trial) -> list[Comparison]:
-    """Every measure, in the order of the figures."""
+    """Return every measure, in the order of the figures."""
     rows = []
     for case, (low_n, high_n) in enumerate(exercises.RANGES_N):
         name = f"reciprocating {low_n:g} .. {high_n:g} N at {exercises.PACE_N_PER_S:g} N/s"

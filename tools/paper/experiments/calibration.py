@@ -60,37 +60,38 @@ class Calibrated:
 
 
 def condition(twin: Twin) -> None:
-    """One full cycle: what the friction remembers afterwards is the ladder's own past."""
+    """Run one full cycle: what the friction remembers afterwards is the ladder's own past."""
     for voltage_v in (LADDER_TOP_V, 0.0):
         twin.command(voltage_v)
         twin.advance(1.5)
 
 
 def quiet_twin(plant: Plant) -> Twin:
-    """The rig after a full cycle, without noise. One float twin per copy: below 20 lanes that is faster than lanes."""
+    """Return the rig after a full cycle, without noise. One float twin per copy: below 20 lanes that is faster than lanes."""
     twin = Twin(with_value(plant, "cell", "noise_n", 0.0), 0)
     condition(twin)
     return twin
 
 
 def noise_n(plant: Plant, seed: int, count: int) -> Floats:
-    """Of single readings on the ladder."""
+    """Return noise of single readings on the ladder, N: (count,)."""
     return np.asarray(np.random.default_rng([seed, 2, 1]).standard_normal(count) * plant.cell.noise_n)
 
 
 def ladder_of(plan: LadderPlan, force_n: Floats) -> Ladder:
+    """Return the readings at a plan's stairs as a ladder."""
     return Ladder(np.array(plan.voltage_v), force_n, np.array(plan.direction), np.array(plan.group))
 
 
 def paper_ladder(plant: Plant, seed: int, groups: int = GROUPS) -> Ladder:
-    """All stairs of all groups on one rig."""
+    """Climb all stairs of all groups on one rig."""
     plan = ladder_plan(LADDER_TOP_V, LADDER_STEP_V, groups)
     force_n = staircase(quiet_twin(plant), plan.voltage_v, READ_ONCE)
     return ladder_of(plan, force_n + noise_n(plant, seed, len(plan)))
 
 
 def stairs_between(turns_v: Sequence[float], step_v: float) -> list[float]:
-    """Even stairs from turn to turn."""
+    """Return even stairs from turn to turn."""
     stairs = [turns_v[0]]
     for turn_v in turns_v[1:]:
         count = max(1, round(abs(turn_v - stairs[-1]) / step_v))
@@ -99,7 +100,7 @@ def stairs_between(turns_v: Sequence[float], step_v: float) -> list[float]:
 
 
 def calibrate(plant: Plant, seed: int) -> Calibrated:
-    """Ladder, minor loops and fits of one copy."""
+    """Run ladder and minor loops of one copy, and fit."""
     one, whole = (ladder_plan(LADDER_TOP_V, LADDER_STEP_V, groups) for groups in (1, GROUPS))
     twin, minor_v = quiet_twin(plant), stairs_between(TURNS_V, STAIR_V)
     group_n, minor_n = (staircase(twin, voltages_v, READ_ONCE) for voltages_v in (one.voltage_v, minor_v))
@@ -113,5 +114,5 @@ def calibrate(plant: Plant, seed: int) -> Calibrated:
 
 
 def sweep(ladder: Ladder, orders: Sequence[int]) -> dict[str, list[FitResult]]:
-    """Fits of all four models, by name, orders ascending (Figs. 4, 5, 6)."""
+    """Return fits of all four models, by name, orders ascending (Figs. 4, 5, 6)."""
     return {name: fit_orders(ladder, name, orders, ties) for name, ties in FORMS.items()}

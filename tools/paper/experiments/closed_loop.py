@@ -17,7 +17,9 @@ LEAD_IN_S: Final = (OFF_TICKS + 10) * TICK_S  # nothing is wanted yet; laws that
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """Inputs from outside at a time, (lanes,) or one float for all: surface height m, force on the slide N."""
+    """What acts on the rig from outside. Inputs from outside at a time, (lanes,) or one float for all: surface height m,
+    force on the slide N.
+    """
 
     height_m: Callable[[float], Floats] | None = None
     force_n: Callable[[float], Floats] | None = None
@@ -28,7 +30,9 @@ NOTHING: Final = Surroundings()
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """desired_n, measured_n, command_v: (ticks, lanes); force_n: the true contact force, (ticks x 10, lanes)."""
+    """What a run was and did. desired_n, measured_n, command_v: (ticks, lanes); force_n: the true contact force, (ticks x
+    10, lanes).
+    """
 
     desired_n: Floats
     measured_n: Floats
@@ -37,11 +41,12 @@ class Record:
 
     @property
     def tick_s(self) -> Floats:
+        """Time of each tick, s."""
         return np.arange(len(self.desired_n)) * TICK_S
 
     @property
     def step_s(self) -> Floats:
-        """End of each step."""
+        """End of each step, s."""
         return (np.arange(len(self.force_n)) + 1) * STEP_S
 
     @property
@@ -50,12 +55,13 @@ class Record:
         return np.asarray(self.force_n - np.repeat(self.desired_n, STEPS, axis=0))
 
     def lanes(self, chosen: Sequence[int] | Floats) -> "Record":
+        """Return the record of some lanes."""
         index = np.asarray(chosen)
         return Record(*(getattr(self, name)[:, index] for name in ("desired_n", "measured_n", "command_v", "force_n")))
 
 
 def run(rig: RigLanes, laws: Sequence[Law], desired_n: Floats, around: Surroundings = NOTHING) -> Record:
-    """desired_n: (ticks, lanes), after a lead-in of nothing, which the record leaves out."""
+    """Run every lane's law on its rig. desired_n: (ticks, lanes), after a lead-in of nothing, which the record leaves out."""
     idle = round(LEAD_IN_S / TICK_S)
     wanted = np.concatenate([np.zeros((idle, len(laws))), desired_n])
     noise = rig.readings(len(wanted))

@@ -42,6 +42,7 @@ CONDITIONS: Final = tuple(
 
 
 def ticks(duration_s: float) -> int:
+    """Return how many ticks a duration takes."""
     return round(duration_s / TICK_S)
 
 
@@ -49,7 +50,7 @@ def ticks(duration_s: float) -> int:
 
 
 def reciprocating_n(low_n: float, high_n: float, duration_s: float) -> Floats:
-    """A triangle between two forces, after FIRST_S at the lower one."""
+    """Return a triangle between two forces, after FIRST_S at the lower one."""
     half_s = (high_n - low_n) / PACE_N_PER_S
     turns = np.arange(ticks(duration_s)) * TICK_S / half_s
     triangle = low_n + (high_n - low_n) * (1.0 - np.abs(turns % 2.0 - 1.0))
@@ -57,7 +58,7 @@ def reciprocating_n(low_n: float, high_n: float, duration_s: float) -> Floats:
 
 
 def validation(copies: Sequence[Calibrated], quick: bool) -> Trial:
-    """Cases are RANGES_N."""
+    """Run the reciprocating command of Fig. 7. Cases are RANGES_N."""
     duration_s = QUICK_RECIPROCATING_S if quick else RECIPROCATING_S
     return trial(copies, LAW_NAMES, [_between(*ends_n, duration_s) for ends_n in RANGES_N], TrialConditions(7))
 
@@ -67,7 +68,7 @@ def _between(low_n: float, high_n: float, duration_s: float) -> Callable[[int], 
 
 
 def without_first_step(series: Floats) -> Floats:
-    """Without the first step."""
+    """Return a series without the first step."""
     return series[round(FIRST_S * 1000) :]
 
 
@@ -75,7 +76,7 @@ def without_first_step(series: Floats) -> Floats:
 
 
 def steps(copies: Sequence[Calibrated]) -> Trial:
-    """One fresh start per target: no load, the pad lifted."""
+    """Run the steps of Fig. 8, one fresh start per target: no load, the pad lifted."""
     wishes = [_constant(target_n) for target_n in TARGETS_N]
     return trial(copies, LAW_NAMES, wishes, TrialConditions(8, conditioned=False, changed=_lifted))
 
@@ -89,14 +90,14 @@ def _constant(target_n: float, duration_s: float = STEP_S) -> Callable[[int], Fl
 
 
 def steps_in_contact(copies: Sequence[Calibrated], laws: tuple[str, ...] = LAW_NAMES) -> Trial:
-    """All targets in one go, 0 V between them; the pad stays on the workpiece."""
+    """Run all targets in one go, 0 V between them; the pad stays on the workpiece."""
     load, rest = np.ones(ticks(STEP_S)), np.zeros(ticks(UNLOADED_S))
     wish_n = np.concatenate([np.concatenate([target_n * load, rest]) for target_n in TARGETS_N])
     return trial(copies, laws, [lambda seed: wish_n], TrialConditions(9))
 
 
 def each_step(series: Floats) -> Floats:
-    """(steps of a run in contact, ...) -> (targets, milliseconds of the loaded part, ...)."""
+    """Cut a run in contact, (steps, ...), into (targets, milliseconds of the loaded part, ...)."""
     per_target = series.reshape(len(TARGETS_N), -1, *series.shape[1:])
     return per_target[:, : round(STEP_S * 1000)]
 
@@ -105,13 +106,16 @@ def each_step(series: Floats) -> Floats:
 
 
 def partial_reversals(copies: Sequence[Calibrated], quick: bool) -> Trial:
-    """Random forces, each held; a series of its own for each seed. Case 0: as calibrated, case 1: months later."""
+    """Hold random forces one after the other, a series of its own for each seed. Case 0: as calibrated, case 1: months
+    later.
+    """
     wish = _held(holds(quick))
     conditions = TrialConditions(10, changed=lambda plant, case: drifted(plant) if case else plant)
     return trial(copies, LAW_NAMES, [wish, wish], conditions)
 
 
 def holds(quick: bool) -> int:
+    """Return how many forces are held."""
     return QUICK_HOLDS if quick else HOLDS
 
 
@@ -123,7 +127,7 @@ def _held(count: int) -> Callable[[int], Floats]:
 
 
 def ends_of_holds(series: Floats) -> Floats:
-    """The end of each hold but the first, joined."""
+    """Return the end of each hold but the first, joined."""
     parts = series.reshape(-1, round(HOLD_S * 1000))
     return parts[1:, -round(SETTLED_S * 1000) :].ravel()
 
@@ -132,14 +136,14 @@ def ends_of_holds(series: Floats) -> Floats:
 
 
 def tracking(copies: Sequence[Calibrated], laws: tuple[str, ...] = ("bsfm", "ours")) -> Trial:
-    """Contact from the lifted pad, then feed along the plate. Cases are CONDITIONS."""
+    """Make contact from the lifted pad, then feed along the plate (Fig. 9). Cases are CONDITIONS."""
     longest_s = FEED_FROM_S + TRAVEL_M / min(TRACKING_FEEDS_M_PER_S)
     wishes = [_constant(force_n, longest_s) for force_n, _, _ in CONDITIONS]
     return trial(copies, laws, wishes, TrialConditions(11, conditioned=False, changed=_lifted, around=moving_surface))
 
 
 def moving_surface(lanes: list[Lane]) -> Surroundings:
-    """Height of the plate under the pad and the spindle's shaking, each lane with its seed's phases."""
+    """Return the height of the plate under the pad and the spindle's shaking, each lane with its seed's phases."""
     phases = np.array(
         [np.random.default_rng([lane.calibrated.seed, 4]).uniform(0.0, 2.0 * np.pi, 3) for lane in lanes]
     ).T
@@ -157,6 +161,7 @@ def moving_surface(lanes: list[Lane]) -> Surroundings:
 
 
 def surface_m(at_m: Floats, phases: Floats) -> Floats:
+    """Return the height of the plate at places along it, m."""
     bow = BOW_M * np.sin(np.pi * at_m / BOW_LENGTH_M)
     path = PATH_M * np.sin(2.0 * np.pi * at_m / PATH_LENGTH_M + phases[0])
     marks = MARKS_M * np.sin(2.0 * np.pi * at_m / MARKS_LENGTH_M + phases[1])
@@ -164,16 +169,16 @@ def surface_m(at_m: Floats, phases: Floats) -> Floats:
 
 
 def feeding(series: Floats, case: int) -> Floats:
-    """The part of a run in which the plate moves under the pad."""
+    """Return the part of a run in which the plate moves under the pad."""
     first = round(FEED_FROM_S * 1000)
     return series[first : first + round(TRAVEL_M / CONDITIONS[case][1] * 1000)]
 
 
 def slow_part(series: Floats) -> Floats:
-    """Mean over 50 ms, the ends left out."""
+    """Return the mean over 50 ms, the ends left out."""
     return np.convolve(series, np.full(50, 0.02), mode="valid")
 
 
 def shaking_n(error_n: Floats) -> float:
-    """RMS of what is faster than 50 ms, N."""
+    """Return the RMS of what is faster than 50 ms, N."""
     return float(np.sqrt(np.mean((error_n[25:-24] - slow_part(error_n)) ** 2)))

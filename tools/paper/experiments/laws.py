@@ -36,8 +36,10 @@ LAW_NAMES: Final = ("psfm", "psfm 2", "bsfm", "ours")
 
 
 class Law(Protocol):
+    """Turns a wanted force into volts, tick by tick."""
+
     def command_v(self, desired_n: float, measured_n: float) -> float:
-        """Volts for this tick."""
+        """Return the volts for this tick."""
         ...
 
 
@@ -49,6 +51,7 @@ class Switched:
         self._desired_n, self._rising = 0.0, True
 
     def command_v(self, desired_n: float, measured_n: float) -> float:
+        """Return the inverse of the branch of the present direction, V."""
         if desired_n != self._desired_n:
             self._rising = desired_n > self._desired_n
             self._desired_n = desired_n
@@ -59,7 +62,7 @@ class Switched:
 
 
 def settings(response_lag_s: float, trim: Trim, precontact_n: float = 60.0) -> ControlSettings:
-    """A rig's settings for these experiments; precontact 60 N: no soft approach, as the paper has none."""
+    """Return a rig's settings for these experiments; precontact 60 N: no soft approach, as the paper has none."""
     return ControlSettings(
         limits=Limits(force_max_n=60.0, over_force_n=75.0, voltage_max_v=8.5, voltage_slew_v_per_s=1.0e4),
         defaults=Defaults(force_ramp_n_per_s=FASTEST_N_PER_S, precontact_force_n=precontact_n),
@@ -77,6 +80,7 @@ class Ours:
         self._voltage_v, self._ticks, self._command = 0.0, 0, Command()
 
     def command_v(self, desired_n: float, measured_n: float) -> float:
+        """Return what the gateway's controller puts out at this tick, V."""
         now_s = self._ticks * TICK_S
         self._tell(desired_n, now_s)
         sample = ForceSample(measured_n, measured_n, Quality.OK, now_s)
@@ -95,7 +99,7 @@ class Ours:
 
 
 def law(name: str, calibrated: Calibrated) -> Law:
-    """A fresh law by its name in LAW_NAMES."""
+    """Return a fresh law by its name in LAW_NAMES."""
     branches = {"psfm": calibrated.psfm, "psfm 2": calibrated.psfm_same_order, "bsfm": calibrated.bsfm}
     if name in branches:
         return Switched(branches[name])

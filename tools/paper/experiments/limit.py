@@ -39,7 +39,7 @@ class Fastest:
 
 
 def responses(plant: Plant, commands_v: Floats) -> Floats:
-    """Force every millisecond for commands every millisecond: both (steps, lanes)."""
+    """Return the force every millisecond for commands every millisecond: both (steps, lanes)."""
     quiet = with_value(lifted(plant), "cell", "noise_n", 0.0)
     twin, force_n = Twin(stack([quiet] * commands_v.shape[1]), 0), np.empty_like(commands_v)
     for step, row in enumerate(commands_v):
@@ -51,28 +51,28 @@ def responses(plant: Plant, commands_v: Floats) -> Floats:
 
 
 def bang_bang_v(pulses: Sequence[tuple[int, int]], hold_v: float) -> Floats:
-    """10 V, 0 V, hold: one lane per (up ms, down ms)."""
+    """Return 10 V, 0 V, hold: one lane per (up ms, down ms)."""
     ms = np.arange(round(DURATION_S * 1000))[:, None]
     up, down = (np.array(column) for column in zip(*pulses, strict=True))
     return np.where(ms < up, HIGH_V, np.where(ms < up + down, 0.0, hold_v))
 
 
 def useful_pulses(plant: Plant, target_n: float, full_n: Floats) -> list[tuple[int, int]]:
-    """The part of the grid that may be fast: 10 V for no longer than until the force stands at the target."""
+    """Return the part of the grid that may be fast: 10 V for no longer than until the force stands at the target."""
     delay_ms = plant.regulator.delay_s * 1000
     reached_ms = float(np.argmax(full_n >= target_n)) - delay_ms
     return [(up, down) for up in UP_MS if 0.2 * reached_ms <= up <= reached_ms + 8 for down in DOWN_MS]
 
 
 def holding_v(plant: Plant, target_n: float) -> float:
-    """The voltage whose steady force on a rising approach is the target: the twin's own statics, not a model's."""
+    """Return the voltage whose steady force on a rising approach is the target: the twin's own statics, not a model's."""
     trial_v = np.linspace(0.5, 6.0, 240)
     settled_n = responses(plant, np.tile(trial_v, (1500, 1)))[-1]
     return float(np.interp(target_n, settled_n, trial_v))
 
 
 def fastest(plant: Plant, target_n: float, bands_n: Sequence[float], hold_v: float, full_n: Floats) -> list[Fastest]:
-    """full_n: the response to 10 V."""
+    """Search the fastest command for one target in every band. full_n: the response to 10 V."""
     pulses = useful_pulses(plant, target_n, full_n)
     force_n = responses(plant, bang_bang_v(pulses, hold_v))
     rows = []
@@ -85,7 +85,7 @@ def fastest(plant: Plant, target_n: float, bands_n: Sequence[float], hold_v: flo
 
 
 def limits(plant: Plant, targets_n: Sequence[float], bands_n: Sequence[float]) -> list[Fastest]:
-    """Every target and band."""
+    """Search the fastest command for every target and band."""
     full_n = responses(plant, np.full((round(DURATION_S * 1000), 1), HIGH_V))[:, 0]
     holds_v = [holding_v(plant, target_n) for target_n in targets_n]
     rows = [

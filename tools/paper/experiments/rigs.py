@@ -40,11 +40,12 @@ LIFTED_M: Final = 5.0e-4  # the pad before a step from no load
 
 
 def paper_plant() -> Plant:
+    """Return the shipped plant of the paper's rig."""
     return load_plant("paper-slide").plant
 
 
 def copy_of(seed: int) -> Plant:
-    """The copy of the paper's rig with this seed; 0 is the rig itself."""
+    """Return the copy of the paper's rig with this seed; 0 is the rig itself."""
     plant, rng = paper_plant(), default_rng([seed, 1])
     for (section, name), spread in SPREAD.items() if seed else ():
         value = getattr(getattr(plant, section), name)
@@ -53,14 +54,14 @@ def copy_of(seed: int) -> Plant:
 
 
 def drifted(plant: Plant) -> Plant:
-    """The same rig, months later."""
+    """Return the same rig, months later."""
     for (section, name), factor in DRIFT.items():
         plant = with_value(plant, section, name, getattr(getattr(plant, section), name) * factor)
     return plant
 
 
 def lifted(plant: Plant) -> Plant:
-    """The same rig with the pad off the workpiece."""
+    """Return the same rig with the pad off the workpiece."""
     return with_value(plant, "contact", "gap_m", LIFTED_M)
 
 
@@ -73,13 +74,15 @@ class RigLanes:
     streams: tuple[Generator, ...]
 
     def readings(self, count: int) -> Floats:
-        """Noise of `count` readings of every cell, N: (count, lanes)."""
+        """Draw noise of `count` readings of every cell, N: (count, lanes)."""
         columns = [stream.standard_normal(count) for stream in self.streams]
         return np.stack(columns, axis=1) * self.noise_n
 
 
 def rig_lanes(plants: Sequence[Plant], seeds: Sequence[int], part: int) -> RigLanes:
-    """One lane per plant. Lanes with the same seed and `part` (of the experiment) read the same noise, whatever drives them."""
+    """Return one lane per plant. Lanes with the same seed and `part` (of the experiment) read the same noise, whatever
+    drives them.
+    """
     noise_n = np.array([plant.cell.noise_n for plant in plants])
     quiet = stack([with_value(plant, "cell", "noise_n", 0.0) for plant in plants])
     return RigLanes(Twin(quiet, 0), noise_n, tuple(default_rng([seed, 2, part]) for seed in seeds))

@@ -32,11 +32,11 @@ class Trial:
     record: Record
 
     def of(self, name: str, seed_at: int = 0, case: int = 0) -> Record:
-        """One lane, as a record with one column."""
+        """Return one lane, as a record with one column."""
         return self.record.lanes([(seed_at * self.cases + case) * len(self.laws) + self.laws.index(name)])
 
     def score(self, measure: Callable[[Floats, Floats], Floats], name: str) -> Floats:
-        """`measure(force_n, desired_n)` of each lane of a law, every millisecond: (seeds, cases, ...)."""
+        """Apply `measure(force_n, desired_n)` to each lane of a law, every millisecond: (seeds, cases, ...)."""
         desired_n = np.repeat(self.record.desired_n, 10, axis=0)
         lanes = range(self.laws.index(name), desired_n.shape[1], len(self.laws))
         values = np.array([measure(self.record.force_n[:, lane], desired_n[:, lane]) for lane in lanes])
@@ -45,8 +45,9 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class TrialConditions:
-    """part: which noise; conditioned: the friction remembers a full cycle, as on the ladder; changed: the plant here, by case;
-    around: inputs from outside, given the lanes."""
+    """How a trial differs from a plain run. part: which noise; conditioned: the friction remembers a full cycle, as on the
+    ladder; changed: the plant here, by case; around: inputs from outside, given the lanes.
+    """
 
     part: int
     conditioned: bool = True
@@ -60,7 +61,7 @@ def trial(
     wishes: Sequence[Callable[[int], Floats]],
     conditions: TrialConditions,
 ) -> Trial:
-    """wishes: one per case, seed -> desired force per tick."""
+    """Run every law on every copy. wishes: one per case, seed -> desired force per tick."""
     lanes = [Lane(copy, name, case) for copy in copies for case in range(len(wishes)) for name in laws]
     plants = [conditions.changed(lane.calibrated.plant, lane.case) for lane in lanes]
     rig = rig_lanes(plants, [lane.calibrated.seed for lane in lanes], conditions.part)
@@ -72,13 +73,15 @@ def trial(
 
 
 def largest_n(force_n: Floats, desired_n: Floats) -> Floats:
+    """Return the largest error, N."""
     return np.asarray(np.max(np.abs(force_n - desired_n)))
 
 
 def rms_n(force_n: Floats, desired_n: Floats) -> Floats:
+    """Return the RMS error, N."""
     return np.asarray(np.sqrt(np.mean((force_n - desired_n) ** 2)))
 
 
 def settled_s(band_n: float) -> Callable[[Floats, Floats], Floats]:
-    """Time to stay within the band; nan when it never does."""
+    """Return the time to stay within the band, s; nan when it never does."""
     return lambda force_n, desired_n: np.asarray(settling_time_s(force_n, float(desired_n[0]), band_n))

@@ -29,6 +29,6 @@ FIGURES: Final[dict[str, tuple[str, Callable[[Study], Figure]]]] = {
 
 
 def draw(study: Study) -> dict[str, Figure]:
-    """Every figure by its short name. The caller closes them."""
+    """Draw every figure, by its short name. The caller closes them."""
     with pyplot.rc_context(STYLE):
         return {name: make(study) for name, (_, make) in FIGURES.items()}

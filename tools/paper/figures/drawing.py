@@ -44,11 +44,12 @@ STYLE: Final = {
 
 
 def sheet(rows: int, columns: int, size: tuple[float, float], **more: Any) -> tuple[Figure, Any]:
+    """Return a figure of rows x columns panels, and the panels."""
     return pyplot.subplots(rows, columns, figsize=size, squeeze=False, **more)
 
 
 def png(figure: Figure) -> bytes:
-    """The picture's bytes; closes the figure."""
+    """Return the picture's bytes; close the figure."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=110)
     pyplot.close(figure)

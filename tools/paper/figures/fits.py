@@ -14,7 +14,7 @@ from paper.study import Study
 
 
 def dots(axes: Any, ladder: Ladder) -> None:
-    """The ladder as the eye sees it: every reading a faint dot."""
+    """Draw the ladder as the eye sees it: every reading a faint dot."""
     rising = ladder.direction == RISING
     for mask, marker, name in ((rising, "^", "measured, rising"), (~rising, "v", "measured, falling")):
         axes.plot(
@@ -23,14 +23,17 @@ def dots(axes: Any, ladder: Ladder) -> None:
 
 
 def of_order(fits: list[FitResult], order: int) -> FitResult:
+    """Return the fit of a model that has this order."""
     return next(result for result in fits if result.order == order)
 
 
 def loop_axes(axes: Any, title: str) -> None:
+    """Label the axes of a loop."""
     axes.set(xlabel="command (V)", ylabel="force (N)", title=title)
 
 
 def figure_4(study: Study) -> Figure:
+    """Draw Fig. 4: pooled fits over the measured loop."""
     figure, axes = sheet(1, 2, (9.0, 3.8), sharey=True)
     volts = np.linspace(0.0, paper_values.LADDER_TOP_V, 300)
     pairs = (("pfm", (2, 3), "(a) pooled polynomial"), ("bfm", (1, 2), "(b) pooled rational Bezier"))
@@ -46,6 +49,7 @@ def figure_4(study: Study) -> Figure:
 
 
 def figure_5(study: Study) -> Figure:
+    """Draw Fig. 5: fits per direction."""
     figure, axes = sheet(2, 2, (9.0, 6.8))
     top_v = paper_values.LADDER_TOP_V
     for row, (name, letters) in enumerate((("psfm", "ab"), ("bsfm", "cd"))):
@@ -61,6 +65,7 @@ def figure_5(study: Study) -> Figure:
 
 
 def branch_panel(panel: Any, study: Study, name: str, low_v: float) -> None:
+    """Draw both branches of a fit into a panel."""
     volts = np.linspace(low_v, paper_values.LADDER_TOP_V, 300)
     dots(panel, study.ladder)
     for order, style in ((2, "--"), (3, "-")):
@@ -72,6 +77,7 @@ def branch_panel(panel: Any, study: Study, name: str, low_v: float) -> None:
 
 
 def figure_6(study: Study) -> Figure:
+    """Draw Fig. 6: residual over the order."""
     figure, axes = sheet(3, 2, (9.0, 7.4), sharex=True)
     measures: tuple[tuple[str, Callable[[FitResult], float]], ...] = (
         ("the paper's norm", lambda result: result.paper_norm),
@@ -101,6 +107,7 @@ def figure_6(study: Study) -> Figure:
 def order_line(
     panel: Any, fits: list[FitResult], name: str, measure: Callable[[FitResult], float], marker: str
 ) -> None:
+    """Draw one model's residual over the order."""
     orders = [result.order for result in fits]
     values = [measure(result) for result in fits]
     panel.plot(orders, values, marker + "-", color=COLOUR[name], markersize=3.5, label=f"{name.upper()}, twin")

@@ -12,6 +12,7 @@ from paper.study import Study
 
 
 def ratio_figure(study: Study) -> Figure:
+    """Draw ours beside the paper's law: ratios with 95 % intervals over the seeds."""
     rows = study.comparisons[::-1]
     figure, axes = sheet(1, 1, (9.0, 0.36 * len(rows) + 1.1))
     panel = axes[0][0]
@@ -35,7 +36,7 @@ def ratio_figure(study: Study) -> Figure:
 
 
 def limit_figure(study: Study, target_n: float = 20.0, band_n: float = 1.0) -> Figure:
-    """One step in detail: the paper's, our and the fastest command with the forces they make."""
+    """Draw one step in detail: the paper's, our and the fastest command with the forces they make."""
     figure, axes = sheet(2, 1, (9.0, 5.0), sharex=True)
     case, plant = paper_values.TARGETS_N.index(target_n), paper_plant()
     for name in ("bsfm", "ours"):

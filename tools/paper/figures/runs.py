@@ -10,6 +10,7 @@ from paper.study import Study
 
 
 def figure_7(study: Study) -> Figure:
+    """Draw Fig. 7: validation with a reciprocating command."""
     figure, axes = sheet(3, 1, (9.0, 7.2), sharex=True)
     wished = study.validation.of("bsfm")
     top, middle, bottom = axes[:, 0]
@@ -45,6 +46,7 @@ def figure_7(study: Study) -> Figure:
 
 
 def figure_8(study: Study) -> Figure:
+    """Draw Fig. 8: steps from no load."""
     figure, axes = sheet(1, 3, (9.0, 3.6), sharex=True, sharey=True)
     for panel, name, letter in zip(axes.ravel(), ("bsfm", "psfm", "ours"), "abc", strict=True):
         for case, target_n in enumerate(paper_values.TARGETS_N):
@@ -59,6 +61,7 @@ def figure_8(study: Study) -> Figure:
 
 
 def settling_figure(study: Study) -> Figure:
+    """Draw the settling times of Fig. 8, and the fastest that the regulator allows."""
     figure, axes = sheet(1, 2, (9.0, 3.9), sharey=True)
     for panel, (band_n, (low_s, mean_s, high_s)) in zip(axes[0], paper_values.SETTLING_S.items(), strict=True):
         panel.axhspan(low_s, high_s, color="#2a78d6", alpha=0.1, linewidth=0.0, label="the paper's range")
@@ -78,6 +81,7 @@ def settling_figure(study: Study) -> Figure:
 
 
 def figure_9(study: Study) -> Figure:
+    """Draw Fig. 9: tracking under feed, as the load cell sees it."""
     figure, axes = sheet(4, 2, (9.0, 9.6), sharex="row", sharey="row")
     for case, (force_n, feed, spinning) in enumerate(exercises.CONDITIONS):
         panel = axes[_row(force_n, feed)][int(spinning)]

@@ -10,7 +10,7 @@ from paper.verdicts.verdict import NO, OUTSIDE, YES, Verdict
 
 
 def verdicts(study: Study) -> list[Verdict]:
-    """In the order of the paper's figures."""
+    """Return all lines of the table, in the order of the paper's figures."""
     parts: list[Callable[[Study], list[Verdict]]] = [
         pooled,
         per_direction,
@@ -24,6 +24,6 @@ def verdicts(study: Study) -> list[Verdict]:
 
 
 def counts(lines: Sequence[Verdict]) -> str:
-    """How many of each."""
+    """Return how many of each word there are."""
     numbers = {word: sum(line.verdict == word for line in lines) for word in (YES, NO, OUTSIDE)}
     return ", ".join(f"{number} {word}" for word, number in numbers.items())

@@ -12,12 +12,12 @@ FLAT: Final = {"pfm": 1.005, "bfm": 1.005, "psfm": 1.1, "bsfm": 1.1}
 
 
 def needed_order(fits: list[FitResult], flat: float) -> int:
-    """The smallest order whose RMS residual is that of the highest, nearly."""
+    """Return the smallest order whose RMS residual is that of the highest, nearly."""
     return next(result.order for result in fits if result.rms_n <= flat * fits[-1].rms_n)
 
 
 def course(study: Study, name: str) -> tuple[tuple[float, float], str]:
-    """Norm at order 1 and 15, and the words with the RMS and largest residual beside it."""
+    """Return the norm at order 1 and 15, and the words with the RMS and largest residual beside it."""
     first, last = study.fits[name][0], study.fits[name][-1]
     norms = (first.paper_norm, last.paper_norm)
     rest = f"RMS {first.rms_n:.3f} → {last.rms_n:.3f} N, max {first.max_n:.2f} → {last.max_n:.2f} N"
@@ -25,6 +25,7 @@ def course(study: Study, name: str) -> tuple[tuple[float, float], str]:
 
 
 def norm_line(study: Study, name: str, statement: str, why: str) -> Verdict:
+    """Compare a model's norms with the paper's."""
     norms, words = course(study, name)
     paper = paper_values.NORM[name]
     holds = all(near(a, b, NORM_TOLERANCE) for a, b in zip(norms, paper, strict=True))
@@ -33,6 +34,7 @@ def norm_line(study: Study, name: str, statement: str, why: str) -> Verdict:
 
 
 def order_line(study: Study, names: tuple[str, str], where: str, statement: str, why: str) -> Verdict:
+    """Compare the orders needed with the paper's."""
     ours = [needed_order(study.fits[name], FLAT[name]) for name in names]
     paper = [paper_values.ORDER_NEEDED[name] for name in names]
     labels = [f"{name.upper()} {{}}" for name in names]
@@ -40,6 +42,7 @@ def order_line(study: Study, names: tuple[str, str], where: str, statement: str,
 
 
 def pooled(study: Study) -> list[Verdict]:
+    """Judge the models with one curve for both directions."""
     pfm = "one curve runs through the middle of the loop: what remains is half its width, whatever the order"
     size = f"{pfm}; a norm within {NORM_TOLERANCE:.0%} counts, the slide is another one"
     return [
@@ -56,6 +59,7 @@ def pooled(study: Study) -> list[Verdict]:
 
 
 def per_direction(study: Study) -> list[Verdict]:
+    """Judge the models with a curve for each direction."""
     smooth = (
         "the twin's loop is smoother than a real one and its noise averages out over ten groups, so high orders leave less; "
         "the norm's formula is inferred, the paper does not give it"

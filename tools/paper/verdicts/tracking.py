@@ -12,22 +12,25 @@ from paper.verdicts.verdict import OUTSIDE, Verdict, word
 
 
 def fed_error_n(study: Study, law: str, case: int) -> Floats:
-    """Error while the plate is fed, on the paper's rig."""
+    """Return the error while the plate is fed, on the paper's rig, N."""
     return exercises.feeding(study.tracking.of(law, 0, case).error_n[:, 0], case)
 
 
 def overshoot_n(study: Study, law: str, case: int) -> float:
+    """Return the largest overshoot before the plate is fed, N."""
     first = round(exercises.FEED_FROM_S * 1000)
     return float(np.max(study.tracking.of(law, 0, case).error_n[:first]))
 
 
 def mean_of(values: dict[int, float], **wanted: object) -> float:
+    """Return the mean over the conditions with this feed, or with the spindle on or off."""
     keys = {"feed": 1, "spinning": 2}
     chosen = [v for case, v in values.items() if all(CONDITIONS[case][keys[k]] == w for k, w in wanted.items())]
     return float(np.mean(chosen))
 
 
 def tracking(study: Study) -> list[Verdict]:
+    """Judge the tracking of Fig. 9."""
     slow, fast = paper_values.TRACKING_FEEDS_M_PER_S
     worst = {case: float(np.max(np.abs(fed_error_n(study, "bsfm", case)))) for case in range(len(CONDITIONS))}
     pairs = [mean_of(worst, feed=feed, spinning=False) for feed in (slow, fast)]
@@ -67,13 +70,14 @@ def tracking(study: Study) -> list[Verdict]:
 
 
 def stiff_variation_n() -> float:
-    """Peak to peak of the force on a tool that does not give way, seed 0's plate."""
+    """Return the force on a tool that does not give way, peak to peak, N, on seed 0's plate."""
     phases = np.random.default_rng([0, 4]).uniform(0.0, 2.0 * np.pi, 3)
     height_m = exercises.surface_m(np.linspace(0.0, exercises.TRAVEL_M, 2000), phases)
     return float(np.ptp(height_m) * paper_plant().contact.pad_stiffness_n_per_m)
 
 
 def spindle(study: Study) -> list[Verdict]:
+    """Judge what the spindle does to the force."""
     cases = range(len(CONDITIONS))
     shaking = {case: exercises.shaking_n(fed_error_n(study, "bsfm", case)) for case in cases}
     over = {case: overshoot_n(study, "bsfm", case) for case in cases}
@@ -102,6 +106,7 @@ def spindle(study: Study) -> list[Verdict]:
 
 
 def roughness() -> Verdict:
+    """Leave out Fig. 10: roughness of a ground surface is outside software."""
     return Verdict(
         "Fig. 10",
         f"Roughness {paper_values.ROUGHNESS_UM:g} µm after five passes; finer with slower feed and more force",

@@ -17,7 +17,7 @@ CUBIC: Final = "a cubic per direction fits the twin's loop down to the noise, so
 
 
 def signs(trial: Trial, name: str) -> tuple[float, float]:
-    """Share of time with a negative error while rising, and with a positive one while falling."""
+    """Return the share of time with a negative error while rising, and with a positive one while falling."""
     record = trial.of(name)
     slope = exercises.without_first_step(np.repeat(np.gradient(record.desired_n[:, 0]), 10))
     error_n = exercises.without_first_step(record.error_n[:, 0])
@@ -25,15 +25,17 @@ def signs(trial: Trial, name: str) -> tuple[float, float]:
 
 
 def largest(trial: Trial, name: str) -> float:
+    """Return a law's largest error in the validation, N."""
     return float(np.max(np.abs(exercises.without_first_step(trial.of(name).error_n[:, 0]))))
 
 
 def validation(study: Study) -> list[Verdict]:
-    """How large the errors are, and on which side."""
+    """Judge how large the errors are, and on which side."""
     return [*largest_errors(study.validation), *sides(study.validation)]
 
 
 def largest_errors(trial: Trial) -> list[Verdict]:
+    """Compare the largest errors with the paper's."""
     bsfm_n, psfm_n = largest(trial, "bsfm"), largest(trial, "psfm")
     pace = (
         f"the paper gives no pace; {lag_s():.3f} s of delay and lags cost {PACE_N_PER_S * lag_s():.2f} N at this one. "
@@ -48,20 +50,21 @@ def largest_errors(trial: Trial) -> list[Verdict]:
 
 
 def largest_error(statement: str, law: str, ours_n: float, ours: str, why: str) -> Verdict:
+    """Compare one law's largest error with the paper's."""
     paper_n = paper_values.VALIDATION_MAX_N[law]
     holds = word(near(ours_n, paper_n, ERROR_TOLERANCE))
     return Verdict("Fig. 7(b)", statement, f"{paper_n:.2f} N", ours, holds, why)
 
 
 def sides(trial: Trial) -> list[Verdict]:
-    """Which sign the error has in each direction."""
+    """Judge which sign the error has in each direction."""
     bsfm, psfm = signs(trial, "bsfm"), signs(trial, "psfm")
     return [
         Verdict(
             "Fig. 7(b)",
             "BSFM: error mostly negative rising, positive falling",
             "shown",
-            mostly(bsfm),
+            describe_signs(bsfm),
             word(min(bsfm) > 0.5),
             "the force comes late: too low on the way up, too high on the way down",
         ),
@@ -69,20 +72,21 @@ def sides(trial: Trial) -> list[Verdict]:
             "Fig. 7(b)",
             "PSFM: error mostly negative in both directions",
             "shown",
-            mostly(psfm),
+            describe_signs(psfm),
             word(psfm[0] > 0.5 and psfm[1] < 0.5),
             f"{CUBIC}, and the same signs",
         ),
     ]
 
 
-def mostly(share: tuple[float, float]) -> str:
+def describe_signs(share: tuple[float, float]) -> str:
+    """Return the shares of `signs` in words."""
     rise, fall = share
     return f"{rise:.0%} of the rise negative, {fall:.0%} of the fall positive"
 
 
 def lag_s() -> float:
-    """How late the force follows a slow command."""
+    """Return how late the force follows a slow command, s."""
     regulator = paper_plant().regulator
     return float(regulator.delay_s + regulator.lag_s + regulator.second_lag_s)
 
@@ -91,16 +95,17 @@ def lag_s() -> float:
 
 
 def step_times_s(study: Study, law: str, band_n: float) -> Floats:
-    """Of the paper's rig, per target."""
+    """Return the settling times of the paper's rig, s, per target."""
     return study.steps.score(settled_s(band_n), law)[0]
 
 
 def steps(study: Study) -> list[Verdict]:
+    """Judge the settling times in both bands."""
     return [line for band_n in paper_values.SETTLING_S for line in step_lines(study, band_n)]
 
 
 def step_lines(study: Study, band_n: float) -> list[Verdict]:
-    """Shortest, mean and longest time to stay within a band."""
+    """Compare shortest, mean and longest time to stay within a band."""
     times_s, paper_s = step_times_s(study, "bsfm", band_n), paper_values.SETTLING_S[band_n]
     fitted = "the plant's delay and lags were fitted to this figure"
     repeated = f"{fitted}; the paper's mean repeats that for 2 N, though its other two are 0.06 s longer"
@@ -119,11 +124,12 @@ def step_lines(study: Study, band_n: float) -> list[Verdict]:
 
 
 def rest_n(study: Study, law: str) -> Floats:
-    """Largest error of the last 0.3 s, per target."""
+    """Return the largest error of the last 0.3 s, N, per target."""
     return study.steps.score(lambda force_n, wanted_n: largest_n(force_n[-300:], wanted_n[-300:]), law)[0]
 
 
 def two_steps(study: Study) -> list[Verdict]:
+    """Judge what is left at rest: at the step to 5 N, and above 10 N."""
     bsfm_n, psfm_n = rest_n(study, "bsfm"), rest_n(study, "psfm")
     above = np.array(paper_values.TARGETS_N) > 10.0
     better = float(np.mean(bsfm_n[above]) / np.mean(psfm_n[above]))

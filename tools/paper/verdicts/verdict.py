@@ -14,7 +14,9 @@ TIME_TOLERANCE_S: Final = 0.03
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """where: figure; paper, ours: the values side by side; verdict: one of the three words."""
+    """One statement of the paper, and whether the twin bears it out. where: figure; paper, ours: the values side by side;
+    verdict: one of the three words.
+    """
 
     where: str
     statement: str
@@ -25,8 +27,10 @@ class Verdict:
 
 
 def word(holds: bool) -> str:
+    """Return the word for whether a statement holds."""
     return YES if holds else NO
 
 
 def near(ours: float, paper: float, share: float) -> bool:
+    """Return whether ours is within this share of the paper's value."""
     return abs(ours - paper) <= share * paper
