@@ -69,7 +69,7 @@ async def serve_pymodbus() -> None:
 
 
 def serve(which: str, loop: str, bank: str) -> None:
-    """Be the server process: print its port, serve until it is ended."""
+    """Serve as a process of its own: print the port, then serve until it is ended."""
     main = serve_pymodbus() if which == "pymodbus" else serve_ours(bank)
     if loop == "uvloop":
         import uvloop

@@ -132,7 +132,7 @@ def make_up_calibration(order: int) -> Calibration:
 
 
 def cost(calibration: Calibration, compiler: str) -> Cost:
-    """Generate, compile and run the C of a calibration; the program's own self-test must pass."""
+    """Compile and run the C of a calibration; the program's own self-test must pass."""
     sources = c_source(calibration)
     prefix = next(name for name in sources if name.endswith(".h")).removesuffix(".h")
     main = MAIN.replace("@p@", prefix).replace("@P@", prefix.upper()).replace("@rounds@", str(ROUNDS))

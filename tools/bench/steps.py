@@ -53,7 +53,7 @@ def measured_n(client: ModbusTcpClient) -> float:
 
 
 def settle(client: ModbusTcpClient, setpoint_n: float) -> Settling:
-    """Command a setpoint and watch it settle."""
+    """Write a setpoint and watch it settle."""
     client.write_registers(0, [1, round(setpoint_n * 100)], device_id=1)
     began_s = time.perf_counter()
     trace = []
