@@ -1,14 +1,14 @@
 """The two curves of one hysteresis loop, over the same voltages, and the exact proof that they do not cross.
 
 At equal voltage friction holds the falling force above the rising one. The difference falling - rising has the
-numerator N_f W_r - N_r W_f, whose sign inside (0, 1) is decided in whole numbers (gateway.bsfm.exact). Zero is allowed
-at the ends, where the continuous form ties the branches, and all over: two equal curves are a loop of no width (PFM and
+numerator N_f W_r - N_r W_f, whose sign inside (0, 1) is decided in whole numbers (exact_polynomials.py). Zero is allowed at
+the ends, where the continuous form ties the branches, and all over: two equal curves are a loop of no width (PFM and
 BFM, a plant without friction).
 """
 
 from dataclasses import dataclass
 
-from gateway.bsfm import exact
+from gateway.bsfm import exact_polynomials as exact
 from gateway.bsfm.curve import RationalBezier
 
 

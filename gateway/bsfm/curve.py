@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from math import comb, frexp, isfinite, ldexp
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
-from gateway.bsfm import exact
+from gateway.bsfm import exact_polynomials as exact
 from gateway.bsfm.inverse import Inverse, inverse_of, refuse_inverse
 
 if TYPE_CHECKING:

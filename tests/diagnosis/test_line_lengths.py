@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from gateway.cli.diagnosis.sources import read_sources
+from gateway.cli.diagnosis.inputs import read_sources
 from gateway.diagnosis import Measurement
 from gateway.diagnosis.noise import Whitener, white_whitener
 from gateway.diagnosis.search.base_fit import base_parameters, fit_base

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.cli.diagnosis.sources import Sources, read_sources
+from gateway.cli.diagnosis.inputs import Sources, read_sources
 from gateway.diagnosis import Diagnosis, Options, Verdict, diagnose
 from gateway.diagnosis.search.bench import bench_of
 from gateway.diagnosis.search.initial_friction import fit_initial_strains

@@ -18,7 +18,7 @@ from gateway.bsfm.fit.order_choice import Score, choose, score_orders
 from gateway.bsfm.fit.result import ModelName, Ties
 from gateway.bsfm.fit.usable_fit import fit_usable, is_moderate
 from gateway.bsfm.ladder.check import CheckedLadder
-from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
+from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.ladder.measured_ladder import Ladder
 from gateway.bsfm.model import Bsfm
 from gateway.bsfm.slip.reversal_choice import ReversalChoice, choose_reversal

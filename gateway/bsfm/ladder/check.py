@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
-from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
 from gateway.bsfm.ladder.labels import Labels, LabelSplit, split_by_labels
+from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 from gateway.bsfm.ladder.rows import Rows, usable_rows
 from gateway.bsfm.ladder.settled_points import Points, find_settled_points

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
-from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
+from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.units import NEWTON_PER_UNIT
 
 FORCE_UNITS: Final = {unit.lower(): factor for unit, factor in NEWTON_PER_UNIT.items()} | {

@@ -102,7 +102,7 @@ def table(comparison: Comparison) -> str:
 def page(comparison: Comparison) -> str:
     """Return a self-contained HTML page: both loops, and the differences."""
     from gateway.reports.style import STYLE
-    from gateway.reports.svg import Axis, Chart, spread
+    from gateway.reports.svg_chart import Axis, Chart, spread
 
     volts = comparison.voltage_v
     across = Axis(volts[0], volts[-1], "command (V)")

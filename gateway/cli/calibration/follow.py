@@ -11,7 +11,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgressColumn, TextColumn
 
-from gateway.cli.calibration.sources import ENDED, LocalRun, RemoteRun, RunStatus
+from gateway.cli.calibration.runs import ENDED, LocalRun, RemoteRun, RunStatus
 from gateway.cli.errors import CliError
 
 _POLL_S: Final = 0.2

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.bsfm.ladder.check import check_ladder
-from gateway.bsfm.ladder.fault import LadderError
 from gateway.bsfm.ladder.labels import Labels
+from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording

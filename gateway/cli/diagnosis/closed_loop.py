@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from gateway.cli.diagnosis.sources import Sources
+from gateway.cli.diagnosis.inputs import Sources
 from gateway.diagnosis.result import Diagnosis
 from gateway.service.closed_loop import study
 from gateway.service.closed_loop.study import ClosedLoopGain

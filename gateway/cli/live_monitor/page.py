@@ -8,9 +8,9 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from gateway.cli.live_monitor.parts import big, chart, chart_top_n
-from gateway.cli.live_monitor.table import View, register_table
-from gateway.cli.live_monitor.track import Track, buckets
+from gateway.cli.live_monitor.drawing import big, chart, chart_top_n
+from gateway.cli.live_monitor.history import Track, buckets
+from gateway.cli.live_monitor.register_table import View, register_table
 from gateway.cli.master.value_text import format_value
 from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError
-from gateway.cli.live_monitor.table import View, Writer
-from gateway.cli.live_monitor.track import Track
+from gateway.cli.live_monitor.history import Track
+from gateway.cli.live_monitor.register_table import View, Writer
 from gateway.cli.master.client import GatewayClient, RefusedError
 
 POLL_S: Final = 0.1

@@ -43,7 +43,7 @@ def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:
     """Return what the gateway itself has said to this refusal; empty where it is elsewhere, or nobody answers."""
     from gateway.cli.control_socket import ask
-    from gateway.cli.master.nearby import sockets_near
+    from gateway.cli.master.local_gateways import sockets_near
     from gateway.service.supervisor.run_options import default_state_root
 
     states = [state] if state else sockets_near(client.where.rpartition(":")[0], default_state_root())

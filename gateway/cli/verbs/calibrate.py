@@ -79,7 +79,7 @@ def command(
     """
     from gateway.cli.calibration.follow import follow
     from gateway.cli.calibration.plans import is_experiment
-    from gateway.cli.calibration.sources import LocalRun, RemoteRun
+    from gateway.cli.calibration.runs import LocalRun, RemoteRun
 
     resumes = True
     if gateway:

@@ -31,7 +31,7 @@ def command() -> None:
 def list_command(*, state: StateChoice, as_json: bool) -> None:
     """List the calibrations of a state directory; * is in use, x was rejected."""
     from gateway.calibrations.selection import OWN
-    from gateway.cli.calibration.stored import open_store
+    from gateway.cli.calibration.store_access import open_store
 
     store = open_store(state.directory, state.rig)
     selected, entries = store.find_selected(), store.list()
@@ -68,7 +68,7 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
 def show_command(*, which: str | None, state: StateChoice, as_json: bool) -> None:
     """Show calibration N (default: the one in use) with all its numbers."""
     from gateway.calibrations.store import as_text
-    from gateway.cli.calibration.stored import find_calibration, in_use, open_store
+    from gateway.cli.calibration.store_access import find_calibration, in_use, open_store
 
     store = open_store(state.directory, state.rig)
     calibration = find_calibration(store, which) if which else in_use(store)
@@ -85,7 +85,7 @@ def use_command(*, number: int, force: bool, state: StateChoice, as_json: bool) 
 
     A running gateway swaps it without a bump. `calibration rollback` goes back.
     """
-    from gateway.cli.calibration.stored import change
+    from gateway.cli.calibration.store_access import change
 
     _tell_change(change(state.directory, state.rig, {"use": number, "force": force}), as_json=as_json)
 
@@ -95,7 +95,7 @@ def use_command(*, number: int, force: bool, state: StateChoice, as_json: bool) 
 @json_option
 def rollback_command(*, state: StateChoice, as_json: bool) -> None:
     """Use again what was in use before the last change."""
-    from gateway.cli.calibration.stored import change
+    from gateway.cli.calibration.store_access import change
 
     _tell_change(change(state.directory, state.rig, {"rollback": True}), as_json=as_json)
 
@@ -112,7 +112,7 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
     Numbers of the store, shipped names or files. Differences are B minus A.
     """
     from gateway.cli.calibration.comparison import compare_calibrations, page, table
-    from gateway.cli.calibration.stored import find_calibration, open_store
+    from gateway.cli.calibration.store_access import find_calibration, open_store
 
     store = open_store(state.directory, state.rig)
     first, second = find_calibration(store, a), find_calibration(store, b)
@@ -136,7 +136,7 @@ def export_command(
 ) -> None:
     """Take calibration N along, as YAML (default) or as C."""
     from gateway.calibrations.store import as_text
-    from gateway.cli.calibration.stored import find_calibration, open_store
+    from gateway.cli.calibration.store_access import find_calibration, open_store
 
     if yaml_file and c_directory:
         raise click.UsageError("--yaml or --c, not both")

@@ -17,7 +17,7 @@ import click
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
-    from gateway.cli.diagnosis.sources import Sources
+    from gateway.cli.diagnosis.inputs import Sources
     from gateway.diagnosis.experiments.experiments import Plan
     from gateway.diagnosis.result import Diagnosis
     from gateway.service.closed_loop.study import ClosedLoopGain
@@ -77,8 +77,8 @@ def command(**options: Any) -> None:
     pressure_kpa. Several are explained by one model.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
+    from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
-    from gateway.cli.diagnosis.sources import read_sources
 
     _check_effect(options["without"])
     sources = read_sources(

@@ -95,7 +95,7 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     """Return the fit; whatever is wrong with the data ends with exit code 65."""
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
-    from gateway.bsfm.ladder.fault import LadderError
+    from gateway.bsfm.ladder.ladder_error import LadderError
     from gateway.recording.tables.mapping_file import column_mapping
     from gateway.service.fitting.ladder_fit import fit_recording
     from gateway.service.fitting.ladder_source import RigContext, find_source, read_source
@@ -120,7 +120,7 @@ def _beside(path: Path) -> Path:
 
 
 def _store(fit: "LadderFit", options: dict[str, Any]) -> int:
-    from gateway.bsfm.ladder.fault import LadderError
+    from gateway.bsfm.ladder.ladder_error import LadderError
     from gateway.calibrations.store import CalibrationStore
     from gateway.profiles import load_rig
     from gateway.service.fitting.ladder_fit import calibration_of

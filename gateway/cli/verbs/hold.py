@@ -79,7 +79,7 @@ def _read_rig_lease(rig: str) -> "KnownLease":
 def _find_gateway_lease(host: str, port: int) -> "KnownLease | None":
     """Return the lease of the gateway that serves this port, where it runs on this machine; None where it is not known."""
     from gateway.cli.force_hold.heartbeat import KnownLease
-    from gateway.cli.master.nearby import running_at
+    from gateway.cli.master.local_gateways import running_at
     from gateway.service.supervisor.run_options import default_state_root
 
     answer = running_at(host, port, default_state_root())

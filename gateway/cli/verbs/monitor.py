@@ -88,7 +88,7 @@ def _text(poller: "Poller") -> None:
 
 
 def _picture(poller: "Poller", svg: Path) -> None:
-    from gateway.cli.live_monitor.picture import svg_picture
+    from gateway.cli.live_monitor.svg_picture import svg_picture
 
     svg.write_text(svg_picture(poller.view(*_PICTURE_SIZE)), encoding="utf-8")
     click.echo(f"wrote {svg}", err=True)

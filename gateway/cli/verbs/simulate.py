@@ -9,7 +9,7 @@ import click
 from gateway.cli.options import json_option
 
 if TYPE_CHECKING:
-    from gateway.cli.diagnosis.sources import Sources
+    from gateway.cli.diagnosis.inputs import Sources
     from gateway.diagnosis.measurement import Floats, Measurement
     from gateway.profiles import PlantProfile
 
@@ -38,8 +38,8 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
 
     RECORDING is what diagnose takes. Residuals are measured minus simulated.
     """
+    from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
-    from gateway.cli.diagnosis.sources import read_sources
     from gateway.profiles import load_plant
 
     profile = load_plant(plant) if plant else None

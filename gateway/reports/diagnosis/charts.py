@@ -13,8 +13,8 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.result import Trace
 from gateway.reports.diagnosis import series
 from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows, TraceResiduals
-from gateway.reports.diagnosis.svg import SeriesChart, limits
-from gateway.reports.svg import Axis
+from gateway.reports.diagnosis.series_chart import SeriesChart, limits
+from gateway.reports.svg_chart import Axis
 
 _WIDE, _NARROW, _WIDE_HIGH, _HIGH = 1140, 560, 250, 300
 _COLUMNS: Final = 260  # of a full-width picture: bands of 4 pixels

@@ -9,7 +9,7 @@ from gateway.bsfm.fit.blend_span import command_error_n, rms_n
 from gateway.bsfm.fit.evaluation import Evaluation
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
 from gateway.reports.fit.document import Document, residual_of
-from gateway.reports.svg import Axis, Chart, spread
+from gateway.reports.svg_chart import Axis, Chart, spread
 
 _WAYS = ((RISING, "rising"), (FALLING, "falling"))
 _CURVE_POINTS: Final = 200  # of a drawn curve: closer than a pixel's width on screen

@@ -25,7 +25,7 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
     is kept but not offered, or {"refused": sentence}.
     """
     from gateway.bsfm.fit.evaluation import FitRequest
-    from gateway.bsfm.ladder.fault import LadderError
+    from gateway.bsfm.ladder.ladder_error import LadderError
     from gateway.calibrations.store import CalibrationStore, StoreError
     from gateway.profiles import ProfileError, load_rig
     from gateway.recording import RecordingError

@@ -14,7 +14,7 @@ from pathlib import Path
 from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, validate_coefficients
 from gateway.bsfm.fit.evaluation import Evaluation, FitRequest, evaluate
 from gateway.bsfm.ladder.check import CheckedLadder
-from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
+from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.response.identification import MeasuredResponse
 from gateway.recording import Recording
 from gateway.reports.fit.document import Document, fit_document

@@ -3,7 +3,7 @@
 from math import inf
 
 from gateway.bsfm.fit.evaluation import Evaluation
-from gateway.bsfm.ladder.fault import LadderError
+from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.bsfm.ladder.rows import usable_rows
 from gateway.bsfm.response.identification import MeasuredResponse, measure_response
 from gateway.bsfm.response.step_responses import RecordedRun

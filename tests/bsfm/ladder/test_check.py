@@ -7,7 +7,7 @@ import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, join_ladders
-from gateway.bsfm.ladder.fault import LadderError, LadderFlaw
+from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
 
 TOP_V, STEP_V, NEWTON_PER_VOLT = 8.0, 0.4, 8.0

@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from gateway.cli.live_monitor.drawing import big, chart, chart_top_n
+from gateway.cli.live_monitor.history import Track, TrackPoint, buckets
 from gateway.cli.live_monitor.page import page
-from gateway.cli.live_monitor.parts import big, chart, chart_top_n
 from gateway.cli.live_monitor.poll import Poller
-from gateway.cli.live_monitor.table import View, Writer
-from gateway.cli.live_monitor.track import Track, TrackPoint, buckets
+from gateway.cli.live_monitor.register_table import View, Writer
 from gateway.cli.master.client import GatewayClient, RegisterReading
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit

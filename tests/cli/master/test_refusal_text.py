@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.cli.errors import CliError
-from gateway.cli.master import nearby
+from gateway.cli.master import local_gateways
 from gateway.codes.refusals import RefusalReason
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.edge_questions import EdgeRefusal
@@ -68,7 +68,7 @@ def test_only_a_gateway_of_this_machine_is_asked_for_its_words(tmp_path: Path) -
     (tmp_path / "demo" / "control.sock").touch()
 
     near = {
-        where: bool(nearby.sockets_near(where.rpartition(":")[0], tmp_path))
+        where: bool(local_gateways.sockets_near(where.rpartition(":")[0], tmp_path))
         for where in ("127.0.0.1:5020", "::1:5020", "localhost:1", "10.0.0.7:5020", "cell-3:5020")
     }  # type: ignore[arg-type]
     assert near == {

@@ -7,7 +7,7 @@ from typing import Any, Final
 from rich.table import Table
 from rich.text import Text
 
-from gateway.cli.live_monitor.track import Track
+from gateway.cli.live_monitor.history import Track
 from gateway.cli.master.value_text import format_value, raw
 
 _ROOMY: Final = 100  # columns from which the writer's port is shown too

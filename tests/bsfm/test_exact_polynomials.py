@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from gateway.bsfm import Branches, RationalBezier
-from gateway.bsfm.exact import place_negative, place_not_positive, product, raise_degree_by_two, whole_numbers
+from gateway.bsfm.exact_polynomials import (
+    place_negative,
+    place_not_positive,
+    product,
+    raise_degree_by_two,
+    whole_numbers,
+)
 
 
 def polynomial(handles: tuple[float, ...]) -> RationalBezier:

@@ -6,7 +6,7 @@ from typing import Final
 
 from rich.text import Text
 
-from gateway.cli.live_monitor.track import TrackPoint
+from gateway.cli.live_monitor.history import TrackPoint
 
 _DIGITS: Final = {
     "0": ("█▀█", "█ █", "▀▀▀"),

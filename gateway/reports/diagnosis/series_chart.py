@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Floats
 from gateway.reports.diagnosis.series import Envelope, occupied_cells
-from gateway.reports.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, spread
+from gateway.reports.svg_chart import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, spread
 
 _LEAST_SPREAD: Final = 1e-6
 

@@ -7,7 +7,7 @@ from typing import Final
 from rich.console import Console
 
 from gateway.cli.live_monitor.page import page
-from gateway.cli.live_monitor.table import View
+from gateway.cli.live_monitor.register_table import View
 
 _WEB_FONT: Final = re.compile(r"@font-face \{.*?\}\s*", re.DOTALL)
 
