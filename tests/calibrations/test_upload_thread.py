@@ -5,6 +5,8 @@ import threading
 from itertools import pairwise
 from pathlib import Path
 
+from gateway.calibrations.activation import ActiveCalibration
+from gateway.control import CalibrationInUse
 from gateway.processes.disk_worker import DiskWorker
 from gateway.registers.upload.coefficients import CoefficientSet
 from gateway.registers.words import CommitStatus
@@ -13,6 +15,10 @@ from tests.calibrations.failing_disk import disk
 from tests.calibrations.upload_bench import Bench
 from tests.control.bench import Bench as ControlBench
 from tests.control.bench import settings
+
+
+def in_use(active: ActiveCalibration) -> CalibrationInUse:
+    return CalibrationInUse(active.model, active.calibration.number)
 
 
 def test_the_loop_goes_on_while_the_disk_takes_its_time(bench: Bench):
@@ -76,9 +82,7 @@ def test_a_swap_while_pressing_moves_the_voltage_no_faster_than_the_slew_limit(t
     for moment_ms in (0, 3, 10, 40, 110, 250, 600, 1500):
         service = Bench(tmp_path / str(moment_ms), register_map)
         control = ControlBench()
-        service.upload.on_use = lambda taken, control=control: control.controller.use(
-            taken.model, taken.calibration.number
-        )
+        service.upload.on_use = lambda taken, control=control: control.controller.use(in_use(taken))
         control.run(0.2)
         control.enable(20.0)
         control.run(moment_ms / 1000)
@@ -108,8 +112,8 @@ def test_committing_the_read_back_while_pressing_leaves_every_later_voltage_as_i
     def voltages(commits: bool) -> list[float]:
         service = Bench(tmp_path / str(commits), register_map, own)
         control = ControlBench()
-        control.controller.use(own.model(), 1)
-        service.upload.on_use = lambda taken: control.controller.use(taken.model, taken.calibration.number)
+        control.controller.use(CalibrationInUse(own.model(), 1))
+        service.upload.on_use = lambda taken: control.controller.use(in_use(taken))
         control.run(0.2)
         control.enable(30.0)
         control.run(1.0)
@@ -126,7 +130,7 @@ def test_committing_the_read_back_while_pressing_leaves_every_later_voltage_as_i
 
 def test_a_swap_leaves_a_voltage_that_is_driven_directly_alone(bench: Bench):
     control = ControlBench()
-    bench.upload.on_use = lambda taken: control.controller.use(taken.model, taken.calibration.number)
+    bench.upload.on_use = lambda taken: control.controller.use(in_use(taken))
     control.run(0.2)
     control.voltage(3.0)
     control.run(1.0)
