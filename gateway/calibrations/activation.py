@@ -94,8 +94,8 @@ class Activation:
         return stored is not None and _words(stored) == _words(fresh)
 
     def _fault(self, calibration: Calibration) -> StagedFault | None:
-        for found in validate_coefficients(Coefficients.of_calibration(calibration), self.limits):
-            return StagedFault(found.index, found.reason, found.text)
+        for fault in validate_coefficients(Coefficients.of_calibration(calibration), self.limits):
+            return StagedFault(fault.index, fault.reason, fault.text)
         return None
 
 

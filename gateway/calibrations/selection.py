@@ -77,10 +77,10 @@ def read_selection(directory: Path) -> tuple[SelectionState, tuple[str, ...]]:
         except (OSError, ValueError) as error:
             damaged.append(f"{directory / name} {_words(error)}")
             continue
-        told = f"the generation before it is used ({generation})"
-        return pointer, tuple(f"E432 {sentence}; {told}" for sentence in damaged)
-    told = "no whole one is left, the rig's built-in calibration is used"
-    return SelectionState(), tuple(f"E432 {sentence}; {told}" for sentence in damaged)
+        consequence = f"the generation before it is used ({generation})"
+        return pointer, tuple(f"E432 {sentence}; {consequence}" for sentence in damaged)
+    consequence = "no whole one is left, the rig's built-in calibration is used"
+    return SelectionState(), tuple(f"E432 {sentence}; {consequence}" for sentence in damaged)
 
 
 def write_selection(directory: Path, descriptor: int, pointer: SelectionState) -> SelectionState:

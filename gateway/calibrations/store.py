@@ -142,8 +142,8 @@ class CalibrationStore:
         if pointer.generation == 0:
             raise StoreError("E433", "no calibration was in use before this one: there is nothing to go back to")
         previous = pointer.previous
-        kept = previous.slot is not None and pointer.in_slot(previous.slot) == previous
-        return previous if kept else Selection(previous.number)
+        is_in_slot = previous.slot is not None and pointer.in_slot(previous.slot) == previous
+        return previous if is_in_slot else Selection(previous.number)
 
     def _change(self, selection: Selection) -> SelectionState:
         try:

@@ -95,31 +95,33 @@ class UploadService:
             return
         self._begin(f"{'dry run' if action is CommitAction.DRY_RUN else 'upload'} by {peer}", CommitStatus.CHECKING)
         limits = self._activation.limits
-        self.run_in_background(lambda: check_staged(words, limits), lambda found: self._on_checked(found, action, peer))
+        self.run_in_background(
+            lambda: check_staged(words, limits), lambda result: self._on_checked(result, action, peer)
+        )
 
-    def _on_checked(self, found: Any, action: CommitAction, peer: Peer) -> None:
-        if isinstance(found, Exception):
-            self._fail(found)
-        elif isinstance(found, StagedFault):
-            self._fail(UnusableCalibration(found))
+    def _on_checked(self, result: Any, action: CommitAction, peer: Peer) -> None:
+        if isinstance(result, Exception):
+            self._fail(result)
+        elif isinstance(result, StagedFault):
+            self._fail(UnusableCalibration(result))
         else:
-            self._notice = CommitNotice.WITHOUT_STOPS if found.without_stops else NO_NOTICE
+            self._notice = CommitNotice.WITHOUT_STOPS if result.without_stops else NO_NOTICE
             if action is CommitAction.DRY_RUN:
                 self._end(CommitStatus.IDLE, self._describe_success("the set would be accepted"))
             else:
-                self._take(found, peer)
+                self._take(result, peer)
 
-    def _take(self, found: Staged, peer: Peer) -> None:
+    def _take(self, staged: Staged, peer: Peer) -> None:
         fresh = make_uploaded(
-            found,
-            name=f"slot-{found.slot}",
+            staged,
+            name=f"slot-{staged.slot}",
             rig=self._rules.rig_name,
             date_utc=self._rules.today(),
             source=f"upload over Modbus by {peer.host}",
         )
         known = self._pointer
         self._staging.show_commit(CommitStatus.WRITING)
-        self.run_in_background(lambda: self._activation.use_uploaded(fresh, found.slot, known), self._on_taken)
+        self.run_in_background(lambda: self._activation.use_uploaded(fresh, staged.slot, known), self._on_taken)
 
     def _on_select(self, slot: int, peer: Peer) -> None:
         self._check_free(self._rules.select_address)
@@ -179,12 +181,12 @@ class UploadService:
         if isinstance(result, Exception):
             self._fail(result)
             return
-        taken: ActiveCalibration = result
-        self._calibration = taken.calibration
-        self._pointer = taken.pointer
-        self.on_use(taken)
-        self._notice |= taken.notice
-        self._end(CommitStatus.COMMITTED, self._describe_success(_describe_active(taken)))
+        active: ActiveCalibration = result
+        self._calibration = active.calibration
+        self._pointer = active.pointer
+        self.on_use(active)
+        self._notice |= active.notice
+        self._end(CommitStatus.COMMITTED, self._describe_success(_describe_active(active)))
 
     def _fail(self, error: Exception) -> None:
         """UnusableCalibration and StoreError are answers; anything else, an internal error, must not stop the control."""
@@ -216,9 +218,9 @@ class UploadService:
         return f"{self._doing}: {what}{known}"
 
 
-def _describe_active(taken: ActiveCalibration) -> str:
+def _describe_active(active: ActiveCalibration) -> str:
     """`calibration 17 (slot-3) in use, slot 3: bsfm n=2, slip, 7 stops, 1.2 .. 65.1 N`."""
-    calibration, slot = taken.calibration, taken.pointer.active.slot
+    calibration, slot = active.calibration, active.pointer.active.slot
     where = "" if slot is None else f", slot {slot}"
     low_n, high_n = calibration.allowed_n
     return (

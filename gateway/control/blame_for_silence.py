@@ -48,11 +48,16 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
             f"the simulated rig's process was stopped for {format_ms(held.rig_stopped_s)} of them (a signal, a debugger)",
         )
     if held.rig_waited_s >= enough_s:
-        seen = f"the simulated rig's process waited {format_ms(held.rig_waited_s)} of them for a processor"
-        return FaultCode.MACHINE_BUSY, f"{seen}: {BUSY_CURE}"
+        evidence = f"the simulated rig's process waited {format_ms(held.rig_waited_s)} of them for a processor"
+        return FaultCode.MACHINE_BUSY, f"{evidence}: {BUSY_CURE}"
     if not held.loop_late_s >= enough_s:  # nor where silent_s is nan
         return fault, f"{ours}: {suspects}" if held.loop_late_s > 0.0 and suspects else suspects
     if waited_s is not None and waited_s >= _SHARE * held.loop_late_s:
         return FaultCode.MACHINE_BUSY, f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {BUSY_CURE}"
-    counted = "not counted why" if waited_s is None else f"only {format_ms(waited_s)} of them waiting for a processor"
-    return fault, f"{ours}, {counted}: this machine stood still (a virtual one on a busy host, a stop), not the device"
+    count_words = (
+        "not counted why" if waited_s is None else f"only {format_ms(waited_s)} of them waiting for a processor"
+    )
+    return (
+        fault,
+        f"{ours}, {count_words}: this machine stood still (a virtual one on a busy host, a stop), not the device",
+    )

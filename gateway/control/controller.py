@@ -96,12 +96,12 @@ class Controller:
         self._commands.use(calibration.model)
         self.calibration_id = calibration.number
 
-    def refusal_of(self, now_s: float, asked: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
+    def refusal_of(self, now_s: float, proposal: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
         is_busy = self.state is State.CALIBRATING or self._machine.is_ramping_down or self._machine.is_stopping
-        if not is_busy and not self._commands.edges_of(asked.command).rises:
+        if not is_busy and not self._commands.edges_of(proposal.command).rises:
             return None  # most writes: a setpoint, a heartbeat
-        return self._edge_check.refusal(asked, self._situation(now_s, line))
+        return self._edge_check.refusal(proposal, self._situation(now_s, line))
 
     def refusal_of_run(self, now_s: float, plan: AnyPlan) -> str:
         """Return why a run that this machine wants cannot begin: a sentence, empty where it can; by the line as it last was."""
@@ -179,16 +179,16 @@ class Controller:
 
     def _obey_this_machine(self, now_s: float) -> None:
         """A run that was asked for at this machine; refused, it leaves everything as it is."""
-        asked = self.active_run.take_asked()
-        if asked is None:
+        plan = self.active_run.take_asked()
+        if plan is None:
             return
-        self.active_run.refused = self.refusal_of_run(now_s, asked)
+        self.active_run.refused = self.refusal_of_run(now_s, plan)
         if self.active_run.refused:
             self._machine.tell(self.active_run.refused)
             return
-        if asked.tare:
+        if plan.tare:
             self._tare()
-        self._machine.begin_run(now_s, asked, "this machine", is_local=True)
+        self._machine.begin_run(now_s, plan, "this machine", is_local=True)
 
     def _tare(self) -> None:
         self._faults.shift_zero(self._conditioner.take_zero(self._commands.gravity_n))
@@ -198,10 +198,10 @@ class Controller:
 
     def _supervise(self, now_s: float, line: LineStatus) -> None:
         name = self._commands.not_finite
-        found = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
-        found = found or self._faults.first_cause(now_s, self._reading, line, self._loop.expected_rise_n)
-        if found:
-            self._machine.fail(now_s, found)
+        cause = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
+        cause = cause or self._faults.first_cause(now_s, self._reading, line, self._loop.expected_rise_n)
+        if cause:
+            self._machine.fail(now_s, cause)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
             self._machine.is_master_lost = self._machine.is_master_lost and self._machine.is_ramping_down
         elif not self._machine.is_master_lost:
@@ -214,8 +214,10 @@ class Controller:
 
     def _lose_master(self, now_s: float, connected: bool) -> None:
         age_ms = self._commands.lease_age_s(now_s) * 1e3
-        seen = f"master lost: {'' if connected else 'connection closed, '}heartbeat unchanged for {age_ms:.0f} ms"
-        self._machine.lose_master(now_s, seen, self._settings.supervision.lease_action)
+        observation = (
+            f"master lost: {'' if connected else 'connection closed, '}heartbeat unchanged for {age_ms:.0f} ms"
+        )
+        self._machine.lose_master(now_s, observation, self._settings.supervision.lease_action)
 
     # -- movement
 
@@ -258,14 +260,14 @@ class Controller:
         held_back, touching = self._faults.is_first_rise_too_high, self._contact.touching
         return LoopInputs(now_s, dt_s, self._reading, touching, expected_n, held_back, self._outside_n)
 
-    def _follow(self, now_s: float, moved: Moved) -> None:
+    def _follow(self, now_s: float, event: Moved) -> None:
         """The state goes along with what has moved, or could not; a ramp down ends at 0 N."""
-        if isinstance(moved, StopCause):
-            self._machine.fail(now_s, moved)
+        if isinstance(event, StopCause):
+            self._machine.fail(now_s, event)
         elif self._machine.is_ramping_down and self._loop.applied_n <= 0.0:
             self._machine.disable("force ramped to 0, output disabled")
         else:
-            self._machine.fire(moved)
+            self._machine.fire(event)
 
     # -- what people see
 

@@ -94,12 +94,12 @@ class EdgeCheck:
         self._conditioner = conditioner
         self._active_run = active_run
 
-    def refusal(self, asked: ProposedWrite, at: Situation) -> EdgeRefusal | None:
+    def refusal(self, proposal: ProposedWrite, at: Situation) -> EdgeRefusal | None:
         """Return why this write cannot be taken now; None takes it."""
-        edges = self._commands.edges_of(asked.command)
-        if not edges.stops and (busy := self._busy(asked, edges, at)):
+        edges = self._commands.edges_of(proposal.command)
+        if not edges.stops and (busy := self._busy(proposal, edges, at)):
             return busy
-        return next(self._refusals(asked.command, edges, at), None)
+        return next(self._refusals(proposal.command, edges, at), None)
 
     def of_run(self, plan: AnyPlan, at: Situation) -> EdgeRefusal | None:
         """Return why a run cannot begin now, for whoever asks; None begins it."""
@@ -116,18 +116,18 @@ class EdgeCheck:
 
     # -- the whole write
 
-    def _busy(self, asked: ProposedWrite, edges: Edges, at: Situation) -> EdgeRefusal | None:
+    def _busy(self, proposal: ProposedWrite, edges: Edges, at: Situation) -> EdgeRefusal | None:
         is_calibrating = at.state is State.CALIBRATING
         if not is_calibrating and not (at.ramps_down and at.state in ENABLED_STATES):
             return None
-        acts, changes = edges.rises & ~_TAKE, asked.changes()
+        acts, changes = edges.rises & ~_TAKE, proposal.changes()
         if not acts and not changes:
             return None
         asks = ", ".join((*changes, *(bit.name.lower() for bit in ControlBit if acts & bit and bit.name)))
         if is_calibrating:
             return EdgeRefusal(RefusalReason.CALIBRATING, _WHOLE, f"{asks} refused: {self._running()}")
-        seen = f"{at.applied_n:.1f} N on the way to 0 N, then the output is off"
-        return EdgeRefusal(RefusalReason.STOPPING, _WHOLE, f"{asks} refused: {seen}; enable again then")
+        situation_text = f"{at.applied_n:.1f} N on the way to 0 N, then the output is off"
+        return EdgeRefusal(RefusalReason.STOPPING, _WHOLE, f"{asks} refused: {situation_text}; enable again then")
 
     def _running(self) -> str:
         """What has the output, how long still, and how it is ended."""

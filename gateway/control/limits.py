@@ -90,10 +90,10 @@ class RateBudget:
         """Add the time that has passed, within what one movement may claim."""
         self.available_s = min(self.available_s + dt_s, max(TICK_S, min(dt_s, LONGEST_STEP_S)))
 
-    def spend(self, moved: float, rate_per_s: float) -> None:
-        """Take what a movement costs from the budget. moved: by how much the value went; rate_per_s: its limit, in the same
+    def spend(self, step: float, rate_per_s: float) -> None:
+        """Take what a movement costs from the budget. step: by how much the value went; rate_per_s: its limit, in the same
         unit per second."""
-        self.available_s = max(0.0, self.available_s - abs(moved) / rate_per_s)
+        self.available_s = max(0.0, self.available_s - abs(step) / rate_per_s)
 
 
 def strongest(*limits: LimitedBy) -> LimitedBy:

@@ -9,11 +9,11 @@ def fault_sentence(fault: FaultCode, detail: str) -> str:
     return f"{fault.code} {detail}"
 
 
-def unreachable_sentence(seen: Evidence) -> str:
+def unreachable_sentence(evidence: Evidence) -> str:
     """Return A301 in numbers, with what it probably is."""
     return (
-        f"A301 {seen.voltage_v:.2f} V out, {seen.measured_n:.1f} N measured, {seen.expected_n:.1f} expected: "
-        f"{unreachable_words(seen)}"
+        f"A301 {evidence.voltage_v:.2f} V out, {evidence.measured_n:.1f} N measured, {evidence.expected_n:.1f} expected: "
+        f"{unreachable_words(evidence)}"
     )
 
 

@@ -111,16 +111,16 @@ class Transitions:
         self.tell(f"fault {self.fault.name} reset by {self._parts.commands.who}")
         self.fault, self.is_restarted = FaultCode.NONE, False
 
-    def lose_master(self, now_s: float, seen: str, action: LeaseAction) -> None:
-        """Act as the rig says where the lease is over. seen: how it was noticed."""
+    def lose_master(self, now_s: float, observation: str, action: LeaseAction) -> None:
+        """Act as the rig says where the lease is over. observation: how it was noticed."""
         self.outcome.release_owner = True
         if action is LeaseAction.FAULT:
-            self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{seen}, safe voltage"))
+            self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{observation}, safe voltage"))
             return
         self.is_master_lost = True
         self.is_ramping_down = self.is_ramping_down or action is LeaseAction.RAMP or self._parts.run.running
         words = "ramping to 0 N" if self.is_ramping_down else "holding the last setpoint"
-        self.tell(fault_sentence(FaultCode.MASTER_LOST, f"{seen}, {words}"))
+        self.tell(fault_sentence(FaultCode.MASTER_LOST, f"{observation}, {words}"))
 
     def _latch(self, now_s: float, fault: FaultCode) -> None:
         self.fire(StateEvent.FAILED)

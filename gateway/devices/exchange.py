@@ -230,8 +230,8 @@ class ForceReading:
 
     def word(self, quality: Quality) -> str | None:
         """Return the status word that means this, None where the frame has none; a device may know unstable readings only."""
-        meant = (quality, Quality.UNSTABLE) if quality is Quality.OK else (quality,)
-        return next((word for one in meant for word, meaning in self.quality.items() if meaning == one), None)
+        qualities = (quality, Quality.UNSTABLE) if quality is Quality.OK else (quality,)
+        return next((word for one in qualities for word, meaning in self.quality.items() if meaning == one), None)
 
 
 def _check_reading(template: Template, reading: ForceReading) -> None:

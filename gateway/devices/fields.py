@@ -242,14 +242,14 @@ _WORD = re.compile(r"[!-~]+")
 
 def field_from(name: str, spec: str) -> Field:
     """Return the field that {name:spec} means; TemplateError where it is none of the five shapes."""
-    if found := _WHOLE.fullmatch(spec):
-        return WholeNumber(name, found[1], found[2], int(found[3] or 0))
-    if found := _HEX.fullmatch(spec):
-        return HexNumber(name, int(found[1]))
-    if found := _DECIMALS.fullmatch(spec):
-        return Decimals(name, found[1], found[2], int(found[3] or 0), int(found[4]))
-    if found := _TEXT.fullmatch(spec):
-        return Text(name, int(found[1] or 0))
+    if match := _WHOLE.fullmatch(spec):
+        return WholeNumber(name, match[1], match[2], int(match[3] or 0))
+    if match := _HEX.fullmatch(spec):
+        return HexNumber(name, int(match[1]))
+    if match := _DECIMALS.fullmatch(spec):
+        return Decimals(name, match[1], match[2], int(match[3] or 0), int(match[4]))
+    if match := _TEXT.fullmatch(spec):
+        return Text(name, int(match[1] or 0))
     words = tuple(spec.split("|"))
     if len(words) > 1 and len(set(words)) == len(words) and all(_WORD.fullmatch(word) for word in words):
         return Choice(name, words)

@@ -42,13 +42,13 @@ def rehearse(profile: DeviceProfile) -> Found:
 def _output(profile: DeviceProfile) -> Found:
     low_v, high_v = profile.voltage_range_v
     for voltage_v in (low_v, 0.5 * (low_v + high_v), high_v):
-        if told := _talk(profile, SetVoltage(voltage_v), Accepted(voltage_v)):
-            yield ("set_voltage",), f"{voltage_v:g} V: {told}"
+        if complaint := _talk(profile, SetVoltage(voltage_v), Accepted(voltage_v)):
+            yield ("set_voltage",), f"{voltage_v:g} V: {complaint}"
             return
     for place, question, answers in _readings(profile):
-        told = next(filter(None, (_talk(profile, question, answer) for answer in answers)), "")
-        if told:
-            yield (place,), told
+        complaint = next(filter(None, (_talk(profile, question, answer) for answer in answers)), "")
+        if complaint:
+            yield (place,), complaint
     yield from _refusals(profile)
 
 
@@ -64,30 +64,30 @@ def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -
     """Ask, obey, answer, understand; why that fails, or nothing."""
     host, device = output_host(profile), output_device(profile)
     try:
-        asked = host.request(request)
+        frame = host.request(request)
         answered = b""
-        for understood in device.receive(asked, _NOW_S):
+        for understood in device.receive(frame, _NOW_S):
             is_read_back = isinstance(request, SetVoltage) and isinstance(understood, ReadVoltage)
             if isinstance(understood, Garbage) or not (is_read_back or isinstance(understood, type(request))):
-                return f"the device reads {_line(asked)} as {_name(understood)}{_too_long(asked)}"
+                return f"the device reads {_line(frame)} as {_name(understood)}{_too_long(frame)}"
             answered += device.reply(answer, to=understood)
     except (ValueRefused, UnicodeEncodeError) as error:
         return str(error)
-    heard = host.receive(answered, _NOW_S)
-    if len(heard) != 1 or not _means(heard[0], answer):
-        seen = " and ".join(map(_name, heard)) or "nothing"
-        return f"the answer {_line(answered)} to {_line(asked)} is read as {seen}{_too_long(asked, answered)}"
+    replies = host.receive(answered, _NOW_S)
+    if len(replies) != 1 or not _means(replies[0], answer):
+        names = " and ".join(map(_name, replies)) or "nothing"
+        return f"the answer {_line(answered)} to {_line(frame)} is read as {names}{_too_long(frame, answered)}"
     if (
         isinstance(request, SetVoltage)
-        and isinstance(heard[0], Accepted)
-        and not host.confirms(request.voltage_v, heard[0], request)
+        and isinstance(replies[0], Accepted)
+        and not host.confirms(request.voltage_v, replies[0], request)
     ):
-        return f"{_line(asked)} is confirmed as {heard[0].voltage_v:g} V by {_line(answered)}: the ranges do not fit"
+        return f"{_line(frame)} is confirmed as {replies[0].voltage_v:g} V by {_line(answered)}: the ranges do not fit"
     return ""
 
 
-def _means(heard: OutputReply, said: OutputReply) -> bool:
-    return type(heard) is type(said)
+def _means(reply: OutputReply, meaning: OutputReply) -> bool:
+    return type(reply) is type(meaning)
 
 
 def _refusals(profile: DeviceProfile) -> Found:
@@ -95,11 +95,11 @@ def _refusals(profile: DeviceProfile) -> Found:
         host = output_host(profile)
         try:
             host.request(SetVoltage(profile.voltage_range_v[0]))
-            heard = host.receive(output_device(profile).reply(Refused(text)), _NOW_S)
+            replies = host.receive(output_device(profile).reply(Refused(text)), _NOW_S)
         except (ValueRefused, UnicodeEncodeError) as error:
-            heard, text = [], str(error)
-        if heard != [Refused(text)]:
-            yield ("refusals",), f"{text!r} as an answer is read as {' and '.join(map(_name, heard)) or 'nothing'}"
+            replies, text = [], str(error)
+        if replies != [Refused(text)]:
+            yield ("refusals",), f"{text!r} as an answer is read as {' and '.join(map(_name, replies)) or 'nothing'}"
 
 
 def _cell(profile: DeviceProfile) -> Found:
@@ -114,12 +114,12 @@ def _cell(profile: DeviceProfile) -> Found:
         for counts in (0, 1, -1):
             force_n = counts * host.resolution_n
             frame = device.frame(force_n)
-            heard = host.receive(frame, _NOW_S)
-            if [type(one) for one in heard] != [ForceSample]:
-                seen = " and ".join(map(_name, heard)) or "nothing"
-                yield place, f"{force_n:.3g} N, shown as {_line(frame)}, is read as {seen}{_too_long(frame)}"
+            samples = host.receive(frame, _NOW_S)
+            if [type(one) for one in samples] != [ForceSample]:
+                names = " and ".join(map(_name, samples)) or "nothing"
+                yield place, f"{force_n:.3g} N, shown as {_line(frame)}, is read as {names}{_too_long(frame)}"
                 return
-            sample = heard[0]
+            sample = samples[0]
             assert isinstance(sample, ForceSample)
             if sample.quality is Quality.OVERLOAD or abs(sample.force_n - force_n) > 0.6 * host.resolution_n:
                 sign = (

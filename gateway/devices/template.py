@@ -41,11 +41,11 @@ class Template:
 
     def decode(self, data: bytes, may_be_blank: str = "") -> dict[str, Value] | None:
         """Return the values by field name, None when these bytes are not this sentence."""
-        found = self.pattern.fullmatch(data)
-        if found is None:
+        match = self.pattern.fullmatch(data)
+        if match is None:
             return None
         values: dict[str, Value] = {}
-        for field, part in zip(self.fields, found.groups(), strict=True):
+        for field, part in zip(self.fields, match.groups(), strict=True):
             value = field.decode(part.decode("ascii"))
             if value is None or (isinstance(value, float) and isnan(value) and field.name != may_be_blank):
                 return None

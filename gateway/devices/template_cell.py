@@ -18,8 +18,8 @@ from gateway.units import NEWTON_PER_UNIT
 
 def _own_unit(reading: ForceReading) -> str | None:
     """The unit that the device is set to: the profile's, else the first that its frames can say."""
-    said = reading.template.field(UNIT)
-    return reading.unit or (said.words[0] if isinstance(said, Choice) else None)
+    unit_field = reading.template.field(UNIT)
+    return reading.unit or (unit_field.words[0] if isinstance(unit_field, Choice) else None)
 
 
 def _nothing(field: Field) -> Value:

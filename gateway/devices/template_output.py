@@ -108,18 +108,18 @@ class TemplateOutputHost:
     def _decode_reply(self, body: bytes | None) -> OutputReply | None:
         if body is not None and body in self._refusals:
             return Refused(self._refusals[body])
-        asked = self._expected[0]
-        exchange = self._confirmation if isinstance(asked, SetVoltage) else self._grammar.exchange(asked)
+        request = self._expected[0]
+        exchange = self._confirmation if isinstance(request, SetVoltage) else self._grammar.exchange(request)
         values = self._grammar.read(exchange.answer, body)
         if values is None:
             return None
         number = self._grammar.number(exchange.answer, values)
         if number is None:  # the device says only that it obeyed
-            return Accepted(asked.voltage_v) if isinstance(asked, SetVoltage) else None
+            return Accepted(request.voltage_v) if isinstance(request, SetVoltage) else None
         if not exchange.range.scale.carries(number, self._grammar.half_step(exchange.answer)):
             return None
         value = exchange.range.scale.to_physical(number)
-        return Pressure(value) if isinstance(asked, ReadPressure) else Accepted(value)
+        return Pressure(value) if isinstance(request, ReadPressure) else Accepted(value)
 
 
 def _idle_question(profile: DeviceProfile) -> OutputRequest | None:

@@ -21,11 +21,11 @@ class PacedWire:
 
     def send(self, data: bytes, now_s: float) -> None:
         """Hand bytes to the sender at now_s; they follow what is still on the wire."""
-        taken = data[: self.room]
-        self.dropped_bytes += len(data) - len(taken)
+        accepted = data[: self.room]
+        self.dropped_bytes += len(data) - len(accepted)
         if not self._queue:
             self._first_through_s = max(now_s, self._free_s) + self.character_s
-        self._queue += taken
+        self._queue += accepted
 
     @property
     def room(self) -> int:
@@ -63,14 +63,14 @@ def resample_at_baud(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
         return data
     levels = _levels(data)
     step = sent_baud / heard_baud  # bits of the sender in one bit of the receiver
-    heard = bytearray()
+    received = bytearray()
     position = 0.0
     while (start := levels.find(0, floor(position))) >= 0:
         position = max(position, float(start))
         samples = [_level(levels, position + (bit + 0.5) * step) for bit in range(1, 9)]
-        heard.append(sum(bit << place for place, bit in enumerate(samples)))
+        received.append(sum(bit << place for place, bit in enumerate(samples)))
         position += 9.5 * step
-    return bytes(heard)
+    return bytes(received)
 
 
 def _levels(data: bytes) -> bytes:

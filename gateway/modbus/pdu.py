@@ -170,9 +170,9 @@ def _quantity(count: int, most: int, address: int) -> None:
         raise RequestError(RequestFault.QUANTITY, f"quantity {count}, allowed 1 .. {most}", count, address)
 
 
-def _byte_count(found: int, expected: int, address: int) -> None:
-    if found != expected:
-        raise RequestError(RequestFault.QUANTITY, f"byte count {found}, expected {expected}", found, address)
+def _byte_count(count: int, expected: int, address: int) -> None:
+    if count != expected:
+        raise RequestError(RequestFault.QUANTITY, f"byte count {count}, expected {expected}", count, address)
 
 
 def _own_quantity(count: int, most: int, odd: int = 0) -> None:

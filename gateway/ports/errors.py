@@ -88,8 +88,8 @@ def _missing(path: str, present: Sequence[str]) -> str:
     if not present:
         return f"{path} is not there, nor is any other serial port: is the adapter plugged in?"
     near = difflib.get_close_matches(path, present, n=1, cutoff=0.6)
-    meant = f"; did you mean {near[0]}?" if near else ""
-    return f"{path} is not there. Present: {', '.join(present)}{meant}"
+    suggestion = f"; did you mean {near[0]}?" if near else ""
+    return f"{path} is not there. Present: {', '.join(present)}{suggestion}"
 
 
 def _user() -> str:

@@ -24,13 +24,13 @@ def holders_of(path: str, processes: Path = Path("/proc")) -> list[Holder]:
         device = Path(path).stat().st_rdev
     except OSError:
         return []
-    found: dict[int, Holder] = {}
+    holders: dict[int, Holder] = {}
     for pid, descriptor in _descriptors(processes):
         if _device(descriptor) == device and device:
             is_locking = _locks(processes / str(pid) / "fdinfo" / descriptor.name)
-            if pid not in found or is_locking:
-                found[pid] = Holder(pid, _name(processes / str(pid)), is_locking)
-    return list(found.values())
+            if pid not in holders or is_locking:
+                holders[pid] = Holder(pid, _name(processes / str(pid)), is_locking)
+    return list(holders.values())
 
 
 def describe_holders(path: str) -> str:

@@ -51,9 +51,9 @@ def severity_of(code: str | None) -> str:
 
 def make_event(time_s: float, source: str, group: str, sentence: str) -> EventRecord:
     """Make a record of what a process says. group: the cause, and what else lines are limited by (`refusal 10.0.0.5`)."""
-    found = _CODE.match(sentence)
-    code = found[1] if found else None
-    text = sentence[found.end() :] if found else sentence
+    match = _CODE.match(sentence)
+    code = match[1] if match else None
+    text = sentence[match.end() :] if match else sentence
     if len(text) > _LONGEST_TEXT:
         text = f"{text[:_LONGEST_TEXT]} ... ({len(text) - _LONGEST_TEXT} more characters)"
     return EventRecord(utc_text(time_s), severity_of(code), code, group.partition(" ")[0], text, source)

@@ -107,8 +107,8 @@ class EventLog:
         """With the code of what is left out, so that it is found where that is looked for."""
         if window is not None and window.count > LINES_PER_S:
             code = self._event(cause, window.sentence).code
-            told = f"{window.count - LINES_PER_S} more lines of {cause!r} left out"
-            self._put(self._event(cause, f"{code} {told}" if code else told, window.source))
+            sentence = f"{window.count - LINES_PER_S} more lines of {cause!r} left out"
+            self._put(self._event(cause, f"{code} {sentence}" if code else sentence, window.source))
 
     def _forget_old(self, now_s: float) -> None:
         recent = {cause: window for cause, window in self._windows.items() if now_s - window.began_s < 1.0}

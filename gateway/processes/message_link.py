@@ -111,8 +111,8 @@ def _body(data: bytes, flags: int) -> dict[str, Any]:
 
 
 def _descriptors(ancillary: Iterable[tuple[int, int, bytes]]) -> list[int]:
-    found = array.array("i")
+    descriptors = array.array("i")
     for level, kind, payload in ancillary:
         if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
-            found.frombytes(payload[: len(payload) // 4 * 4])
-    return list(found)
+            descriptors.frombytes(payload[: len(payload) // 4 * 4])
+    return list(descriptors)

@@ -85,19 +85,21 @@ def time_between(before: ProcessorTime | None, now: ProcessorTime | None) -> Pro
 def explain_silence(silence: Silence, load: str) -> Ending:
     """Return the cause of a silence: what took the largest part of it. load: of the machine, in words."""
     allowed = f"allowed {format_ms(silence.bound_s)} (stall_s)"
-    seen = f"control process stalled: {format_ms(silence.silent_s)} without a tick, {allowed}"
+    observation = f"control process stalled: {format_ms(silence.silent_s)} without a tick, {allowed}"
     if silence.state and silence.state in STOPPED_STATES:
-        return Ending(EndCause.STOPPED, f"{seen}; it was stopped by a signal or a debugger")
+        return Ending(EndCause.STOPPED, f"{observation}; it was stopped by a signal or a debugger")
     if silence.used is None:
         cause = EndCause.MACHINE_BUSY if silence.was_late else EndCause.STALLED
-        return Ending(cause, f"{seen}; this kernel does not count why; {load}{_CURE if silence.was_late else ''}")
+        return Ending(
+            cause, f"{observation}; this kernel does not count why; {load}{_CURE if silence.was_late else ''}"
+        )
     ran_s, waited_s = silence.used.on_cpu_s, silence.used.waited_s
     slept_s = max(0.0, silence.silent_s - ran_s - waited_s)
     parts = f"it waited {format_ms(waited_s)} for a processor, ran {format_ms(ran_s)} and slept {format_ms(slept_s)}; {load}"
     if waited_s >= max(ran_s, slept_s):
-        return Ending(EndCause.MACHINE_BUSY, f"{seen}; {parts}{_CURE}")
+        return Ending(EndCause.MACHINE_BUSY, f"{observation}; {parts}{_CURE}")
     where = ", in the kernel, for a disk or a driver" if silence.state == "D" else ""
-    return Ending(EndCause.STALLED, f"{seen}; {parts}: not the machine's load{where}")
+    return Ending(EndCause.STALLED, f"{observation}; {parts}: not the machine's load{where}")
 
 
 def load_of_machine(proc: Path = Path("/proc")) -> str:

@@ -49,8 +49,8 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
     if "/" in name or name.endswith(_SUFFIXES):
         raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(path)}")
     near = closest(name, known)
-    meant = f"; did you mean {near}?" if near else ""
-    raise FileNotFoundError(f"is neither a shipped {kind} ({one_of(known) or 'there is none'}) nor a file{meant}")
+    suggestion = f"; did you mean {near}?" if near else ""
+    raise FileNotFoundError(f"is neither a shipped {kind} ({one_of(known) or 'there is none'}) nor a file{suggestion}")
 
 
 def _is_file(path: Path) -> bool:

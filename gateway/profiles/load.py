@@ -51,10 +51,11 @@ def refer_at(
 def open_profile(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
     """Find, read and parse one file of a kind; None with the faults noted."""
     opened = open_file(kind, reference, findings)
-    found = kind_of(opened[0].value, kind) if opened else None
-    if opened and found and found != kind:
-        told = f"is {CALLED[found]}, {CALLED[kind]} is needed here: `force-gateway check {display(opened[1])}` takes it as one"
-        findings.faults.append(reference.place(told))
+    actual_kind = kind_of(opened[0].value, kind) if opened else None
+    if opened and actual_kind and actual_kind != kind:
+        command = f"`force-gateway check {display(opened[1])}` takes it as one"
+        mismatch = f"is {CALLED[actual_kind]}, {CALLED[kind]} is needed here: {command}"
+        findings.faults.append(reference.place(mismatch))
         return None
     return opened
 

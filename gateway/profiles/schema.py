@@ -45,15 +45,15 @@ def field_comments(kind: type) -> dict[str, str]:
         source = inspect.getsource(kind)
     except (OSError, TypeError):  # no source at hand: a help text less
         return {}
-    found: dict[str, str] = {}
+    comments: dict[str, str] = {}
     name, depth = "", 0
     for token in tokenize.generate_tokens(io.StringIO(inspect.cleandoc(source) + "\n").readline):
         if token.type == tokenize.NAME and token.start[1] == 4 and depth == 0:
             name = token.string
         elif token.type == tokenize.COMMENT and name and token.start[1] > 4:
-            found.setdefault(name, token.string.lstrip("# "))
+            comments.setdefault(name, token.string.lstrip("# "))
         depth += {"(": 1, "[": 1, "{": 1, ")": -1, "]": -1, "}": -1}.get(token.string, 0)
-    return found
+    return comments
 
 
 def schema(kind: str) -> dict[str, Any]:
@@ -76,11 +76,11 @@ def dataclass_schema(kind: type) -> dict[str, Any]:
 
 def _tree(kind: type) -> list[type]:
     """Return every dataclass below one, each once."""
-    found: list[type] = []
+    kinds: list[type] = []
     for _, inner in groups(kind):
-        if inner not in found:
-            found += [inner, *(deeper for deeper in _tree(inner) if deeper not in found)]
-    return found
+        if inner not in kinds:
+            kinds += [inner, *(deeper for deeper in _tree(inner) if deeper not in kinds)]
+    return kinds
 
 
 def _describe(schema: dict[str, Any], kind: type) -> None:

@@ -36,19 +36,19 @@ def measurement_of(recording: Recording) -> Measurement:
     """Return the checked measurement. RecordingError in the user's words, with row and column where there is one."""
     _check_columns(recording)
     axis = check_time_axis(recording)
-    columns, told = _replace_absurd({name: values[axis.kept] for name, values in recording.columns.items()})
-    notes = [*recording.notes, *axis.notes, *told]
-    usable, told = _usable_rows(columns, axis)
-    notes += told
-    drive, driven, told = _drive(columns, axis.time_s)
-    notes += told
+    columns, more_notes = _replace_absurd({name: values[axis.kept] for name, values in recording.columns.items()})
+    notes = [*recording.notes, *axis.notes, *more_notes]
+    usable, more_notes = _usable_rows(columns, axis)
+    notes += more_notes
+    drive, driven, more_notes = _drive(columns, axis.time_s)
+    notes += more_notes
     usable &= driven
     _check_enough(recording, axis, usable, notes)
-    repeated, told = flag_repeated(columns["force_n"])
-    position_m, said = _position_m(columns, axis.time_s)
-    others, heard = extract_covariates(columns, axis.time_s, columns["force_n"])
-    heard += _suspicious(columns["force_n"][usable], {name: values[usable] for name, values in drive.items()})
-    found = Measurement(
+    repeated, more_notes = flag_repeated(columns["force_n"])
+    position_m, position_notes = _position_m(columns, axis.time_s)
+    others, suspicions = extract_covariates(columns, axis.time_s, columns["force_n"])
+    suspicions += _suspicious(columns["force_n"][usable], {name: values[usable] for name, values in drive.items()})
+    measurement = Measurement(
         name=recording.path.name,
         time_s=axis.time_s,
         force_n=columns["force_n"],
@@ -58,9 +58,9 @@ def measurement_of(recording: Recording) -> Measurement:
         pressure_pa=drive.get("pressure_pa"),
         position_m=position_m,
         covariates=others,
-        notes=(*notes, *told, *said, *heard),
+        notes=(*notes, *more_notes, *position_notes, *suspicions),
     )
-    return resample_evenly(found, *(columns[name] for name in SENT)) if set(SENT) <= set(columns) else found
+    return resample_evenly(measurement, *(columns[name] for name in SENT)) if set(SENT) <= set(columns) else measurement
 
 
 def _check_columns(recording: Recording) -> None:
@@ -85,12 +85,12 @@ def _suggest_columns(recording: Recording, missing: list[str]) -> str:
     )
     near = []
     for name in recording.columns:
-        found = quantity_of(name)
+        match = quantity_of(name)
         for target in sorted(wanted):
             quantity = quantity_of(target)
             stem = target.removesuffix(f"_{quantity[1]}") if quantity else target
-            if found and quantity and found[0] == quantity[0] and name.lower() == f"{stem}_{found[1]}":
-                near.append(f"{target}={name}:{found[1]}")
+            if match and quantity and match[0] == quantity[0] and name.lower() == f"{stem}_{match[1]}":
+                near.append(f"{target}={name}:{match[1]}")
     return f" Meant is probably --columns {','.join(near)}." if near else ""
 
 
@@ -124,8 +124,8 @@ def _usable_rows(columns: Mapping[str, Floats], axis: TimeAxis) -> tuple[Flags, 
     notes = [] if read.all() else [f"{int((~read).sum())} rows without a force are not judged"]
     usable = read & ~axis.after_gap
     if "quality" in columns:
-        valid, told = valid_by_quality(columns["quality"], is_own_recording(columns))
-        return usable & valid, notes + told
+        valid, quality_note = valid_by_quality(columns["quality"], is_own_recording(columns))
+        return usable & valid, notes + quality_note
     return usable, notes
 
 
@@ -171,8 +171,8 @@ def _position_m(columns: Mapping[str, Floats], time_s: Floats) -> tuple[Floats |
         return None, [f"position_mm {state} and was left out: the direction of motion is inferred"]
     if known.all():
         return values * _METRE, []
-    told = f"position_mm is missing in {int((~known).sum())} rows: drawn straight from those around"
-    return interpolate_missing(values, time_s) * _METRE, [told]
+    note = f"position_mm is missing in {int((~known).sum())} rows: drawn straight from those around"
+    return interpolate_missing(values, time_s) * _METRE, [note]
 
 
 def _check_enough(recording: Recording, axis: TimeAxis, usable: Flags, notes: list[str]) -> None:

@@ -103,8 +103,8 @@ class Admission:
         rises = written & ~int(before[CONTROL_WORD])
         if rises & STARTS:
             self._check_starts(write.host, rises, written, word_at)
-        kept = 0 if is_stop else written & ~EDGE_BITS
-        return AdmittedWrite(values, kept, command, is_stop, bool(written & TAKE), self._held_by(write, written))
+        edges_kept = 0 if is_stop else written & ~EDGE_BITS
+        return AdmittedWrite(values, edges_kept, command, is_stop, bool(written & TAKE), self._held_by(write, written))
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""

@@ -274,10 +274,10 @@ class RegisterBank:
         """Return what an accepted write changed; empty when nothing that people want to know."""
         changes = self._commands.differences(before, admitted.values)
         edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE
-        asked = ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
+        edge_names = ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
         now_owner = self._ownership.owner
         owners = f"owner {owner or 'nobody'} -> {now_owner or 'nobody'}" if owner != now_owner else ""
-        return ", ".join(part for part in (changes, asked, owners) if part)
+        return ", ".join(part for part in (changes, edge_names, owners) if part)
 
     def _tell(self, sentence: str, peer: Peer) -> None:
         if self.on_accepted is not None and sentence:

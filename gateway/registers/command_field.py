@@ -66,8 +66,8 @@ class CommandField:
     def _not_a_value(self, value: float, address: int, order: WordOrder) -> Refusal:
         if self._is_plausible(swapped := _swap_words_of_float(value)):
             sends, cure = _CURES[order]
-            seen = f"{self.format(value)}; with the words swapped {self.format(swapped)}"
-            text = f"{seen}: your client sends {sends}, {cure} ({self.name} at {address})"
+            value_text = f"{self.format(value)}; with the words swapped {self.format(swapped)}"
+            text = f"{value_text}: your client sends {sends}, {cure} ({self.name} at {address})"
             return Refusal(RefusalReason.WORDS_SWAPPED, address, text, value=value)
         if not isfinite(value):
             return Refusal(

@@ -32,5 +32,5 @@ class EdgeRefusal(NamedTuple):
 Decide: TypeAlias = Callable[[ProposedWrite], EdgeRefusal | None]
 
 
-def decide_nothing(asked: ProposedWrite) -> None:
+def decide_nothing(proposal: ProposedWrite) -> None:
     """Take everything: stands for control where there is none."""

@@ -34,8 +34,8 @@ class RegisterImage:
         for address in range(block.last, block.first - 1, -1):
             self.block_at[address] = block
             self.room[address] = block.last - address + 1
-            found = self.register_at.get(address)
-            is_closed = found is not None and not found.is_writable
+            mapped = self.register_at.get(address)
+            is_closed = mapped is not None and not mapped.is_writable
             self.writable[address] = 0 if is_closed else self.writable[address + 1] + 1 if address < block.last else 1
 
     def read(self, address: int, count: int) -> bytes:

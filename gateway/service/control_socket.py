@@ -38,19 +38,19 @@ class RunningParts:
 class ControlSocket(JsonLineServer):
     """Local socket of control's process, on which commands of the command line are answered."""
 
-    def __init__(self, state: Path, asked: RunningParts, log: Callable[[str, str], None]) -> None:
+    def __init__(self, state: Path, parts: RunningParts, log: Callable[[str, str], None]) -> None:
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,
-            "calibrate": asked.calibration_runs.answer,
+            "calibrate": parts.calibration_runs.answer,
             "last-writer": self._last_writer,
             "last-refusal": self._last_refusal,
             "health": self._health_figures,
             "running": self._running,
-            "residual": asked.watch.answer,
+            "residual": parts.watch.answer,
         }
         super().__init__(state / "control.sock", handlers, log)
-        self._asked = asked
+        self._asked = parts
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:
         is_on = parse_request(RecordRequest, request).on
@@ -61,11 +61,11 @@ class ControlSocket(JsonLineServer):
     def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
         """{"use": number} (with "force": true a rejected one, too) or {"rollback": true} begin a change; neither tells what is
         in use and how the last one went."""
-        asked = parse_request(CalibrationRequest, request)
-        if asked.rollback:
+        query = parse_request(CalibrationRequest, request)
+        if query.rollback:
             return self._asked.upload.rollback()
         return (
-            self._asked.upload.status() if asked.use is None else self._asked.upload.use(asked.use, force=asked.force)
+            self._asked.upload.status() if query.use is None else self._asked.upload.use(query.use, force=query.force)
         )
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:

@@ -116,8 +116,8 @@ class SimulatedRig:
         {"do": "fault", "name": NAME, "on": bool}; NAME plant takes {"values": {"friction.coulomb_n": 2.5}} besides.
         ValueError on an unknown name, or a value that no plant has.
         """
-        asked = parse_request(FaultRequest, request)
-        name, is_on = asked.name, asked.on
+        query = parse_request(FaultRequest, request)
+        name, is_on = query.name, query.on
         match name:
             case "no-air" | "no-contact" | "sign-inverted":
                 self._twin_faults[name] = is_on
@@ -129,7 +129,7 @@ class SimulatedRig:
             case "output-cut":
                 self.is_output_cut = is_on
             case "plant":
-                self._change_plant(_change_plant(self._plant, asked.values) if is_on else self._plant)
+                self._change_plant(_change_plant(self._plant, query.values) if is_on else self._plant)
             case _:
                 raise ValueError(
                     f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, cell-frozen, "

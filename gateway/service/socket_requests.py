@@ -96,11 +96,11 @@ for _shape in (
 
 def parse_request(shape: type[Shape], request: Mapping[str, Any]) -> Shape:
     """Return the request without its verb as `shape`. ValueError names the first key that does not fit."""
-    asked = {key: value for key, value in request.items() if key != "do"}
-    for key, value in asked.items():
+    fields = {key: value for key, value in request.items() if key != "do"}
+    for key, value in fields.items():
         if value is None:
             raise ValueError(f"{key} is null: leave it out instead")
-    found, faults = build(shape, Document("request", asked, {}))
-    if found is None or faults:
+    shaped, faults = build(shape, Document("request", fields, {}))
+    if shaped is None or faults:
         raise ValueError(f"{faults[0].path} {faults[0].message}".strip())
-    return found
+    return shaped

@@ -34,9 +34,9 @@ class WatchReports:
     def answer(self, request: Answer) -> Answer:
         """Take the watch's report, or answer how it stands. ValueError refuses.
         {"cause": number, "sentence": text, "counters": {...}} reports; without a cause it is a question."""
-        told = parse_request(ResidualRequest, request)
-        if told.cause is not None:
-            self._hear(told.cause, told)
+        report = parse_request(ResidualRequest, request)
+        if report.cause is not None:
+            self._hear(report.cause, report)
         return self.figures() | {"sentence": self._sentence}
 
     def figures(self) -> Answer:
@@ -45,13 +45,13 @@ class WatchReports:
         age_s = None if self._heard_s is None else round(self._clock() - self._heard_s, 3)
         return {"cause": int(cause), "name": cause.effect, "warnings": self._warnings, "age_s": age_s} | self._counters
 
-    def _hear(self, number: int, told: ResidualRequest) -> None:
+    def _hear(self, number: int, report: ResidualRequest) -> None:
         if number not in set(ResidualCause):
             raise ValueError(f"cause = {number}: a number of residual_cause is expected")
-        self._counters = _numbers(told.counters)
+        self._counters = _numbers(report.counters)
         self._heard_s = self._clock()
         cause, before = ResidualCause(number), self._loop.residual_cause
-        self._sentence = told.sentence[:_LONGEST_SENTENCE]
+        self._sentence = report.sentence[:_LONGEST_SENTENCE]
         if cause is not before:
             self._change(cause)
 
@@ -68,9 +68,9 @@ class WatchReports:
         loop.refresh()
 
 
-def _numbers(told: dict[str, Any]) -> dict[str, float]:
+def _numbers(counters: dict[str, Any]) -> dict[str, float]:
     """Return the known counters that are finite numbers."""
-    return {name: told[name] for name in COUNTERS if _is_number(told.get(name))}
+    return {name: counters[name] for name in COUNTERS if _is_number(counters.get(name))}
 
 
 def _is_number(value: Any) -> bool:

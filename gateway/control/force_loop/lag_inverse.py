@@ -148,11 +148,11 @@ class LagInverse:
         if way * second_v >= 0.0:
             return False
         rises_s = 0.0 if way > 0.0 else 0.5 * (brake_v - push_v) / self._limits.voltage_slew_v_per_s
-        kept, second_kept, passed = _decays(self._lag_s, self._second_lag_s, self._wire_s + LATE_S + rises_s)
+        first_decay, second_decay, passed = _decays(self._lag_s, self._second_lag_s, self._wire_s + LATE_S + rises_s)
         first_v, second_v = first_v - push_v, second_v - push_v
-        first_v, second_v = push_v + kept * first_v, push_v + second_kept * second_v + passed * first_v
+        first_v, second_v = push_v + first_decay * first_v, push_v + second_decay * second_v + passed * first_v
         first_v, second_v = first_v - brake_v, second_v - brake_v
-        later = (brake_v + second_kept * second_v + passed * first_v for _, second_kept, passed in self._later)
+        later = (brake_v + second_decay * second_v + passed * first_v for _, second_decay, passed in self._later)
         return way * (second_v + brake_v) < 0.0 and all(way * at_v < 0.0 for at_v in later)
 
     def _linear(self, first_v: float, second_v: float) -> float:
@@ -164,23 +164,23 @@ class LagInverse:
 
 def _decays(lag_s: float, second_lag_s: float, after_s: float) -> tuple[float, float, float]:
     """What is left of the first lag's distance and of the second's, and what the second takes over of the first's."""
-    kept, second_kept = exp(-after_s / lag_s), exp(-after_s / second_lag_s)
-    return kept, second_kept, lag_s * (kept - second_kept) / (lag_s - second_lag_s)
+    first_decay, second_decay = exp(-after_s / lag_s), exp(-after_s / second_lag_s)
+    return first_decay, second_decay, lag_s * (first_decay - second_decay) / (lag_s - second_lag_s)
 
 
 def _pulses(lag_s: float, second_lag_s: float, horizon_s: float) -> Pulses:
     """Both states at rest after 2 horizons: two equations, linear in the two pulses."""
-    kept, second_kept = exp(-horizon_s / lag_s), exp(-horizon_s / second_lag_s)
-    passed = lag_s * (kept - second_kept) / (lag_s - second_lag_s)
-    given = 1.0 - second_kept - passed  # of a pulse, what the second lag has of it after one horizon
-    share = passed - given * kept / (1.0 - kept)
-    by = -1.0 / (second_kept * given + share * (1.0 - kept))
+    first_decay, second_decay = exp(-horizon_s / lag_s), exp(-horizon_s / second_lag_s)
+    passed = lag_s * (first_decay - second_decay) / (lag_s - second_lag_s)
+    given = 1.0 - second_decay - passed  # of a pulse, what the second lag has of it after one horizon
+    share = passed - given * first_decay / (1.0 - first_decay)
+    by = -1.0 / (second_decay * given + share * (1.0 - first_decay))
     return Pulses(
         horizon_s,
-        by * (second_kept * passed + share * kept),
-        by * second_kept * second_kept,
-        -kept * kept / (1.0 - kept),
-        -kept,
+        by * (second_decay * passed + share * first_decay),
+        by * second_decay * second_decay,
+        -first_decay * first_decay / (1.0 - first_decay),
+        -first_decay,
     )
 
 

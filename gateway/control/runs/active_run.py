@@ -87,8 +87,8 @@ class ActiveRun:
 
     def take_asked(self) -> AnyPlan | None:
         """Return the plan that was asked for, once."""
-        asked, self._asked = self._asked, None
-        return asked
+        plan, self._asked = self._asked, None
+        return plan
 
     def begin(self, plan: AnyPlan, *, is_local: bool) -> None:
         """Begin the run of this plan. ValueError for a plan that the rig does not allow."""
@@ -144,8 +144,8 @@ class ActiveRun:
 
     def take_said(self) -> str:
         """Return what the run has said, once; empty for nothing."""
-        said, self.said = self.said, ""
-        return said
+        sentence, self.said = self.said, ""
+        return sentence
 
     # -- the rig's largest force
 

@@ -72,9 +72,9 @@ class ExperimentRun:
     def step(self, now_s: float, reading: Reading) -> RunStep:
         """Advance to now_s and return the voltage and labels to apply. reading: of this moment."""
         if not self._check.is_done or self._check.is_waiting:
-            checked = self._check.step(now_s, reading)
+            check = self._check.step(now_s, reading)
             if not self._check.is_done or self._check.is_waiting:
-                return checked._replace(progress=0.0, eta_s=self.eta_s)
+                return check._replace(progress=0.0, eta_s=self.eta_s)
         if self._began_s is None:
             self._began_s = now_s
         self._elapsed_s = now_s - self._began_s

@@ -43,8 +43,10 @@ class _Range:
         """ValueError outside the range."""
         if move.to_share is not None:
             return self.low_v + move.to_share * (self.top_v - self.low_v)
-        volts, told = (move.to_v, f"{move.to_v:g} V") if move.to_v is not None else self._of_force(move.to_n or 0.0)
-        return self.check_level_v(float(volts or 0.0), told)
+        volts, level_text = (
+            (move.to_v, f"{move.to_v:g} V") if move.to_v is not None else self._of_force(move.to_n or 0.0)
+        )
+        return self.check_level_v(float(volts or 0.0), level_text)
 
     def _of_force(self, force_n: float) -> tuple[float, str]:
         volts, status = self.model.branches.rising.inverse(force_n)
@@ -54,12 +56,12 @@ class _Range:
             )
         return max(volts, self.low_v), f"{force_n:g} N"
 
-    def check_level_v(self, volts: float, told: str) -> float:
-        """Return a voltage of the plan; ValueError where it is outside the rig's range. told: how the plan names it."""
+    def check_level_v(self, volts: float, level_text: str) -> float:
+        """Return a voltage of the plan; ValueError where it is outside the rig's range. level_text: how the plan names it."""
         if not (isfinite(volts) and self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V):
             low_n, high_n = (self.model.branches.rising.value(end_v) for end_v in (self.low_v, self.top_v))
             raise ValueError(
-                f"{told}, allowed {self.low_v:g} .. {self.top_v:g} V (about {max(0.0, low_n):.0f} .. {high_n:.0f} N): "
+                f"{level_text}, allowed {self.low_v:g} .. {self.top_v:g} V (about {max(0.0, low_n):.0f} .. {high_n:.0f} N): "
                 f"beyond lie the rig's limits (force_max_n = {self.limits.force_max_n:g} N), the end of the calibration in "
                 f"use, or the over-force trip at {self.limits.over_force_n:g} N"
             )
@@ -76,10 +78,10 @@ def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segm
     for p, part in enumerate(plan.parts):
         for m, move in enumerate(part.moves):
             try:
-                found = list(_segments_of_move(move, at_v, usable, p))
+                candidates = list(_segments_of_move(move, at_v, usable, p))
             except ValueError as error:
                 raise ValueError(f"plan {plan.name}, part {part.name}, move {m + 1} ({move.do}): {error}") from None
-            segments += found
+            segments += candidates
             at_v = segments[-1].to_v
     if len(segments) > MOST_SEGMENTS:
         raise ValueError(f"plan {plan.name}: {len(segments)} stairs and turns, at most {MOST_SEGMENTS}")

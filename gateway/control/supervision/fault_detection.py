@@ -45,16 +45,17 @@ def stop_cause(fault: FaultCode, detail: str) -> StopCause:
 
 def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
     """Return the cause of a late loop: internal error or machine load, whichever made the larger part of the lateness."""
-    seen = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
+    observation = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
     dropped = "what arrived meanwhile was dropped"
     if line.waited_s is None:
-        return stop_cause(FaultCode.LOOP_STALLED, f"{seen}: the machine is overloaded; {dropped}")
+        return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: the machine is overloaded; {dropped}")
     waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"
     if line.waited_s < 0.5 * line.late_s:
         return stop_cause(
-            FaultCode.LOOP_STALLED, f"{seen}, only {waited}: stopped, or an internal error (please report); {dropped}"
+            FaultCode.LOOP_STALLED,
+            f"{observation}, only {waited}: stopped, or an internal error (please report); {dropped}",
         )
-    return stop_cause(FaultCode.MACHINE_BUSY, f"{seen}, {waited}: {BUSY_CURE}; {dropped}")
+    return stop_cause(FaultCode.MACHINE_BUSY, f"{observation}, {waited}: {BUSY_CURE}; {dropped}")
 
 
 class FaultDetector:
@@ -151,9 +152,9 @@ class FaultDetector:
 
     def _no_answer(self, now_s: float, line: LineStatus) -> StopCause:
         silent_s, bound_s = now_s - (line.unanswered_since_s or 0.0), self._bounds.output_timeout_s
-        seen = f"no answer from the output device for {silent_s * 1e3:.0f} ms, allowed {bound_s * 1e3:.0f} ms"
+        observation = f"no answer from the output device for {silent_s * 1e3:.0f} ms, allowed {bound_s * 1e3:.0f} ms"
         fault, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "power or wires")
-        return stop_cause(fault, f"{seen}: {blamed}")
+        return stop_cause(fault, f"{observation}: {blamed}")
 
     def _of_cell(self, reading: Reading, line: LineStatus) -> StopCause | None:
         if line.cell_lost:
@@ -161,10 +162,12 @@ class FaultDetector:
                 FaultCode.CELL_LOST, "the load cell's port went away: check the plug; it reopens by itself"
             )
         if not reading.is_fresh:
-            seen = f"last sample {reading.age_s * 1e3:.0f} ms old, allowed {self._bounds.sample_timeout_s * 1e3:.0f} ms"
+            observation = (
+                f"last sample {reading.age_s * 1e3:.0f} ms old, allowed {self._bounds.sample_timeout_s * 1e3:.0f} ms"
+            )
             suspects = "power, wires or stream mode of the amplifier"
             fault, blamed = cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, suspects)
-            return stop_cause(fault, f"{seen}: {blamed}")
+            return stop_cause(fault, f"{observation}: {blamed}")
         if not (reading.is_usable or reading.overload):
             return stop_cause(FaultCode.NOT_FINITE, "the load cell's reading is not a number")
         return None
@@ -174,8 +177,8 @@ class FaultDetector:
             return stop_cause(FaultCode.OVER_FORCE, self._over_words(reading, expected_n))
         if words := self._frozen.words:
             self._frozen.tripped()
-            said = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
-            return stop_cause(FaultCode.SAMPLE_FROZEN, said)
+            observation = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
+            return stop_cause(FaultCode.SAMPLE_FROZEN, observation)
         if self._response_fault is FaultCode.SIGN_INVERTED:
             return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self._rise.measured_rise_n, expected_n))
         if self._response_fault is FaultCode.GAIN_WRONG:
@@ -185,6 +188,8 @@ class FaultDetector:
     def _over_words(self, reading: Reading, expected_n: float) -> str:
         if reading.overload:
             return f"cell saturated ({self._bounds.saturation_n:.0f} N is 98 % of its range): over-force, open or shorted wires"
-        seen = f"{reading.contact_n:.1f} N measured, allowed {self._limits.over_force_n:.1f} N, {expected_n:.1f} N expected"
+        values = f"{reading.contact_n:.1f} N measured, allowed {self._limits.over_force_n:.1f} N, {expected_n:.1f} N expected"
         far_off = abs(reading.contact_n) > _FAR_OFF * abs(expected_n)
-        return f"{seen}: kgf and N mixed up, or a wrong span?" if far_off else f"{seen}: a jam, or the tool was pushed"
+        return (
+            f"{values}: kgf and N mixed up, or a wrong span?" if far_off else f"{values}: a jam, or the tool was pushed"
+        )

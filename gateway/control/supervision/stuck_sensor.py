@@ -66,13 +66,15 @@ class StuckSensorCheck:
         must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
         if self._same_s >= self._frozen_s and must_have_moved:
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
-        seen = f"repeated for {self._equal_s:.2f} s, {self._equal} samples bit for bit"
+        observation = f"repeated for {self._equal_s:.2f} s, {self._equal} samples bit for bit"
         if self._told_limit is not None:
             return (
-                f"{seen}, allowed {self._told_limit} (frozen_equal_samples)" if self._equal > self._told_limit else ""
+                f"{observation}, allowed {self._told_limit} (frozen_equal_samples)"
+                if self._equal > self._told_limit
+                else ""
             )
         if self._equal >= self._noise.limit and self._equal_s >= self._frozen_s:
-            return f"{seen}, while its noise has left at most {self._noise.longest} equal so far"
+            return f"{observation}, while its noise has left at most {self._noise.longest} equal so far"
         return ""
 
     @property
@@ -87,10 +89,12 @@ class StuckSensorCheck:
         if self.found_s <= SLOW_S:
             return ""
         noise = self._noise
-        found = f"after {self.found_s:.1f} s" if self.found_s < inf else "never"
-        seen = f"{noise.counts:.2f} counts of {noise.count_n:.3g} N" if noise.counts > 0.0 else "less than it can tell"
+        when = f"after {self.found_s:.1f} s" if self.found_s < inf else "never"
+        noise_text = (
+            f"{noise.counts:.2f} counts of {noise.count_n:.3g} N" if noise.counts > 0.0 else "less than it can tell"
+        )
         return (
-            f"W234 while the force stands still a frozen load cell would be found {found}: its noise is {seen} at "
+            f"W234 while the force stands still a frozen load cell would be found {when}: its noise is {noise_text} at "
             f"{1.0 / noise.interval_s:.0f} samples/s; set a finer count, a faster rate or less filter on the amplifier"
         )
 

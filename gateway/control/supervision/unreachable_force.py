@@ -73,43 +73,43 @@ class Evidence:
         return self.factor > _TIMES and off_n < (_UNIT_SLACK - 1.0) * self.expected_n + _FRICTION_N
 
 
-def unreachable_words(seen: Evidence) -> str:
+def unreachable_words(evidence: Evidence) -> str:
     """Return what it probably is, and one thing to do."""
-    pressure = _pressure(seen)
-    if seen.no_air:
+    pressure = _pressure(evidence)
+    if evidence.no_air:
         return f"{pressure}: no air, or a closed valve; open the air supply and look at its gauge"
-    if seen.looks_like_another_unit:
-        return _unit_words(seen, pressure)
-    if seen.is_silent:
-        return _silent_words(seen, pressure)
-    said = f"{pressure}; " if pressure else ""
-    if seen.factor < 0.5 and not pressure:
+    if evidence.looks_like_another_unit:
+        return _unit_words(evidence, pressure)
+    if evidence.is_silent:
+        return _silent_words(evidence, pressure)
+    clause = f"{pressure}; " if pressure else ""
+    if evidence.factor < 0.5 and not pressure:
         return "no air, valve closed or no contact"
-    return f"{said}target not reached: supply pressure too low, trim at its limit or calibration off"
+    return f"{clause}target not reached: supply pressure too low, trim at its limit or calibration off"
 
 
-def _pressure(seen: Evidence) -> str:
+def _pressure(evidence: Evidence) -> str:
     """The pressure in numbers, where it is one to compare."""
-    if not isfinite(seen.pressure_pa):
+    if not isfinite(evidence.pressure_pa):
         return ""
-    expected = f", {seen.expected_pa / 1e3:.0f} kPa expected" if seen.expected_pa >= _LEAST_EXPECTED_PA else ""
-    return f"{seen.pressure_pa / 1e3:.0f} kPa measured{expected}"
+    expected = f", {evidence.expected_pa / 1e3:.0f} kPa expected" if evidence.expected_pa >= _LEAST_EXPECTED_PA else ""
+    return f"{evidence.pressure_pa / 1e3:.0f} kPa measured{expected}"
 
 
-def _unit_words(seen: Evidence, pressure: str) -> str:
-    unit = "kgf read as N" if seen.factor < 1.0 else "N read as kgf"
-    told = f"factor {seen.factor:.3g} is what {unit} looks like (A303)"
-    if seen.has_air:
-        return f"{pressure}: air is there, and {told}: check the unit on the amplifier against the rig file"
-    since = ", though the force was right before in this enable" if seen.was_in_band else ""
-    other = "; else no air, valve closed or no contact" if seen.factor < 1.0 else ""
-    return f"{f'{pressure}: ' if pressure else ''}{told}{since}: check the unit on the amplifier against the rig file{other}"
+def _unit_words(evidence: Evidence, pressure: str) -> str:
+    unit = "kgf read as N" if evidence.factor < 1.0 else "N read as kgf"
+    factor = f"factor {evidence.factor:.3g} is what {unit} looks like (A303)"
+    if evidence.has_air:
+        return f"{pressure}: air is there, and {factor}: check the unit on the amplifier against the rig file"
+    since = ", though the force was right before in this enable" if evidence.was_in_band else ""
+    other = "; else no air, valve closed or no contact" if evidence.factor < 1.0 else ""
+    return f"{f'{pressure}: ' if pressure else ''}{factor}{since}: check the unit on the amplifier against the rig file{other}"
 
 
-def _silent_words(seen: Evidence, pressure: str) -> str:
-    if seen.has_air:
+def _silent_words(evidence: Evidence, pressure: str) -> str:
+    if evidence.has_air:
         return f"{pressure}: air is there, so no contact with the workpiece"
-    said = f"{pressure}; " if pressure else ""
-    if seen.was_in_band:
-        return f"{said}the force was right before in this enable: contact lost or air gone; look at the gauge and at the tool"
-    return f"{said}no air, valve closed or no contact"
+    clause = f"{pressure}; " if pressure else ""
+    if evidence.was_in_band:
+        return f"{clause}the force was right before in this enable: contact lost or air gone; look at the gauge and at the tool"
+    return f"{clause}no air, valve closed or no contact"

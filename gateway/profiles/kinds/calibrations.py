@@ -37,7 +37,7 @@ def coefficient_faults(calibration: Calibration, document: Document, cell_range_
     """Return what is wrong with coefficients that are to drive a plant with this load cell."""
     limits = CoefficientLimits(cell_range_n=cell_range_n)
     coefficients = Coefficients.of_calibration(calibration)
-    return [document.fault(_place(found), found.text) for found in validate_coefficients(coefficients, limits)]
+    return [document.fault(_place(fault), fault.text) for fault in validate_coefficients(coefficients, limits)]
 
 
 def _length_faults(calibration: Calibration, document: Document) -> list[ProfileFault]:
@@ -58,12 +58,12 @@ def _model_faults(calibration: Calibration, document: Document) -> list[ProfileF
     return []
 
 
-def _place(found: CoefficientFault) -> Path:
+def _place(fault: CoefficientFault) -> Path:
     """Return where a coefficient of the upload's numbering stands in the file; () for the set as a whole."""
-    if found.reason in _OF_ALL_STOPS:
+    if fault.reason in _OF_ALL_STOPS:
         return ("slip_radii_v",)
-    if found.index < 0:
+    if fault.index < 0:
         return ()
-    if found.index >= RESPONSE_FROM:
-        return ("response", _RESPONSE[found.index - RESPONSE_FROM])
-    return (_ARRAYS[found.index // STRIDE], found.index % STRIDE)
+    if fault.index >= RESPONSE_FROM:
+        return ("response", _RESPONSE[fault.index - RESPONSE_FROM])
+    return (_ARRAYS[fault.index // STRIDE], fault.index % STRIDE)

@@ -50,8 +50,8 @@ def read_plant(document: Document) -> tuple[PlantProfile | None, list[ProfileFau
         for key, text in about.items()
         if not isinstance(text, str)
     ]
-    plant, found = build(Plant, Document(document.file, values, document.marks | reader.marks))
-    faults += reader.faults + [fault for fault in found if fault.path not in reader.refused]
+    plant, more_faults = build(Plant, Document(document.file, values, document.marks | reader.marks))
+    faults += reader.faults + [fault for fault in more_faults if fault.path not in reader.refused]
     if faults or plant is None:
         return None, sorted(faults)
     return PlantProfile(plant=plant, origins=reader.origins, **about), []
@@ -68,9 +68,9 @@ class _PlantReader:
         self.refused: set[str] = set()  # paths with a fault of their own: pydantic need not tell a second one
 
     def group(self, path: Path, kind: type) -> dict[str, Any]:
-        found = self.document.at(*path)
+        content = self.document.at(*path)
         values: dict[str, Any] = {}
-        for key, value in found.items() if isinstance(found, dict) else ():
+        for key, value in content.items() if isinstance(content, dict) else ():
             place = (*path, key)
             inner = kind_at(kind, (key,))
             if inner is not None and isinstance(value, dict):

@@ -85,14 +85,14 @@ def check_saturation(parts: Parts) -> Found:
     """Yield a fault for a saturation_n beyond the load cell, or within the forces of normal work."""
     if (supervision := parts.supervision) is None:
         return
-    path, seen = "supervision.saturation_n", supervision.saturation_n
-    if parts.load_cell and seen > parts.load_cell.range_n:
+    path, saturation_n = "supervision.saturation_n", supervision.saturation_n
+    if parts.load_cell and saturation_n > parts.load_cell.range_n:
         cell = parts.load_cell.range_n
         suggested = f"{100.0 * _SATURATION_SHARE:.0f} % of it is {newton(round(_SATURATION_SHARE * cell, 1))}"
-        yield path, f"{newton(seen)} is beyond load_cell.range_n = {newton(cell)}; {suggested}"
-    elif parts.limits and seen <= parts.limits.force_max_n:
+        yield path, f"{newton(saturation_n)} is beyond load_cell.range_n = {newton(cell)}; {suggested}"
+    elif parts.limits and saturation_n <= parts.limits.force_max_n:
         most = newton(parts.limits.force_max_n)
-        yield path, f"{newton(seen)} is not above force_max_n = {most}: it would trip in normal work"
+        yield path, f"{newton(saturation_n)} is not above force_max_n = {most}: it would trip in normal work"
 
 
 def check_defaults(parts: Parts) -> Found:
@@ -146,10 +146,10 @@ def check_calibration_against_cell(parts: Parts) -> Found:
     if parts.limits and parts.supervision:
         resting = calibration.model().force_n(_within(calibration, parts.limits.safe_voltage_v), -1.0)
         if resting >= parts.supervision.stuck_n:
-            told = f"{resting:.1f} N that calibration {calibration.name} expects at the safe voltage"
+            expectation = f"{resting:.1f} N that calibration {calibration.name} expects at the safe voltage"
             yield (
                 "supervision.stuck_n",
-                f"{newton(parts.supervision.stuck_n)} is not above the {told}: it could never be enabled",
+                f"{newton(parts.supervision.stuck_n)} is not above the {expectation}: it could never be enabled",
             )
 
 
@@ -165,8 +165,8 @@ def check_times(parts: Parts) -> Found:
     for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s"):
         value = getattr(supervision, key)
         if value is not None and value < ticks_s:
-            told = f"two ticks of the loop: {second(ticks_s)} at {number(parts.loop_hz)} Hz"
-            yield f"supervision.{key}", f"{second(value)} is shorter than {told}"
+            two_ticks = f"two ticks of the loop: {second(ticks_s)} at {number(parts.loop_hz)} Hz"
+            yield f"supervision.{key}", f"{second(value)} is shorter than {two_ticks}"
 
 
 def check_simulated_plant(parts: Parts) -> Found:
@@ -182,8 +182,8 @@ def check_real_rig(parts: Parts) -> Found:
     if parts.supervision and parts.supervision.lease_s is None:
         yield "supervision.lease_s", "there is no lease: when the master is lost, the last command lasts; 0.2 is usual"
     if parts.calibration and parts.calibration.rig != parts.name:
-        made = f'was made on "{parts.calibration.rig}", not on {parts.name}'
-        yield "calibration", f"{made}: its forces are a guess until you run `force-gateway calibrate`"
+        origin = f'was made on "{parts.calibration.rig}", not on {parts.name}'
+        yield "calibration", f"{origin}: its forces are a guess until you run `force-gateway calibrate`"
 
 
 def check_contact_threshold(parts: Parts) -> Found:
@@ -192,8 +192,8 @@ def check_contact_threshold(parts: Parts) -> Found:
         return
     threshold = defaults.contact_threshold_n
     if 0 < defaults.precontact_force_n <= threshold:
-        told = f"contact_threshold_n = {newton(threshold)}: contact would never be felt"
-        yield "defaults.precontact_force_n", f"{newton(defaults.precontact_force_n)} is not above {told}"
+        observation = f"contact_threshold_n = {newton(threshold)}: contact would never be felt"
+        yield "defaults.precontact_force_n", f"{newton(defaults.precontact_force_n)} is not above {observation}"
 
 
 def check_plant_supply(parts: Parts) -> Found:
@@ -203,9 +203,9 @@ def check_plant_supply(parts: Parts) -> Found:
     regulator, most_v = parts.plant.plant.regulator, parts.limits.voltage_max_v
     pascal_per_volt = regulator.full_scale_pa / regulator.full_scale_v
     if most_v * pascal_per_volt > regulator.supply_pa:
-        asked, there = f"{most_v * pascal_per_volt / 1e6:.3g} MPa", f"{regulator.supply_pa / 1e6:.3g} MPa"
+        needed, available = f"{most_v * pascal_per_volt / 1e6:.3g} MPa", f"{regulator.supply_pa / 1e6:.3g} MPa"
         end = f"above {regulator.supply_pa / pascal_per_volt:.2f} V nothing changes"
-        yield "limits.voltage_max_v", f"{volt(most_v)} asks for {asked}, the plant's supply has {there}: {end}"
+        yield "limits.voltage_max_v", f"{volt(most_v)} asks for {needed}, the plant's supply has {available}: {end}"
 
 
 def check_compensation(parts: Parts) -> Found:

@@ -43,7 +43,7 @@ class FieldTreatment:
 
 def treatments_of(effects: Iterable[Effect]) -> tuple[FieldTreatment, ...]:
     """Return the treatments of these entries of the catalogue in its order, those of what is compensated first."""
-    found = [
+    treatments = [
         FieldTreatment(
             effect.name,
             treatment.fields or tuple(parameter.path for parameter in effect.parameters),
@@ -54,7 +54,7 @@ def treatments_of(effects: Iterable[Effect]) -> tuple[FieldTreatment, ...]:
         for effect in effects
         for treatment in effect.treatments
     ]
-    return tuple(sorted(found, key=lambda each: each.by is By.NOTHING))
+    return tuple(sorted(treatments, key=lambda each: each.by is By.NOTHING))
 
 
 TREATMENTS: Final = treatments_of(EFFECTS)

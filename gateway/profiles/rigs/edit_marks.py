@@ -19,8 +19,8 @@ def find_edit_marks(document: Document, text: str) -> Iterator[ProfileFault]:
     """Yield each value whose line is still marked, with what belongs there."""
     keys = {mark.key_line: path for path, mark in document.marks.items() if path}
     for number, line in enumerate(text.splitlines(), start=1):
-        if found := _MARK.search(line):
+        if match := _MARK.search(line):
             at = number if line.split("#", 1)[0].strip() else number + 1
             if at in keys:
-                what = f": {found[1]}" if found[1] else ""
+                what = f": {match[1]}" if match[1] else ""
                 yield document.fault(keys[at], f"is still marked EDIT{what}; when it is yours, take the mark away")

@@ -45,9 +45,9 @@ def _output_talks_s(device: DeviceProfile, character_s: float) -> dict[str, floa
 
 
 def _characters(device: DeviceProfile, question: OutputRequest, answer: OutputReply) -> int:
-    asked, far = output_host(device).request(question), output_device(device)
-    understood = (one for one in far.receive(asked, 0.0) if isinstance(one, OutputRequest))
-    return len(asked) + sum(len(far.reply(answer, to=one)) for one in understood)
+    frame, far = output_host(device).request(question), output_device(device)
+    understood = (one for one in far.receive(frame, 0.0) if isinstance(one, OutputRequest))
+    return len(frame) + sum(len(far.reply(answer, to=one)) for one in understood)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,11 +154,11 @@ def check_display_range(parts: Parts) -> Found:
     if (limits := parts.limits) is None or parts.load_cell is None:
         return
     for reading in _readings(parts):
-        said = reading.device.reading
-        per_count = reading.host.resolution_n / said.step
-        says_overload = said.blank_is_overload or "overload" in said.quality.values()
+        message = reading.device.reading
+        per_count = reading.host.resolution_n / message.step
+        says_overload = message.blank_is_overload or "overload" in message.quality.values()
         key = "force_max_n" if says_overload else "over_force_n"
-        wanted_n, end_n = getattr(limits, key), said.largest_shown * per_count
+        wanted_n, end_n = getattr(limits, key), message.largest_shown * per_count
         if wanted_n > end_n:
             yield f"limits.{key}", f"{newton(wanted_n)} is beyond what {reading.device.name} can show: {end_n:.4g} N"
 
@@ -197,9 +197,11 @@ def check_frozen_detection(parts: Parts) -> Found:
         counts = counts_found_within(SLOW_S, rate_hz)
         if counts > _COUNTS_OF_NOISE:
             reason = f"noise of {counts:.2g} counts or more" if counts < inf else "no noise whatever: too few readings"
-            seen = f"{reading.device.name} gives {rate_hz:.3g} readings/s"
-            found = f"at a force that stands still a frozen cell is found within {SLOW_S:.0f} s by {reason} (W234)"
-            yield "load_cell.device", f"{seen}: {found}"
+            rate_text = f"{reading.device.name} gives {rate_hz:.3g} readings/s"
+            consequence = (
+                f"at a force that stands still a frozen cell is found within {SLOW_S:.0f} s by {reason} (W234)"
+            )
+            yield "load_cell.device", f"{rate_text}: {consequence}"
 
 
 def check_output_resolution(parts: Parts) -> Found:

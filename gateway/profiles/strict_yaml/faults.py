@@ -73,8 +73,8 @@ class Findings:
 def closest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word that a typist most likely meant, None when nothing is near."""
     candidates = {name.lower(): name for name in known}
-    found = get_close_matches(word.lower(), candidates, n=1, cutoff=0.6)
-    return candidates[found[0]] if found else None
+    matches = get_close_matches(word.lower(), candidates, n=1, cutoff=0.6)
+    return candidates[matches[0]] if matches else None
 
 
 def one_of(words: Iterable[object]) -> str:

@@ -116,8 +116,8 @@ def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | 
 def _describe_expected(what: str) -> Callable[[Any, dict[str, Any], str], str]:
     def sentence(value: Any, context: dict[str, Any], unit: str) -> str:
         hint = _hint(value, what)
-        seen = str(value) if isinstance(value, float) and hint else quote_value(value)
-        return f"{seen} is not {what}{hint}"
+        value_text = str(value) if isinstance(value, float) and hint else quote_value(value)
+        return f"{value_text} is not {what}{hint}"
 
     return sentence
 
@@ -152,11 +152,11 @@ def _number_hint(text: str) -> str:
 def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     """Return the choices in pydantic's list `expected`: `'fault', 'hold' or 'ramp'`."""
     choices = [word.strip(" '") for word in str(context["expected"]).replace(" or ", ",").split(",")]
-    seen = value if isinstance(value, str) else quote_value(value)
+    value_text = value if isinstance(value, str) else quote_value(value)
     near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
     if len(choices) == 1:
-        return f"{seen} is not {choices[0]}, the only choice"
-    return f"{seen} is not one of {one_of(choices)}" + (f"; did you mean {near}?" if near else "")
+        return f"{value_text} is not {choices[0]}, the only choice"
+    return f"{value_text} is not one of {one_of(choices)}" + (f"; did you mean {near}?" if near else "")
 
 
 def _nearest(value: Any, choices: list[str]) -> str | None:

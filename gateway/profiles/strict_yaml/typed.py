@@ -35,7 +35,7 @@ def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None,
         return value, []
     except ValidationError as error:
         findings = _told_once(error)
-    faults = [_fault(kind, document, path, found) for found in findings]
+    faults = [_fault(kind, document, path, finding) for finding in findings]
     return None, sorted(_without_echoes(faults))
 
 
@@ -55,30 +55,30 @@ def _told_once(error: ValidationError) -> list[Any]:
     """Return one finding per place, the first: a union reports each of its members. No more than a person
     reads: a sentence takes half a millisecond, and a hostile document may have thousands."""
     first = error.errors(include_url=False)[:_MOST_FINDINGS]
-    return list({_steps(found["loc"]): found for found in reversed(first)}.values())[::-1]
+    return list({_steps(finding["loc"]): finding for finding in reversed(first)}.values())[::-1]
 
 
 def _without_echoes(faults: list[ProfileFault]) -> list[ProfileFault]:
     """Return the findings without a missing key that is misspelt beside it: the first tells what was meant."""
-    meant = {f"{fault.path.rpartition('.')[0]}.{fault.meant}".lstrip(".") for fault in faults if fault.meant}
-    return [fault for fault in faults if not (fault.path in meant and fault.kind is FaultKind.MISSING)]
+    suggestions = {f"{fault.path.rpartition('.')[0]}.{fault.meant}".lstrip(".") for fault in faults if fault.meant}
+    return [fault for fault in faults if not (fault.path in suggestions and fault.kind is FaultKind.MISSING)]
 
 
 def _steps(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
     return tuple(step for step in location if not (isinstance(step, str) and any(sign in step for sign in "[(-")))
 
 
-def _fault(kind: type, document: Document, path: Path, found: Mapping[str, Any]) -> ProfileFault:
-    place = _place(document, path, found["loc"])
+def _fault(kind: type, document: Document, path: Path, finding: Mapping[str, Any]) -> ProfileFault:
+    place = _place(document, path, finding["loc"])
     key = place[-1] if place else ""
-    if found["type"] == "missing":
+    if finding["type"] == "missing":
         missing = f"is missing{_what_it_is(kind, place[len(path) :])}"
         return replace(document.fault(place, missing, at_key=True), kind=FaultKind.MISSING)
-    if found["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+    if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         known = names(kind_at(kind, place[len(path) : -1]) or kind)
-        sentence, meant = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
-        return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=meant)
-    return document.fault(place, type_sentence(found, document.at(*place), key))
+        sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
+        return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
+    return document.fault(place, type_sentence(finding, document.at(*place), key))
 
 
 def _place(document: Document, path: Path, location: tuple[int | str, ...]) -> Path:
@@ -108,14 +108,14 @@ def names(kind: type) -> list[str]:
 
 def kind_at(kind: type, path: Path) -> type | None:
     """Return the dataclass that describes the group at `path` below `kind`, None when it is no dataclass."""
-    found: type | None = kind
+    current: type | None = kind
     for step in path:
         if isinstance(step, int):
             continue
-        if found is None or not is_dataclass(found):
+        if current is None or not is_dataclass(current):
             return None
-        found = next((inner for name, inner in groups(found) if name == step), None)
-    return found
+        current = next((inner for name, inner in groups(current) if name == step), None)
+    return current
 
 
 def groups(kind: type) -> Iterator[tuple[str, type]]:

@@ -72,13 +72,13 @@ class SelectedColumn:
 def quantity_of(name: str) -> tuple[str, str] | None:
     """Return the (quantity, unit) that a column's name ends with, None when it ends with none.
     `oil_temperature_c`, `feed_mm_s`."""
-    found = [
+    matches = [
         (len(unit), quantity, unit)
         for quantity, units in LINEAR.items()
         for unit in units
         if name.lower().endswith(f"_{unit}")
     ]
-    return max(found)[1:] if found else None
+    return max(matches)[1:] if matches else None
 
 
 def _source(name: str, text: str) -> ColumnSource:
@@ -107,12 +107,12 @@ def select_columns(names: Sequence[str], mapping: ColumnMapping | None, file: st
     """Return what is read from a table with these headers ("" where there is none).
     RecordingError when a column is not there."""
     mapped = [_select_column(source, names, file) for source in mapping.sources] if mapping else []
-    taken = {pick.index for pick in mapped}
+    used = {pick.index for pick in mapped}
     claimed = {pick.name for pick in mapped}
-    own = [SelectedColumn(k, name) for k, name in enumerate(names) if name and k not in taken and name not in claimed]
-    seen = [pick.name for pick in own]
-    for name in seen:
-        if seen.count(name) > 1:
+    own = [SelectedColumn(k, name) for k, name in enumerate(names) if name and k not in used and name not in claimed]
+    names_in_use = [pick.name for pick in own]
+    for name in names_in_use:
+        if names_in_use.count(name) > 1:
             raise RecordingError(f"{file}: a column name stands twice in the header: {name}; pick one with --columns")
     return (*mapped, *own)
 
@@ -136,8 +136,8 @@ def _index(source: ColumnSource, names: Sequence[str], file: str) -> int:
     if source.source in names:
         return list(names).index(source.source)
     near = get_close_matches(source.source, [name for name in names if name], n=1, cutoff=0.6)
-    meant = f"; did you mean {near[0]}?" if near else f"; there: {join_names([name for name in names if name])}"
-    raise RecordingError(f"{file}: {source.name}={source.source}: no such header{meant}")
+    suggestion = f"; did you mean {near[0]}?" if near else f"; there: {join_names([name for name in names if name])}"
+    raise RecordingError(f"{file}: {source.name}={source.source}: no such header{suggestion}")
 
 
 def join_names(words: Sequence[str], most: int = 12) -> str:

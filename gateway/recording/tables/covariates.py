@@ -42,7 +42,7 @@ def extract_covariates(
         if name not in MEASUREMENT_COLUMNS and not (ours and name in (*DERIVED, *LABELS, *SENT))
     ]
     dropped: dict[str, list[str]] = {}
-    found: dict[str, Floats] = {}
+    covariates: dict[str, Floats] = {}
     filled: list[str] = []
     for name in names:
         values = columns[name]
@@ -53,13 +53,15 @@ def extract_covariates(
         known = np.isfinite(values)
         if not known.all():
             filled.append(f"{name} ({int((~known).sum())})")
-        found[name] = values if known.all() else interpolate_missing(values, time_s)
+        covariates[name] = values if known.all() else interpolate_missing(values, time_s)
     notes = [f"left out, {why}: {join_names(which, _MOST_NAMES)}" for why, which in dropped.items()]
     if filled:
         notes.append(f"values missing, drawn straight from the ones around: {join_names(filled, _MOST_NAMES)}")
-    if len(found) >= MANY_COVARIATES:
-        notes.append(f"{len(found)} covariates: with so many, some seem to matter by chance, so each is trusted less")
-    return found, notes
+    if len(covariates) >= MANY_COVARIATES:
+        notes.append(
+            f"{len(covariates)} covariates: with so many, some seem to matter by chance, so each is trusted less"
+        )
+    return covariates, notes
 
 
 def interpolate_missing(values: Floats, time_s: Floats) -> Floats:

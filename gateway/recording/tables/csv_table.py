@@ -47,9 +47,9 @@ def read_csv(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool 
             f"{path}:{form.skip + 1}: no header row; it names the columns, such as time_s,command_v,force_n. "
             f"Or say which is which: {EXAMPLE} (the table has {len(form.names)} columns)"
         )
-    asked = select_columns(form.names, mapping, str(path))
-    chosen = [pick for pick in asked if pick.is_contract or not form.is_words(pick.index)]
-    words = [pick.name for pick in asked if pick not in chosen]
+    selected = select_columns(form.names, mapping, str(path))
+    chosen = [pick for pick in selected if pick.is_contract or not form.is_words(pick.index)]
+    words = [pick.name for pick in selected if pick not in chosen]
     if not chosen:
         raise RecordingError(
             f"{path}: no column of numbers; a recording is a table with a header such as time_s,command_v,force_n"
@@ -85,28 +85,28 @@ def _read_fast(form: CsvDialect, chosen: Sequence[SelectedColumn]) -> NumberTabl
         return None
     pa.enable_signal_handlers(False)  # they would hold a pipe open from now on, and Ctrl-C is Python's
     names = [str(k) for k in range(len(form.names))]
-    kept = [names[pick.index] for pick in chosen]
+    wanted_names = [names[pick.index] for pick in chosen]
     with form.path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
         _check_size(form, data, len(chosen))
         if data.find(b"\n#", 1) >= 0 and _is_comment_between(form, data):
             return None
         try:
-            found = csv.read_csv(
+            table = csv.read_csv(
                 pa.BufferReader(pa.memory_map(str(form.path)).read_buffer().slice(0, _end(data))),
                 read_options=csv.ReadOptions(skip_rows=form.skip, column_names=names, block_size=8 << 20),
                 parse_options=csv.ParseOptions(delimiter=form.separator, ignore_empty_lines=False),
                 convert_options=csv.ConvertOptions(
-                    column_types=dict.fromkeys(kept, pa.float64()),
-                    include_columns=list(dict.fromkeys(kept)),
+                    column_types=dict.fromkeys(wanted_names, pa.float64()),
+                    include_columns=list(dict.fromkeys(wanted_names)),
                     null_values=[word for given in MISSING for word in (given, given.upper(), given.title(), "NaN")],
                     decimal_point=form.decimal,
                 ),
             )
         except pa.ArrowInvalid:
             return None
-        columns = {k: _floats(found[name]) for k, name in enumerate(kept)}
+        columns = {k: _floats(table[name]) for k, name in enumerate(wanted_names)}
     first = form.skip + 1
-    return NumberTable(form.facts, columns, range(first, first + found.num_rows))
+    return NumberTable(form.facts, columns, range(first, first + table.num_rows))
 
 
 def _floats(column: Any) -> "NDArray[np.float64]":

@@ -110,8 +110,8 @@ class _EvenClock:
             for values in (column, self._time_s)
         )
         mean, time_s = (total[there] / count[there] for total in sums)
-        found: Floats = np.interp(self.rows_s, time_s, mean)
+        resampled: Floats = np.interp(self.rows_s, time_s, mean)
         if mean.size > _SMOOTH:  # interpolated, neighbours would share their noise
             slope = np.gradient(np.convolve(np.pad(mean, _SMOOTH // 2, mode="edge"), _KERNEL, "valid"), time_s)
-            found[there] = mean + slope * (self.rows_s[there] - time_s)
-        return found
+            resampled[there] = mean + slope * (self.rows_s[there] - time_s)
+        return resampled

@@ -60,11 +60,11 @@ def check_time_axis(recording: Recording) -> TimeAxis:
         notes.append(
             f"{int((~last_of_stamp).sum())} rows repeat the time stamp before (the first: {first}): the last of each stays"
         )
-    kept = rows[last_of_stamp]
-    time_s = stamps[kept] - stamps[kept[0]] if kept.size else stamps[kept]
+    kept_rows = rows[last_of_stamp]
+    time_s = stamps[kept_rows] - stamps[kept_rows[0]] if kept_rows.size else stamps[kept_rows]
     _refuse_coarse(recording, time_s)
-    after_gap, told = _flag_after_gaps(time_s)
-    return TimeAxis(kept, time_s, after_gap, (*notes, *told))
+    after_gap, gap_notes = _flag_after_gaps(time_s)
+    return TimeAxis(kept_rows, time_s, after_gap, (*notes, *gap_notes))
 
 
 def _check_unknown(recording: Recording, known: Flags) -> list[str]:

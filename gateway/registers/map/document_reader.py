@@ -52,33 +52,33 @@ class DocumentReader:
 
     def text(self, place: Place, content: Mapping[str, Any], key: str, default: str | None = None) -> str:
         """Return a text; a fault and an empty one for anything else."""
-        found = content.get(key, default)
-        if not isinstance(found, str):
+        value = content.get(key, default)
+        if not isinstance(value, str):
             self.fault(
                 (*place, key) if key in content else place,
                 f"{key} is not text" if key in content else f"{key} is missing",
                 is_of_key=key not in content,
             )
             return ""
-        return found
+        return value
 
     def number(self, place: Place, content: Mapping[str, Any], key: str) -> float:
         """Return a finite number; a fault and 0 for anything else."""
-        found = content[key]
-        if isinstance(found, bool) or not isinstance(found, (int, float)) or not isfinite(found):
-            self.fault((*place, key), f"{found} is not a number")
+        value = content[key]
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+            self.fault((*place, key), f"{value} is not a number")
             return 0.0
-        return found
+        return value
 
     def whole(self, place: Place, content: Mapping[str, Any], key: str, low: int, high: int) -> int:
         """Return a whole number within low .. high; a fault and low for anything else."""
-        found = content.get(key)
-        if found is None:
+        value = content.get(key)
+        if value is None:
             self.fault(place, f"{key} is missing", is_of_key=True)
-        elif not isinstance(found, int) or isinstance(found, bool) or not low <= found <= high:
-            self.fault((*place, key), f"{found} is not a whole number {low} .. {high}")
+        elif not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+            self.fault((*place, key), f"{value} is not a whole number {low} .. {high}")
         else:
-            return found
+            return value
         return low
 
     def order(self, place: Place, content: Mapping[str, Any]) -> WordOrder:

@@ -39,10 +39,10 @@ class MapError(ValueError):
 def read_map(document: Mapping[str, Any]) -> RegisterMap:
     """Read and check a map. Raises MapError with every fault found."""
     reader = _MapReader()
-    found = reader.map(document)
+    register_map = reader.map(document)
     if reader.faults:
         raise MapError(reader.faults)
-    return found
+    return register_map
 
 
 class _MapReader(DocumentReader):
@@ -161,14 +161,14 @@ class _MapReader(DocumentReader):
     def registers_apart(self, registers: list[Register]) -> None:
         """Check that no two registers of a block share a name, and that none overlap."""
         names: set[tuple[str, str]] = set()
-        taken: dict[int, Register] = {}
+        owner_of: dict[int, Register] = {}
         for register in registers:
             place: Place = ("blocks", register.block)
             if (register.name, register.block) in names:
                 self.fault(place, f"{register.name} is there twice")
             names.add((register.name, register.block))
             for address in range(register.address, register.address + register.words):
-                other = taken.setdefault(address, register)
+                other = owner_of.setdefault(address, register)
                 if other is not register:
                     self.fault(place, f"{register.name} overlaps {other.name} at {address}")
 

@@ -78,8 +78,8 @@ def check_staged(block: bytes, limits: CoefficientLimits) -> Staged | StagedFaul
     if (fault := next(_frame_faults(block, given), None)) is not None:
         return fault
     used = _cut_to_order(given.staged)
-    for found in validate_coefficients(used, limits):
-        return StagedFault(found.index, found.reason, found.text)
+    for finding in validate_coefficients(used, limits):
+        return StagedFault(finding.index, finding.reason, finding.text)
     if (fault := _force_fault(given.staged)) is not None:
         return fault
     return Staged(used, _own_limits_n(given.staged), given.slot, given.length == HEAD_WORDS)

@@ -120,15 +120,13 @@ def _usable_branches(ladder: Ladder) -> tuple[Ladder, Branches]:
     after each turn, at which a valve's play or a seal still holds the force and no branch could increase."""
     steps_v = np.unique(ladder.voltage_v)
     for cut in range(TURN_STAIRS + 1):
-        turned = (ladder.direction < 0) & (ladder.voltage_v > steps_v[-1 - cut])
-        part = ladder.part((ladder.voltage_v >= steps_v[cut]) & ~turned)
+        reversal = (ladder.direction < 0) & (ladder.voltage_v > steps_v[-1 - cut])
+        part = ladder.part((ladder.voltage_v >= steps_v[cut]) & ~reversal)
         for ties in ("tied", "free"):
-            usable = [
-                found for found in fit_orders(part, "bsfm", ORDERS, ties, _full_range(ladder)) if found.verdicts.usable
-            ]
+            usable = [fit for fit in fit_orders(part, "bsfm", ORDERS, ties, _full_range(ladder)) if fit.verdicts.usable]
             if usable:
-                least_n = ORDER_TOLERANCE * min(found.overall.rms_n for found in usable)
-                return part, next(found.branches for found in usable if found.overall.rms_n <= least_n)
+                least_n = ORDER_TOLERANCE * min(fit.overall.rms_n for fit in usable)
+                return part, next(fit.branches for fit in usable if fit.overall.rms_n <= least_n)
     raise ValueError("no order gives branches that increase and do not cross")
 
 

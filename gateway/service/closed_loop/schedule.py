@@ -103,7 +103,7 @@ class SetpointSchedule:
 def columns_of(base: Plant, extended: Plant) -> frozenset[str]:
     """Return what has to move so that the extension is felt."""
     names = {treatment.name for treatment in differing_treatments(base, extended)}
-    found = {column for name, column in COLUMNS.items() if name in names}
+    columns = {column for name, column in COLUMNS.items() if name in names}
     friction, before = extended.friction, base.friction
     for field, column in (
         ("side_load_n_s_per_mm", "feed_mm_s"),
@@ -112,8 +112,8 @@ def columns_of(base: Plant, extended: Plant) -> frozenset[str]:
         ("side_load_n_per_mm", "position_mm"),
     ):
         if getattr(friction, field) != getattr(before, field):
-            found.add(column)
-    return frozenset(found)
+            columns.add(column)
+    return frozenset(columns)
 
 
 def draw_schedule(base: Plant, extended: Plant, seed: int, force_max_n: float) -> SetpointSchedule:

@@ -90,13 +90,15 @@ def _compensate(
 ) -> ControlSetup:
     """With everything that can be known. A model that the extended plant does not give, or that does worse on a trial run of
     its own seed, is not used: some friction (rigid, and wide) is beyond what the model's stops can follow."""
-    whole, kept = (compensation_of(base, extended, known_inputs, new_model=new) for new in (True, False))
-    old = ControlSetup(before.settings, before.model, kept)
+    on_new_model, on_old_model = (compensation_of(base, extended, known_inputs, new_model=new) for new in (True, False))
+    old = ControlSetup(before.settings, before.model, on_old_model)
     try:
-        model = identify_model(remove_compensated(extended, whole), HEADROOM * before.settings.limits.voltage_max_v)
+        model = identify_model(
+            remove_compensated(extended, on_new_model), HEADROOM * before.settings.limits.voltage_max_v
+        )
     except ValueError as error:
         return _without_model(old, f"the extended plant gives no model: {error}")
-    new = ControlSetup(before.settings, model, whole)
+    new = ControlSetup(before.settings, model, on_new_model)
     if model is before.model:
         return new
     wishes = draw_schedule(base, extended, seed, _reach_n(before.settings, (model, before.model)))
@@ -107,7 +109,7 @@ def _compensate(
 
 
 def _without_model(driver: ControlSetup, why: str) -> ControlSetup:
-    limited = tuple((name, why if said == CALIBRATE else said) for name, said in driver.compensation.limited)
+    limited = tuple((name, why if reason == CALIBRATE else reason) for name, reason in driver.compensation.limited)
     return replace(driver, compensation=replace(driver.compensation, limited=limited))
 
 
@@ -146,8 +148,8 @@ def _summarize(
 def _ratios(squares: Floats) -> Floats:
     """RMS after over before for seeds drawn with replacement; both runs of a seed stay together."""
     count = squares.shape[1]
-    drawn = default_rng(0).integers(0, count, (RESAMPLES, count))
-    sums = squares[:, drawn].sum(axis=2)
+    resamples = default_rng(0).integers(0, count, (RESAMPLES, count))
+    sums = squares[:, resamples].sum(axis=2)
     ratios: Floats = np.sqrt(sums[1] / sums[0])
     return ratios
 
@@ -160,28 +162,28 @@ def _mean_settled_s(runs: list[SimulatedRun]) -> float:
     return float(np.mean([settled_s for one in runs for settled_s in one.settled_s]))
 
 
-def format_gain(found: ClosedLoopGain) -> list[str]:
+def format_gain(gain: ClosedLoopGain) -> list[str]:
     """Return the lines that tell the gain in a terminal."""
-    low, high = found.rms_ratio_ci95
+    low, high = gain.rms_ratio_ci95
     lines = [
-        f"error in commanded force on the twin, {len(found.seeds)} seeds",
-        f"  RMS {_change(found.before_rms_n, found.after_rms_n)} N",
-        f"  after / before: {found.rms_ratio:.2f}, 95 % interval {low:.2f} .. {high:.2f}",
-        f"  largest error {_change(found.before_max_n, found.after_max_n)} N",
-        f"  a step is within 1 N for good after {_change(found.before_settled_s, found.after_settled_s)} s",
+        f"error in commanded force on the twin, {len(gain.seeds)} seeds",
+        f"  RMS {_change(gain.before_rms_n, gain.after_rms_n)} N",
+        f"  after / before: {gain.rms_ratio:.2f}, 95 % interval {low:.2f} .. {high:.2f}",
+        f"  largest error {_change(gain.before_max_n, gain.after_max_n)} N",
+        f"  a step is within 1 N for good after {_change(gain.before_settled_s, gain.after_settled_s)} s",
         *(
             ["  no gain: the interval holds 1, what was found matters little for the force that is commanded"]
             if low <= 1.0 <= high
             else []
         ),
-        f"compensated: {', '.join(found.compensated) or 'nothing'}",
-        *(f"not compensated: {name}: {why}" for name, why in found.not_compensated),
+        f"compensated: {', '.join(gain.compensated) or 'nothing'}",
+        *(f"not compensated: {name}: {why}" for name, why in gain.not_compensated),
     ]
-    for when, faults in (("before", found.before_faults), ("after", found.after_faults)):
+    for when, faults in (("before", gain.before_faults), ("after", gain.after_faults)):
         if faults:
-            stopped = f"{len(faults)} of {len(found.seeds)} runs {when}"
+            stopped = f"{len(faults)} of {len(gain.seeds)} runs {when}"
             lines.append(f"stopped by supervision: {stopped} ({', '.join(sorted(set(faults)))})")
-    return [*lines, *found.notes]
+    return [*lines, *gain.notes]
 
 
 def _change(before: float, after: float) -> str:

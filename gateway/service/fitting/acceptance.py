@@ -72,5 +72,5 @@ def _beyond_band(error: Error, tolerance_n: float) -> tuple[str, ...]:
 
 def _worse(error: Error, other: Error, number: int, tolerance_n: float) -> tuple[str, ...]:
     bound_n = max(WORSE_BY * other.rms_n, other.rms_n + WORSE_SHARE * tolerance_n)
-    said = f"{other.rms_n:.3f} N by calibration {number} in use on the same data"
-    return () if error.rms_n <= bound_n else (said,)
+    comparison = f"{other.rms_n:.3f} N by calibration {number} in use on the same data"
+    return () if error.rms_n <= bound_n else (comparison,)

@@ -81,8 +81,8 @@ def rejected_sentence(number: int, why: str) -> str:
 def main(arguments: list[str]) -> int:
     """Fit, store and print the result; return the exit code. arguments: the request as JSON."""
     priority.lower_priority()
-    asked = json.loads(arguments[0])
-    result = fit_and_store(Path(asked["recording"]), asked["rig"], Path(asked["state"]))
+    options = json.loads(arguments[0])
+    result = fit_and_store(Path(options["recording"]), options["rig"], Path(options["state"]))
     sys.stdout.write(json.dumps(result) + "\n")
     return 0 if "stored" in result else 65
 

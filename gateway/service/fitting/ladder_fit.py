@@ -114,12 +114,12 @@ def write_whole(target: Path, text: str) -> None:
         beside.unlink(missing_ok=True)
 
 
-def data_sha256(checked: CheckedLadder) -> str:
+def data_sha256(joined: CheckedLadder) -> str:
     """Return the SHA-256 of every settled point that the fit has used, as text with fixed digits."""
-    ladder = checked.ladder
+    ladder = joined.ladder
     rows = zip(ladder.voltage_v, ladder.force_n, ladder.direction, ladder.group, strict=True)
     text = "".join(f"{volts:.4f},{newtons:.6f},{way},{group}\n" for volts, newtons, way, group in rows)
     text += "".join(
-        f"{volts:.4f},{newtons:.6f}\n" for volts, newtons in zip(checked.minor_v, checked.minor_n, strict=True)
+        f"{volts:.4f},{newtons:.6f}\n" for volts, newtons in zip(joined.minor_v, joined.minor_n, strict=True)
     )
     return sha256(text.encode()).hexdigest()

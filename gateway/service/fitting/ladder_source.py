@@ -56,29 +56,29 @@ def _shift_to_zero(part: Recording, zero_n: float) -> Recording:
     moved_n = float(part.header.get("zero_n", zero_n)) - zero_n
     if moved_n == 0.0 or "force_n" not in part.columns:
         return part
-    said = f"{part.path.name} was recorded from another zero, {moved_n:+.2f} N: its forces were moved to that of the first part"
+    note = f"{part.path.name} was recorded from another zero, {moved_n:+.2f} N: its forces were moved to that of the first part"
     columns = part.columns | {"force_n": part.columns["force_n"] + moved_n}
-    return replace(part, columns=columns, notes=(*part.notes, said))
+    return replace(part, columns=columns, notes=(*part.notes, note))
 
 
 def check_source(recording: Recording, context: RigContext) -> CheckedLadder:
     """Return the ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
-    expected, said = expectation(recording, context)
+    expected, rig_notes = expectation(recording, context)
     recordings = read_resumed(recording)
-    checked = join_ladders([check_ladder(part.columns, part.header, expected) for part in recordings])
-    told = dict.fromkeys(note for part in recordings for note in part.notes)
-    return replace(checked, notes=(*told, *said, *checked.notes))
+    ladder = join_ladders([check_ladder(part.columns, part.header, expected) for part in recordings])
+    notes = dict.fromkeys(note for part in recordings for note in part.notes)
+    return replace(ladder, notes=(*notes, *rig_notes, *ladder.notes))
 
 
 def expectation(recording: Recording, context: RigContext) -> tuple[Expectation, list[str]]:
     """Return what to compare the data with, and sentences about what could not be compared."""
     recorded = str(recording.header.get("rig", "")).strip()
-    asked = context.rig or rig_of_state(context.state)
-    rig, said = find_rig(asked or recorded, str(recording.header.get("rig_file", "")))
+    rig_name = context.rig or rig_of_state(context.state)
+    rig, rig_notes = find_rig(rig_name or recorded, str(recording.header.get("rig_file", "")))
     reference = _reference(rig, context.state)
     fingerprint = recording.header.get("rig_fingerprint")
     if rig is not None and fingerprint and fingerprint != rig.fingerprint and recorded == rig.name:
-        said.append(f"the files of rig {rig.name} have changed since the recording was made")
+        rig_notes.append(f"the files of rig {rig.name} have changed since the recording was made")
     fallback_rig = rig or load_rig(_DEFAULT_RIG)
     plant = rig.plant if rig else None
     expected = Expectation(
@@ -87,17 +87,17 @@ def expectation(recording: Recording, context: RigContext) -> tuple[Expectation,
         if reference
         else f"{fallback_rig.calibration.name} (a stand-in)",
         area_mm2=plant.cylinder.area_m2 * _MM2_PER_M2 if plant else None,
-        rig=rig.name if rig and asked else asked,
+        rig=rig.name if rig and rig_name else rig_name,
         saturation_n=rig.control.supervision.saturation_n if rig else None,
         force_unit=context.force_unit,
     )
-    return expected, said
+    return expected, rig_notes
 
 
 def acceptance_bounds(recording: Recording, context: RigContext) -> tuple[float | None, Calibration | None]:
     """Return what a fit of it must not miss: the rig's in-band tolerance, N, and the calibration in use. None: not known."""
-    asked = context.rig or rig_of_state(context.state)
-    rig, _ = find_rig(asked or str(recording.header.get("rig", "")), str(recording.header.get("rig_file", "")))
+    rig_name = context.rig or rig_of_state(context.state)
+    rig, _ = find_rig(rig_name or str(recording.header.get("rig", "")), str(recording.header.get("rig_file", "")))
     tolerance_n = rig.control.defaults.in_band_tolerance_n if rig else None
     return tolerance_n, _reference(rig, context.state)
 

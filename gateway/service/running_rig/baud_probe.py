@@ -34,23 +34,21 @@ class ProbeResult:
 async def explain_silent_device(line: OutputLine | CellLine, path: str) -> str:
     """Return one sentence, E110 or E111 (or E10x when the port cannot be opened)."""
     try:
-        heard = [await listen_at(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
+        probes = [await listen_at(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
     except PortError as error:
         return str(error)
-    return _sentence(path, heard[0], heard[1:])
+    return _sentence(path, probes[0], probes[1:])
 
 
 def _sentence(path: str, here: ProbeResult, elsewhere: list[ProbeResult]) -> str:
     if here.valid:
         return f"{path}: valid lines at {here.baud}; the device was silent a moment ago"
     saw = f"{here.bytes} bytes, 0 valid lines at {here.baud}"
-    found = max(elsewhere, key=lambda heard: heard.valid)
-    if found.valid:
-        return (
-            f"E110 {path}: {saw}; at {found.baud} the same device gives valid lines: set baud: {found.baud} in the rig"
-        )
-    if here.bytes or any(heard.bytes for heard in elsewhere):
-        tried = ", ".join(str(heard.baud) for heard in elsewhere)
+    best = max(elsewhere, key=lambda probe: probe.valid)
+    if best.valid:
+        return f"E110 {path}: {saw}; at {best.baud} the same device gives valid lines: set baud: {best.baud} in the rig"
+    if here.bytes or any(probe.bytes for probe in elsewhere):
+        tried = ", ".join(str(probe.baud) for probe in elsewhere)
         return f"E110 {path}: {saw}, nor at {tried}: another device on this port, or another parity?"
     return f"E111 {path}: silence at every speed; power, crossed wires, stream mode? force-gateway explain E111"
 

@@ -66,15 +66,15 @@ class CalibrationRuns:
         {"plan": {...}, "continues": [numbers], "name": text} starts, with "dry_run": true it is only tried; {"stop": true}
         stops; neither tells how it is.
         """
-        asked = parse_request(CalibrateRequest, request)
+        query = parse_request(CalibrateRequest, request)
         self._followed_s = self._clock()
-        if asked.dry_run:
-            return self._try_plan(_parse_plan(asked.plan))
-        if asked.stop:
+        if query.dry_run:
+            return self._try_plan(_parse_plan(query.plan))
+        if query.stop:
             self._calibrating.ask_stop("calibration stopped at this machine")
-        elif asked.plan is not None:
-            self._start(asked.plan, asked.continues)
-            self._name = asked.name
+        elif query.plan is not None:
+            self._start(query.plan, query.continues)
+            self._name = query.name
         if refused := self._calibrating.take_refused():
             raise ValueError(refused)
         return self.status()
@@ -230,8 +230,8 @@ class CalibrationRuns:
             self._log("calibration", f"calibration {self.stored} stored, not active; report {result['report']}")
         else:
             self._calibrating.phase = CalibrationPhase.REFUSED
-            told = f"; report {result['report']}" if "report" in result else ""
-            self._log("calibration", f"{result.get('refused')}{told}")
+            report_clause = f"; report {result['report']}" if "report" in result else ""
+            self._log("calibration", f"{result.get('refused')}{report_clause}")
 
 
 def _describe_experiment(plan: AnyPlan) -> Answer:
@@ -239,26 +239,26 @@ def _describe_experiment(plan: AnyPlan) -> Answer:
     if not isinstance(plan, ExperimentPlan):
         return {"experiment": "", "check": True, "notes": [], "questions": []}
     missing = [name for name in plan.columns if name not in COLUMNS]
-    told = f"this gateway does not record {' and '.join(missing)}: record it beside, and join the tables by time"
+    advice = f"this gateway does not record {' and '.join(missing)}: record it beside, and join the tables by time"
     return {
         "experiment": f"experiment {plan.name}, {len(plan.parts)} parts ({', '.join(part.name for part in plan.parts)})",
         "check": plan.check,
-        "notes": [told] if missing else [],
+        "notes": [advice] if missing else [],
         "questions": [f"Ready to do this while it runs: {text}?" for text in plan.by_hand],
     }
 
 
 def _describe_progress(run: AnyRun | None) -> Answer:
     """Return how far a run is, in its own terms."""
-    told: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
+    progress: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
     if isinstance(run, ExperimentRun):
         part = run.part
-        return told | {"part": part + 1, "parts": len(run.plan.parts), "part_name": run.plan.parts[part].name}
+        return progress | {"part": part + 1, "parts": len(run.plan.parts), "part_name": run.plan.parts[part].name}
     if run is None:
-        return told
+        return progress
     stair = run.stairs[min(run.done, len(run.stairs) - 1)]
     groups = run.plan.groups
-    return told | {"stair": run.done, "stairs": len(run.stairs), "group": stair.group + 1, "groups": groups}
+    return progress | {"stair": run.done, "stairs": len(run.stairs), "group": stair.group + 1, "groups": groups}
 
 
 def _header_of_plan(run: AnyRun) -> Answer:

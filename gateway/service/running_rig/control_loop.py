@@ -95,10 +95,10 @@ class ControlLoop:
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
 
-    def _on_asked(self, asked: ProposedWrite) -> EdgeRefusal | None:
+    def _on_asked(self, proposal: ProposedWrite) -> EdgeRefusal | None:
         """Before the bank stores a write: whether control can take it at this moment."""
         now_s = self._clock()
-        return self.controller.refusal_of(now_s, asked, self._line(now_s))
+        return self.controller.refusal_of(now_s, proposal, self._line(now_s))
 
     def _on_command(self, command: Command) -> None:
         self.owner_connected = True

@@ -37,14 +37,14 @@ class CellExchange:
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
         """Return what these bytes complete; the next question goes out at once where it is due."""
-        found = self._host.receive(chunk, now_s)
-        if any(isinstance(one, ForceSample) for one in found):
+        messages = self._host.receive(chunk, now_s)
+        if any(isinstance(one, ForceSample) for one in messages):
             if self._is_overdue:
                 self._is_overdue = False  # of the question before, perhaps: the one that is out has its time
             else:
                 self._sent_s = None
         self._send_next(now_s)
-        return found
+        return messages
 
     def tick(self, now_s: float) -> None:
         """Give up waiting for an overdue answer, and ask again."""

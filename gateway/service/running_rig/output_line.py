@@ -139,36 +139,36 @@ class OutputExchange:
             self.garbage_bytes += len(reply.data)
             self._is_overdue = self._is_overdue and self._in_flight is not None  # unasked: that was it
             return
-        asked, self._in_flight = self._in_flight, None
+        request, self._in_flight = self._in_flight, None
         self.unanswered_since_s = None
-        if self._is_overdue and not self._is_echo(asked, reply):
+        if self._is_overdue and not self._is_echo(request, reply):
             self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
         self.round_trip_s = now_s - self._sent_s
         if isinstance(reply, Pressure):
-            self._failures[type(asked)] = 0
+            self._failures[type(request)] = 0
             self.pressure_pa = reply.pressure_pa
         elif isinstance(reply, Refused):
-            self._count_failure(type(asked), FaultCode.OUTPUT_REFUSED)
-        elif asked is not None and isinstance(reply, Accepted):
-            self._check_setting(asked, reply)
+            self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
+        elif request is not None and isinstance(reply, Accepted):
+            self._check_setting(request, reply)
 
-    def _is_echo(self, asked: OutputRequest | None, reply: OutputReply) -> bool:
+    def _is_echo(self, request: OutputRequest | None, reply: OutputReply) -> bool:
         return (
-            isinstance(asked, SetVoltage)
+            isinstance(request, SetVoltage)
             and isinstance(reply, Accepted)
-            and self._host.confirms(asked.voltage_v, reply, asked)
+            and self._host.confirms(request.voltage_v, reply, request)
         )
 
-    def _check_setting(self, asked: OutputRequest, reply: Accepted) -> None:
+    def _check_setting(self, request: OutputRequest, reply: Accepted) -> None:
         """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted."""
         self.acknowledged_v = self._standing_v = reply.voltage_v
-        if not self._host.confirms(self._asked_v, reply, asked):
-            self._count_failure(type(asked), FaultCode.OUTPUT_ALTERED)
+        if not self._host.confirms(self._asked_v, reply, request):
+            self._count_failure(type(request), FaultCode.OUTPUT_ALTERED)
             return
         if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:
             self._standing_v = self._asked_v  # the answer only counts in coarser steps
-        self._failures[type(asked)] = 0
+        self._failures[type(request)] = 0
         if max(self._failures.values()) < _FAILURES_BEFORE_FAULT:
             self.fault = FaultCode.NONE
 

@@ -24,10 +24,10 @@ class LoopHealth:
 
     def lateness_us(self, share: float) -> int:
         """Return the upper bound in us of the lateness that this share of the ticks stayed under."""
-        wanted, seen = share * sum(self.lateness), 0
+        wanted_ticks, ticks = share * sum(self.lateness), 0
         for bits, count in enumerate(self.lateness):
-            seen += count
-            if seen >= wanted and seen:
+            ticks += count
+            if ticks >= wanted_ticks and ticks:
                 return 1 << bits
         return 0
 

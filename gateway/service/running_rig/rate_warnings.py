@@ -73,12 +73,12 @@ class LineNoise(_RateWarning):
         if not dropped:
             return ""
         self._last_s = now_s
-        count, heard, size = self._recent.totals()
-        if self.is_on or count < LEAST or count <= SHARE * heard:
+        count, total, size = self._recent.totals()
+        if self.is_on or count < LEAST or count <= SHARE * total:
             return ""
         self.is_on = True
-        seen = f"{count:.0f} of {heard:.0f} messages ({size:.0f} bytes) within {WINDOW_S:g} s could not be read"
-        return f"A341 {self._line}: {seen} and were dropped; {_cause_of_noise(heard - count)}"
+        observation = f"{count:.0f} of {total:.0f} messages ({size:.0f} bytes) within {WINDOW_S:g} s could not be read"
+        return f"A341 {self._line}: {observation} and were dropped; {_cause_of_noise(total - count)}"
 
 
 def _cause_of_noise(whole: float) -> str:
@@ -116,22 +116,20 @@ class SlowLoop(_RateWarning):
             return ""
         self.is_on = True
         bound = _ms(LATE_PERIODS * self._period_s)
-        seen = f"{missed:.0f} of {ticks:.0f} ticks within {WINDOW_S:g} s were missed or over {bound} late"
-        return f"A342 {seen}, {_cause_of_lateness(*spent_s, is_counted=used is not None)}"
+        observation = f"{missed:.0f} of {ticks:.0f} ticks within {WINDOW_S:g} s were missed or over {bound} late"
+        return f"A342 {observation}, {_cause_of_lateness(*spent_s, is_counted=used is not None)}"
 
 
 def _cause_of_lateness(late_s: float, waited_s: float, ran_s: float, *, is_counted: bool) -> str:
     """The machine or the program, by what took most of the lateness; all in seconds."""
     if not is_counted:
         return f"{_ms(late_s)} in all, not counted why: end other programs, or `run --realtime`"
-    seen = f"{_ms(late_s)} in all, {_ms(waited_s)} of them waiting for a processor, {_ms(ran_s)} at work"
+    times_text = f"{_ms(late_s)} in all, {_ms(waited_s)} of them waiting for a processor, {_ms(ran_s)} at work"
     if waited_s >= _HALF * late_s:
-        return f"{seen}: the machine is too busy; end other programs, or `run --realtime`"
+        return f"{times_text}: the machine is too busy; end other programs, or `run --realtime`"
     if ran_s >= _HALF * late_s:
-        return (
-            f"{seen}: the gateway's own work takes too long here; a slower loop_hz, fewer clients, or a faster machine"
-        )
-    return f"{seen}: this machine stood still or slept (a virtual one on a busy host, a CPU in deep sleep)"
+        return f"{times_text}: the gateway's own work takes too long here; a slower loop_hz, fewer clients, or a faster machine"
+    return f"{times_text}: this machine stood still or slept (a virtual one on a busy host, a CPU in deep sleep)"
 
 
 def _ms(seconds: float) -> str:

@@ -246,11 +246,11 @@ class RunningRig:
         if self._line.acknowledged_v is not None and self.loop.sample is not None:
             self._spoke.set()
 
-    def _on_calibration(self, taken: ActiveCalibration) -> None:
+    def _on_calibration(self, active: ActiveCalibration) -> None:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
-        self.controller.use(self._rig.calibration_in_use(taken.calibration, taken.model))
-        self._recordings.calibration_number = taken.calibration.number
-        lowered = self.bank.set_active_model(taken.calibration, taken.pointer.active.slot_word)
+        self.controller.use(self._rig.calibration_in_use(active.calibration, active.model))
+        self._recordings.calibration_number = active.calibration.number
+        lowered = self.bank.set_active_model(active.calibration, active.pointer.active.slot_word)
         if lowered:
             self._log("calibration", lowered)
         self.loop.refresh()

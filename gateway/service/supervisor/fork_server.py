@@ -79,10 +79,10 @@ def prepare(options: dict[str, Any]) -> None:
 
 def serve(link: socket.socket) -> None:
     """Fork for whatever is asked, until the guardian is gone."""
-    asked = select.poll()
-    asked.register(link, select.POLLIN)
+    poll = select.poll()
+    poll.register(link, select.POLLIN)
     while True:
-        asked.poll()
+        poll.poll()
         message = guardian_link.receive(link)
         if message is None:
             return

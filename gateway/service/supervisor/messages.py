@@ -52,8 +52,8 @@ def describe_acknowledgement(acknowledged: bool | None) -> str:
 
 def too_many_sentence(causes: Counter[EndCause]) -> str:
     """Return what the log says when the guardian gives up."""
-    counted = ", ".join(f"{count} {cause.value}" for cause, count in causes.most_common())
-    sentence = f"A402 five restarts in {WINDOW_S:.0f} s ({counted}): the safe voltage is held, the gateway stops"
+    counts = ", ".join(f"{count} {cause.value}" for cause, count in causes.most_common())
+    sentence = f"A402 five restarts in {WINDOW_S:.0f} s ({counts}): the safe voltage is held, the gateway stops"
     if causes.most_common(1)[0][0] is EndCause.MACHINE_BUSY:
         sentence += "; the machine is too busy for it (A403)"
     return sentence

@@ -44,15 +44,15 @@ class SafeLine:
     def _wait_for_acknowledgement(self, timeout_s: float) -> bool:
         """Return whether the reply came. It counts as a whole line only: the 0 at the end of 510 acknowledges nothing."""
         deadline_s = time.monotonic() + timeout_s
-        seen = b""
+        received = b""
         while (left_s := deadline_s - time.monotonic()) > 0:
             if not select.select([self.descriptor], [], [], left_s)[0]:
                 return False
             chunk = os.read(self.descriptor, 256)
             if not chunk:
                 return False
-            seen += chunk
-            if self.reply.strip(b"\r\n") in re.split(rb"[\r\n]+", seen)[:-1]:
+            received += chunk
+            if self.reply.strip(b"\r\n") in re.split(rb"[\r\n]+", received)[:-1]:
                 return True
         return False
 

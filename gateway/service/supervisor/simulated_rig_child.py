@@ -97,8 +97,8 @@ class RigSupervisor:
             if message is not None and message.tag == message_link.BORN:
                 child.adopt(int(message.body["pid"]))
             elif message is not None and message.tag == message_link.PTYS:
-                told = {"pid": int(message.body["pid"])} if "pid" in message.body else {}
-                self._due_s, self._answer = inf, {"ptys": dict(message.body["ptys"]), **told}
+                pid_field = {"pid": int(message.body["pid"])} if "pid" in message.body else {}
+                self._due_s, self._answer = inf, {"ptys": dict(message.body["ptys"]), **pid_field}
         except (OSError, ValueError, KeyError, TypeError):
             child.kill()
             self._on_death_of_child("its first words made no sense", now_s)
