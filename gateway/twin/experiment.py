@@ -3,7 +3,7 @@
 Used by tools/fit_demo, tools/paper and the tests, so that all of them run the same experiment.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -51,21 +51,6 @@ def staircase(twin: Twin, voltages_v: Iterable[float], dwell: Dwell) -> Floats:
             total = total + twin.read()
         measured.append(total / dwell.readings)
     return np.asarray(measured, dtype=np.float64)
-
-
-def trace(twin: Twin, duration_s: float, look: Callable[[Twin], Any], every_s: float = 1.0e-3) -> Floats:
-    """Return what `look` sees after each `every_s` of `duration_s`; shape (samples,), or (samples, lanes)."""
-    samples = []
-    for _ in range(round(duration_s / every_s)):
-        twin.advance(every_s)
-        samples.append(look(twin))
-    return np.asarray(samples, dtype=np.float64)
-
-
-def step_response(twin: Twin, voltage_v: float, duration_s: float = 1.5) -> Floats:
-    """Return the true contact force every millisecond after a step of the command, N."""
-    twin.command(voltage_v)
-    return trace(twin, duration_s, lambda running: running.force_n)
 
 
 def settling_time_s(force_n: Floats, target_n: float, band_n: float, every_s: float = 1.0e-3) -> float:

@@ -5,8 +5,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin
-from gateway.twin.experiment import trace
 from gateway.twin.plant import with_value
+from tests.twin.traces import trace
 
 _QUIET = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from gateway.twin import LoadCell, Plant, Regulator, Twin, stack
-from gateway.twin.experiment import Dwell, settling_time_s, staircase, step_response, trace
+from gateway.twin.experiment import Dwell, settling_time_s, staircase
 from gateway.twin.plant import with_value
+from tests.twin.traces import step_response, trace
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 0.05, 0.2])

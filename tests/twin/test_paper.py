@@ -22,8 +22,9 @@ from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
 from gateway.bsfm.model import Calibration
 from gateway.bsfm.validate import validate_coefficients
 from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin
-from gateway.twin.experiment import Dwell, Floats, settling_time_s, staircase, step_response
+from gateway.twin.experiment import Dwell, Floats, settling_time_s, staircase
 from gateway.twin.plant import with_value
+from tests.twin.traces import step_response
 
 ROOT = Path(__file__).parents[2]
 SECTIONS = {

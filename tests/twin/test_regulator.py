@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gateway.twin import Plant, Regulator, Twin
-from gateway.twin.experiment import Floats, trace
+from gateway.twin.experiment import Floats
+from tests.twin.traces import trace
 
 STEP_PA = 0.9e6 / 1023
 

@@ -8,8 +8,9 @@ import pytest
 import yaml
 
 from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin, stack
-from gateway.twin.experiment import Floats, trace
+from gateway.twin.experiment import Floats
 from gateway.twin.plant import values, with_value
+from tests.twin.traces import trace
 
 RICH = Plant(
     regulator=Regulator(

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gateway.twin import Contact, Cylinder, Friction, Plant, Regulator, Twin
-from gateway.twin.experiment import Floats, trace
+from gateway.twin.experiment import Floats
+from tests.twin.traces import trace
 
 NEWTON_PER_VOLT = 9.0
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gateway.twin import Contact, Friction, LoadCell, Plant, Regulator, Surroundings, Twin
-from gateway.twin.experiment import Floats, trace
+from gateway.twin.experiment import Floats
+from tests.twin.traces import trace
 
 AROUND = Surroundings(
     temperature_c=30.0,

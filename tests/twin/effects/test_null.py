@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from gateway.twin import UNLIMITED, Contact, Friction, LoadCell, Plant, Regulator, Surroundings, Twin, stack
-from gateway.twin.experiment import Floats, trace
+from gateway.twin.experiment import Floats
 from gateway.twin.plant import values, with_value
+from tests.twin.traces import trace
 
 DIMENSIONS = {
     ("regulator", "full_scale_v"),
