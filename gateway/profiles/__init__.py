@@ -9,7 +9,7 @@ Nothing here imports scipy: `check` answers at once.
 
 from gateway.profiles.find import list_shipped, shipped_profiles_folder
 from gateway.profiles.kinds.any_file import Checked, check_file
-from gateway.profiles.kinds.kinds import CALLED
+from gateway.profiles.kinds.file_kind import CALLED
 from gateway.profiles.kinds.plants import Origin, PlantProfile
 from gateway.profiles.load import load_calibration, load_plant, load_register_map
 from gateway.profiles.rigs.assembly import Report, check_report, load_rig

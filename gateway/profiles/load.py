@@ -12,7 +12,7 @@ from typing import TypeVar
 from gateway.bsfm.model import Calibration
 from gateway.profiles.find import display, locate
 from gateway.profiles.kinds.calibrations import read_calibration
-from gateway.profiles.kinds.kinds import CALLED, kind_of
+from gateway.profiles.kinds.file_kind import CALLED, kind_of
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
 from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault

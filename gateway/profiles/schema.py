@@ -20,7 +20,7 @@ from gateway.devices import DeviceProfile
 from gateway.profiles.kinds.plants import ABOUT
 from gateway.profiles.kinds.registers_schema import register_map_schema
 from gateway.profiles.rigs.rig_file import RigFile
-from gateway.profiles.strict_yaml.sentences import unit_of, without_unit
+from gateway.profiles.strict_yaml.fault_sentences import unit_of, without_unit
 from gateway.profiles.strict_yaml.typed import adapter, groups
 from gateway.twin import Plant
 

@@ -17,7 +17,7 @@ from gateway.recording.tables.column_mapping import EXAMPLE, join_names, quantit
 from gateway.recording.tables.columns import SENT
 from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
 from gateway.recording.tables.even_rows import resample_evenly
-from gateway.recording.tables.judged_rows import flag_repeated, valid_by_quality
+from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality
 from gateway.recording.tables.time_axis import TimeAxis, check_time_axis
 from gateway.units import linear_conversion
 

@@ -10,7 +10,7 @@ from gateway.registers.map.document import FORMATS, render_block, render_registe
 from gateway.registers.map.map_reader import MapError
 from gateway.registers.map.register_map import Block, Register, RegisterMap, UnknownRegister
 from gateway.registers.refusal import Refusal
-from gateway.registers.rules import BankRules
+from gateway.registers.rig_rules import BankRules
 from gateway.registers.values import WordOrder
 
 __all__ = [

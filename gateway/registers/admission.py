@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
+from gateway.registers.byte_order_echo import ByteOrderEcho
 from gateway.registers.command import Command
 from gateway.registers.command_block import (
     CONTROL_WORD,
@@ -23,12 +24,11 @@ from gateway.registers.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.echo import ByteOrderEcho
 from gateway.registers.edge_questions import Decide, ProposedWrite, decide_nothing
 from gateway.registers.map.register_map import Block
 from gateway.registers.ownership import Ownership
 from gateway.registers.refusal import Refusal
-from gateway.registers.rules import BankRules
+from gateway.registers.rig_rules import BankRules
 from gateway.registers.words import ControlBit
 
 ENABLE: Final = int(ControlBit.ENABLE)

@@ -17,7 +17,7 @@ from gateway.registers.command_field import CommandField, command_field
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal
-from gateway.registers.rules import BankRules
+from gateway.registers.rig_rules import BankRules
 from gateway.registers.values import WordOrder, swap_words, words_swapped_from_little_endian
 from gateway.registers.words import ControlBit, Mode
 

@@ -13,7 +13,7 @@ from typing import Final
 from gateway.codes.refusals import RefusalReason
 from gateway.registers.map.register_map import Register
 from gateway.registers.refusal import Refusal, allowed_range, quantity
-from gateway.registers.rules import BankRules
+from gateway.registers.rig_rules import BankRules
 from gateway.registers.values import WordOrder, float32, pack_number, unpack_number
 
 SMALLEST_MEANT: Final = 1.0e-3

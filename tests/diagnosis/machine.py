@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis import Measurement
-from gateway.recording.tables.judged_rows import flag_repeated
+from gateway.recording.tables.row_validity import flag_repeated
 from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 from gateway.twin.replay.replay import Drive, Replay
 from gateway.twin.surroundings import Surroundings

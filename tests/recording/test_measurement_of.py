@@ -13,8 +13,8 @@ from gateway.diagnosis.measurement import Measurement
 from gateway.recording import Recording, RecordingError, read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.columns import DERIVED
-from gateway.recording.tables.judged_rows import flag_repeated, valid_by_quality
 from gateway.recording.tables.mapping_file import column_mapping
+from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality
 
 N = 1000
 TIME_S = np.arange(N) / 200.0

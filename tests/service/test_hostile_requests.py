@@ -16,8 +16,8 @@ from gateway.processes.json_socket import JsonLineServer
 from gateway.registers.words import State
 from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
-from gateway.service.running_rig.calibrations import RigCalibrations
 from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.simulated_rig import SimulatedRig
 from gateway.service.watch_reports import WatchReports
 from tests.service.hostile import garbage, mutants

@@ -8,7 +8,7 @@ from typing import Any, Final
 from gateway.profiles.find import FOLDERS, list_shipped
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
-from gateway.profiles.kinds.kinds import kind_of
+from gateway.profiles.kinds.file_kind import kind_of
 from gateway.profiles.kinds.plans import AnyPlan, read_plan
 from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.kinds.registers import read_registers

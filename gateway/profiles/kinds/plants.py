@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from gateway.profiles.strict_yaml.fault_sentences import number, quote_value, unit_of, unknown_key
 from gateway.profiles.strict_yaml.faults import Path, ProfileFault, path_text
-from gateway.profiles.strict_yaml.sentences import number, quote_value, unit_of, unknown_key
 from gateway.profiles.strict_yaml.text import Document, Mark
 from gateway.profiles.strict_yaml.typed import build, kind_at, names
 from gateway.twin import Plant

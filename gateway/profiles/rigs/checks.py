@@ -16,7 +16,7 @@ from gateway.control.settings import Defaults, Limits, Supervision, Trim
 from gateway.devices import DeviceProfile
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile
-from gateway.profiles.strict_yaml.sentences import newton, number, second, volt
+from gateway.profiles.strict_yaml.fault_sentences import newton, number, second, volt
 
 Found = Iterator[tuple[str, str]]
 """(dotted path of the file, sentence)."""

@@ -7,7 +7,7 @@ from gateway.devices import DeviceProfile, Role, cell_host
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.rig_file import CellFile, OutputFile
-from gateway.profiles.strict_yaml.sentences import number, volt
+from gateway.profiles.strict_yaml.fault_sentences import number, volt
 
 _UNSTABLE_PATHS: Final = ("/dev/ttyUSB", "/dev/ttyACM")  # numbered in the order of plugging
 _ROLES: Final = {"output": Role.OUTPUT, "load_cell": Role.LOAD_CELL}

@@ -23,7 +23,7 @@ from gateway.devices.messages import (
 )
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.line_checks import of_role
-from gateway.profiles.strict_yaml.sentences import newton, number, second
+from gateway.profiles.strict_yaml.fault_sentences import newton, number, second
 
 _COUNTS_OF_NOISE: Final = 0.7  # a rate that needs more noise than this to find a frozen cell gets a warning
 _LEAST_QUANTUM_COUNTS: Final = 0.5  # below half a count every repeated reading looks frozen; rounding stays above it

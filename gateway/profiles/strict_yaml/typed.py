@@ -14,8 +14,8 @@ from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_t
 
 from pydantic import TypeAdapter, ValidationError
 
+from gateway.profiles.strict_yaml.fault_sentences import type_sentence, unit_of, unknown_key
 from gateway.profiles.strict_yaml.faults import FaultKind, Path, ProfileFault, path_text
-from gateway.profiles.strict_yaml.sentences import type_sentence, unit_of, unknown_key
 from gateway.profiles.strict_yaml.text import Document
 
 T = TypeVar("T")

@@ -16,7 +16,7 @@ from gateway.registers.command_block import check_zeros
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.refusal import Refusal
-from gateway.registers.rules import BankRules
+from gateway.registers.rig_rules import BankRules
 from gateway.registers.upload.coefficients import (
     BLOCK_BYTES,
     HEAD_BYTES,

@@ -15,7 +15,7 @@ from gateway.devices.messages import ForceSample, Quality
 from gateway.modbus import Peer
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, Refusal, RegisterBank
-from gateway.registers.rules import BASIC_BITS
+from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from tests.control.bench import SmallPlant, bsfm, settings

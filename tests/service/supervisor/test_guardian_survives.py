@@ -392,7 +392,7 @@ def test_a_reader_that_has_gone_does_not_end_the_guardian():
     reader, writer = os.pipe()
     os.close(reader)
     code = (
-        "from gateway.service.supervisor.messages import print_error, print_ready; print_ready('READY'); "
+        "from gateway.service.supervisor.guardian_sentences import print_error, print_ready; print_ready('READY'); "
         "print_ready({}); print_error('A401')"
     )
     done = subprocess.run([sys.executable, "-c", code], stdout=writer, stderr=writer, check=False)
