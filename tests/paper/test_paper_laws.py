@@ -41,11 +41,11 @@ def test_more_seeds_make_a_narrower_interval() -> None:
 
 
 def test_a_goal_is_met_only_by_the_whole_interval() -> None:
-    def found(ratios: list[float]) -> Comparison:
+    def comparison(ratios: list[float]) -> Comparison:
         return compare_scores("error", "N", {"bsfm": np.ones(4), "ours": np.array(ratios)}, goal=0.5)
 
-    assert found([0.3, 0.4, 0.35, 0.3]).meets("ours")
-    assert not found([0.1, 0.9, 0.1, 0.9]).meets("ours")
+    assert comparison([0.3, 0.4, 0.35, 0.3]).meets("ours")
+    assert not comparison([0.1, 0.9, 0.1, 0.9]).meets("ours")
 
 
 def test_a_verdict_is_a_check_not_an_opinion() -> None:

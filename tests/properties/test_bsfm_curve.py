@@ -138,11 +138,11 @@ def test_rounding_to_float32_keeps_a_usable_curve_or_is_refused(curve):
     assert stored == stored.round_to_float32()
     if validate_coefficients(raw, LIMITS):
         return
-    kept = RationalBezier(stored.x0_v, stored.x1_v, stored.rising_handles_n, stored.rising_weights)
-    assert kept.is_increasing()
+    remaining = RationalBezier(stored.x0_v, stored.x1_v, stored.rising_handles_n, stored.rising_weights)
+    assert remaining.is_increasing()
     for i in range(11):
         x = curve.x1 * i / 10
-        assert abs(kept.value(x) - curve.value(x)) <= 4e-6 * (1.0 + max(map(abs, curve.handles)))
+        assert abs(remaining.value(x) - curve.value(x)) <= 4e-6 * (1.0 + max(map(abs, curve.handles)))
 
 
 def with_weight(weight: float, index: int) -> Coefficients:

@@ -45,13 +45,13 @@ def test_voltage_is_continuous_along_any_path_of_force(path):
 @given(st.floats(1.0, 37.0), st.floats(0.0, 0.05), st.integers(1, 30))
 def test_chatter_moves_the_voltage_by_its_share_of_the_loop_and_does_not_drift(force, chatter, cycles):
     state = MODEL.reversal.advance(1.0, force)
-    seen = []
+    values = []
     for _ in range(cycles):
         for delta in (-chatter, chatter):
             state = MODEL.reversal.advance(state, delta)
-        seen.append(MODEL.voltage_v(force, state)[0])
-    assert max(seen) - min(seen) <= 1e-12
-    assert abs(seen[0] - RISING.inverse(force)[0]) <= 2 * chatter / SPAN_N * WIDTH_V + 1e-12
+        values.append(MODEL.voltage_v(force, state)[0])
+    assert max(values) - min(values) <= 1e-12
+    assert abs(values[0] - RISING.inverse(force)[0]) <= 2 * chatter / SPAN_N * WIDTH_V + 1e-12
 
 
 @MANY

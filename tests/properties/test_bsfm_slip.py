@@ -33,7 +33,7 @@ def stop_sets(draw: st.DrawFn) -> SlipStops:
     return SlipStops(tuple(first_v + width for width in accumulate(widths)), tuple(p / sum(parts) for p in parts))
 
 
-def walked(model: Bsfm, path: list[float], memory: Memory | None = None, from_n: float = LOW_N) -> Memory:
+def memory_along(model: Bsfm, path: list[float], memory: Memory | None = None, from_n: float = LOW_N) -> Memory:
     memory = memory or model.reversal.start()
     for force_n in path:
         memory, from_n = model.memory_after(memory, from_n, force_n), force_n
@@ -64,7 +64,7 @@ def test_the_voltage_solves_its_own_equation(stops, path):
 @given(stop_sets(), paths)
 def test_force_to_voltage_to_force_is_a_round_trip(stops, path):
     model = Bsfm(BRANCHES, stops)
-    memory = walked(model, path)
+    memory = memory_along(model, path)
     volts = voltage_v(model, memory, path[-1])
     assert math.isclose(model.settled_n(volts, model.branch_share(memory)), path[-1], abs_tol=1e-9)
 
@@ -84,9 +84,11 @@ def test_every_stop_and_the_share_stay_within_one(stops, path):
 def test_the_voltage_is_continuous_in_the_force_and_grows_with_it(stops, path, delta_n):
     """dV/df is positive and at most that of the gentler branch over 1 - h sum c/r."""
     model = Bsfm(BRANCHES, stops)
-    memory, force_n = walked(model, path), path[-1]
+    memory, force_n = memory_along(model, path), path[-1]
     there_n = min(max(force_n + delta_n, LOW_N), HIGH_N)
-    rise_v = voltage_v(model, walked(model, [there_n], memory, force_n), there_n) - voltage_v(model, memory, force_n)
+    rise_v = voltage_v(model, memory_along(model, [there_n], memory, force_n), there_n) - voltage_v(
+        model, memory, force_n
+    )
     steepest = 1.0 / GENTLEST_N_PER_V / (1.0 - WIDEST_V * stops.stiffness_per_v)
     assert -1e-12 <= rise_v * math.copysign(1.0, there_n - force_n) <= abs(there_n - force_n) * steepest + 1e-12
 
@@ -94,9 +96,9 @@ def test_the_voltage_is_continuous_in_the_force_and_grows_with_it(stops, path, d
 @MANY
 @given(paths, forces, st.integers(1, 40))
 def test_cutting_a_movement_into_steps_changes_nothing(path, target_n, steps):
-    before, from_n = walked(MODEL, path), path[-1]
+    before, from_n = memory_along(MODEL, path), path[-1]
     parts = [from_n + (target_n - from_n) * (k + 1) / steps for k in range(steps - 1)]
-    whole, cut = (walked(MODEL, way, before, from_n) for way in ([target_n], [*parts, target_n]))
+    whole, cut = (memory_along(MODEL, way, before, from_n) for way in ([target_n], [*parts, target_n]))
     assert cut == pytest.approx(whole, abs=1e-9)
 
 
@@ -104,9 +106,9 @@ def test_cutting_a_movement_into_steps_changes_nothing(path, target_n, steps):
 @given(paths, forces, forces, st.integers(1, 4))
 def test_a_closed_minor_loop_comes_back_to_the_same_memory_and_voltage(path, first_n, turn_n, rounds):
     """Return points: after one round between two forces the next rounds repeat it, and nothing else is changed."""
-    before = walked(MODEL, [*path, first_n])
-    once = walked(MODEL, [turn_n, first_n], before, first_n)
-    again = walked(MODEL, [turn_n, first_n] * rounds, once, first_n)
+    before = memory_along(MODEL, [*path, first_n])
+    once = memory_along(MODEL, [turn_n, first_n], before, first_n)
+    again = memory_along(MODEL, [turn_n, first_n] * rounds, once, first_n)
     assert again == pytest.approx(once, abs=1e-9)
     assert math.isclose(voltage_v(MODEL, again, first_n), voltage_v(MODEL, once, first_n), abs_tol=1e-9)
 
@@ -116,21 +118,21 @@ def test_a_closed_minor_loop_comes_back_to_the_same_memory_and_voltage(path, fir
 def test_a_loop_inside_a_movement_is_wiped_out_when_it_closes(turns, rising):
     """Nested excursions that return to where they left the way do not change where the way leads."""
     start_n, end_n = (LOW_N, HIGH_N) if rising else (HIGH_N, LOW_N)
-    memory = walked(MODEL, [HIGH_N, LOW_N, start_n])
-    straight, detours, here_n = walked(MODEL, [end_n], memory, start_n), memory, start_n
+    memory = memory_along(MODEL, [HIGH_N, LOW_N, start_n])
+    straight, detours, here_n = memory_along(MODEL, [end_n], memory, start_n), memory, start_n
     for leave_n, depth in sorted(turns, reverse=not rising):
         back_n = leave_n + depth * (start_n - leave_n)
-        detours, here_n = walked(MODEL, [leave_n, back_n, leave_n], detours, here_n), leave_n
-    assert walked(MODEL, [end_n], detours, here_n) == pytest.approx(straight, abs=1e-9)
+        detours, here_n = memory_along(MODEL, [leave_n, back_n, leave_n], detours, here_n), leave_n
+    assert memory_along(MODEL, [end_n], detours, here_n) == pytest.approx(straight, abs=1e-9)
 
 
 @pytest.mark.parametrize("chatter_n", [1e-6, 0.05, 1.0])
 def test_ten_thousand_small_reversals_neither_drift_nor_widen(chatter_n):
-    memory = walked(MODEL, [20.0, 20.0 - chatter_n, 20.0])
+    memory = memory_along(MODEL, [20.0, 20.0 - chatter_n, 20.0])
     first_v = voltage_v(MODEL, memory, 20.0)
-    later = walked(MODEL, [20.0 - chatter_n, 20.0] * 5000, memory, 20.0)
+    later = memory_along(MODEL, [20.0 - chatter_n, 20.0] * 5000, memory, 20.0)
     assert math.isclose(voltage_v(MODEL, later, 20.0), first_v, abs_tol=1e-9)
-    low_v = voltage_v(MODEL, walked(MODEL, [20.0 - chatter_n], later, 20.0), 20.0 - chatter_n)
+    low_v = voltage_v(MODEL, memory_along(MODEL, [20.0 - chatter_n], later, 20.0), 20.0 - chatter_n)
     assert 0.0 < first_v - low_v <= chatter_n / GENTLEST_N_PER_V / (1.0 - WIDEST_V * STOPS.stiffness_per_v)
 
 
@@ -141,10 +143,10 @@ def test_a_full_traverse_reaches_each_branch_whatever_came_before(stops, path):
         RationalBezier(0.0, 50.0, (0.0, 300.0), (1.0, 1.0)), RationalBezier(0.0, 50.0, (4.0, 304.0), (1.0, 1.0))
     )
     model = Bsfm(wide, stops)
-    memory = walked(model, [*path, 290.0])
+    memory = memory_along(model, [*path, 290.0])
     assert model.branch_share(memory) == pytest.approx(1.0, abs=1e-12)
     assert voltage_v(model, memory, 290.0) == pytest.approx(wide.rising.inverse(290.0)[0])
-    memory = walked(model, [10.0], memory, 290.0)
+    memory = memory_along(model, [10.0], memory, 290.0)
     assert model.branch_share(memory) == pytest.approx(-1.0, abs=1e-12)
     assert voltage_v(model, memory, 10.0) == pytest.approx(wide.falling.inverse(10.0)[0])
 

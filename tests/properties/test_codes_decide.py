@@ -21,10 +21,10 @@ SAYS = r"(sentence|message|reason|said|error|fault\.message|str\([a-z_]+\))"
     ],
 )
 def test_nothing_is_decided_by_english(decides: str) -> None:
-    found = [
+    result = [
         f"{file.name}: {line.strip()}"
         for file in SOURCES
         for line in file.read_text().splitlines()
         if re.search(decides, line)
     ]
-    assert not found
+    assert not result

@@ -54,10 +54,10 @@ def test_any_plant_stays_finite_between_its_stops_and_pushes_only(plant: Plant, 
     twin = Twin(plant, 1)
     for voltage_v in voltages_v:
         twin.command(voltage_v)
-        found = trace(twin, 0.05, lambda running: (running.force_n, running.position_m, running.friction_n))
-        assert np.all(np.isfinite(found))
-        assert np.all(found[:, 0] >= 0.0)
-        assert np.all((found[:, 1] >= -1.0e-12) & (found[:, 1] <= 0.03 + 1.0e-12))
+        result = trace(twin, 0.05, lambda running: (running.force_n, running.position_m, running.friction_n))
+        assert np.all(np.isfinite(result))
+        assert np.all(result[:, 0] >= 0.0)
+        assert np.all((result[:, 1] >= -1.0e-12) & (result[:, 1] <= 0.03 + 1.0e-12))
 
 
 @_QUIET
@@ -87,15 +87,15 @@ def test_the_slide_never_gives_more_work_than_it_was_given(plant: Plant, voltage
 @given(plants, st.floats(0.0, 10.0), st.floats(0.0, 10.0), st.integers(1, 60))
 def test_the_future_does_not_change_the_past(plant: Plant, first_v: float, second_v: float, at_ms: int) -> None:
     delay_ms = int(plant.regulator.delay_s * 1000.0 + 1.0e-6)
-    kept, changed = Twin(plant, 1), Twin(plant, 1)
-    for twin in (kept, changed):
+    remaining, changed = Twin(plant, 1), Twin(plant, 1)
+    for twin in (remaining, changed):
         twin.command(first_v)
         twin.advance(at_ms / 1000.0)
     changed.command(second_v)
     for _ in range(delay_ms):
-        kept.advance(0.001)
+        remaining.advance(0.001)
         changed.advance(0.001)
-        assert kept.force_n == changed.force_n
+        assert remaining.force_n == changed.force_n
 
 
 @_QUIET

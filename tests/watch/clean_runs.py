@@ -102,8 +102,8 @@ class Run:
 
     def rows(self) -> list[tuple[float, ...]]:
         """From the beginning of the recording, times from 0."""
-        kept = [row for row in self.wired.rows if self._begin_s <= row[0] <= self._begin_s + self.lasts_s]
-        return [(row[0] - kept[0][0], *row[1:]) for row in kept]
+        remaining = [row for row in self.wired.rows if self._begin_s <= row[0] <= self._begin_s + self.lasts_s]
+        return [(row[0] - remaining[0][0], *row[1:]) for row in remaining]
 
 
 def _stairs(run: Run) -> None:

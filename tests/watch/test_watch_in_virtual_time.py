@@ -36,11 +36,11 @@ class StubDiagnosis:
     causes: tuple[Cause, ...] = ()
     leftover: tuple[Leftover, ...] = ()
     rms_n: float = 0.15
-    asked: int = 0
+    requests: int = 0
     references: list[Plant] = field(default_factory=list)
 
     def __call__(self, measurements, plant: Plant) -> Diagnosis:
-        self.asked += 1
+        self.requests += 1
         self.references.append(plant)
         return Diagnosis(
             verdict=Verdict.PARTIAL,
@@ -112,7 +112,7 @@ def scene() -> Iterator[Scene]:
 def test_a_healthy_machine_is_searched_once_and_then_only_looked_at(scene):
     scene.work(25)
     assert scene.looks(6) == [ResidualCause.NONE] * 6
-    assert scene.search.asked == 1
+    assert scene.search.requests == 1
     assert scene.watch.counters["rms_n"] < 0.3
 
 
@@ -141,9 +141,9 @@ def test_more_friction_raises_the_warning_by_its_name_and_its_end_clears_it(scen
     scene.work(25)
     scene.looks(2)
     scene.change(friction__coulomb_n=3.0)
-    found = scene.looks(6)
-    assert found[0] is ResidualCause.NONE, "one window is not enough"
-    assert found[-1] is ResidualCause.COULOMB_FRICTION
+    result = scene.looks(6)
+    assert result[0] is ResidualCause.NONE, "one window is not enough"
+    assert result[-1] is ResidualCause.COULOMB_FRICTION
     assert "coulomb_n 1 -> 3 N" in scene.watch.published.sentence
     scene.wired.fault("plant", on=False)
     scene.search.plant = scene.plant
@@ -156,9 +156,9 @@ def test_a_standing_cause_is_searched_for_less_and_less(scene):
     scene.looks(1)
     scene.change(friction__coulomb_n=3.0)
     scene.looks(4)
-    asked = scene.search.asked
+    requests = scene.search.requests
     scene.looks(6)
-    assert scene.search.asked - asked <= 2
+    assert scene.search.requests - requests <= 2
 
 
 def test_a_change_that_hardly_moves_the_force_disturbs_nobody(scene):
@@ -179,7 +179,7 @@ def test_a_name_for_a_force_that_is_where_it_should_be_disturbs_nobody(scene):
     size = Estimate("cell", 3.0, "N", (2.0, 4.0))
     scene.search.causes = (Cause("warm-up", ("warm-up",), 0.9, {"warm_up_n": size}, GAIN),)
     assert scene.looks(3) == [ResidualCause.NONE] * 3
-    assert scene.search.asked >= 2
+    assert scene.search.requests >= 2
 
 
 def test_what_no_effect_explains_is_an_unknown_cause(scene):
@@ -196,7 +196,7 @@ def test_an_idle_gateway_is_never_searched(scene):
     scene.wired.run(40.0)
     scene.watch.check_newest_window()
     assert scene.watch.why_skipped == "nothing was commanded"
-    assert scene.search.asked == 0
+    assert scene.search.requests == 0
 
 
 def test_the_first_window_must_have_seen_something(scene):
@@ -204,7 +204,7 @@ def test_the_first_window_must_have_seen_something(scene):
     scene.wired.run(40.0)
     scene.watch.check_newest_window()
     assert "too little" in scene.watch.why_skipped
-    assert scene.search.asked == 0
+    assert scene.search.requests == 0
 
 
 def test_a_gain_has_no_name_in_the_catalogue_but_is_told(scene):
@@ -222,7 +222,7 @@ def test_a_cell_whose_sign_turned_is_told_as_such(scene):
     scene.looks(1)
     window = scene.watch._window(20.0)
     turned = replace(window.measurement, force_n=-window.measurement.force_n)
-    found = diagnose_window([turned], scene.plant)
-    sentence = judge_window(replace(window, measurement=turned), found, scene.watch._reference, 0.25).sentence
+    result = diagnose_window([turned], scene.plant)
+    sentence = judge_window(replace(window, measurement=turned), result, scene.watch._reference, 0.25).sentence
     assert "E522" in sentence
     assert "falls where it should rise" in sentence

@@ -20,7 +20,7 @@ def run_of(duration_s: float, command_v, **columns) -> dict[str, np.ndarray]:
     return rows
 
 
-def seen(rows: dict[str, np.ndarray], window_s: float = 20.0) -> Window | str:
+def window_from(rows: dict[str, np.ndarray], window_s: float = 20.0) -> Window | str:
     return window_of(np.column_stack([rows[name] for name in COLUMNS]).astype("<f8").tobytes(), COLUMNS, window_s)
 
 
@@ -36,57 +36,57 @@ def judged_s(window: Window) -> tuple[float, float]:
 
 
 def test_the_newest_seconds_are_judged_and_the_lead_is_not():
-    window = seen(run_of(120.0, steps))
+    window = window_from(run_of(120.0, steps))
     assert judged_s(window) == pytest.approx((-20.0, 0.0), abs=0.011)
     assert window.excitation_v > 0.3
     assert window.moves >= 4
 
 
 def test_a_replay_begins_at_the_last_rest():
-    window = seen(run_of(120.0, lambda t: 0.0 if 90.0 <= t < 94.0 else steps(t)))
+    window = window_from(run_of(120.0, lambda t: 0.0 if 90.0 <= t < 94.0 else steps(t)))
     assert window.measurement.duration_s == pytest.approx(26.0, abs=0.1)
 
 
 def test_a_dip_of_the_command_is_no_rest():
     """The lead of the force law lets a falling command touch 0 V while the pressure is still there."""
-    window = seen(run_of(120.0, lambda t: 0.0 if 95.0 <= t < 95.3 else steps(t)))
+    window = window_from(run_of(120.0, lambda t: 0.0 if 95.0 <= t < 95.3 else steps(t)))
     assert window.measurement.duration_s != pytest.approx(24.7, abs=0.5)
 
 
 def test_without_a_rest_it_begins_at_the_highest_command():
-    window = seen(run_of(120.0, lambda t: 6.0 if 92.0 <= t < 94.0 else steps(t)))
+    window = window_from(run_of(120.0, lambda t: 6.0 if 92.0 <= t < 94.0 else steps(t)))
     assert window.measurement.duration_s == pytest.approx(28.0, abs=0.1)
 
 
 def test_a_young_run_is_not_judged():
-    assert "younger" in seen(run_of(15.0, steps))
+    assert "younger" in window_from(run_of(15.0, steps))
 
 
 def test_a_gap_ends_what_can_be_replayed():
     rows = run_of(120.0, steps)
     rows["time_s"][-1000:] += 60.0
-    assert "younger" in seen(rows)
+    assert "younger" in window_from(rows)
     rows = run_of(120.0, steps)
     rows["time_s"][-1000:] -= 60.0
-    assert "younger" in seen(rows)
+    assert "younger" in window_from(rows)
 
 
 def test_an_idle_machine_is_not_judged():
-    assert seen(run_of(120.0, lambda t: steps(t) if t < 60.0 else 0.0)) == "nothing was commanded"
+    assert window_from(run_of(120.0, lambda t: steps(t) if t < 60.0 else 0.0)) == "nothing was commanded"
 
 
 def test_rows_in_and_after_a_fault_are_no_witness():
-    window = seen(run_of(120.0, steps, fault_code=lambda t: 1.0 if 104.0 <= t < 104.01 else 0.0), 60.0)
+    window = window_from(run_of(120.0, steps, fault_code=lambda t: 1.0 if 104.0 <= t < 104.01 else 0.0), 60.0)
     measurement = window.measurement
     away = ~measurement.usable & (measurement.time_s > measurement.time_s[-1] - 59.9)
     assert away.sum() == pytest.approx(200, abs=5)
-    assert seen(run_of(120.0, steps, fault_code=lambda t: float(t > 100.0))) == "a fault stood"
+    assert window_from(run_of(120.0, steps, fault_code=lambda t: float(t > 100.0))) == "a fault stood"
 
 
 def test_a_sample_that_is_missing_spoils_nothing():
     rows = run_of(120.0, steps)
     rows["force_n"][-500:-480] = np.nan
-    window = seen(rows)
+    window = window_from(rows)
     assert np.isfinite(window.measurement.force_n).all()
     assert window.measurement.usable.sum() == pytest.approx(1980, abs=5)
 

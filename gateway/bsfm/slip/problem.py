@@ -71,14 +71,14 @@ def inverses(curve: RationalBezier, force_n: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class System:
-    """matrix @ c = wanted where the model is exact, in newtons: (rows, shares) and (rows,). Volts of each row on both branches,
+    """matrix @ c = target where the model is exact, in newtons: (rows, shares) and (rows,). Volts of each row on both branches,
     slope: what tells volts in newtons; widest_v: half the loop at its widest."""
 
     rising_v: Floats
     falling_v: Floats
     slope: Floats
     matrix: Floats
-    wanted: Floats
+    target: Floats
     widest_v: float
 
 
@@ -100,7 +100,7 @@ class SlipProblem:
         """Return the best c of a system, (shares,): non-negative least squares."""
         rows = np.column_stack([self.weight[:, None] * system.matrix, np.zeros(len(system.matrix))])
         bound = np.concatenate([rows, self.heavy_rows(system)])
-        solution, _ = nnls(bound, np.append(self.weight * system.wanted, [HEAVY, HEAVY]))
+        solution, _ = nnls(bound, np.append(self.weight * system.target, [HEAVY, HEAVY]))
         shares: Floats = solution[:-1] / solution[:-1].sum()
         return shares
 
@@ -112,7 +112,7 @@ class SlipProblem:
     def errors_n(self, branches: Branches, shares: Floats | None = None) -> Floats:
         """Return model minus walk: V(f) - V, in newtons. shares: None for the best."""
         system = self.system(branches)
-        errors: Floats = system.matrix @ (self.best_shares(system) if shares is None else shares) - system.wanted
+        errors: Floats = system.matrix @ (self.best_shares(system) if shares is None else shares) - system.target
         return errors
 
     def system(self, branches: Branches, slope: Floats | None = None) -> System:

@@ -56,7 +56,7 @@ class SlipSearch:
         if not (trial.rising.is_increasing() and trial.falling.is_increasing()):
             return refused
         problem, system = self._problem, self._problem.system(trial, self._slope)
-        error_n = problem.weight * (system.matrix @ problem.best_shares(system) - system.wanted)
+        error_n = problem.weight * (system.matrix @ problem.best_shares(system) - system.target)
         return np.concatenate([error_n, self._penalties(trial), RIDGE * numbers[-self._log_weights :]])
 
     def jacobian(self, numbers: Floats) -> Floats:

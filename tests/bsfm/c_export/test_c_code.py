@@ -87,8 +87,8 @@ def bits(answers: Iterable[tuple[float, int]]) -> list[tuple[int, int]]:
 @every_case
 def test_c_and_its_float32_model_agree_to_the_bit(library, name, level):
     for function, arguments in FUNCTIONS.items():
-        found = library(name, level).each(function, ((x,) for x in arguments(name)))
-        assert bits(found) == bits(expected(name, function)), function
+        result = library(name, level).each(function, ((x,) for x in arguments(name)))
+        assert bits(result) == bits(expected(name, function)), function
 
 
 @needs_gcc
@@ -134,10 +134,10 @@ def test_float32_stays_near_the_double_model(name):
     tolerances = {"rising_force": 1e-4, "falling_force": 1e-4, "rising_voltage": 1e-5, "falling_voltage": 1e-5}
     for function, tolerance in tolerances.items():
         branch = getattr(branches, function.split("_")[0])
-        for x, (found, code) in zip(FUNCTIONS[function](name), expected(name, function), strict=True):
+        for x, (result, code) in zip(FUNCTIONS[function](name), expected(name, function), strict=True):
             if code is not Code.INVALID:
                 wanted = branch.value(x) if function.endswith("force") else branch.inverse(x)[0]
-                assert abs(found - wanted) < tolerance, (function, x)
+                assert abs(result - wanted) < tolerance, (function, x)
 
 
 @pytest.mark.parametrize("name", HARD)
@@ -146,10 +146,10 @@ def test_on_hard_curves_the_error_is_still_that_of_a_force_rounded_to_float32(na
     branches = CASES[name].model().branches
     for function in ("rising_voltage", "falling_voltage"):
         branch = getattr(branches, function.split("_")[0])
-        for x, (found, code) in zip(newtons(name), expected(name, function), strict=True):
+        for x, (result, code) in zip(newtons(name), expected(name, function), strict=True):
             if code is Code.OK:
-                steepness = max(branch.slope(branch.inverse(x)[0]), branch.slope(found))
-                assert abs(branch.value(found) - x) < 1e-5 + 1e-6 * steepness, x
+                steepness = max(branch.slope(branch.inverse(x)[0]), branch.slope(result))
+                assert abs(branch.value(result) - x) < 1e-5 + 1e-6 * steepness, x
 
 
 def test_newton_needs_far_fewer_rounds_than_it_may_take():

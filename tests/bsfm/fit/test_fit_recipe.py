@@ -161,9 +161,11 @@ def test_covariance_agrees_with_the_scatter_of_repeated_fits(loops):
         fits.append(fit(Ladder(base.voltage_v, noisy, base.direction, base.group), "psfm", 3))
     assert isinstance(fits[1].covariance, Covariance)
     assert fits[1].covariance.names[:3] == ("both b0", "rising b1", "rising b2")
-    seen = np.std([[result.branches.rising.handles[i] for i in range(3)] for result in fits[1:]], axis=0)
-    told = np.sqrt(np.diag(fits[1].covariance.matrix))[:3]
-    assert told == pytest.approx(seen, rel=0.6)  # the loop is no cubic: its misfit counts as noise, and 40 fits are few
+    values = np.std([[result.branches.rising.handles[i] for i in range(3)] for result in fits[1:]], axis=0)
+    text = np.sqrt(np.diag(fits[1].covariance.matrix))[:3]
+    assert text == pytest.approx(
+        values, rel=0.6
+    )  # the loop is no cubic: its misfit counts as noise, and 40 fits are few
 
 
 def test_what_the_data_leave_open_is_called_not_identifiable(loops):

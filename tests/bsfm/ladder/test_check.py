@@ -38,18 +38,18 @@ def recorded(voltages: list[float], dwell_s: float = 0.4, noise_n: float = 0.1, 
     return dict(zip(("time_s", "command_v", "force_n"), np.array(rows).T.copy(), strict=True))
 
 
-def judged(table: Table, expected: Expectation = KNOWN, **facts: str) -> CheckedLadder:
+def check_table(table: Table, expected: Expectation = KNOWN, **facts: str) -> CheckedLadder:
     return check_ladder(table, ON_DEMO | facts, expected)
 
 
-def refused(table: Table, expected: Expectation = KNOWN, **facts: str) -> LadderError:
+def refuse_table(table: Table, expected: Expectation = KNOWN, **facts: str) -> LadderError:
     with pytest.raises(LadderError) as caught:
-        judged(table, expected, **facts)
+        check_table(table, expected, **facts)
     return caught.value
 
 
 def test_a_clean_ladder_passes_without_a_word_and_each_stair_is_one_point() -> None:
-    checked = judged(recorded(stairs()))
+    checked = check_table(recorded(stairs()))
     assert checked.notes == ()
     assert checked.ladder.groups == (0, 1, 2)
     assert len(checked.ladder) == 3 * 41
@@ -62,13 +62,13 @@ def test_a_clean_ladder_passes_without_a_word_and_each_stair_is_one_point() -> N
 
 def test_partial_reversals_after_the_last_group_are_the_minor_loop_part() -> None:
     walk = [0.8 * k for k in range(1, 9)] + [5.2, 4.0, 2.8, 3.6, 4.4, 3.2, 2.0, 1.0]
-    checked = judged(recorded(stairs() + walk))
+    checked = check_table(recorded(stairs() + walk))
     assert len(checked.ladder) == 3 * 41
     assert checked.minor_v == pytest.approx([0.0, *walk])
 
 
 def test_a_coarse_cycle_before_the_ladder_is_left_out_and_said() -> None:
-    checked = judged(recorded([0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0, *stairs()]))
+    checked = check_table(recorded([0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0, *stairs()]))
     assert checked.ladder.groups == (0, 1, 2)
     assert "settled the friction" in checked.notes[0]
 
@@ -77,7 +77,7 @@ def test_a_resumed_reversal_part_adds_its_walk_and_no_group() -> None:
     cycle, walk = [0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0], [2.8, 5.6, 4.0, 2.0, 3.6, 4.8, 3.2, 1.0]
     rest = check_ladder(recorded(cycle + walk), ON_DEMO | {"ladder": {"first_group": 2, "groups": 2}}, KNOWN)
     assert rest.only_walk
-    whole = join_ladders([judged(recorded(stairs(2))), rest])
+    whole = join_ladders([check_table(recorded(stairs(2))), rest])
     assert whole.ladder.groups == (0, 1)
     assert len(whole.ladder) == 2 * 41, "the coarse cycle is no group"
     assert whole.minor_v == pytest.approx([0.0, *walk])
@@ -86,14 +86,14 @@ def test_a_resumed_reversal_part_adds_its_walk_and_no_group() -> None:
 
 
 def test_one_row_per_stair_is_paired_by_its_turns_whichever_row_the_force_stands_in() -> None:
-    dwelt = judged(recorded(stairs(), noise_n=0.0)).ladder
+    dwelt = check_table(recorded(stairs(), noise_n=0.0)).ladder
     table = {
         "time_s": np.arange(len(dwelt)) * 1.0,
         "command_v": dwelt.voltage_v.copy(),
         "force_n": dwelt.force_n.copy(),
     }
-    own = judged(table)
-    late = judged({name: np.append(values, values[-1]) for name, values in table.items()} | {
+    own = check_table(table)
+    late = check_table({name: np.append(values, values[-1]) for name, values in table.items()} | {
         "time_s": np.arange(len(dwelt) + 1) * 1.0,
         "force_n": np.append(0.0, dwelt.force_n),
     })  # fmt: skip
@@ -109,40 +109,42 @@ def with_force(change: Callable[[np.ndarray], np.ndarray]) -> Table:
 
 
 def test_three_samples_are_no_ladder() -> None:
-    error = refused({name: values[:3] for name, values in recorded(stairs()).items()})
+    error = refuse_table({name: values[:3] for name, values in recorded(stairs()).items()})
     assert error.flaw is LadderFlaw.TOO_SHORT
     assert "3 rows" in str(error)
 
 
 def test_one_direction_only_is_refused() -> None:
-    error = refused(recorded(stairs(1)[:21]))
+    error = refuse_table(recorded(stairs(1)[:21]))
     assert error.flaw is LadderFlaw.ONE_DIRECTION
     assert "20 rising and 0 falling" in str(error)
 
 
 def test_constant_force_is_not_called_a_model() -> None:
-    error = refused(with_force(lambda force: np.full_like(force, 2.0)))
+    error = refuse_table(with_force(lambda force: np.full_like(force, 2.0)))
     assert error.flaw is LadderFlaw.FORCE_CONSTANT
     assert "no air, no contact, or a dead load cell" in str(error)
 
 
 def test_constant_command_is_refused() -> None:
     table = recorded(stairs())
-    assert refused(table | {"command_v": np.full_like(table["force_n"], 3.0)}).flaw is LadderFlaw.COMMAND_CONSTANT
+    assert refuse_table(table | {"command_v": np.full_like(table["force_n"], 3.0)}).flaw is LadderFlaw.COMMAND_CONSTANT
 
 
 def test_swapped_columns_are_named_in_fine_and_in_coarse_tables() -> None:
     table = recorded(stairs())
-    fine = refused(table | {"command_v": table["force_n"], "force_n": table["command_v"]})
-    ladder = judged(table).ladder
-    coarse = refused({"time_s": np.arange(len(ladder)) * 1.0, "command_v": ladder.force_n, "force_n": ladder.voltage_v})
+    fine = refuse_table(table | {"command_v": table["force_n"], "force_n": table["command_v"]})
+    ladder = check_table(table).ladder
+    coarse = refuse_table(
+        {"time_s": np.arange(len(ladder)) * 1.0, "command_v": ladder.force_n, "force_n": ladder.voltage_v}
+    )
     for error in (fine, coarse):
         assert error.flaw is LadderFlaw.SWAPPED
         assert "change the two names" in str(error)
 
 
 def test_an_inverted_sign_says_how_to_put_it_right() -> None:
-    error = refused(with_force(lambda force: -force))
+    error = refuse_table(with_force(lambda force: -force))
     assert error.flaw is LadderFlaw.SIGN
     assert "sign: -1" in str(error)
 
@@ -150,8 +152,8 @@ def test_an_inverted_sign_says_how_to_put_it_right() -> None:
 def test_kgf_instead_of_newton_is_seen_against_the_model_and_against_the_pressure() -> None:
     table = with_force(lambda force: force / 9.80665)
     pressure = table["command_v"] * 80.0
-    by_model = refused(table)
-    by_pressure = refused(table | {"pressure_kpa": pressure}, Expectation(area_mm2=100.0))
+    by_model = refuse_table(table)
+    by_pressure = refuse_table(table | {"pressure_kpa": pressure}, Expectation(area_mm2=100.0))
     for error in (by_model, by_pressure):
         assert error.flaw is LadderFlaw.UNIT
         assert "kgf" in str(error)
@@ -161,39 +163,39 @@ def test_a_unit_that_is_written_down_is_converted_and_said() -> None:
     table = recorded(stairs())
     weight = table["force_n"] / 9.80665
     named = {"time_s": table["time_s"], "command_v": table["command_v"], "force_kgf": weight}
-    for checked in (judged(named), judged(table | {"force_n": weight}, force_unit="kgf")):
+    for checked in (check_table(named), check_table(table | {"force_n": weight}, force_unit="kgf")):
         assert checked.slope_n_per_v == pytest.approx(8.0, rel=0.02)
         assert any("turned into newtons" in note for note in checked.notes)
 
 
 def test_a_small_cylinder_passes_once_its_unit_is_stated() -> None:
     table = with_force(lambda force: force / 9.80665)
-    checked = judged(table, Expectation(reference=REFERENCE, named="1", force_unit="N"))
+    checked = check_table(table, Expectation(reference=REFERENCE, named="1", force_unit="N"))
     assert "times what calibration 1 has" in checked.notes[0]
 
 
 def test_a_saturated_cell_costs_its_stairs_only() -> None:
-    checked = judged(with_force(lambda force: np.minimum(force, 52.0)))
+    checked = check_table(with_force(lambda force: np.minimum(force, 52.0)))
     assert checked.ladder.voltage_v.max() == pytest.approx(6.0)
     assert any("saturated" in note and "ends at 6.00 V" in note for note in checked.notes)
 
 
 def test_a_cell_saturated_for_most_of_the_way_is_refused() -> None:
-    assert refused(with_force(lambda force: np.minimum(force, 20.0))).flaw is LadderFlaw.SATURATED
+    assert refuse_table(with_force(lambda force: np.minimum(force, 20.0))).flaw is LadderFlaw.SATURATED
 
 
 def test_a_group_cut_short_is_left_out_and_alone_it_is_refused() -> None:
     cut = stairs(1)[:30]
-    checked = judged(recorded(stairs(2) + cut))
+    checked = check_table(recorded(stairs(2) + cut))
     assert checked.ladder.groups == (0, 1)
     assert any("cut short" in note for note in checked.notes)
-    assert refused(recorded(cut)).flaw is LadderFlaw.CUT_SHORT
+    assert refuse_table(recorded(cut)).flaw is LadderFlaw.CUT_SHORT
 
 
 def test_rows_without_numbers_are_left_out_with_the_first_one_named() -> None:
     table = recorded(stairs())
     table["force_n"][[40, 41, 300]] = np.nan
-    checked = judged(table)
+    checked = check_table(table)
     assert len(checked.ladder) == 3 * 41
     assert checked.notes == (
         "3 of 2480 rows without a number in time, command or force, the first is data row 41: left out",
@@ -203,24 +205,24 @@ def test_rows_without_numbers_are_left_out_with_the_first_one_named() -> None:
 def test_a_table_of_mostly_nothing_is_refused() -> None:
     table = recorded(stairs())
     table["force_n"][::3] = np.nan
-    assert refused(table).flaw is LadderFlaw.NOT_FINITE
+    assert refuse_table(table).flaw is LadderFlaw.NOT_FINITE
 
 
 def test_repeated_and_late_rows_are_left_out() -> None:
     table = {name: np.insert(values, 100, values[90]) for name, values in recorded(stairs()).items()}
-    assert "does not advance" in judged(table).notes[0]
+    assert "does not advance" in check_table(table).notes[0]
 
 
 def test_a_force_that_dips_on_the_way_up_has_no_inverse() -> None:
     table = recorded(stairs())
     dip = (table["command_v"] > 4.0) & (table["command_v"] < 5.5)
-    error = refused(table | {"force_n": np.where(dip, table["force_n"] - 12.0, table["force_n"])})
+    error = refuse_table(table | {"force_n": np.where(dip, table["force_n"] - 12.0, table["force_n"])})
     assert error.flaw is LadderFlaw.NOT_INCREASING
     assert "has no inverse" in str(error)
 
 
 def test_another_rigs_file_is_refused_by_name() -> None:
-    error = refused(recorded(stairs()), Expectation(rig="irc5-cell"))
+    error = refuse_table(recorded(stairs()), Expectation(rig="irc5-cell"))
     assert error.flaw is LadderFlaw.OTHER_RIG
     assert "--rig demo" in str(error)
 
@@ -228,12 +230,12 @@ def test_another_rigs_file_is_refused_by_name() -> None:
 def test_a_ramp_is_not_a_ladder() -> None:
     time_s = np.arange(1000) * 0.01
     volts = 4.0 - 4.0 * np.cos(time_s)
-    assert refused({"time_s": time_s, "command_v": volts, "force_n": 8.0 * volts}).flaw is LadderFlaw.NO_STAIRS
+    assert refuse_table({"time_s": time_s, "command_v": volts, "force_n": 8.0 * volts}).flaw is LadderFlaw.NO_STAIRS
 
 
 def test_missing_columns_are_told_with_those_that_are_there() -> None:
     table = recorded(stairs())
     assert "there: time_s, voltage, force_n" in str(
-        refused({"time_s": table["time_s"], "voltage": table["command_v"], "force_n": table["force_n"]})
+        refuse_table({"time_s": table["time_s"], "voltage": table["command_v"], "force_n": table["force_n"]})
     )
-    assert "no column force_n" in str(refused({"time_s": table["time_s"], "command_v": table["command_v"]}))
+    assert "no column force_n" in str(refuse_table({"time_s": table["time_s"], "command_v": table["command_v"]}))

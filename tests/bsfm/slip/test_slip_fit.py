@@ -67,24 +67,26 @@ def tied() -> Branches:
 
 
 def test_stops_of_known_branches_are_found_from_a_minor_loop_walk() -> None:
-    found = fit_stops(TRUTH.branches, [walk(TURNS_V, 1)])
+    result = fit_stops(TRUTH.branches, [walk(TURNS_V, 1)])
     other = walk(OTHER_TURNS_V, 2, noise_n=0.0)
-    assert not found.joint and found.branches == TRUTH.branches
-    assert found.rms_n < 1.2 * NOISE_N
-    assert np.abs(residuals_n(found.model, other)).max() < 0.1
-    assert sum(found.stops.shares) == pytest.approx(1.0)
+    assert not result.joint and result.branches == TRUTH.branches
+    assert result.rms_n < 1.2 * NOISE_N
+    assert np.abs(residuals_n(result.model, other)).max() < 0.1
+    assert sum(result.stops.shares) == pytest.approx(1.0)
 
 
 def test_the_joint_fit_finds_branches_that_no_staircase_shows() -> None:
-    found = fit_joint(tied(), [walk_of(ladder()), walk(TURNS_V, 1)])
+    result = fit_joint(tied(), [walk_of(ladder()), walk(TURNS_V, 1)])
     other = walk(OTHER_TURNS_V, 2, noise_n=0.0)
-    assert found.joint
-    assert np.sqrt(np.mean(residuals_n(found.model, other) ** 2)) < NOISE_N
+    assert result.joint
+    assert np.sqrt(np.mean(residuals_n(result.model, other) ** 2)) < NOISE_N
     assert (
-        np.abs(found.branches.falling.value(np.linspace(0.5, 4.0, 30)) - FALLING.value(np.linspace(0.5, 4.0, 30))).max()
+        np.abs(
+            result.branches.falling.value(np.linspace(0.5, 4.0, 30)) - FALLING.value(np.linspace(0.5, 4.0, 30))
+        ).max()
         < 0.4
     )
-    assert verdicts_of(found.branches, SLOPE_FLOOR_N_PER_V).usable
+    assert verdicts_of(result.branches, SLOPE_FLOOR_N_PER_V).usable
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -138,9 +140,9 @@ def test_points_without_trust_are_passed_but_not_fitted() -> None:
     whole = walk(TURNS_V, 1)
     trust = np.where(np.arange(len(whole.force_n)) % 3 == 0, 0.0, 1.0)
     spoilt = replace(whole, force_n=whole.force_n + 9.0 * (trust == 0.0), trust=trust)
-    clean, found = fit_stops(TRUTH.branches, [replace(whole, trust=trust)]), fit_stops(TRUTH.branches, [spoilt])
-    assert (found.stops, found.rms_n) == (clean.stops, clean.rms_n)
-    assert found.points == int(trust.sum())
+    clean, result = fit_stops(TRUTH.branches, [replace(whole, trust=trust)]), fit_stops(TRUTH.branches, [spoilt])
+    assert (result.stops, result.rms_n) == (clean.stops, clean.rms_n)
+    assert result.points == int(trust.sum())
 
 
 def test_no_trust_at_all_and_no_loop_are_refused() -> None:
@@ -167,8 +169,8 @@ def test_the_found_stops_always_leave_the_voltage_unique() -> None:
     switched = np.where(
         np.diff(sharp.voltage_v, prepend=-1.0) > 0, RISING.value(sharp.voltage_v), FALLING.value(sharp.voltage_v)
     )
-    found = fit_stops(TRUTH.branches, [Walk(sharp.voltage_v, switched)])
-    assert found.model.reversal == found.stops  # Bsfm proves it, or raises
+    result = fit_stops(TRUTH.branches, [Walk(sharp.voltage_v, switched)])
+    assert result.model.reversal == result.stops  # Bsfm proves it, or raises
 
 
 def test_table_inverse_and_free_numbers_agree_with_the_curves() -> None:
@@ -190,7 +192,7 @@ def test_where_the_branches_meet_a_fit_that_crosses_by_a_hair_is_looked_for_agai
     shares = [STOPS.branch_share(tuple(place)) for place in places(turns.voltage_v, np.array(STOPS.radii_v)).tolist()]
     noise_n = NOISE_N * np.random.default_rng(4).standard_normal(len(shares))
     forces_n = [truth.settled_n(volts, at) for volts, at in zip(turns.voltage_v.tolist(), shares, strict=True)]
-    found = fit_joint(truth.branches, [Walk(turns.voltage_v, np.array(forces_n) + noise_n)])
-    assert found.joint
-    assert verdicts_of(found.branches, SLOPE_FLOOR_N_PER_V).usable
-    assert found.rms_n < 1.2 * NOISE_N
+    result = fit_joint(truth.branches, [Walk(turns.voltage_v, np.array(forces_n) + noise_n)])
+    assert result.joint
+    assert verdicts_of(result.branches, SLOPE_FLOOR_N_PER_V).usable
+    assert result.rms_n < 1.2 * NOISE_N

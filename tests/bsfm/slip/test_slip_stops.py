@@ -16,7 +16,7 @@ BRANCHES = Branches(RISING, FALLING)
 
 
 @pytest.mark.parametrize(
-    ("radii", "shares", "told"),
+    ("radii", "shares", "text"),
     [
         ((), (), "0 radii"),
         ((1.0,), (0.5, 0.5), "1 radii and 2 shares"),
@@ -30,8 +30,8 @@ BRANCHES = Branches(RISING, FALLING)
         (tuple(range(1, 18)), (1 / 17,) * 17, "1 to 16"),
     ],
 )
-def test_what_are_no_stops_is_refused(radii, shares, told):
-    with pytest.raises(ValueError, match=told):
+def test_what_are_no_stops_is_refused(radii, shares, text):
+    with pytest.raises(ValueError, match=text):
         SlipStops(radii, shares)
 
 

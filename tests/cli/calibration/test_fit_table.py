@@ -23,7 +23,7 @@ def ladder() -> dict[str, np.ndarray]:
     return {"time_s": np.arange(len(forces)) * 0.1, "command_v": np.repeat(stairs, 5), "force_n": force_n}
 
 
-def chosen(call, *words: object) -> dict:
+def fit_and_read_choice(call, *words: object) -> dict:
     answer = call("fit", *words, *ORDERS)
     assert answer.exit_code == 0, answer.output
     return json.loads(answer.stdout)["chosen"]
@@ -48,13 +48,13 @@ def test_parquet_and_mapped_tables_give_the_fit_of_the_plain_one(headless: Path,
     pq.write_table(pa.table(ladder()), tmp_path / "ladder.parquet")
     mapping = tmp_path / "logger.yaml"
     mapping.write_text("time_s: 1:ms\nforce_n: 2:kgf\ncommand_v: 3:mv\n")
-    expected = chosen(call, plain)["rms_n"]
+    expected = fit_and_read_choice(call, plain)["rms_n"]
     for words in (
         [tmp_path / "ladder.parquet"],
         [headless, "--columns", "time_s=1:ms,force_n=2:kgf,command_v=3:mv"],
         [headless, "--columns", mapping],
     ):
-        assert chosen(call, *words)["rms_n"] == pytest.approx(expected, abs=1e-4)
+        assert fit_and_read_choice(call, *words)["rms_n"] == pytest.approx(expected, abs=1e-4)
 
 
 @pytest.mark.parametrize(

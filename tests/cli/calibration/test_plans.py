@@ -28,7 +28,7 @@ def _volts() -> list[float]:
 
 
 def answering(monkeypatch: pytest.MonkeyPatch, answer: Diagnosis) -> None:
-    monkeypatch.setattr(gateway.diagnosis, "diagnose", lambda *asked: answer)
+    monkeypatch.setattr(gateway.diagnosis, "diagnose", lambda *requests: answer)
 
 
 def test_the_plan_is_written_and_named_in_terminal_and_report(
@@ -45,8 +45,8 @@ def test_the_plan_is_written_and_named_in_terminal_and_report(
     assert "# Not in it: tilt-gravity: record tilt_deg; turn the tool" in text
     assert "# Besides: warm the cell up" in text
     assert f"force-gateway calibrate --plan {plan}" in page.read_text(encoding="utf-8")
-    told = "".join(answer.stdout.split())
-    assert f"force-gatewaycalibrate--plan{plan}runsit:" in told
+    sentence = "".join(answer.stdout.split())
+    assert f"force-gatewaycalibrate--plan{plan}runsit:" in sentence
 
 
 def test_without_the_option_the_terminal_names_it(tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from gateway.cli.verbs import hold
 HERE = {"rig": "own", "port": 5020, "lease_s": 0.08, "lease_action": "ramp"}
 
 
-def told(monkeypatch, tmp_path: Path, host: str, answers: dict[str, dict[str, Any] | None]) -> KnownLease | None:
+def find_lease(monkeypatch, tmp_path: Path, host: str, answers: dict[str, dict[str, Any] | None]) -> KnownLease | None:
     """What hold makes of these control sockets; None: killed, its socket is left."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     for name in answers:
@@ -32,12 +32,12 @@ def told(monkeypatch, tmp_path: Path, host: str, answers: dict[str, dict[str, An
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1"])
 def test_a_gateway_of_this_machine_tells_its_lease(host: str, monkeypatch, tmp_path: Path) -> None:
     other = HERE | {"port": 5021, "lease_s": 5.0}
-    found = told(monkeypatch, tmp_path, host, {"another": other, "own": HERE, "killed": None})
-    assert found == KnownLease(0.08, "ramp") and found.period_s == pytest.approx(0.02)
+    result = find_lease(monkeypatch, tmp_path, host, {"another": other, "own": HERE, "killed": None})
+    assert result == KnownLease(0.08, "ramp") and result.period_s == pytest.approx(0.02)
 
 
 def test_a_rig_without_a_lease_says_so(monkeypatch, tmp_path: Path) -> None:
-    assert told(monkeypatch, tmp_path, "127.0.0.1", {"own": HERE | {"lease_s": None}}) == KnownLease(None, "ramp")
+    assert find_lease(monkeypatch, tmp_path, "127.0.0.1", {"own": HERE | {"lease_s": None}}) == KnownLease(None, "ramp")
 
 
 @pytest.mark.parametrize(
@@ -51,4 +51,4 @@ def test_a_rig_without_a_lease_says_so(monkeypatch, tmp_path: Path) -> None:
     ids=["another machine", "nobody", "an older gateway", "two of one port"],
 )
 def test_what_nobody_says_is_not_guessed(host: str, answers: dict[str, Any], monkeypatch, tmp_path: Path) -> None:
-    assert told(monkeypatch, tmp_path, host, answers) is None
+    assert find_lease(monkeypatch, tmp_path, host, answers) is None

@@ -84,7 +84,7 @@ def test_what_a_newcomer_gets_wrong_has_its_code(
     ],
 )
 def test_an_enable_that_is_refused_says_why(block: RefusalReason, code: str, bank, gateway: str, call) -> None:
-    bank.on_asked = lambda asked: EdgeRefusal(block, ControlBit.ENABLE, "enable refused: as control says")
+    bank.on_asked = lambda requests: EdgeRefusal(block, ControlBit.ENABLE, "enable refused: as control says")
     answer = call("write", "control_word=enable", "--gateway", gateway)
     assert answer.exit_code == 1
     assert answer.stderr.startswith(f"{code} "), answer.stderr

@@ -17,7 +17,7 @@ OWN = "tare refused: 1.56 V are out: disable the output or set the force to 0 fi
 @pytest.fixture
 def gateway(register_map: RegisterMap, serve) -> str:
     bank = RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
-    bank.on_asked = lambda asked: EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, OWN)
+    bank.on_asked = lambda requests: EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, OWN)
     address: str = serve(bank).address
     return address
 

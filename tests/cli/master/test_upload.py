@@ -85,10 +85,10 @@ def test_an_upload_is_stored_used_and_read_back(gateway, address, call, tmp_path
     path.write_text(as_text(given), encoding="utf-8")
     done = call("upload", path, "--slot", 5, *fc06, "--gateway", address)
     assert done.exit_code == 0, done.output
-    told = (
+    text = (
         f"mark {order} is in use as calibration 2, slot 5: {given.reversal_kind}, durable, and read back word by word\n"
     )
-    assert done.output == told
+    assert done.output == text
     assert slot_number(gateway.store, 5) == 2
     assert (
         CoefficientSet.of_calibration(gateway.store.load(2)).to_words()
@@ -178,8 +178,8 @@ def test_a_commit_that_never_ends_is_waited_for_with_a_bound(gateway, address, c
     gateway.upload.run_in_background = lambda work, done: None
     done = call("upload", file, "--gateway", address)
     assert done.exit_code == 1
-    seen, advice = done.stderr.split(": ")
-    assert seen == "E431 after 0.05 s the gateway is still checking"
+    values, advice = done.stderr.split(": ")
+    assert values == "E431 after 0.05 s the gateway is still checking"
     assert advice == "its disk probably hangs; look at its log and at the kernel's (dmesg)\n"
 
 
@@ -209,7 +209,7 @@ def test_printed_frames_played_by_anybody_make_the_upload(gateway, call, file, f
     for frame in frames:
         (adu,) = framer.feed(bytes.fromhex(frame["frame"]))
         answers.append(answer(adu.pdu, gateway.bank, Peer("10.0.0.9")))
-    assert all(told[0] < 0x80 for told in answers)
+    assert all(text[0] < 0x80 for text in answers)
     assert struct.unpack(">HHH", answers[-1][2:]) == (CommitStatus.COMMITTED, 0, 0)
     assert slot_number(gateway.store, 6) == 2
     assert gateway.store.load(2).slip_radii_v == (0.25, 0.5, 1.0)

@@ -127,8 +127,8 @@ def test_compare_tells_the_differences_of_the_branches(state, call, tmp_path):
     back = json.loads(call("calibration", "compare", 3, 2, "--state", state, "--json").output)
     assert back["rising"]["max_n"] == pytest.approx(-1.0)
     plot = tmp_path / "plot.html"
-    told = call("calibration", "compare", "2", "demo", "--state", state, "--plot", plot)
-    assert told.output.startswith("A  calibration 2 (mark 16, 2026-11-21), blend 5 N\nB  calibration 1 (demo, ")
+    text = call("calibration", "compare", "2", "demo", "--state", state, "--plot", plot)
+    assert text.output.startswith("A  calibration 2 (mark 16, 2026-11-21), blend 5 N\nB  calibration 1 (demo, ")
     assert plot.read_text(encoding="utf-8").count("<svg") == 2
 
 

@@ -103,18 +103,18 @@ def test_json_to_stdout_is_nothing_but_json(tmp_path: Path, call: Call, engine: 
 
 
 @pytest.mark.parametrize(
-    ("verdict", "asked", "code"),
+    ("verdict", "fail_on", "code"),
     [
         ("nothing-found", None, 0), ("unknown", None, 0), ("confirmed", "partial", 0), ("partial", "partial", 1),
         ("unknown", "partial", 1), ("partial", "unknown", 0), ("unknown", "unknown", 1), ("nothing-found", "partial", 0),
     ],
 )  # fmt: skip
 def test_exit_code_1_only_for_what_fail_on_asks(
-    tmp_path: Path, call: Call, engine: Engine, verdict: str, asked: str | None, code: int
+    tmp_path: Path, call: Call, engine: Engine, verdict: str, fail_on: str | None, code: int
 ) -> None:
     engine.answer = diagnosis(verdict=Verdict(verdict))
     target = tmp_path / "out.json"
-    words = ["--json", str(target), *(["--fail-on", asked] if asked else [])]
+    words = ["--json", str(target), *(["--fail-on", fail_on] if fail_on else [])]
     assert call("diagnose", str(table(tmp_path / "a.csv")), *words).exit_code == code
     assert target.exists()
 
@@ -158,21 +158,21 @@ def test_a_table_without_a_rig_says_which_plant_is_the_start(tmp_path: Path, cal
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "sentence"),
     [
         ("", "empty"), ("time_s,force_n\n0,1\n", "no column command_v"), ("time_s,command_v,force_n\n0,1,2\n", "1 rows"),
         ("time_s,command_v,force_n\n0,1,2\n1,1,x\n", "a.csv:3"),
     ],
 )  # fmt: skip
 def test_bad_input_is_said_with_its_place_and_nothing_is_written(
-    tmp_path: Path, call: Call, engine: Engine, text: str, said: str
+    tmp_path: Path, call: Call, engine: Engine, text: str, sentence: str
 ) -> None:
     path = tmp_path / "a.csv"
     path.write_text(text)
     outputs = [f"--{option}={tmp_path / option}" for option in ("json", "report", "extend")]
     answer = call("diagnose", str(path), *outputs)
     assert answer.exit_code == 65
-    assert answer.stderr.startswith("E403") and said in answer.stderr
+    assert answer.stderr.startswith("E403") and sentence in answer.stderr
     assert list(tmp_path.iterdir()) == [path] and not engine.asked
 
 
@@ -204,11 +204,11 @@ def test_no_output_may_replace_what_it_was_made_from(tmp_path: Path, call: Call,
 
 
 def test_when_one_file_cannot_be_written_none_is(tmp_path: Path, call: Call, engine: Engine) -> None:
-    path, kept = table(tmp_path / "a.csv"), tmp_path / "kept.json"
-    kept.write_text("old")
-    answer = call("diagnose", str(path), "--json", str(kept), "--report", str(tmp_path / "none" / "out.html"))
+    path, remaining = table(tmp_path / "a.csv"), tmp_path / "kept.json"
+    remaining.write_text("old")
+    answer = call("diagnose", str(path), "--json", str(remaining), "--report", str(tmp_path / "none" / "out.html"))
     assert answer.exit_code == 1 and "E106" in answer.stderr
-    assert kept.read_text() == "old" and sorted(tmp_path.iterdir()) == [path, kept]
+    assert remaining.read_text() == "old" and sorted(tmp_path.iterdir()) == [path, remaining]
     assert not engine.asked, "an hour of search must not end in a missing directory"
 
 
@@ -231,8 +231,8 @@ def test_help_of_the_verbs_imports_nothing_heavy() -> None:
         "    except SystemExit: pass\n"
         "print(*sorted(set(sys.modules) & {'numpy', 'scipy', 'yaml', 'pydantic', 'rich'}), file=sys.stderr)"
     )
-    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ, check=True)
-    assert told.stderr.strip() == ""
+    text = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ, check=True)
+    assert text.stderr.strip() == ""
 
 
 def test_the_closed_loop_is_measured_only_when_asked_and_told_everywhere(

@@ -59,7 +59,7 @@ def test_json_is_one_object_per_line(state: Path, call) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "found"),
+    ("options", "result"),
     [
         (["--since", "10m"], ["W204", "A345", "A401"]),
         (["--since", "301s"], ["A345", "A401"]),
@@ -75,9 +75,9 @@ def test_json_is_one_object_per_line(state: Path, call) -> None:
         (["--code", "W204", "--severity", "error"], []),
     ],
 )
-def test_filters(options: list[str], found: list[str | None], state: Path, call) -> None:
+def test_filters(options: list[str], result: list[str | None], state: Path, call) -> None:
     answer = call("events", "--state", state, "--json", *options)
-    assert (answer.exit_code, codes(answer.output)) == (0, found)
+    assert (answer.exit_code, codes(answer.output)) == (0, result)
 
 
 @pytest.mark.parametrize("wrong", ["10", "10x", "yesterday", "-5m", "", "9" * 400 + "d", "99999999999d"])

@@ -200,8 +200,8 @@ def test_a_map_that_is_not_there_is_told(call) -> None:
 
 def test_ports_lists_by_id_names_first(call, monkeypatch: pytest.MonkeyPatch) -> None:
     by_id = "/dev/serial/by-id/usb-FTDI_FT232R_A10K-if00-port0"
-    found = [PortInfo(by_id, "/dev/ttyUSB0", "FTDI FT232R USB UART", "ftdi_sio", 16, "minicom (4711)")]
-    monkeypatch.setattr("gateway.ports.list_ports", lambda: found)
+    result = [PortInfo(by_id, "/dev/ttyUSB0", "FTDI FT232R USB UART", "ftdi_sio", 16, "minicom (4711)")]
+    monkeypatch.setattr("gateway.ports.list_ports", lambda: result)
     answer = call("ports")
     assert answer.output.splitlines()[0] == by_id
     assert "latency timer 16 ms (slow" in answer.output

@@ -64,8 +64,8 @@ def test_the_series_and_the_figures_are_one_story(tmp_path: Path, call: Call, re
     columns = read_table(series).columns
     assert list(columns) == ["time_s", "force_n", "command_v", "simulated_n", "residual_n", "usable"]
     left_n = columns["residual_n"][columns["usable"] == 1.0]
-    told = json.loads(answer.stdout)["residual_n"]["all"]
-    assert told["rms_n"] == pytest.approx(np.sqrt(np.mean(left_n**2)), rel=1e-6)
+    text = json.loads(answer.stdout)["residual_n"]["all"]
+    assert text["rms_n"] == pytest.approx(np.sqrt(np.mean(left_n**2)), rel=1e-6)
     assert np.allclose(columns["force_n"] - columns["simulated_n"], columns["residual_n"], atol=1e-6)
 
 

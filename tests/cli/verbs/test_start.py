@@ -79,10 +79,10 @@ def test_options_of_run_are_the_fields_of_run_options() -> None:
     ],
 )
 def test_an_endpoint_is_read_as_people_write_it(text: str, expected: tuple[str, int], call, monkeypatch) -> None:
-    seen: list[RunOptions] = []
-    monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: seen.append(options) or 0)
+    values: list[RunOptions] = []
+    monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: values.append(options) or 0)
     assert call("run", "--bind", text).exit_code == 0
-    assert seen[0].bind == expected
+    assert values[0].bind == expected
 
 
 @pytest.mark.parametrize("text", ["127.0.0.1:http", "host:70000", "1.2.3.4:-1"])
@@ -93,12 +93,12 @@ def test_a_wrong_endpoint_is_a_usage_error(text: str, call) -> None:
 
 
 def test_run_hands_over_everything_and_ends_with_the_guardians_code(call, monkeypatch, tmp_path: Path) -> None:
-    seen: list[RunOptions] = []
-    monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: seen.append(options) or 69)
+    values: list[RunOptions] = []
+    monkeypatch.setattr("gateway.service.supervisor.guardian.run", lambda options: values.append(options) or 69)
     answer = call("run", "my.yaml", "--sim", "--state", tmp_path, "--json", "--record", "--realtime")
     assert answer.exit_code == 69
     expected = RunOptions(rig="my.yaml", simulate=True, state=tmp_path, json=True, record=True, realtime=True)
-    assert seen == [expected]
+    assert values == [expected]
 
 
 def test_a_mistyped_verb_gets_a_proposal(call) -> None:

@@ -94,9 +94,9 @@ def test_a_backup_restores_to_the_same_content(state: Path, call, tmp_path: Path
     assert answer.exit_code == 0, answer.output
     answer = call("restore", tmp_path / "b.tar.gz", "--state", tmp_path / "elsewhere" / "demo")
     assert answer.exit_code == 0, answer.output
-    kept = {name: data for name, data in content(state).items() if name not in ("lock", "running")}
-    assert content(tmp_path / "elsewhere" / "demo") == kept
-    assert len(kept) == 2
+    remaining = {name: data for name, data in content(state).items() if name not in ("lock", "running")}
+    assert content(tmp_path / "elsewhere" / "demo") == remaining
+    assert len(remaining) == 2
 
 
 def test_sockets_stay_behind(state: Path, call, tmp_path: Path, monkeypatch) -> None:
@@ -211,7 +211,7 @@ def control_socket(tmp_path: Path) -> Iterator[Callable[[Any], list[Any]]]:
     listeners: list[tuple[socket.socket, threading.Thread]] = []
 
     def answering(answer: Any) -> list[Any]:
-        asked: list[Any] = []
+        requests: list[Any] = []
         listener = socket.socket(socket.AF_UNIX)
         listener.bind(str(tmp_path / "control.sock"))
         listener.listen()
@@ -219,12 +219,12 @@ def control_socket(tmp_path: Path) -> Iterator[Callable[[Any], list[Any]]]:
         def serve() -> None:
             connection, _ = listener.accept()
             with connection, connection.makefile("rwb") as stream:
-                asked.append(json.loads(stream.readline()))
+                requests.append(json.loads(stream.readline()))
                 stream.write(json.dumps(answer).encode() + b"\n")
 
         listeners.append((listener, threading.Thread(target=serve)))
         listeners[-1][1].start()
-        return asked
+        return requests
 
     yield answering
     for listener, thread in listeners:
@@ -248,19 +248,19 @@ def control_socket(tmp_path: Path) -> Iterator[Callable[[Any], list[Any]]]:
 def test_record_asks_the_running_gateway(
     word: str, request_: Any, answer: Any, sentence: str, call, control_socket, tmp_path: Path
 ) -> None:
-    asked = control_socket({"ok": True} | answer)
+    requests = control_socket({"ok": True} | answer)
     result = call("record", word, "--state", tmp_path)
     assert result.exit_code == 0, result.output
-    assert asked == [request_]
+    assert requests == [request_]
     assert sentence in result.output
 
 
 def test_metrics_are_figures_with_a_name_a_kind_and_base_units(call, control_socket, tmp_path: Path) -> None:
     residual = {"cause": 1, "name": "transport-delay", "warnings": 2, "age_s": None, "rms_n": 0.31}
     health = {"ticks": 500, "missed_ticks": 3, "loop_time_us": 250.0, "late_p50_us": 64, "late_p99_us": 1024}
-    asked = control_socket({"ok": True, **health, "residual": residual})
+    requests = control_socket({"ok": True, **health, "residual": residual})
     result = call("metrics", "--state", tmp_path)
-    assert (result.exit_code, asked) == (0, [{"do": "health"}])
+    assert (result.exit_code, requests) == (0, [{"do": "health"}])
     lines = result.output.splitlines()
     values = [line for line in lines if not line.startswith("#")]
     assert values == [

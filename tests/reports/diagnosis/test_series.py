@@ -23,24 +23,24 @@ def test_a_spike_of_one_row_in_a_million_is_in_the_envelope() -> None:
     time_s = np.arange(1_000_000) / 1000.0
     force_n = np.zeros(time_s.size)
     force_n[654_321] = 9.0
-    found = envelope(time_s, force_n, 260)
-    assert found.high.max() == 9.0 and found.low.min() == 0.0
-    assert found.x.size <= 260
-    assert abs(found.x[np.argmax(found.high)] - 654.321) < 1000.0 / 260
+    result = envelope(time_s, force_n, 260)
+    assert result.high.max() == 9.0 and result.low.min() == 0.0
+    assert result.x.size <= 260
+    assert abs(result.x[np.argmax(result.high)] - 654.321) < 1000.0 / 260
 
 
 def test_few_rows_are_drawn_as_they_are() -> None:
-    found = envelope(np.arange(5.0), np.array([1.0, 3.0, 2.0, 5.0, 4.0]), 260)
-    assert found.low.tolist() == found.high.tolist() == [1.0, 3.0, 2.0, 5.0, 4.0]
+    result = envelope(np.arange(5.0), np.array([1.0, 3.0, 2.0, 5.0, 4.0]), 260)
+    assert result.low.tolist() == result.high.tolist() == [1.0, 3.0, 2.0, 5.0, 4.0]
 
 
 @pytest.mark.parametrize("rows", [100, 100_000])
 def test_a_gap_is_not_drawn_over(rows: int) -> None:
     time_s = np.arange(rows) * (100.0 / rows)
-    kept = (time_s < 40.0) | (time_s > 60.0)
-    found = envelope(time_s[kept], np.ones(int(kept.sum())), 260)
-    assert len(found.pieces) == 2
-    assert found.x[found.pieces[0]].max() <= 40.0 and found.x[found.pieces[1]].min() >= 60.0
+    remaining = (time_s < 40.0) | (time_s > 60.0)
+    result = envelope(time_s[remaining], np.ones(int(remaining.sum())), 260)
+    assert len(result.pieces) == 2
+    assert result.x[result.pieces[0]].max() <= 40.0 and result.x[result.pieces[1]].min() >= 60.0
 
 
 def test_uneven_sampling_is_no_gap() -> None:
@@ -88,9 +88,9 @@ def test_the_way_of_the_tool_along_the_workpiece_is_no_direction_of_the_slide() 
 def test_mains_hum_stands_at_its_frequency_though_rows_are_uneven_and_missing() -> None:
     rng = np.random.default_rng(4)
     time_s = np.cumsum(rng.uniform(0.0045, 0.0055, 12_000))
-    kept = (time_s < 20.0) | (time_s > 23.0)
+    remaining = (time_s < 20.0) | (time_s > 23.0)
     values = 0.3 * np.sin(2 * np.pi * 50.0 * time_s) + rng.normal(0.0, 0.1, time_s.size)
-    hertz, density = spectrum(time_s[kept], values[kept])
+    hertz, density = spectrum(time_s[remaining], values[remaining])
     assert abs(hertz[np.argmax(density)] - 50.0) < 0.5
     assert density.max() > 5.0 * np.median(density)
 
@@ -116,8 +116,8 @@ def test_dependence_is_the_share_of_the_variance_that_the_means_carry() -> None:
 
 def test_means_over_bins_follow_the_shape() -> None:
     x = np.linspace(0.0, 1.0, 3000)
-    found = bin_means(x, x**2)
-    assert np.allclose(found.mean, found.x**2, atol=1e-3)
+    result = bin_means(x, x**2)
+    assert np.allclose(result.mean, result.x**2, atol=1e-3)
 
 
 def test_residuals_are_measured_minus_simulated_of_judged_rows() -> None:

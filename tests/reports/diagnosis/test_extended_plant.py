@@ -23,8 +23,8 @@ def test_the_file_reads_back_as_the_extended_plant(tmp_path: Path) -> None:
 
 def test_found_refitted_and_known_numbers_are_told_apart() -> None:
     origins = extended_plant(diagnosis(), START, "press-07.csv", "2026-11-21").origins
-    found = "diagnosed from press-07.csv, 2026-11-21, ci95 [0.0482, 0.0511]"
-    assert origins["friction.load_dependent_n_per_n"].source == found
+    result = "diagnosed from press-07.csv, 2026-11-21, ci95 [0.0482, 0.0511]"
+    assert origins["friction.load_dependent_n_per_n"].source == result
     assert origins["friction.load_dependent_n_per_n"].range == (0.0, 0.2)
     assert origins["cylinder.area_m2"].source == "refitted to press-07.csv, 2026-11-21"
     assert origins["cell.zero_n"].source.startswith("refitted to press-07.csv")
@@ -46,8 +46,8 @@ def test_only_what_was_found_is_written() -> None:
         "clock_offset_s": Estimate("cell", 0.011, "s", (0.0105, 0.0115)),
     }
     plant = START.plant
-    for name, found in vague.items():
-        plant = with_value(plant, found.section, name, found.value)
+    for name, result in vague.items():
+        plant = with_value(plant, result.section, name, result.value)
     profile = extended_plant(diagnosis(causes=(), plant=plant, base_parameters=vague), START, "a.csv", "2026-11-22")
     assert profile.plant == with_value(START.plant, "friction", "coulomb_n", 1.4)
     assert profile.origins["cylinder.area_m2"] == START.origins["cylinder.area_m2"]

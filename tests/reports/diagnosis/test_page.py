@@ -194,9 +194,9 @@ def test_partial_says_what_it_lacks() -> None:
 
 
 def test_a_size_that_the_plant_had_already_is_told_beside_the_new_one() -> None:
-    found = FRICTION.parameters["load_dependent_n_per_n"]
+    result = FRICTION.parameters["load_dependent_n_per_n"]
     had = replace(diagnosis(), base=with_value(diagnosis().base, "friction", "load_dependent_n_per_n", 0.08))
-    assert words.previous_value(had, "load_dependent_n_per_n", found) == " (0.0800 before)"
+    assert words.previous_value(had, "load_dependent_n_per_n", result) == " (0.0800 before)"
     assert "(0.0800 before)" in page(had)
     lacked = replace(had, base=with_value(had.base, "friction", "load_dependent_n_per_n", 0.0))
-    assert words.previous_value(lacked, "load_dependent_n_per_n", found) == ""
+    assert words.previous_value(lacked, "load_dependent_n_per_n", result) == ""

@@ -70,8 +70,8 @@ def test_exactly_the_fields_of_the_contract_stand_in_the_json(answer) -> None:
 def test_values_are_those_of_the_answer_and_causes_keep_their_order() -> None:
     document = diagnosis_document(diagnosis(causes=(FRICTION, WARMTH)), 1.5)
     assert [cause["name"] for cause in document["causes"]] == ["load-dependent-friction", "thermal-zero-drift"]
-    found = document["causes"][0]["parameters"]["load_dependent_n_per_n"]
-    assert found == {"value": 0.0497, "unit": "N/N", "ci95": [0.0482, 0.0511]}
+    result = document["causes"][0]["parameters"]["load_dependent_n_per_n"]
+    assert result == {"value": 0.0497, "unit": "N/N", "ci95": [0.0482, 0.0511]}
     assert document["causes"][1]["group"] == ["thermal-zero-drift", "warm-up", "linear-drift"]
     assert document["runtime_s"] == 1.5
 
