@@ -20,6 +20,8 @@ from gateway.diagnosis.search.bench import BLOCKS, Bench
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.normal_equations import NormalEquations
 
+_RESOLUTION_N: Final = 1.0e-4
+"""What the simulation itself resolves: its rigid friction gives by a nanometre, 4e-5 N on the usual pad."""
 _SIGNIFICANCE: Final = 1.0e-3  # of a false answer over all questions
 _LEAST_SHARE: Final = 0.01  # of the whitened squared residual
 _REGRESSORS_AT_ONCE: Final = 60  # questions
@@ -46,6 +48,8 @@ def strongest_dependence(
     bench: Bench, fitted: FittedModel, whiten: Whitener, given: Collection[Leftover], *, outside: bool
 ) -> Dependence | None:
     """Return the most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
+    if bench.rms_n(fitted.residual_n) < _RESOLUTION_N:
+        return None
     white = whiten(fitted.residual_n)
     known = {(each.depends_on, each.shape) for each in given}
     asked = (
@@ -109,6 +113,8 @@ def _find_unsteadiness(bench: Bench, fitted: FittedModel, whiten: Whitener) -> I
     """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
+    if bench.rms_n(fitted.residual_n) < _RESOLUTION_N:
+        return
     white = whiten(fitted.residual_n)
     times_are_sure = whiten.knows_times and all(map(_evenly_sampled, bench.measurements))
     for channel in bench.channels:

@@ -1,18 +1,19 @@
 """The simulated world: regulator, slide with friction, pad on a workpiece, load cell. Pure: time and seed are arguments.
 
 `Twin(plant, seed)` takes voltages and lets time pass; `Plant` names the physics, one field per effect, each with a null
-value that is the default; `stack` runs many plants in one twin, as numpy lanes. Modules in the order of the signal:
-regulator, slide (with friction), contact, load_cell; simulation joins them; the formulas of single effects stand in
-gateway/twin/effects; experiment does to the twin what one does to a rig.
+value that is the default. Modules in the order of the signal: regulator, slide (with friction), contact, load_cell;
+simulation joins them. Each formula stands once: a step with a memory as a plain function of floats (regulator, friction,
+slide, lags), one without as a formula for floats or series (gateway/twin/effects). experiment does to the twin what one
+does to a rig.
 
-`Replay(drive).run(plants)` runs plants over a recording, for the diagnosis. It is loaded when it is asked for, and with it
-scipy when it runs: the real-time twin knows neither.
+`Replay(drive).run(plants)` runs plants over a recording, for the diagnosis: the same functions, compiled. It is loaded when
+it is asked for, and with it numba when it runs: the real-time twin knows neither.
 """
 
 from typing import TYPE_CHECKING, Any
 
 from gateway.defaults import UNLIMITED
-from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, stack
+from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator
 from gateway.twin.simulation import STEP_S, Twin
 from gateway.twin.surroundings import Surroundings
 
@@ -33,7 +34,6 @@ __all__ = [
     "ReplayResult",
     "Surroundings",
     "Twin",
-    "stack",
 ]
 
 

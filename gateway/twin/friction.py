@@ -14,13 +14,10 @@ tolerance, stable for any step.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-
-from gateway.twin.effects.term import is_switched_on
-from gateway.twin.elementwise import Real, clip, exponential, larger, sign, sine
+from gateway.compiled import step
+from gateway.twin.elementwise import Real, exponential, positive_part, sine
 from gateway.twin.sections import Friction
 from gateway.twin.surroundings import TwinConditions
 
@@ -30,18 +27,6 @@ ELEMENTS: Final = 3
 RIGID_M: Final = 1.0e-9
 FREE_N_PER_M: Final = 1.0e-3  # stands for no stiffness at all, where a slide without mass and drag moves freely
 BREAKAWAY_M: Final = 2.0e-5  # motion after which a rest is forgotten, where presliding is shorter
-DRY: Final = (
-    "coulomb_n",
-    "load_dependent_n_per_n",
-    "asymmetry_n",
-    "stribeck_n",
-    "dwell_stiction_n",
-    "side_load_n_s_per_mm",
-    "side_load_n_per_n",
-    "side_load_tilt_n",
-    "side_load_n_per_mm",
-)
-"""Fields without which there is no dry friction at all."""
 
 
 def side_load_n(friction: Friction, conditions: TwinConditions) -> Real:
@@ -63,133 +48,91 @@ def side_share(friction: Friction, conditions: TwinConditions) -> Real:
     return friction.side_load_n_per_n * (1.0 - exponential(-abs(conditions.feed_mm_s) / _DRAGGED_MM_PER_S))
 
 
-def two_sided_limit(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
+def yield_travels_m(presliding_m: float, least_m: float = RIGID_M) -> tuple[float, float, float]:
+    """Return the travel from rest after which each element slides, the stiffest first, m."""
+    one, two, three = (max(presliding_m * (j / ELEMENTS), least_m) for j in range(1, ELEMENTS + 1))
+    return one, two, three
+
+
+def directional_drags(friction: Friction) -> tuple[float, float]:
+    """asymmetric-friction by speed: viscous drag (moving out, moving in), N s/m, neither below 0."""
+    viscous, more_out = friction.viscous_n_s_per_m, friction.asymmetry_n_s_per_m
+    return max(viscous + more_out, 0.0), max(viscous - more_out, 0.0)
+
+
+@step
+def two_sided_limit(limit: Real, asymmetry_n: float) -> tuple[Real, Real]:
     """asymmetric-friction: (limit, centre) of a friction that is larger moving out than moving in, neither below 0.
 
     Friction is then centre + limit x strain. Rejected: a limit that jumps with the direction, which chatters at rest.
     """
-    out, back = larger(limit + asymmetry_n, 0.0), larger(limit - asymmetry_n, 0.0)
+    out, back = positive_part(limit + asymmetry_n), positive_part(limit - asymmetry_n)
     return 0.5 * (out + back), 0.5 * (out - back)
 
 
-def directional_drags(friction: Friction) -> tuple[Real, Real]:
-    """asymmetric-friction by speed: viscous drag (moving out, moving in), N s/m, neither below 0."""
-    viscous, more_out = friction.viscous_n_s_per_m, friction.asymmetry_n_s_per_m
-    return larger(viscous + more_out, 0.0), larger(viscous - more_out, 0.0)
+@step
+def stribeck_limit_n(stribeck_n: Real, speed_ratio: Real) -> Real:
+    """Return stribeck-friction: what standing adds to sliding, at a speed given as a multiple of its scale."""
+    return stribeck_n / (1.0 + speed_ratio * speed_ratio)
 
 
-def travel_share(drag_n_s_per_m: Real, stiffness_n_per_m: Real, step_s: Real) -> Real:
-    """Return how much of its way a slide behind a spring goes in one step against viscous drag (implicit Euler)."""
-    return stiffness_n_per_m / (stiffness_n_per_m + drag_n_s_per_m / step_s)
+@step
+def age_stiction(stiction_n: float, full_n: float, rest: float, travel: float) -> tuple[float, float]:
+    """dwell-stiction: a rest brings it towards `full_n`, motion takes it away; return (what rest adds, stiction after both).
+
+    rest: length of the step as a multiple of its time constant. travel: of the step, as a multiple of the breakaway.
+    """
+    grown_n = (full_n - stiction_n) * (1.0 - math.exp(-rest))
+    return grown_n, (stiction_n + grown_n) * math.exp(-abs(travel))
 
 
-def rest_stiction(stiction_n: Real, full_n: Real, share: Real) -> Real:
-    """dwell-stiction grows towards `full_n` by this share of what is missing."""
-    return stiction_n + share * (full_n - stiction_n)
+@step
+def strain_element(strain: float, shift: float) -> float:
+    """Return the strain of an element after a shift in units of its yield travel."""
+    strained = strain + shift
+    return -1.0 if strained < -1.0 else 1.0 if strained > 1.0 else strained
 
 
-def relieve_stiction(stiction_n: Real, travel_m: Real, breakaway_m: Real) -> Real:
-    """Return what motion leaves of the stiction."""
-    return stiction_n * exponential(-abs(travel_m) / breakaway_m)
+@step
+def strain_elements(
+    strains: tuple[float, float, float], travel_m: float, inverse_per_m: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return the strains after a travel."""
+    z1, z2, z3 = strains
+    i1, i2, i3 = inverse_per_m
+    return strain_element(z1, travel_m * i1), strain_element(z2, travel_m * i2), strain_element(z3, travel_m * i3)
 
 
-class Elements:
-    """Strains of the elements and the constants that solve them. None at all when the friction is null."""
+@step
+def travel_against_friction(
+    drive_n: float,
+    stiffness: tuple[float, float],
+    share_n: float,
+    strains: tuple[float, float, float],
+    inverse_per_m: tuple[float, float, float],
+) -> float:
+    """Return how far `drive_n` moves the slide in one step, m.
 
-    def __init__(self, friction: Friction, step_s: float, zero: Real) -> None:
-        self._friction = friction
-        self._stribeck_travel_m = friction.stribeck_speed_m_per_s * step_s
-        self._stribeck = bool(np.any(friction.stribeck_n))
-        dry = is_switched_on(friction, DRY)
-        self._coulomb_n, self._per_n = friction.coulomb_n, friction.load_dependent_n_per_n
-        self.asymmetric, self.ages = bool(np.any(friction.asymmetry_n)), bool(np.any(friction.dwell_stiction_n))
-        self._rest_share = 1.0 - exponential(-step_s / friction.dwell_stiction_s)
-        self._breakaway_m = larger(friction.presliding_m, BREAKAWAY_M)
-        self._stiction_n = zero
-        count = (ELEMENTS if np.any(friction.presliding_m) else 1) if dry else 0
-        yields_m = [larger(friction.presliding_m * ((j + 1) / count), RIGID_M) for j in range(count)]
-        self._inverse_per_m = [1.0 / yield_m for yield_m in yields_m]
-        self._lopsided = bool(np.any(friction.asymmetry_n_s_per_m))
-        self.set_drag(step_s)
-        tails = [sum(self._inverse_per_m[j:], start=zero) for j in range(count + 1)]
-        self._stuck_slope_per_m, self._slopes_per_m = tails[0], tails[1:]
-        self._part = 1.0 / count if count else 0.0
-        self._total = zero
-        self.strains: list[Real] = [zero] * count
-
-    def limit_n(self, thrust_n: Real, last_travel_m: Real) -> Real:
-        """Largest friction at this thrust (never negative), N; the speed that shapes it is the last step's."""
-        limit = self._coulomb_n + self._per_n * thrust_n
-        if self._stribeck:
-            ratio = last_travel_m / self._stribeck_travel_m
-            limit = limit + self._friction.stribeck_n / (1.0 + ratio * ratio)
-        if self.ages:
-            limit = limit + self._stiction_n
-        return limit
-
-    def load_sideways(self, load_n: Real, share: Real) -> None:
-        """Raise the limit by a side load and by a share of the thrust, until the next one."""
-        self._coulomb_n = self._friction.coulomb_n + load_n
-        self._per_n = self._friction.load_dependent_n_per_n + share
-
-    def age(self, travel_m: Real, limit: Real) -> None:
-        """Rest raises the limit, motion lowers it again. What a rising limit holds it does not push: the strains give."""
-        kept = self._stiction_n
-        grown = rest_stiction(kept, self._friction.dwell_stiction_n, self._rest_share)
-        ratio = larger(limit, 1.0e-12) / larger(limit + (grown - kept), 1.0e-12)
-        self._stiction_n = relieve_stiction(grown, travel_m, self._breakaway_m)
-        self.strains = [strain * ratio for strain in self.strains]
-        self._total = self._total * ratio
-
-    def set_drag(self, step_s: Real) -> None:
-        """Set the mean of the drags in both directions, and half of what they differ, as stiffness of a step, N/m."""
-        out, back = directional_drags(self._friction)
-        self.drag_n_per_m, self._more_out_n_per_m = 0.5 * (out + back) / step_s, 0.5 * (out - back) / step_s
-
-    def travel_m(self, drive_n: Real, stiffness_n_per_m: Real, limit: Real) -> Real:
-        """Return how far `drive_n` moves the slide against a spring, the mean drag and this friction."""
-        share = limit * self._part
-        held = drive_n - share * self._total
-        direction = sign(held)
-        if self._lopsided:
-            stiffness_n_per_m = larger(stiffness_n_per_m + direction * self._more_out_n_per_m, FREE_N_PER_M)
-        if not self.strains:
-            return drive_n / stiffness_n_per_m
-        left, along = direction * held, direction * share
-        furthest = left / (stiffness_n_per_m + share * self._stuck_slope_per_m)
-        for strain, slope in zip(self.strains, self._slopes_per_m, strict=True):
-            left = left + along * strain - share  # this element slides from here on
-            furthest = larger(furthest, left / (stiffness_n_per_m + share * slope))
-        return direction * furthest
-
-    def move(self, travel_m: Real) -> None:
-        """Strain the elements by a travel."""
-        strains = [
-            clip(strain + travel_m * inverse, -1.0, 1.0)
-            for strain, inverse in zip(self.strains, self._inverse_per_m, strict=True)
-        ]
-        if strains:
-            self.strains, self._total = strains, sum(strains[1:], start=strains[0])
-
-    def become(self, other: "Elements") -> None:
-        """Take over the strains of another slide at rest; nothing when its elements are others."""
-        if self.strains and len(other.strains) == len(self.strains):
-            self.strains, self._total = other.strains, other._total
-
-    def state(self) -> list[Real]:
-        """Return what the elements remember: the stiction after a rest, and the strains."""
-        return [self._stiction_n, *self.strains]
-
-    def resume(self, state: Sequence[Real]) -> None:
-        """Go on from what `state` gave."""
-        self._stiction_n, *self.strains = state
-        self._total = sum(self.strains[1:], start=self.strains[0]) if self.strains else self._total
-
-    def bear(self, other: "Elements") -> None:
-        """Take over the side load of another slide."""
-        self._coulomb_n, self._per_n = other._coulomb_n, other._per_n
-
-    @property
-    def mean(self) -> Real:
-        """Friction as a share of its limit, -1..1; positive against motion outward."""
-        return self._total * self._part
+    stiffness: what works against the travel besides friction, N/m: the mean of both directions, and what moving out has
+    more. share_n: limit of one element. strains and 1/d of the elements, the stiffest first.
+    """
+    z1, z2, z3 = strains
+    _, i2, i3 = inverse_per_m
+    held = drive_n - share_n * (z1 + z2 + z3)
+    way = 1.0 if held >= 0.0 else -1.0
+    free = stiffness[0] + way * stiffness[1]
+    free = FREE_N_PER_M if free < FREE_N_PER_M else free
+    left = way * held
+    travel = left / (free + share_n * (inverse_per_m[0] + i2 + i3))
+    left += share_n * (way * z1 - 1.0)  # the stiffest slides from here on
+    further = left / (free + share_n * (i2 + i3))
+    if further > travel:
+        travel = further
+        left += share_n * (way * z2 - 1.0)
+        further = left / (free + share_n * i3)
+        if further > travel:
+            travel = further
+            further = (left + share_n * (way * z3 - 1.0)) / free
+            if further > travel:
+                travel = further
+    return way * travel

@@ -1,17 +1,14 @@
 """The plant: one rig's physics, as profiles/plants/*.yaml fills it, field by field, with source and range.
 
-Every effect has a null value, which is the default: off equals absent. The sections stand in sections.py. For many
-parameter sets at once, `stack` makes one Plant whose fields are arrays of lanes.
+Every effect has a null value, which is the default: off equals absent. The sections stand in sections.py.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
-
-import numpy as np
+from functools import lru_cache
+from typing import Any, Final
 
 from gateway.defaults import STRICT, UNLIMITED
-from gateway.twin.elementwise import Real
 from gateway.twin.sections import Contact, Cylinder, Friction, LoadCell, Regulator
 
 __all__ = [
@@ -22,9 +19,7 @@ __all__ = [
     "LoadCell",
     "Plant",
     "Regulator",
-    "lane_count",
     "plain",
-    "stack",
     "values",
     "with_value",
 ]
@@ -42,7 +37,7 @@ class Plant:
     cell: LoadCell = field(default_factory=LoadCell)
 
 
-def values(plant: Plant) -> Iterator[tuple[str, str, Real]]:
+def values(plant: Plant) -> Iterator[tuple[str, str, float]]:
     """Yield every (section, field, value) of a plant, in the order of the file."""
     for section in fields(plant):
         part = getattr(plant, section.name)
@@ -50,35 +45,24 @@ def values(plant: Plant) -> Iterator[tuple[str, str, Real]]:
             yield section.name, entry.name, getattr(part, entry.name)
 
 
-def with_value(plant: Plant, section: str, name: str, value: Real) -> Plant:
+def with_value(plant: Plant, section: str, name: str, value: float) -> Plant:
     """Return the same plant with one field changed; AttributeError or TypeError for a name that it does not have."""
     changed: dict[str, Any] = {section: replace(getattr(plant, section), **{name: value})}
     return replace(plant, **changed)
 
 
-def stack(plants: Sequence[Plant]) -> Plant:
-    """Return one plant whose fields are arrays with one value per lane; ValueError when there is none."""
-    if not plants:
-        raise ValueError("a stack needs at least one plant")
-    stacked = plants[0]
-    for section, name, _ in values(plants[0]):
-        column = np.array([getattr(getattr(plant, section), name) for plant in plants], dtype=np.float64)
-        stacked = with_value(stacked, section, name, column)
-    return stacked
-
-
 def plain(plant: Plant) -> Plant:
-    """Return the same plant with Python floats where it has integers or numpy scalars: those would be slow, or taken for
-    lanes."""
-    for section, name, value in values(plant):
-        if type(value) is not float and not isinstance(value, np.ndarray):
-            plant = with_value(plant, section, name, float(value))
-    return plant
+    """Return the same plant with Python floats where it has integers or numpy scalars, which are slow.
+
+    TypeError where a value is not a number.
+    """
+    return Plant(**{name: plain_section(getattr(plant, name)) for name in SECTIONS})
 
 
-def lane_count(plant: Plant) -> int | None:
-    """Return how many lanes a stacked plant has; None for a plant of plain floats. ValueError when lanes differ in number."""
-    counts = {value.size for _, _, value in values(plant) if isinstance(value, np.ndarray)}
-    if len(counts) > 1:
-        raise ValueError(f"fields of one plant have different numbers of lanes: {sorted(counts)}")
-    return counts.pop() if counts else None
+@lru_cache(maxsize=4096)
+def plain_section(section: Any) -> Any:
+    """Return a section of Python floats. The cache makes this, which every plant of a search goes through, cheap."""
+    return replace(section, **{entry.name: float(getattr(section, entry.name)) for entry in fields(section)})
+
+
+SECTIONS: Final = tuple(entry.name for entry in fields(Plant))

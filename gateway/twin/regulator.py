@@ -1,156 +1,207 @@
 """The electro-pneumatic regulator: command steps, dead band, hysteresis, supply limit, delay, two lags, slew.
 
 Order of the terms: what does not depend on time (steps, dead band, play, supply) acts when the command arrives, and
-what does (delay, lags, slew) acts in each step. The two commute - a rate-independent operator does not care when its
-input comes - and a held command then costs nothing but the lags. The lags are exact for a held input:
-p += (1 - exp(-dt/tau)) (u - p), stable for any dt. The delay may be a fraction of a step (interpolated, never early),
-so that its sensitivity can be computed.
+what does (delay, lags, slew) acts while it stands. The two commute - a rate-independent operator does not care when its
+input comes - and a held command then costs nothing but the lags. These are exact under a target u that is held for a time h:
+    p1' = u + e1 (p1 - u),  p2' = u + e2 (p2 - u) + K (p1 - u),  K = t1 (e1 - e2) / (t1 - t2),  e = exp(-h / t).
+A delay shifts the moment at which a target is seen, by any time: a step in which one arrives is cut there. Only a regulator
+without any lag jumps: there the pressure of a step is the mean of the targets that it saw.
 """
 
-from typing import Any
+import math
+from collections import deque
+from typing import NamedTuple
 
-import numpy as np
-
+from gateway.compiled import step
 from gateway.defaults import UNLIMITED
 from gateway.twin.effects.regulator import add_droop, add_hunting, apply_leak, bend_command
 from gateway.twin.effects.term import is_switched_on
-from gateway.twin.elementwise import Real, choose, clip, exponential, larger, quantise, smaller, where
+from gateway.twin.elementwise import Real, clip, quantise, smaller
+from gateway.twin.lags import apply_play
 from gateway.twin.sections import Regulator
 
 
-def lag_factor(lag_s: Real, step_s: float) -> Real:
-    """Return the share of the remaining difference that a first-order lag covers in one step; 1 without a lag."""
-    present = larger(lag_s, 1.0e-12)
-    return where(lag_s > 0.0, 1.0 - exponential(-step_s / present), lag_s * 0.0 + 1.0)
-
-
-def filling_factor(regulator: Regulator, step_s: float) -> Real:
-    """Return lag_factor while the pressure rises."""
-    return lag_factor(regulator.lag_s * (1.0 + regulator.fill_slowdown), step_s)
-
-
-def half_decay(decay: Real) -> Real:
-    """Return a leak's decay over half a step: the first step after a command counts at its middle."""
-    return np.sqrt(decay) if isinstance(decay, np.ndarray) else decay**0.5
-
-
-def target_pa(regulator: Regulator, voltage_v: Real, bends: bool = False) -> Real:
-    """Return the pressure that a command asks for, in the command's own steps. bends: is its map other than straight?"""
+def target_pa(regulator: Regulator, voltage_v: Real) -> Real:
+    """Return the pressure that a command asks for, in the command's own steps."""
     stepped_v = quantise(clip(voltage_v, 0.0, regulator.full_scale_v), regulator.command_step_v)
-    if bends:
+    if is_switched_on(regulator, ("command_bow", "command_s")):
         stepped_v = bend_command(regulator, stepped_v)
     return smaller(stepped_v, regulator.full_scale_v) * (regulator.full_scale_pa / regulator.full_scale_v)
 
 
-def apply_dead_band(target: Real, held: Real, dead_band: Real) -> Real:
-    """Return the target that the regulator works on: a change within the dead band passes unnoticed."""
-    return where(abs(target - held) > dead_band, target, held)
+class HeldTarget(NamedTuple):
+    """The target while a command stands, Pa: as it was noticed, and behind the play and the supply's limit."""
+
+    noticed_pa: float = 0.0
+    play_pa: float = 0.0
+    held_pa: float = 0.0
 
 
-def apply_play(state: Real, value: Real, width: Real) -> Real:
-    """Apply a play of full width `width`: the state is dragged along, half a width behind."""
-    return clip(state, value - 0.5 * width, value + 0.5 * width)
+@step
+def notice_target(
+    target: HeldTarget, asked_pa: float, dead_band_pa: float, play_pa: float, supply_pa: float
+) -> HeldTarget:
+    """Return the target after another one was asked for; a change within the dead band passes unnoticed."""
+    noticed_pa = asked_pa if abs(asked_pa - target.noticed_pa) > dead_band_pa else target.noticed_pa
+    behind_pa = apply_play(target.play_pa, noticed_pa, play_pa)
+    return HeldTarget(noticed_pa, behind_pa, min(max(behind_pa, 0.0), supply_pa))
 
 
-class DelayLine:
-    """What was put in `delay_s` ago, one `put` per step. One ring for all lanes; lanes may have different delays."""
+@step
+def leaked_share(leak_per_s: float, since_s: float, held_s: float) -> float:
+    """Return the mean share of a target that a leak has left, over the next `held_s`, `since_s` after it was noticed."""
+    return math.exp(-leak_per_s * since_s) * -math.expm1(-leak_per_s * held_s) / (leak_per_s * held_s)
 
-    def __init__(self, delay_s: Real, step_s: float, start: Real) -> None:
-        steps = np.round(np.asarray(delay_s) / step_s, 9)
-        whole = np.floor(steps).astype(int)
-        self._fraction = float(steps - whole) if steps.ndim == 0 else steps - whole
-        self._interpolates = bool(np.any(steps != whole))
-        self._same = bool(np.all(whole == whole.flat[0]))
-        self._whole, self._first = whole, int(whole.flat[0])
-        self._length = int(whole.max()) + 2
-        self._lanes = np.arange(whole.size)
-        self._ring: Any = [start] * self._length if self._same else np.zeros((self._length, whole.size))
-        self._at = 0
 
-    def put(self, value: Real) -> Real:
-        """Store this step's value and return the one that is due."""
-        self._at = at = (self._at + 1) % self._length
-        self._ring[at] = value
-        if not self._interpolates:
-            return self._look_back(at)
-        later, earlier = self._look_back(at), self._look_back(at - 1)
-        return later + self._fraction * (earlier - later)
+class Lags(NamedTuple):
+    """What delays the pressure. filling_s: the first lag while the pressure rises."""
 
-    def _look_back(self, at: int) -> Real:
-        if self._same:
-            return self._ring[(at - self._first) % self._length]
-        return self._ring[(at - self._whole) % self._length, self._lanes]
+    emptying_s: float
+    filling_s: float
+    second_s: float
+    slew_pa_per_s: float
+
+    @property
+    def are_none(self) -> bool:
+        """Whether the pressure takes no time at all: it jumps with the target."""
+        return self.emptying_s == 0.0 and self.second_s == 0.0 and self.slew_pa_per_s >= UNLIMITED
+
+
+class LagShares(NamedTuple):
+    """What is kept over a time: (e1, K) while the pressure rises and while it falls, and e2. most_pa: the slew lets through."""
+
+    filling: tuple[float, float]
+    emptying: tuple[float, float]
+    second: float
+    most_pa: float
+
+
+class PressureState(NamedTuple):
+    """Pressure behind the first lag, behind the second, and behind the slew limit, Pa."""
+
+    first_pa: float = 0.0
+    second_pa: float = 0.0
+    slewed_pa: float = 0.0
+
+
+def lags_of(regulator: Regulator) -> Lags:
+    """Return what delays the pressure of a regulator."""
+    filling_s = regulator.lag_s * (1.0 + regulator.fill_slowdown)
+    return Lags(regulator.lag_s, filling_s, regulator.second_lag_s, regulator.slew_pa_per_s)
+
+
+@step
+def couple_lags(first_s: float, second_s: float, held_s: float) -> tuple[float, float]:
+    """Return (e1, K) of the module's text; lags of 0 are none."""
+    kept_1 = math.exp(-held_s / first_s) if first_s > 0.0 else 0.0
+    if second_s == 0.0:
+        return kept_1, kept_1
+    kept_2 = math.exp(-held_s / second_s)
+    if abs(first_s - second_s) > 1.0e-3 * max(first_s, second_s):
+        return kept_1, (kept_1 - kept_2) * (first_s / (first_s - second_s))
+    between = held_s * ((first_s - second_s) / (first_s * second_s))
+    growth = 1.0 + between * (0.5 + between / 6.0)  # expm1(x) / x, also at 0
+    return kept_1, held_s / second_s * kept_2 * growth
+
+
+@step
+def lag_shares(lags: Lags, held_s: float) -> LagShares:
+    """Return what is kept over a time."""
+    emptying = couple_lags(lags.emptying_s, lags.second_s, held_s)
+    filling = emptying if lags.filling_s == lags.emptying_s else couple_lags(lags.filling_s, lags.second_s, held_s)
+    second = math.exp(-held_s / lags.second_s) if lags.second_s > 0.0 else 0.0
+    return LagShares(filling, emptying, second, lags.slew_pa_per_s * held_s)
+
+
+@step
+def follow_target(state: PressureState, target_pa: float, shares: LagShares) -> PressureState:
+    """Return the state after the time of the shares under one target."""
+    ahead_pa = state.first_pa - target_pa
+    kept, across = shares.filling if ahead_pa < 0.0 else shares.emptying
+    second_pa = target_pa + shares.second * (state.second_pa - target_pa) + across * ahead_pa
+    slewed_pa = min(max(second_pa, state.slewed_pa - shares.most_pa), state.slewed_pa + shares.most_pa)
+    return PressureState(target_pa + kept * ahead_pa, second_pa, slewed_pa)
 
 
 class RegulatorState:
     """The moving part: `command` when a voltage arrives, `step` every step."""
 
-    def __init__(self, regulator: Regulator, step_s: float, zero: Real) -> None:
-        self._regulator = regulator
-        self._noticed_pa = self._play_pa = self._target_pa = self._slewed_pa = self._first_pa = zero
-        self._zero, self._step_s = zero, step_s
-        self.pressure_pa: Real = zero
-        self.air = True
-        self.supply_kpa: Real = None
-        self._bends = is_switched_on(regulator, ("command_bow", "command_s"))
-        self._delay = DelayLine(regulator.delay_s, step_s, zero) if np.any(regulator.delay_s) else None
-        self._slew_pa = regulator.slew_pa_per_s * step_s if np.any(regulator.slew_pa_per_s < UNLIMITED) else None
-        self._lag = lag_factor(regulator.lag_s, step_s) if np.any(regulator.lag_s) else None
-        self._fill_lag = filling_factor(regulator, step_s) if np.any(regulator.fill_slowdown) else None
-        self._second_lag = lag_factor(regulator.second_lag_s, step_s) if np.any(regulator.second_lag_s) else None
-        self._decay = exponential(-regulator.leak_per_s * step_s) if np.any(regulator.leak_per_s) else None
-        self._kept: Real = zero + 1.0
+    def __init__(self, regulator: Regulator, step_s: float) -> None:
+        self._regulator, self._step_s = regulator, step_s
+        self._lags = lags_of(regulator)
+        self._shares = lag_shares(self._lags, step_s)
+        self._target, self._state = HeldTarget(), PressureState()
+        self._since_s = 0.0
+        self._delay = round(regulator.delay_s / step_s, 9)  # in steps, as all moments here
+        self._now, self._seen_pa = 0, 0.0
+        self._arriving: deque[tuple[float, float]] = deque()
         self._droops = is_switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa"))
-        self._extra = self._decay is not None or self._droops
-        self._caps = bool(np.any(regulator.ceiling_pa < UNLIMITED))
-        self._leaks = bool(np.any(regulator.leak_flow_pa))
-        self._hunts = bool(np.any(regulator.hunting_pa))
-        self._steps, self._smooth_pa = 0, zero
+        self._changes = self._droops or regulator.leak_per_s != 0.0
+        self.pressure_pa = 0.0
+        self.air = True
+        self.supply_kpa: float | None = None
 
-    def command(self, voltage_v: Real) -> None:
-        """Take a new command, V (one for all lanes, or one per lane)."""
-        regulator, before = self._regulator, self._noticed_pa
-        target = target_pa(regulator, voltage_v, self._bends)
-        self._noticed_pa = apply_dead_band(target, before, regulator.dead_band_pa)
-        self._play_pa = apply_play(self._play_pa, self._noticed_pa, regulator.hysteresis_pa)
-        self._target_pa = smaller(larger(self._play_pa, 0.0), regulator.supply_pa) + self._zero
-        if self._decay is not None:
-            self._kept = choose(self._noticed_pa != before, half_decay(self._decay), self._kept)
+    def command(self, voltage_v: float) -> None:
+        """Take a new command, V."""
+        regulator, before = self._regulator, self._target
+        self._target = notice_target(
+            before,
+            target_pa(regulator, voltage_v),
+            regulator.dead_band_pa,
+            regulator.hysteresis_pa,
+            regulator.supply_pa,
+        )
+        if self._target.noticed_pa != before.noticed_pa:
+            self._since_s = 0.0
+        if not self._changes:
+            self._send(self._target.held_pa)
 
-    def step(self) -> Real:
+    def step(self) -> float:
         """Return the pressure at the end of one step, Pa."""
-        pressure = self._target_pa if not self._extra else self._held_pa()
-        if self._delay is not None:
-            pressure = self._delay.put(pressure)
-        if not self.air:
-            pressure = self._zero
-        if self._lag is not None:
-            lag = self._lag
-            if self._fill_lag is not None:
-                lag = choose(pressure > self._first_pa, self._fill_lag, lag)
-            self._first_pa = pressure = self._first_pa + lag * (pressure - self._first_pa)
-        if self._second_lag is not None:
-            pressure = self._smooth_pa + self._second_lag * (pressure - self._smooth_pa)
-        self._smooth_pa = pressure
-        if self._slew_pa is not None:
-            last = self._slewed_pa
-            self._slewed_pa = pressure = clip(pressure, last - self._slew_pa, last + self._slew_pa)
-        if self._caps:
-            pressure = smaller(pressure, self._regulator.ceiling_pa)
-        if self._leaks:
-            pressure = apply_leak(self._regulator, pressure)
+        if self._changes:
+            self._send(self._held_pa())
+        pressure = self._follow() if self._arriving else self._advance(self._step_s)
+        self._now += 1
+        regulator = self._regulator
+        if pressure > regulator.ceiling_pa:
+            pressure = regulator.ceiling_pa
+        if regulator.leak_flow_pa != 0.0:
+            pressure = apply_leak(regulator, pressure)
+        if regulator.hunting_pa != 0.0:
+            pressure = add_hunting(regulator, pressure, self._now * self._step_s)
         self.pressure_pa = pressure
-        if self._hunts:
-            self._steps += 1
-            self.pressure_pa = add_hunting(self._regulator, pressure, self._steps * self._step_s)
-        return self.pressure_pa
+        return pressure
 
-    def _held_pa(self) -> Real:
-        """The target with what happens to it while the command stands: leak and droop."""
-        pressure = self._target_pa
-        if self._decay is not None:
-            pressure = pressure * self._kept
-            self._kept = self._kept * self._decay
+    def _send(self, target_pa: float) -> None:
+        if self._delay:
+            self._arriving.append((self._now + self._delay, target_pa))
+        else:
+            self._seen_pa = target_pa
+
+    def _follow(self) -> float:
+        """One step in which targets may arrive."""
+        at, total = float(self._now), 0.0
+        while self._arriving and self._arriving[0][0] < self._now + 1:
+            moment, target = self._arriving.popleft()
+            total += (moment - at) * self._advance((moment - at) * self._step_s)
+            at, self._seen_pa = moment, target
+        left = self._now + 1 - at
+        pressure = self._advance(left * self._step_s)
+        return total + left * pressure if self._lags.are_none else pressure
+
+    def _advance(self, held_s: float) -> float:
+        """Live under the target that is seen now."""
+        target = self._seen_pa if self.air else 0.0
+        shares = self._shares if held_s == self._step_s else lag_shares(self._lags, held_s)
+        self._state = follow_target(self._state, target, shares)
+        return self._state.slewed_pa
+
+    def _held_pa(self) -> float:
+        """The target over the next step, with what happens to it while the command stands: leak and droop."""
+        pressure, regulator = self._target.held_pa, self._regulator
+        if regulator.leak_per_s != 0.0:
+            pressure *= leaked_share(regulator.leak_per_s, self._since_s, self._step_s)
+            self._since_s += self._step_s
         if self._droops and self.supply_kpa is not None:
-            pressure = add_droop(self._regulator, pressure, self.supply_kpa)
+            pressure = add_droop(regulator, pressure, self.supply_kpa)
         return pressure

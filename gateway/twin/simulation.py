@@ -7,16 +7,14 @@ gives 1 mm, and no figure of the paper shows otherwise. Time and chance are argu
 import math
 from typing import Final
 
-import numpy as np
 from numpy.random import default_rng
 
 from gateway.twin.contact import ContactState
-from gateway.twin.elementwise import Real
 from gateway.twin.friction import side_load_n, side_share
 from gateway.twin.load_cell import LoadCellState
-from gateway.twin.plant import Plant, lane_count, plain
+from gateway.twin.moving_slide import MovingSlide
+from gateway.twin.plant import Plant, plain
 from gateway.twin.regulator import RegulatorState
-from gateway.twin.slide import SlideState
 from gateway.twin.surroundings import Surroundings, TwinConditions
 
 STEP_S: Final = 1.0e-3
@@ -24,34 +22,31 @@ _ROUNDING: Final = 1.0e-6  # of a step: ten times 0.001 s are ten steps
 
 
 class Twin:
-    """A simulated rig. Floats in, floats out; arrays of lanes when the plant is stacked."""
+    """A simulated rig."""
 
     def __init__(self, plant: Plant, seed: int) -> None:
-        """Start at rest, without air pressure, at time 0. ValueError when the plant's lanes differ in number."""
+        """Start at rest, without air pressure, at time 0."""
         self.plant = plain(plant)
         self._seed = seed
         self.reset()
 
     def reset(self) -> None:
         """Back to the start: state, time, faults and noise."""
-        lanes = lane_count(self.plant)
-        zero: Real = 0.0 if lanes is None else np.zeros(lanes)
-        self._conditions = TwinConditions(command_v=zero)
-        self._regulator = RegulatorState(self.plant.regulator, STEP_S, zero)
-        self._slide = SlideState(self.plant, STEP_S, zero)
-        self._contact = ContactState(self.plant.contact, STEP_S, self._conditions, zero)
-        self._cell = LoadCellState(self.plant.cell, STEP_S, zero)
+        self._conditions = TwinConditions(command_v=0.0)
+        self._regulator = RegulatorState(self.plant.regulator, STEP_S)
+        self._slide = MovingSlide(self.plant, STEP_S)
+        self._contact = ContactState(self.plant.contact, STEP_S, self._conditions)
+        self._cell = LoadCellState(self.plant.cell, STEP_S)
         self._cell.select_active_effects(self._conditions)
         self._rng = default_rng(self._seed)
         self._steps = 0
         self._owed_steps = 0.0
-        self._reading: Real = None
+        self._reading: float | None = None
 
-    def command(self, voltage_v: Real) -> None:
+    def command(self, voltage_v: float) -> None:
         """Apply a command voltage, V; it holds until the next one. ValueError when it is not finite."""
-        if not np.all(np.isfinite(voltage_v)):
+        if not math.isfinite(voltage_v):
             raise ValueError(f"command {voltage_v} V is not finite")
-        voltage_v = voltage_v if isinstance(voltage_v, np.ndarray) else float(voltage_v)
         self._regulator.command(voltage_v)
         self._conditions.command_v = voltage_v
 
@@ -82,14 +77,14 @@ class Twin:
             conditions.spindle_rad = conditions.spindle_rad + turn_rad
             cell(contact(slide(regulator())))
 
-    def read(self) -> Real:
+    def read(self) -> float:
         """Return a reading of the load cell now, N: each call draws new noise."""
         self._conditions.time_s = self._steps * STEP_S
-        self._reading = self._cell.read(self._rng, self._conditions)
-        return self._reading
+        self._reading = reading = self._cell.read(self._rng, self._conditions)
+        return reading
 
     @property
-    def measured_n(self) -> Real:
+    def measured_n(self) -> float:
         """The reading of this moment, N: the last `read`, or a new one when time has passed since."""
         return self.read() if self._reading is None else self._reading
 
@@ -98,37 +93,37 @@ class Twin:
         return (self._steps + self._owed_steps) * STEP_S
 
     @property
-    def pressure_pa(self) -> Real:
+    def pressure_pa(self) -> float:
         """Gauge pressure in the cylinder."""
         return self._regulator.pressure_pa
 
     @property
-    def force_n(self) -> Real:
+    def force_n(self) -> float:
         """True contact force, without cell, noise or sign."""
         return self._contact.force_n if self._contact.is_on else self._slide.force_n
 
     @property
-    def friction_n(self) -> Real:
+    def friction_n(self) -> float:
         """Friction on the slide, positive against motion outward."""
-        return self._slide.friction_n
+        return self._slide.state.friction_n
 
     @property
-    def position_m(self) -> Real:
+    def position_m(self) -> float:
         """Travel of the slide from its back stop."""
-        return self._slide.position_m
+        return self._slide.state.position_m
 
     @property
-    def speed_m_per_s(self) -> Real:
+    def speed_m_per_s(self) -> float:
         return self._slide.speed_m_per_s
 
-    def set_surface(self, height_m: Real) -> None:
-        """Input: the workpiece under the pad, m towards the tool (one for all lanes, or one per lane); 0 is null.
+    def set_surface(self, height_m: float) -> None:
+        """Input: the workpiece under the pad, m towards the tool; 0 is null.
 
         Feed under the tool is a series of heights. ValueError when not finite.
         """
-        if not np.all(np.isfinite(height_m)):
+        if not math.isfinite(height_m):
             raise ValueError(f"surface height {height_m} m is not finite")
-        self._slide.set_surface(height_m if isinstance(height_m, np.ndarray) else float(height_m))
+        self._slide.set_surface(height_m)
 
     def set_surroundings(self, around: Surroundings) -> None:
         """Input: temperature, supply, spindle, feed, tilt, place; they hold until the next ones. None: not known.
@@ -142,14 +137,14 @@ class Twin:
         self._contact.select_active_effects(self._slide.force_n)
         self._cell.select_active_effects(self._conditions)
 
-    def set_disturbance(self, force_n: Real) -> None:
+    def set_disturbance(self, force_n: float) -> None:
         """Input: an outside force on the slide, N towards the workpiece (a spindle's vibration); 0 is null.
 
         It holds until the next one. ValueError when not finite.
         """
-        if not np.all(np.isfinite(force_n)):
+        if not math.isfinite(force_n):
             raise ValueError(f"disturbance {force_n} N is not finite")
-        self._slide.set_disturbance(force_n if isinstance(force_n, np.ndarray) else float(force_n))
+        self._slide.set_disturbance(force_n)
 
     def set_air(self, on: bool) -> None:
         """Fault: shut the air supply off; the pressure falls with the regulator's lag."""

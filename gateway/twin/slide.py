@@ -5,146 +5,166 @@ friction are piecewise linear, so the solution is closed (see friction.py). The 
 larger of 0 and k (x - gap + D) + d D/dt, a convex function, so D is the smaller of the solutions with and without the
 pad. The damping d sees the slide's speed only: a surface that passes under the pad at 15 mm/s with a slope of 1 % would
 add 6 mN. Implicit Euler damps: at 1 ms the 40 Hz of 0.6 kg on 4e4 N/m get a damping ratio of 0.13 on top of the pad's own.
-A null mass gives the quasi-static solution.
+A null mass gives the quasi-static solution, for steps of any length.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from typing import Final, NamedTuple
 
-import numpy as np
-
-from gateway.twin.elementwise import Real, any_below, clip, larger, smaller
-from gateway.twin.friction import FREE_N_PER_M, Elements, two_sided_limit
+from gateway.compiled import step
+from gateway.twin.friction import (
+    BREAKAWAY_M,
+    age_stiction,
+    directional_drags,
+    strain_elements,
+    stribeck_limit_n,
+    travel_against_friction,
+    two_sided_limit,
+    yield_travels_m,
+)
 from gateway.twin.plant import Plant
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
-MOVING = ("viscous_n_s_per_m", "asymmetry_n_s_per_m", "stribeck_n", "dwell_stiction_n")
-"""Friction that is nothing at rest."""
+_LEAST_N: Final = 1.0e-12  # of a limit that is divided by
+_UPRIGHT: Final = 1.0e-15  # cos(90 deg) is 6e-17 in floats
 
 
-def weight_n(mass_kg: Real, tilt_deg: Real) -> Real:
-    """Return part of the weight that presses towards the workpiece, m g cos(tilt)."""
-    upright = np.cos(np.radians(tilt_deg))
-    share = np.where(np.abs(upright) < 1.0e-15, 0.0, upright)  # cos(90 deg) is 6e-17 in floats
-    weight = mass_kg * STANDARD_GRAVITY_M_PER_S2 * share
-    return weight if weight.ndim else float(weight)
+class Slide(NamedTuple):
+    """The constants of a plant's slide, as its step needs them.
 
-
-def stop_in_reach(plant: Plant, gap_m: Real) -> bool:
-    """Can the slide reach a stop while the pad is pressed?
-
-    The end stop: twice the full thrust covers inertial overshoot. The back stop: only a workpiece that stands behind it
-    (gap < 0) pushes the slide so far. Where both are out of reach the step need not look for them.
+    most_n: thrust and weight at full scale. inverse_per_m: 1 / yield travel of the friction elements.
     """
-    contact, regulator = plant.contact, plant.regulator
-    thrust = plant.cylinder.area_m2 * regulator.full_scale_pa + weight_n(contact.mass_kg, 0.0)
-    spring_n = contact.pad_stiffness_n_per_m * (plant.cylinder.stroke_m - gap_m)
-    return bool(np.any(spring_n < 2.0 * thrust)) or bool(np.any(np.less(gap_m, 0.0)))
+
+    area_m2: float
+    stroke_m: float
+    gap_m: float
+    stops_in_reach: bool
+    most_n: float
+    pad_n_per_m: float
+    pad_n_s_per_m: float
+    mass_kg: float
+    weight_n: float
+    coulomb_n: float
+    load_dependent_n_per_n: float
+    asymmetry_n: float
+    stribeck_n: float
+    stribeck_m_per_s: float
+    drag_n_s_per_m: float
+    more_out_n_s_per_m: float
+    stiction_n: float
+    stiction_s: float
+    breakaway_m: float
+    inverse_per_m: tuple[float, float, float]
 
 
-class SlideState:
-    """Position, speed and contact force. `step` takes the pressure of a step and returns the contact force, N."""
+class SlideState(NamedTuple):
+    """What the slide remembers, and the forces of its last step, N. travel_m: of that step; strains: the stiffest first."""
 
-    def __init__(self, plant: Plant, step_s: float, zero: Real) -> None:
-        contact = plant.contact
-        self._step_s, self._zero, self._touching = step_s, zero, True
-        self._area_m2 = plant.cylinder.area_m2
-        self._stroke_m = plant.cylinder.stroke_m
-        self._plant = plant
-        self._gap_m = contact.gap_m
-        self._weight_n = self._steady_n = weight_n(contact.mass_kg, contact.tilt_deg)
-        self._inertia_n_per_m = contact.mass_kg / step_s**2
-        self._elements = Elements(plant.friction, step_s, zero)
-        drag_n_per_m = self._inertia_n_per_m + self._elements.drag_n_per_m
-        self._free_n_per_m = larger(drag_n_per_m, FREE_N_PER_M)
-        self._pad_n_per_m = contact.pad_stiffness_n_per_m
-        self._pad_step_n_per_m = contact.pad_stiffness_n_per_m + contact.pad_damping_n_s_per_m / step_s
-        self._pressed_n_per_m = drag_n_per_m + self._pad_step_n_per_m
-        self._stop_in_reach = stop_in_reach(plant, contact.gap_m)
-        self._limit_n = self._centre_n = zero
-        self._travel_m: Real = zero
-        self.position_m: Real = zero
-        self.force_n: Real = zero
+    position_m: float = 0.0
+    travel_m: float = 0.0
+    stiction_n: float = 0.0
+    strains: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    force_n: float = 0.0
+    friction_n: float = 0.0
 
-    @property
-    def speed_m_per_s(self) -> Real:
-        return self._travel_m / self._step_s
 
-    @property
-    def friction_n(self) -> Real:
-        """Friction on the slide, positive against motion outward."""
-        return self._centre_n + self._limit_n * self._elements.mean
+def weight_n(mass_kg: float, tilt_deg: float) -> float:
+    """Return the part of the weight that presses towards the workpiece, m g cos(tilt)."""
+    upright = math.cos(math.radians(tilt_deg))
+    return mass_kg * STANDARD_GRAVITY_M_PER_S2 * (0.0 if abs(upright) < _UPRIGHT else upright)
 
-    def set_contact(self, on: bool) -> None:
-        """Take the workpiece away, or bring it back to where the gap says: the slide is pushed back to touch it."""
-        if on and not self._touching:
-            self.position_m = smaller(self.position_m, self._gap_m + self._zero)
-            self._travel_m = self._zero
-        self._touching = on
 
-    def set_surface(self, height_m: Real) -> None:
-        """Set by how much the workpiece's surface stands nearer to the tool than the gap says; 0 is null."""
-        self._gap_m = self._plant.contact.gap_m - height_m
-        self._stop_in_reach = stop_in_reach(self._plant, self._gap_m)
+def slide_of(plant: Plant) -> Slide:
+    """Return the constants of a plant's slide."""
+    contact, friction, cylinder = plant.contact, plant.friction, plant.cylinder
+    out, back = directional_drags(friction)
+    one, two, three = yield_travels_m(friction.presliding_m)
+    slide = Slide(
+        area_m2=cylinder.area_m2,
+        stroke_m=cylinder.stroke_m,
+        gap_m=contact.gap_m,
+        stops_in_reach=True,
+        most_n=cylinder.area_m2 * plant.regulator.full_scale_pa + contact.mass_kg * STANDARD_GRAVITY_M_PER_S2,
+        pad_n_per_m=contact.pad_stiffness_n_per_m,
+        pad_n_s_per_m=contact.pad_damping_n_s_per_m,
+        mass_kg=contact.mass_kg,
+        weight_n=weight_n(contact.mass_kg, contact.tilt_deg),
+        coulomb_n=friction.coulomb_n,
+        load_dependent_n_per_n=friction.load_dependent_n_per_n,
+        asymmetry_n=friction.asymmetry_n,
+        stribeck_n=friction.stribeck_n,
+        stribeck_m_per_s=friction.stribeck_speed_m_per_s,
+        drag_n_s_per_m=0.5 * (out + back),
+        more_out_n_s_per_m=0.5 * (out - back),
+        stiction_n=friction.dwell_stiction_n,
+        stiction_s=friction.dwell_stiction_s,
+        breakaway_m=max(friction.presliding_m, BREAKAWAY_M),
+        inverse_per_m=(1.0 / one, 1.0 / two, 1.0 / three),
+    )
+    return with_gap(slide, contact.gap_m)
 
-    def set_side_load(self, load_n: Real, share: Real = 0.0) -> None:
-        """Set by how much what presses the slide sideways raises its friction, N, and this share of the thrust; 0 is null."""
-        self._elements.load_sideways(load_n, share)
 
-    def settle(self, pressure_pa: Real) -> None:
-        """Come to rest under this pressure at once: one step without inertia and drag, which are nothing at rest."""
-        friction = replace(self._plant.friction, **dict.fromkeys(MOVING, 0.0))
-        contact = replace(self._plant.contact, mass_kg=0.0, pad_damping_n_s_per_m=0.0)
-        still = SlideState(replace(self._plant, friction=friction, contact=contact), self._step_s, self._zero)
-        still._steady_n, still._gap_m, still._touching = self._steady_n, self._gap_m, self._touching
-        still._elements.bear(self._elements)
-        self.force_n, self.position_m = still.step(pressure_pa), still.position_m
-        self._elements.become(still._elements)
+def with_gap(slide: Slide, gap_m: float) -> Slide:
+    """Return a slide whose workpiece stands elsewhere.
 
-    def state(self) -> list[Real]:
-        """Return what the slide remembers: position, m, travel of the last step, m, stiction, N, and strains."""
-        return [self.position_m, self._travel_m, *self._elements.state()]
+    The step looks for the stops only where they can be reached while the pad is pressed. The end stop: twice the full
+    thrust covers inertial overshoot. The back stop: only a workpiece that stands behind it (gap < 0) pushes so far.
+    """
+    reaches_end = slide.pad_n_per_m * (slide.stroke_m - gap_m) < 2.0 * slide.most_n
+    return slide._replace(gap_m=gap_m, stops_in_reach=reaches_end or gap_m < 0.0)
 
-    def resume(self, state: Sequence[Real]) -> None:
-        """Go on from what `state` gave."""
-        self.position_m, self._travel_m, *rest = state
-        self._elements.resume(rest)
 
-    def set_disturbance(self, force_n: Real) -> None:
-        """Set an outside force on the slide, positive towards the workpiece; 0 is null."""
-        self._steady_n = self._weight_n + force_n
+def without_motion(slide: Slide) -> Slide:
+    """Return a slide that one step brings to rest: without inertia and drag, which are nothing at rest."""
+    return slide._replace(
+        mass_kg=0.0, pad_n_s_per_m=0.0, stribeck_n=0.0, drag_n_s_per_m=0.0, more_out_n_s_per_m=0.0, stiction_n=0.0
+    )
 
-    def step(self, pressure_pa: Real) -> Real:
-        """Advance one step under this pressure."""
-        elements = self._elements
-        thrust = self._area_m2 * pressure_pa
-        self._limit_n = limit = elements.limit_n(thrust, self._travel_m)
-        drive = thrust + self._steady_n + self._inertia_n_per_m * self._travel_m
-        if elements.asymmetric:
-            self._limit_n, self._centre_n = limit, centre = two_sided_limit(limit, self._plant.friction.asymmetry_n)
-            drive = drive - centre
-        travel = self._solve(drive, limit)
-        elements.move(travel)
-        if elements.ages:
-            elements.age(travel, limit)
-        self.position_m = self.position_m + travel
-        self._travel_m = travel
-        return self.force_n
 
-    def _solve(self, drive_n: Real, limit: Real) -> Real:
-        """Travel of one step; leaves the contact force."""
-        if not self._touching:
-            self.force_n = self._zero
-            return self._between_stops(self._elements.travel_m(drive_n, self._free_n_per_m, limit))
-        pad = self._pad_n_per_m * (self.position_m - self._gap_m)
-        travel = self._elements.travel_m(drive_n - pad, self._pressed_n_per_m, limit)
-        self.force_n = force = pad + self._pad_step_n_per_m * travel
-        if self._stop_in_reach or any_below(force, 0.0):
-            travel = smaller(travel, self._elements.travel_m(drive_n, self._free_n_per_m, limit))
-            travel = self._between_stops(travel)
-            self.force_n = larger(pad + self._pad_step_n_per_m * travel, 0.0)
-        return travel
+def without_mass(slide: Slide) -> Slide:
+    """Return a quasi-static slide, which keeps its weight."""
+    return slide._replace(mass_kg=0.0, pad_n_s_per_m=0.0)
 
-    def _between_stops(self, travel_m: Real) -> Real:
-        position = self.position_m
-        return clip(travel_m, -position, self._stroke_m - position)
+
+@step
+def advance_slide(
+    slide: Slide, state: SlideState, loads_n: tuple[float, float, float], step_s: float, last_step_s: float
+) -> SlideState:
+    """Return the state after one step.
+
+    loads_n: thrust of the pressure, what surroundings add to the friction's limit, force from outside towards the workpiece.
+    last_step_s: length of the step in which the slide made its last travel.
+    """
+    thrust_n, side_n, outside_n = loads_n
+    limit_n = slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n + state.stiction_n
+    if slide.stribeck_n != 0.0:
+        limit_n += stribeck_limit_n(slide.stribeck_n, state.travel_m / (slide.stribeck_m_per_s * last_step_s))
+    centre_n, drive_n = 0.0, thrust_n + slide.weight_n + outside_n
+    if slide.asymmetry_n != 0.0:
+        limit_n, centre_n = two_sided_limit(limit_n, slide.asymmetry_n)
+        drive_n -= centre_n
+    inertia = slide.mass_kg / step_s
+    drive_n += inertia * state.travel_m / last_step_s
+    own = inertia / step_s + slide.drag_n_s_per_m / step_s
+    more_out = slide.more_out_n_s_per_m / step_s
+    share_n = limit_n * (1.0 / 3.0)
+
+    pad_n_per_m = slide.pad_n_per_m + slide.pad_n_s_per_m / step_s
+    pad_n = slide.pad_n_per_m * (state.position_m - slide.gap_m)
+    pressed = (own + pad_n_per_m, more_out)
+    travel_m = travel_against_friction(drive_n - pad_n, pressed, share_n, state.strains, slide.inverse_per_m)
+    force_n = pad_n + pad_n_per_m * travel_m
+    if slide.stops_in_reach or force_n < 0.0:
+        free_m = travel_against_friction(drive_n, (own, more_out), share_n, state.strains, slide.inverse_per_m)
+        travel_m = min(max(min(travel_m, free_m), -state.position_m), slide.stroke_m - state.position_m)
+        force_n = max(pad_n + pad_n_per_m * travel_m, 0.0)
+
+    z1, z2, z3 = strain_elements(state.strains, travel_m, slide.inverse_per_m)
+    friction_n, stiction_n = centre_n + share_n * (z1 + z2 + z3), state.stiction_n
+    if slide.stiction_n != 0.0:
+        grown_n, stiction_n = age_stiction(
+            stiction_n, slide.stiction_n, step_s / slide.stiction_s, travel_m / slide.breakaway_m
+        )
+        held = max(limit_n, _LEAST_N) / max(limit_n + grown_n, _LEAST_N)
+        z1, z2, z3 = z1 * held, z2 * held, z3 * held  # what a rising limit holds it does not push: the strains give
+    return SlideState(state.position_m + travel_m, travel_m, stiction_n, (z1, z2, z3), force_n, friction_n)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gateway.twin import LoadCell, Plant, Regulator, Twin, stack
+from gateway.twin import LoadCell, Plant, Regulator, Twin
 from gateway.twin.experiment import Dwell, settling_time_s, staircase
 from gateway.twin.plant import with_value
 from tests.twin.traces import step_response, trace
@@ -24,11 +24,6 @@ def test_readings_of_a_stair_are_averaged() -> None:
     single = staircase(twin, [1.0] * 60, Dwell(readings=1))
     averaged = staircase(twin, [1.0] * 60, Dwell(readings=16))
     assert averaged.std() == pytest.approx(single.std() / 4.0, rel=0.35)
-
-
-def test_lanes_give_a_column_each() -> None:
-    plants = [with_value(Plant(), "cylinder", "area_m2", area) for area in (1.0e-4, 2.0e-4)]
-    np.testing.assert_allclose(staircase(Twin(stack(plants), 1), [1.0, 2.0], Dwell()), [[9.0, 18.0], [18.0, 36.0]])
 
 
 def test_a_trace_looks_once_per_interval() -> None:

@@ -2,10 +2,9 @@
 
 import math
 
-import numpy as np
 import pytest
 
-from gateway.twin import Contact, Cylinder, Friction, Plant, Regulator, Twin, stack
+from gateway.twin import Contact, Cylinder, Friction, Plant, Regulator, Twin
 from gateway.twin.plant import with_value
 
 STIFFNESS_N_PER_M = 4.0e4
@@ -75,22 +74,6 @@ def test_a_surface_behind_the_back_stop_presses_the_pad_not_the_slide_through_th
     twin.advance(0.1)
     assert twin.position_m == 0.0
     assert twin.force_n == pytest.approx(4.0)
-
-
-def test_lanes_take_their_own_inputs() -> None:
-    lanes, heights_m, forces_n = Twin(stack([RICH, RICH]), 1), np.array([1.0e-4, -2.0e-4]), np.array([0.5, -1.0])
-    singles = [Twin(RICH, 1) for _ in range(2)]
-    for twin in (lanes, *singles):
-        twin.command(4.0)
-    for _ in range(200):
-        lanes.set_surface(heights_m)
-        lanes.set_disturbance(forces_n)
-        lanes.advance(0.001)
-        for single, height_m, force_n in zip(singles, heights_m, forces_n, strict=True):
-            single.set_surface(float(height_m))
-            single.set_disturbance(float(force_n))
-            single.advance(0.001)
-    np.testing.assert_allclose(lanes.force_n, [single.force_n for single in singles], rtol=1.0e-12)
 
 
 def test_reset_takes_the_inputs_back() -> None:

@@ -1,4 +1,4 @@
-"""Time, chance and lanes: the same formula, however it is run."""
+"""Time and chance: the same physics, however it is run."""
 
 import math
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin, stack
+from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin
 from gateway.twin.experiment import Floats
 from gateway.twin.plant import values, with_value
 from tests.twin.traces import trace
@@ -44,37 +44,6 @@ def run(plant: Plant, seed: int = 3, part_s: float = 0.01) -> Floats:
         twin.command(voltage_v)
         rows.append(trace(twin, 0.2, lambda running: (running.force_n, running.read(), running.pressure_pa), part_s))
     return np.concatenate(rows)
-
-
-def variants() -> list[Plant]:
-    """RICH, and RICH with each field in turn a tenth larger."""
-    return [RICH, *(with_value(RICH, section, name, 1.1 * value) for section, name, value in values(RICH))]
-
-
-def test_a_lane_equals_the_float_run() -> None:
-    plants = variants()
-    lanes = run(stack(plants))
-    for index, plant in enumerate(plants):
-        np.testing.assert_allclose(lanes[:, :, index], run(plant), rtol=1.0e-12, atol=1.0e-12)
-
-
-def test_lanes_that_differ_in_one_field_may_share_the_others_as_floats() -> None:
-    delays_s = np.array([0.0, 0.0105, 0.02])
-    lanes = run(with_value(RICH, "regulator", "delay_s", delays_s))
-    for index, delay_s in enumerate(delays_s):
-        alone = run(with_value(RICH, "regulator", "delay_s", float(delay_s)))
-        np.testing.assert_allclose(lanes[:, :, index], alone, rtol=1.0e-12, atol=1.0e-12)
-
-
-def test_each_lane_may_have_its_own_command() -> None:
-    twin = Twin(stack([RICH, RICH]), 1)
-    twin.command(np.array([2.0, 4.0]))
-    twin.advance(1.0)
-    for index, voltage_v in enumerate((2.0, 4.0)):
-        alone = Twin(RICH, 1)
-        alone.command(voltage_v)
-        alone.advance(1.0)
-        assert twin.force_n[index] == pytest.approx(alone.force_n, rel=1.0e-12)
 
 
 def test_whole_numbers_and_numpy_scalars_are_taken_for_floats() -> None:
@@ -133,14 +102,6 @@ def test_reset_starts_the_same_life_again() -> None:
         twin.reset()
         assert (twin.time_s, twin.force_n, twin.pressure_pa) == (0.0, 0.0, 0.0)
     np.testing.assert_array_equal(lives[0], lives[1])
-
-
-def test_lanes_of_different_numbers_are_refused() -> None:
-    plant = with_value(Plant(), "regulator", "lag_s", np.zeros(2))
-    with pytest.raises(ValueError, match="different numbers of lanes"):
-        Twin(with_value(plant, "friction", "coulomb_n", np.zeros(3)), 1)
-    with pytest.raises(ValueError, match="at least one"):
-        stack([])
 
 
 def test_the_shipped_plant_names_every_field_once_with_source_and_range() -> None:

@@ -8,8 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import numpy as np
-
 from gateway.twin.elementwise import Real
 from gateway.twin.surroundings import TwinConditions
 
@@ -19,7 +17,7 @@ Formula: TypeAlias = Callable[[Any, Real, TwinConditions], Real]
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """switches: fields of which one must differ from 0; column: of Moment, which must be known; None: needs none."""
+    """switches: fields of which one must differ from 0; column: of TwinConditions, which must be known; None: needs none."""
 
     switches: tuple[str, ...]
     column: str | None
@@ -27,12 +25,8 @@ class Term:
 
 
 def is_switched_on(section: Any, names: Sequence[str]) -> bool:
-    """Return whether one of these fields is not 0 in any lane."""
-    for name in names:
-        value = getattr(section, name)
-        if np.any(value) if isinstance(value, np.ndarray) else value != 0.0:
-            return True
-    return False
+    """Return whether one of these fields is not 0."""
+    return any(getattr(section, name) != 0.0 for name in names)
 
 
 def active_formulas(terms: Sequence[Term], section: Any, conditions: TwinConditions) -> tuple[Formula, ...]:

@@ -10,7 +10,7 @@ from gateway.twin.effects.contact import SLOW, SPINDLE
 from gateway.twin.effects.term import active_formulas
 from gateway.twin.replay.drive import Floats
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.lags import follow_lag
+from gateway.twin.replay.loops import march_lag, march_play
 from gateway.twin.sections import Contact
 
 
@@ -24,9 +24,12 @@ class Forces:
         """Contact force on the grid without the spindle, N; the slide's own array when there is nothing to add."""
         force = slide_n
         if contact.backlash_n != 0.0:
-            force = _backlash(force, contact.backlash_n)
+            force = np.empty_like(slide_n)
+            march_play(contact.backlash_n, 0.0, slide_n, force)
         if contact.creep_share != 0.0:
-            force = force + contact.creep_share * follow_lag(force, contact.creep_s, self._grid.steps_s)
+            late = np.empty_like(force)
+            march_lag(contact.creep_s, force, self._grid.steps_s, late)
+            force = force + contact.creep_share * late
         for term in active_formulas(SLOW, contact, self._grid.conditions):
             force = term(contact, force, self._grid.conditions)
         return force
@@ -37,13 +40,3 @@ class Forces:
         conditions = self._grid.row_conditions
         for term in active_formulas((SPINDLE,), contact, conditions):
             found[:] = term(contact, found, conditions)
-
-
-def _backlash(force_n: Floats, width_n: float) -> Floats:
-    """regulator.play over a series, from 0."""
-    state, found = 0.0, []
-    half = 0.5 * width_n
-    for low, high in zip((force_n - half).tolist(), (force_n + half).tolist(), strict=True):
-        state = low if state < low else high if state > high else state
-        found.append(state)
-    return np.array(found)

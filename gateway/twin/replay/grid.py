@@ -2,8 +2,7 @@
 
 The step is the median row distance, halved until it is at most 5 ms; rows further apart have points between them, at
 about this step. So nothing is interpolated at a row: behind a command the pressure has a corner, and a line drawn across
-it, between points of a uniform grid, was wrong by up to 1 N. Steps may all be different; each stage takes the length of
-each, or one number where they are alike, as in an evenly sampled recording. A value at a point is that before the
+it, between points of a uniform grid, was wrong by up to 1 N. Steps may all be different. A value at a point is that before the
 command of a row at this time acts. Only where there would be too many points they lie evenly, apart from the rows.
 """
 
@@ -13,7 +12,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.twin.elementwise import Real
 from gateway.twin.replay.drive import Drive, Floats
 from gateway.twin.surroundings import COLUMNS, TwinConditions
 
@@ -22,14 +20,8 @@ MOST_STEPS: Final = 80_000  # where many plants share the memory
 _ALIKE: Final = 1.0e-6  # of a step
 
 
-def common_step_s(steps_s: Floats, first: int = 0) -> Real:
-    """Return the lengths of steps, s: one float where, from the first that counts, they are alike."""
-    counted = steps_s[first:]
-    return float(np.mean(counted)) if np.ptp(counted) < _ALIKE * counted[0] else steps_s
-
-
 class Grid:
-    """Points of time, rows among them, and the surroundings at both. steps_s: a float, or (points - 1,)."""
+    """Points of time, rows among them, and the surroundings at both. steps_s: between them, (points - 1,)."""
 
     def __init__(self, drive: Drive, step_s: float | None, most_steps: int = MOST_STEPS) -> None:
         time_s = drive.time_s
@@ -41,7 +33,7 @@ class Grid:
         self._has_rows = not self.notes  # else there would be too many points
         self.time_s = _divide_rows(time_s, self._parts) if self._has_rows else _even_times_s(time_s[-1], self.step_s)
         self.points = self.time_s.size
-        self.steps_s = common_step_s(np.diff(self.time_s))
+        self.steps_s: Floats = np.diff(self.time_s)
         self.is_rows = self._has_rows and self.points == self.rows
         self._row_index = np.concatenate([[0], np.cumsum(self._parts)])
         self.row_conditions = _conditions(drive, self.row_s, self)

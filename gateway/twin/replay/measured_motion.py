@@ -11,12 +11,21 @@ from typing import Final
 
 import numpy as np
 
-from gateway.twin.friction import BREAKAWAY_M, ELEMENTS, RIGID_M, directional_drags, relieve_stiction, rest_stiction
+from gateway.twin.friction import (
+    BREAKAWAY_M,
+    ELEMENTS,
+    RIGID_M,
+    directional_drags,
+    stribeck_limit_n,
+    two_sided_limit,
+    yield_travels_m,
+)
 from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.load import Load
+from gateway.twin.replay.loops import march_play, march_stiction
 from gateway.twin.sections import Friction
+from gateway.twin.slide import Slide
 
 NOISE_WIDTHS: Final = 4.0
 _SLOPE_S: Final = 0.025  # to either side
@@ -36,32 +45,30 @@ class Motions:
         self._speed_m_per_s = self._slope(_SLOPE_S)
         self._strains = Cache()
 
-    def force_n(self, load: Load) -> Floats:
-        """Force of one load on the grid, N: thrust - friction outward, seen from the position's own direction."""
-        friction = load.plant.friction
-        limit, strain = self._limit_n(friction, load.limit_n), self._mean_strain(friction.presliding_m)
+    def force_n(self, slide: Slide, friction: Friction, thrust_n: Floats, side_n: Floats) -> Floats:
+        """Force on the grid, N: thrust - friction outward, seen from the position's own direction."""
+        limit = slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n
+        limit, centre = two_sided_limit(limit, slide.asymmetry_n)
+        limit, strain = self._moving_limit_n(friction, limit), self._mean_strain(friction.presliding_m)
         out, back = directional_drags(friction)
         speed = self._speed_m_per_s
-        return load.drive_n - limit * strain - np.where(speed > 0.0, out, back) * speed
+        drag: Floats = np.where(speed > 0.0, out, back) * speed
+        return np.asarray(thrust_n + slide.weight_n - centre - limit * strain - drag)
 
-    def _limit_n(self, friction: Friction, limit: Floats) -> Floats:
+    def _moving_limit_n(self, friction: Friction, limit: Floats) -> Floats:
         """The limit with what the motion makes of it: Stribeck's curve and stiction after a rest."""
         if friction.stribeck_n != 0.0:
             ratio = self._speed_m_per_s / friction.stribeck_speed_m_per_s
-            limit = limit + friction.stribeck_n / (1.0 + ratio * ratio)
+            limit = limit + stribeck_limit_n(friction.stribeck_n, ratio)
         return limit + self._stiction_n(friction) if friction.dwell_stiction_n != 0.0 else limit
 
     def _stiction_n(self, friction: Friction) -> Floats:
         breakaway_m = max(friction.presliding_m, BREAKAWAY_M, NOISE_WIDTHS * self._noise_m)
-        shares = 1.0 - np.exp(-np.diff(self._grid.time_s) / friction.dwell_stiction_s)
-        travels = self._quiet_travels_m(breakaway_m)
-        stiction, found = 0.0, [0.0]
-        for kept, share in zip(relieve_stiction(1.0, travels, breakaway_m).tolist(), shares.tolist(), strict=True):
-            stiction = rest_stiction(stiction, friction.dwell_stiction_n, share) * kept
-            found.append(stiction)
-        return np.array(found)
+        travels, stiction = self._quiet_travels_m() / breakaway_m, np.empty(self._grid.points)
+        march_stiction(friction.dwell_stiction_n, friction.dwell_stiction_s, travels, self._grid.steps_s, stiction)
+        return stiction
 
-    def _quiet_travels_m(self, breakaway_m: float) -> Floats:
+    def _quiet_travels_m(self) -> Floats:
         """Travel of each step, without the noise of a position at rest (a play of four deviations takes it out)."""
         if self._noise_m == 0.0:
             return np.diff(self._position_m)
@@ -75,7 +82,7 @@ class Motions:
             return self._strains.put(presliding_m, self._direction())
         count = ELEMENTS if presliding_m > 0.0 else 1
         least_m = max(RIGID_M, NOISE_WIDTHS * self._noise_m)
-        widths = [max(presliding_m * (j + 1) / count, least_m) for j in range(count)]
+        widths = yield_travels_m(presliding_m, least_m)[:count]
         strains = [(self._position_m - _drag_element(self._position_m, width)) / width for width in widths]
         return self._strains.put(presliding_m, np.clip(sum(strains[1:], start=strains[0]) / count, -1.0, 1.0))
 
@@ -99,9 +106,6 @@ class Motions:
 
 def _drag_element(position_m: Floats, width_m: float) -> Floats:
     """The far end of an element of this width: the position drags it along."""
-    end = float(position_m[0])
-    found = []
-    for low, high in zip((position_m - width_m).tolist(), (position_m + width_m).tolist(), strict=True):
-        end = low if end < low else high if end > high else end
-        found.append(end)
-    return np.array(found)
+    end = np.empty_like(position_m)
+    march_play(2.0 * width_m, float(position_m[0]), position_m, end)
+    return end

@@ -18,7 +18,7 @@ from gateway.twin.load_cell import shown_time_s
 from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import Drive, Flags, Floats
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.lags import follow_lag
+from gateway.twin.replay.loops import march_lag
 from gateway.twin.sections import Contact, LoadCell
 from gateway.twin.surroundings import TwinConditions
 
@@ -54,7 +54,10 @@ class Readings:
         shifted = is_switched_on(cell, ("clock_offset_s", "clock_skew"))
         if cell.filter_s == 0.0 and not shifted:
             return force_n
-        filtered = follow_lag(contact_n, cell.filter_s, grid.steps_s)
+        filtered = contact_n
+        if cell.filter_s != 0.0:
+            filtered = np.empty_like(contact_n)
+            march_lag(cell.filter_s, contact_n, grid.steps_s, filtered)
         if not shifted:
             return self._vibrating(plant, grid.at_rows(filtered), grid.row_conditions)
         shown_s = shown_time_s(cell, grid.row_s)

@@ -11,13 +11,11 @@ The state before the first row is rest under the command `before_v`; what fricti
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
-from typing import Any, Final
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from gateway.twin.plant import Plant
+from gateway.twin.plant import Plant, plain
 from gateway.twin.replay.drive import Drive, Floats, Strains
 from gateway.twin.replay.force import Forces
 from gateway.twin.replay.grid import MOST_STEPS, Grid
@@ -26,22 +24,6 @@ from gateway.twin.replay.regulator import Pressures
 from gateway.twin.replay.slide import Slides
 
 __all__ = ["Drive", "Replay", "ReplayResult"]
-
-_SECTIONS: Final = tuple(entry.name for entry in fields(Plant))
-
-
-@lru_cache(maxsize=4096)
-def _plain_section(section: Any) -> Any:
-    """A section of Python floats. The cache makes this, which every plant of a search goes through, cost next to nothing."""
-    return replace(section, **{entry.name: float(getattr(section, entry.name)) for entry in fields(section)})
-
-
-def single(plant: Plant) -> Plant:
-    """Return a plant of Python floats: numpy's scalars, as optimisers give them, are slow. ValueError when it is stacked."""
-    try:
-        return Plant(**{name: _plain_section(getattr(plant, name)) for name in _SECTIONS})
-    except TypeError as wrong:
-        raise ValueError("a replay takes single plants, not a stack of lanes") from wrong
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,13 +64,13 @@ class Replay:
         return self.grid.notes
 
     def run(self, plants: Sequence[Plant], starts: Sequence[Strains | None] | None = None) -> ReplayResult:
-        """Replay the recording with each plant. ValueError when there is none, or one is stacked.
+        """Replay the recording with each plant. ValueError when there is none.
 
         starts: what each plant's friction remembers when the slide begins (`Drive.settled_s`); None: rest without pressure.
         """
         if not plants:
             raise ValueError("a replay needs at least one plant")
-        plants = [single(plant) for plant in plants]
+        plants = [plain(plant) for plant in plants]
         pressures, which = self._pressures.of([plant.regulator for plant in plants])
         slides = self._slides.of(plants, pressures, which, starts or [None] * len(plants))
         force = np.empty((len(plants), self.grid.rows))

@@ -1,33 +1,19 @@
-"""Replay, stage 2: the slide's force on the grid for each different combination of pressure, cylinder, friction and pad.
+"""Replay, stage 2: the slide's force on the grid for each different combination of pressure, cylinder, friction and pad."""
 
-Four ways to the same closed form of friction.py, the cheapest that a plant allows:
-    - rigid friction (no presliding) is a play of the force between thrust - limit and thrust + limit (replay_play.py);
-    - presliding where the pad is never left and no stop is met: all lanes at once (replay_elastic.py);
-    - rigid friction with Stribeck's curve or stiction, on the pad: a play of varying width (replay_sticking.py);
-    - anything else (a gap, a stop, presliding with these): the twin's own slide, step by step (replay_stepped.py).
-Measured motion leaves the pad out (replay_measured.py).
-"""
-
-from collections.abc import Callable, Hashable, Sequence
-from typing import TypeAlias
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.twin.effects.term import is_switched_on
-from gateway.twin.friction import DRY
+from gateway.twin.elementwise import Real
+from gateway.twin.friction import ELEMENTS, side_load_n, side_share, two_sided_limit
 from gateway.twin.plant import Plant
 from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats, Strains
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.load import Load, load_of
+from gateway.twin.replay.loops import march_slide
 from gateway.twin.replay.measured_motion import Motions
-from gateway.twin.replay.presliding import presliding_forces
-from gateway.twin.replay.rigid_friction import rigid_forces
-from gateway.twin.replay.stepped_slide import stepped_forces
-from gateway.twin.replay.sticking_friction import sticking_forces
-
-Way: TypeAlias = Callable[[list[Load], Grid], list[Floats]]
+from gateway.twin.slide import Slide, SlideState, slide_of, without_mass, without_motion
 
 
 class Slides:
@@ -48,16 +34,13 @@ class Slides:
         starts: Sequence[Strains | None],
     ) -> list[Floats]:
         """Return one force per plant; equal ones are the same array."""
-        keys: list[Hashable] = [(self._key(plant), start) for plant, start in zip(plants, starts, strict=True)]
-        known = {key: found for key in keys if (found := self._forces.get(key)) is not None}
-        missing: dict[Hashable, Load] = {}
-        for key, plant, place, start in zip(keys, plants, which, starts, strict=True):
-            if key not in known and key not in missing:
-                missing[key] = load_of(plant, self._settled(pressures[place]), self._grid.conditions, start)
-        fresh = dict(zip(missing, self._computed(list(missing.values())), strict=True))
-        for key, force in fresh.items():  # a long recording's series push each other out, and those known before
-            self._forces.put(key, force)
-        return [fresh[key] if key in fresh else known[key] for key in keys]
+        given = zip(plants, which, starts, strict=True)
+        return [self._force_n(plant, pressures[place], start) for plant, place, start in given]
+
+    def _force_n(self, plant: Plant, pressure_pa: Floats, start: Strains | None) -> Floats:
+        key = (self._key(plant), start)
+        force = self._forces.get(key)
+        return self._forces.put(key, self._moved(plant, self._settled(pressure_pa), start)) if force is None else force
 
     def _settled(self, pressure_pa: Floats) -> Floats:
         """The pressure, until it is sure that of the moment from which it is."""
@@ -70,34 +53,45 @@ class Slides:
         pad = (contact.pad_stiffness_n_per_m, contact.gap_m, contact.mass_kg, contact.tilt_deg)
         return (plant.regulator if self._driven else None, plant.cylinder, plant.friction, pad)
 
-    def _computed(self, loads: list[Load]) -> list[Floats]:
+    def _moved(self, plant: Plant, pressure_pa: Floats, start: Strains | None) -> Floats:
+        """The force of the quasi-static slide, by its own motion or by the measured one."""
+        slide = without_mass(slide_of(plant))
+        thrust_n = slide.area_m2 * pressure_pa
+        side_n = np.ascontiguousarray(np.broadcast_to(self._side_n(plant, thrust_n), thrust_n.shape))
         if self._motions is not None:
-            return [self._motions.force_n(load) for load in loads]
-        found: dict[int, Floats] = {}
-        batches: dict[tuple[Way, tuple[bool, ...]], list[Load]] = {}
-        for load in loads:
-            way = self._way(load)
-            batches.setdefault((way, _memories(load) if way is stepped_forces else ()), []).append(load)
-        for (way, _), batch in batches.items():
-            found |= zip(map(id, batch), way(batch, self._grid), strict=True)
-        return [found[id(load)] for load in loads]
+            return self._motions.force_n(slide, plant.friction, thrust_n, side_n)
+        state = SlideState() if start is None else start_state(slide, start, float(thrust_n[0]), float(side_n[0]))
+        force_n = np.empty_like(thrust_n)
+        march_slide((slide, without_motion(slide)), state, thrust_n, side_n, self._grid.steps_s, force_n)
+        return force_n
 
-    @staticmethod
-    def _way(load: Load) -> Way:
-        contact, friction = load.plant.contact, load.plant.friction
-        drags = friction.viscous_n_s_per_m != 0.0 or friction.asymmetry_n_s_per_m != 0.0
-        if load.is_rigid and (contact.gap_m == 0.0 or not drags):
-            return rigid_forces
-        if not load.is_always_pressed:
-            return stepped_forces
-        if friction.presliding_m == 0.0:
-            return sticking_forces
-        moved = friction.stribeck_n or friction.dwell_stiction_n or friction.asymmetry_n_s_per_m
-        return stepped_forces if moved else presliding_forces
+    def _side_n(self, plant: Plant, thrust_n: Floats) -> Real:
+        """The side load on the grid."""
+        friction, conditions = plant.friction, self._grid.conditions
+        side: Real = side_load_n(friction, conditions)
+        return side + side_share(friction, conditions) * thrust_n if friction.side_load_n_per_n else side
 
 
-def _memories(load: Load) -> tuple[bool, ...]:
-    """What a slide remembers: lanes that step together, and any part of them, must have as many elements."""
-    friction = load.plant.friction
-    others = (friction.presliding_m, friction.dwell_stiction_n, friction.asymmetry_n, friction.asymmetry_n_s_per_m)
-    return (is_switched_on(friction, DRY), *(value != 0.0 for value in others))
+def start_state(slide: Slide, start: Strains, thrust_n: float, side_n: float) -> SlideState:
+    """Return the state of a slide that rests with these strains; without a force where there is none to begin with.
+
+    No element is strained by more than the thrust: a pad does not pull. Rigid friction has their mean.
+    """
+    limit_n, centre_n = two_sided_limit(
+        slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n, slide.asymmetry_n
+    )
+    drive_n = thrust_n + slide.weight_n - centre_n
+    if limit_n <= 0.0:
+        return SlideState()
+    most = drive_n / limit_n
+    one, two, three = start
+    two = 0.5 * (one + two)
+    three = (2.0 * two + three) / 3.0
+    strains = (min(one, most), min(two, most), min(three, most))
+    mean = sum(strains) / ELEMENTS
+    force_n = drive_n - limit_n * mean
+    if force_n <= 0.0:
+        return SlideState()
+    is_rigid = slide.inverse_per_m[0] == slide.inverse_per_m[-1]
+    position_m = slide.gap_m + force_n / slide.pad_n_per_m
+    return SlideState(position_m, strains=(mean, mean, mean) if is_rigid else strains, force_n=force_n)

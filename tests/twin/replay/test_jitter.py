@@ -110,15 +110,15 @@ def test_steady_drag_does_not_feel_the_jitter() -> None:
         np.testing.assert_allclose(prompt[sliding] - slow[sliding], 300.0 * 0.01, atol=0.01)
 
 
-@pytest.mark.parametrize("lanes", [2, 9, 40])
-def test_lanes_at_uneven_rows_are_single_runs(lanes: int) -> None:
+@pytest.mark.parametrize("count", [2, 9, 40])
+def test_plants_at_uneven_rows_are_single_runs(count: int) -> None:
     drags = [Friction(coulomb_n=1.0, viscous_n_s_per_m=50.0)]
     drags += [replace(drags[0], presliding_m=2.0e-4), replace(drags[0], stribeck_n=0.5, dwell_stiction_n=0.5)]
     for friction in drags:
         base = replace(RIGID, friction=friction, cell=LoadCell(filter_s=0.005), contact=Contact(creep_share=0.02))
-        plants = [with_value(base, "friction", "coulomb_n", 1.0 + 0.02 * lane) for lane in range(lanes)]
+        plants = [with_value(base, "friction", "coulomb_n", 1.0 + 0.02 * lane) for lane in range(count)]
         together = Replay(drive(GAPS_S)).run(plants).reading_n
-        for lane in (0, lanes // 2, lanes - 1):
+        for lane in (0, count // 2, count - 1):
             alone = Replay(drive(GAPS_S)).run([plants[lane]]).reading_n[0]
             np.testing.assert_allclose(together[lane], alone, rtol=0.0, atol=1.0e-7)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.twin import Contact, Drive, Friction, LoadCell, Plant, Regulator, Replay, stack
+from gateway.twin import Contact, Drive, Friction, LoadCell, Plant, Regulator, Replay
 from gateway.twin.experiment import Floats
 from gateway.twin.plant import with_value
 
@@ -82,14 +82,13 @@ def test_what_is_known_from_before_changes_nothing() -> None:
     np.testing.assert_array_equal(first.reading_n[1:], again.reading_n[:3])
 
 
-@pytest.mark.parametrize("lanes", [2, 9, 40])
-def test_many_lanes_are_single_runs(lanes: int) -> None:
-    """Lanes run beside each other, and parts of the recording too; a single one runs in floats."""
+@pytest.mark.parametrize("count", [2, 9, 40])
+def test_many_plants_together_are_single_runs(count: int) -> None:
     for friction in (PLANT.friction, Friction(coulomb_n=1.0), Friction(coulomb_n=1.0, stribeck_n=0.5)):
         base = replace(PLANT, friction=friction)
-        plants = [with_value(base, "friction", "coulomb_n", 1.0 + 0.02 * k) for k in range(lanes)]
+        plants = [with_value(base, "friction", "coulomb_n", 1.0 + 0.02 * k) for k in range(count)]
         together = Replay(drive()).run(plants).reading_n
-        for lane in (0, lanes // 2, lanes - 1):
+        for lane in (0, count // 2, count - 1):
             alone = Replay(drive()).run([plants[lane]]).reading_n[0]
             np.testing.assert_allclose(together[lane], alone, rtol=0.0, atol=1.0e-7)
 
@@ -186,11 +185,11 @@ def test_a_drive_that_does_not_fit_is_refused(changes: dict[str, Any], sentence:
 def test_a_replay_takes_plants_one_by_one() -> None:
     with pytest.raises(ValueError, match="at least one"):
         Replay(drive()).run([])
-    with pytest.raises(ValueError, match="single plants"):
-        Replay(drive()).run([stack([PLANT, PLANT])])
 
 
-def test_the_real_time_twin_loads_neither_replay_nor_scipy() -> None:
-    code = "import sys, gateway.twin; print(sorted({'scipy', 'gateway.twin.replay.replay'} & set(sys.modules)))"
+def test_the_real_time_twin_loads_neither_replay_nor_scipy_nor_numba() -> None:
+    code = (
+        "import sys, gateway.twin; print(sorted({'scipy', 'numba', 'gateway.twin.replay.replay'} & set(sys.modules)))"
+    )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"

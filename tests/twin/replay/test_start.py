@@ -46,7 +46,7 @@ def test_it_goes_on_as_the_whole_does(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", FRICTIONS)
-def test_lanes_together_begin_as_one_alone_does(kind: str) -> None:
+def test_plants_together_begin_as_one_alone_does(kind: str) -> None:
     friction = replace(PLANT.friction, **FRICTIONS[kind])
     plants = [replace(PLANT, friction=replace(friction, coulomb_n=1.5 + 0.01 * lane)) for lane in range(14)]
     starts = [(-1.0, 0.3, 1.0 - 0.1 * lane) for lane in range(14)]

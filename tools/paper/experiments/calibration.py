@@ -22,6 +22,7 @@ from gateway.twin import Plant, Twin
 from gateway.twin.experiment import Dwell, Floats, staircase
 from gateway.twin.plant import with_value
 from paper.paper_values import GROUPS, LADDER_STEP_V, LADDER_TOP_V
+from paper.experiments.rigs import Twins
 
 READ_ONCE: Final = Dwell(readings=1)
 TURNS_V: Final = (
@@ -59,7 +60,7 @@ class Calibrated:
     ours: Bsfm  # branches and slip stops of one fit to ladder and minor loops, as `force-gateway fit` chooses it
 
 
-def condition(twin: Twin) -> None:
+def condition(twin: Twin | Twins) -> None:
     """Run one full cycle: what the friction remembers afterwards is the ladder's own past."""
     for voltage_v in (LADDER_TOP_V, 0.0):
         twin.command(voltage_v)
@@ -67,7 +68,7 @@ def condition(twin: Twin) -> None:
 
 
 def quiet_twin(plant: Plant) -> Twin:
-    """Return the rig after a full cycle, without noise. One float twin per copy: below 20 lanes that is faster than lanes."""
+    """Return the rig after a full cycle, without noise."""
     twin = Twin(with_value(plant, "cell", "noise_n", 0.0), 0)
     condition(twin)
     return twin

@@ -15,9 +15,12 @@ from typing import Final
 
 import numpy as np
 
-from gateway.twin import Plant, Twin, stack
+from gateway.twin import STEP_S, Drive, Plant
 from gateway.twin.experiment import Floats, settling_time_s
-from gateway.twin.plant import with_value
+from gateway.twin.replay.grid import Grid
+from gateway.twin.replay.loops import march_slide
+from gateway.twin.replay.regulator import Pressures
+from gateway.twin.slide import SlideState, slide_of, without_motion
 from paper.experiments.rigs import lifted
 
 HIGH_V: Final = 10.0
@@ -39,14 +42,18 @@ class Fastest:
 
 
 def responses(plant: Plant, commands_v: Floats) -> Floats:
-    """Return the force every millisecond for commands every millisecond: both (steps, lanes)."""
-    quiet = with_value(lifted(plant), "cell", "noise_n", 0.0)
-    twin, force_n = Twin(stack([quiet] * commands_v.shape[1]), 0), np.empty_like(commands_v)
-    for step, row in enumerate(commands_v):
-        if step == 0 or np.any(row != commands_v[step - 1]):
-            twin.command(row)
-        twin.advance(1.0e-3)
-        force_n[step] = twin.force_n
+    """Return the force every millisecond for commands every millisecond, both (steps, lanes): the twin's steps, compiled."""
+    slide = slide_of(lifted(plant))
+    time_s = np.arange(len(commands_v) + 1) * STEP_S
+    force_n = np.empty_like(commands_v)
+    for lane, command_v in enumerate(commands_v.T):
+        drive = Drive(time_s=time_s, command_v=np.append(command_v, command_v[-1]))
+        grid = Grid(drive, STEP_S)
+        (pressure_pa,), _ = Pressures(drive, grid).of([plant.regulator])
+        moved_n = np.empty(grid.points)
+        start = (slide, without_motion(slide))
+        march_slide(start, SlideState(), slide.area_m2 * pressure_pa, np.zeros(grid.points), grid.steps_s, moved_n)
+        force_n[:, lane] = moved_n[1:]
     return force_n
 
 

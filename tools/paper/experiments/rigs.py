@@ -1,13 +1,13 @@
-"""Copies of the paper's rig: lanes of one twin, each with its own small deviations and its own noise.
+"""Copies of the paper's rig side by side, as lanes: each a twin with its own small deviations and its own noise.
 
 Seed 0 is the shipped plant itself. Every other seed is another copy: friction, presliding, pad and lags differ by 10 %
 (one standard deviation), the machined bore by 0.3 %. Assumed: nobody has measured ten such slides. Without a spread, an
 interval over seeds would only tell how much noise the load cell has.
 
-The twin's own noise is one draw for all lanes; here each lane has a stream of its own, added to a quiet twin.
+The noise of a lane comes from a stream of its own, added to a quiet twin, so that lanes may share it whatever drives them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator, default_rng
 
 from gateway.profiles import load_plant
-from gateway.twin import Plant, Twin, stack
+from gateway.twin import Plant, Twin
 from gateway.twin.experiment import Floats
 from gateway.twin.plant import with_value
 
@@ -65,11 +65,44 @@ def lifted(plant: Plant) -> Plant:
     return with_value(plant, "contact", "gap_m", LIFTED_M)
 
 
+class Twins:
+    """Twins side by side: what one takes or gives as a float is here an array, (lanes,), or one float for all."""
+
+    def __init__(self, plants: Sequence[Plant]) -> None:
+        self._twins = [Twin(plant, 0) for plant in plants]
+
+    def command(self, voltage_v: Floats) -> None:
+        for twin, own_v in self._each(voltage_v):
+            twin.command(own_v)
+
+    def set_surface(self, height_m: Floats | float) -> None:
+        for twin, own_m in self._each(height_m):
+            twin.set_surface(own_m)
+
+    def set_disturbance(self, force_n: Floats | float) -> None:
+        for twin, own_n in self._each(force_n):
+            twin.set_disturbance(own_n)
+
+    def advance(self, dt_s: float) -> None:
+        for twin in self._twins:
+            twin.advance(dt_s)
+
+    def read(self) -> Floats:
+        return np.array([twin.read() for twin in self._twins])
+
+    @property
+    def force_n(self) -> Floats:
+        return np.array([twin.force_n for twin in self._twins])
+
+    def _each(self, value: Floats | float) -> Iterator[tuple[Twin, float]]:
+        return zip(self._twins, np.broadcast_to(value, len(self._twins)).tolist(), strict=True)
+
+
 @dataclass(frozen=True, slots=True)
 class RigLanes:
-    """A quiet twin of many lanes and the noise of each lane's cell."""
+    """Quiet twins, one per lane, and the noise of each lane's cell."""
 
-    twin: Twin
+    twin: Twins
     noise_n: Floats  # standard deviation, (lanes,)
     streams: tuple[Generator, ...]
 
@@ -84,5 +117,5 @@ def rig_lanes(plants: Sequence[Plant], seeds: Sequence[int], part: int) -> RigLa
     drives them.
     """
     noise_n = np.array([plant.cell.noise_n for plant in plants])
-    quiet = stack([with_value(plant, "cell", "noise_n", 0.0) for plant in plants])
-    return RigLanes(Twin(quiet, 0), noise_n, tuple(default_rng([seed, 2, part]) for seed in seeds))
+    quiet = [with_value(plant, "cell", "noise_n", 0.0) for plant in plants]
+    return RigLanes(Twins(quiet), noise_n, tuple(default_rng([seed, 2, part]) for seed in seeds))

@@ -1,0 +1,59 @@
+"""The slide of the running twin: the step of slide.py with what changes while it moves - surface, side load, disturbance."""
+
+from gateway.defaults import UNLIMITED
+from gateway.twin.plant import Plant
+from gateway.twin.slide import SlideState, advance_slide, slide_of, with_gap
+
+
+class MovingSlide:
+    """`step` takes the pressure of a step and returns the contact force, N."""
+
+    def __init__(self, plant: Plant, step_s: float) -> None:
+        self._step_s = step_s
+        self._slide = slide_of(plant)
+        self._surface_gap_m = self._contact_gap_m = self._slide.gap_m
+        self._touching = True
+        self._side_n = self._side_share = self._disturbance_n = 0.0
+        self.state = SlideState()
+
+    @property
+    def force_n(self) -> float:
+        """Return the contact force, N."""
+        return self.state.force_n
+
+    @property
+    def speed_m_per_s(self) -> float:
+        """Return the mean speed of the last step."""
+        return self.state.travel_m / self._step_s
+
+    def set_contact(self, on: bool) -> None:
+        """Take the workpiece away, or bring it back to where the gap says: the slide is pushed back to touch it."""
+        if on and not self._touching:
+            position_m = min(self.state.position_m, self._surface_gap_m)
+            self.state = self.state._replace(position_m=position_m, travel_m=0.0)
+        self._touching = on
+        self._place()
+
+    def set_surface(self, height_m: float) -> None:
+        """Set by how much the workpiece's surface stands nearer to the tool than the gap says; 0 is null."""
+        self._surface_gap_m = self._contact_gap_m - height_m
+        self._place()
+
+    def set_side_load(self, load_n: float, share: float = 0.0) -> None:
+        """Set by how much what presses the slide sideways raises its friction, N, and this share of the thrust; 0 is null."""
+        self._side_n, self._side_share = load_n, share
+
+    def set_disturbance(self, force_n: float) -> None:
+        """Set an outside force on the slide, positive towards the workpiece; 0 is null."""
+        self._disturbance_n = force_n
+
+    def step(self, pressure_pa: float) -> float:
+        """Advance one step under this pressure."""
+        thrust_n = self._slide.area_m2 * pressure_pa
+        loads_n = (thrust_n, self._side_n + self._side_share * thrust_n, self._disturbance_n)
+        self.state = state = advance_slide(self._slide, self.state, loads_n, self._step_s, self._step_s)
+        return state.force_n
+
+    def _place(self) -> None:
+        """Put the workpiece where it stands now; one that was taken away stands out of reach."""
+        self._slide = with_gap(self._slide, self._surface_gap_m if self._touching else UNLIMITED)
