@@ -21,8 +21,8 @@ from gateway.bsfm.slip.slip_fit import fit_joint, walk_of
 from gateway.twin import Plant, Twin
 from gateway.twin.experiment import Dwell, Floats, staircase
 from gateway.twin.plant import with_value
-from paper.paper_values import GROUPS, LADDER_STEP_V, LADDER_TOP_V
 from paper.experiments.rigs import Twins
+from paper.paper_values import GROUPS, LADDER_STEP_V, LADDER_TOP_V
 
 READ_ONCE: Final = Dwell(readings=1)
 TURNS_V: Final = (
