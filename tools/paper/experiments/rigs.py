@@ -72,26 +72,32 @@ class Twins:
         self._twins = [Twin(plant, 0) for plant in plants]
 
     def command(self, voltage_v: Floats) -> None:
+        """Apply a command voltage, V."""
         for twin, own_v in self._each(voltage_v):
             twin.command(own_v)
 
     def set_surface(self, height_m: Floats | float) -> None:
+        """Set the workpiece under the pad, m towards the tool."""
         for twin, own_m in self._each(height_m):
             twin.set_surface(own_m)
 
     def set_disturbance(self, force_n: Floats | float) -> None:
+        """Set an outside force on the slide, N."""
         for twin, own_n in self._each(force_n):
             twin.set_disturbance(own_n)
 
     def advance(self, dt_s: float) -> None:
+        """Let time pass."""
         for twin in self._twins:
             twin.advance(dt_s)
 
     def read(self) -> Floats:
+        """Return a reading of each load cell, N."""
         return np.array([twin.read() for twin in self._twins])
 
     @property
     def force_n(self) -> Floats:
+        """Return the true contact forces, N."""
         return np.array([twin.force_n for twin in self._twins])
 
     def _each(self, value: Floats | float) -> Iterator[tuple[Twin, float]]:
