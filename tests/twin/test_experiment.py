@@ -7,7 +7,6 @@ import pytest
 
 from gateway.twin import LoadCell, Plant, Regulator, Twin
 from gateway.twin.experiment import Dwell, settling_time_s, staircase
-from gateway.twin.plant import with_value
 from tests.twin.traces import step_response, trace
 
 
