@@ -90,7 +90,9 @@ class Record:
 
 
 class Bench:
-    """Control at 100 Hz ticks, on each sample of a 100 Hz cell (5 ms apart from the ticks) and on each command."""
+    """Control at 100 Hz ticks, on each sample (of a 100 Hz cell, 5 ms apart from the ticks) and on each command."""
+
+    sample_every_ms = 10
 
     def __init__(self, control: ControlSettings | None = None, seed: int = 1, **plant: float | bool) -> None:
         self.settings = control or settings()
@@ -178,7 +180,7 @@ class Bench:
         self.plant.advance(self.voltage_v)
         if self.loop_blocked:
             return
-        if self.ms % 10 == 5 and not self.cell_silent:
+        if self.ms % self.sample_every_ms == min(5, self.sample_every_ms - 1) and not self.cell_silent:
             self._measure()
             self.step()
         if self.heartbeat_every_ms and self.ms % self.heartbeat_every_ms == 0:

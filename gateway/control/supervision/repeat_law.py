@@ -2,32 +2,37 @@
 
 A force that stands in the middle of a count is read as that count with a probability p = erf(1 / (sqrt(8) s)), s the
 standard deviation of the noise in counts; anywhere else less often. n equal samples in a row begin at each sample with a
-probability (1 - p) p^(n-1), so that at r samples/s less than one false alarm comes in a time T where
-r (1 - p) p^(n-1) T < 1; T is FALSE_ALARM_S, 1000 h of holding. That is what the noise allows; no test of equal samples
-finds a cell sooner without more false alarms. Seconds until a frozen cell is found, by this law and frozen_s = 0.5:
+probability (1 - p) p^n, so that at r samples/s less than one false alarm comes in a time T where r (1 - p) p^n T < 1; T is
+FALSE_ALARM_S: 1000 h of holding at the worst place, half a year of shifts. That is what the noise allows; no test of equal
+samples finds a cell sooner without more false alarms. The first of the n was alive, so a cell is found at the latest
+(n - 1) / r after it has frozen, when the nth is read. Seconds until then, by this law and frozen_s = 0.5:
 
-    noise in counts    0.2    0.3    0.5    0.7    1.0    1.5    3.0
-    at  10 samples/s   (104)  15     4.4    2.7    1.9    1.4    1.0
-    at  80 samples/s   (15)   2.2    0.63   0.5    0.5    0.5    0.5
-    at 500 samples/s   (2.7)  0.5    0.5    0.5    0.5    0.5    0.5
+    noise in counts    0.3    0.4    0.5    0.7    0.86   1.0    1.5    3.0
+    at  10 samples/s   15     6.6    4.2    2.5    2.0    1.7    1.2    0.9
+    at  25 samples/s   6.3    2.8    1.8    1.1    0.84   0.72   0.52   0.5
+    at  80 samples/s   2.1    0.94   0.6    0.5    0.5    0.5    0.5    0.5
+    at 100 samples/s   1.7    0.76   0.5    0.5    0.5    0.5    0.5    0.5
 
 Below FEWEST_COUNTS nothing is concluded: the spread of such noise cannot be told from readings of one or two counts, and
 the cell is never found frozen while the force stands still. A finer count, a faster rate or a weaker filter is the cure.
-repeated_readings learns s from samples, rather too small: at 0.3 counts a cell is mostly not found either, at 0.4 counts
-after 1.2 times, from 0.7 counts up after 1.1 times as long as the law says.
+repeated_readings learns s from samples, and is careful as long as they are few: from 0.4 counts up the law holds behind
+800 samples to one sample in ten; at 0.3 counts a cell is mostly not found.
 """
 
-from math import ceil, erf, exp, inf, log, pi, sqrt
+from math import ceil, erf, exp, factorial, inf, log, sqrt
 from typing import Final
 
 FALSE_ALARM_S: Final = 3.6e6  # 1000 h of holding
 FEWEST_EQUAL: Final = 10
 FEWEST_COUNTS: Final = 0.28
-_CAREFUL: Final = 0.3  # of the harmonic's size: how unsure a spread is below 0.4 counts
-MOST_COUNTS: Final = 50.0
+_NEAR: Final = 1.01  # for a derivative
+MOST_COUNTS: Final = 50.0  # what is read of more noise no cell says twice
 LONGEST_RUNS: Final = 3  # of a run that the law does not explain
-_SURPRISE: Final = 0.01
+_SURPRISE: Final = 1.0e-4  # probability of as many runs so long, among some 100 000 samples
+_JUDGED: Final = 3  # lengths: a strange run may be followed by an equal sample
 _TAIL_RUNS: Final = 100
+_MOST_SEEN: Final = 20  # of so many runs a term of the sum
+_CLEARLY: Final = 2.0  # standard errors from which on a tail is longer than the law's
 _SAMPLES: Final = 65536  # of one generation of runs
 
 
@@ -45,48 +50,39 @@ def equal_samples(counts: float, rate_hz: float, independent: float = 1.0) -> fl
         return inf
     stay = stays(counts)
     seldom = log(FALSE_ALARM_S * rate_hz * (1.0 - stay)) / -log(stay)
-    return max(FEWEST_EQUAL, 1.0 + seldom / independent)
+    return max(FEWEST_EQUAL, seldom / independent)
+
+
+def careful_counts(counts: float, error: float, rate_hz: float) -> float:
+    """Return the noise to reckon with where it is known but to this relative standard error.
+
+    A limit of S / -ln(stay) samples, S the logarithm of the samples without a false alarm, makes exp((S g e)^2 / 2) times as
+    many on average, g being how fast ln(stay) goes with the noise. Noise smaller by S g e^2 / 2 makes up for that.
+    """
+    if not counts >= FEWEST_COUNTS:
+        return counts
+    slope = log(log(stays(counts / _NEAR)) / log(stays(counts * _NEAR))) / (-2.0 * log(_NEAR))
+    return counts * max(0.0, 1.0 - 0.5 * log(FALSE_ALARM_S * rate_hz) * slope * error * error)
 
 
 def seconds_to_find(counts: float, rate_hz: float, at_least_s: float) -> float:
     """Return how long a cell of this noise repeats itself until it is called frozen, inf where it never is."""
     samples = equal_samples(counts, rate_hz)
-    return max(at_least_s, ceil(samples) / rate_hz) if samples < inf else inf
+    return max(at_least_s, (ceil(samples) - 1) / rate_hz) if samples < inf else inf
 
 
 def counts_found_within(bound_s: float, rate_hz: float) -> float:
-    """Return the least noise, in counts, of which a frozen cell is found within bound_s; inf where no noise is enough."""
-    low, high = FEWEST_COUNTS, MOST_COUNTS
+    """Return the least noise, in counts, of which a frozen cell is found within bound_s; inf where no noise is enough.
+
+    A sample early by the law, because the noise is learned and not known.
+    """
+    low, high, bound_s = FEWEST_COUNTS, MOST_COUNTS, bound_s - 1.0 / rate_hz
     if seconds_to_find(high, rate_hz, 0.0) > bound_s:
         return inf
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if seconds_to_find(middle, rate_hz, 0.0) <= bound_s else (middle, high)
     return high
-
-
-def spread_of(variance: float, centred: float) -> float:
-    """Return the standard deviation in counts of normal noise whose readings in whole counts have this variance, counts^2.
-
-    centred: cosine of the force's place in its count, 1 in the middle, -1 between two. Sheppard's correction with the
-    first harmonic of the rounding (Widrow and Kollar, Quantization Noise, 2008), which counts below 0.5 counts of noise.
-    """
-    low, high = 0.0, MOST_COUNTS
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        square = middle * middle
-        harmonic = (4.0 * square + 1.0 / pi**2) * exp(-2.0 * pi**2 * square)
-        low, high = (middle, high) if square + 1.0 / 12.0 - centred * harmonic < variance else (low, middle)
-    return low * (1.0 - _CAREFUL * exp(-2.0 * pi**2 * low * low))
-
-
-def spread_within_two(share: float) -> float:
-    """Return the standard deviation in counts of normal noise of which two neighbouring counts hold at most this share."""
-    low, high = 0.0, MOST_COUNTS
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if erf(1.0 / (sqrt(2.0) * middle)) > share else (low, middle)
-    return low
 
 
 class Runs:
@@ -110,17 +106,25 @@ class Runs:
         """Length of the longest run."""
         return max((*self._now, *self._before), default=0)
 
-    def is_explained(self, length: int, stay: float) -> bool:
-        """Return whether a run of this length is no surprise among so many samples, each repeated with a probability of
-        stay."""
-        expected = sum(self._samples) * (1.0 - stay) * stay ** (length - 1)
-        return expected > _SURPRISE
+    def longest_unexplained(self, stay: float) -> int:
+        """Return the length of the longest runs that the law does not explain, 0 where it explains the longest ones."""
+        lengths = sorted({*self._now, *self._before}, reverse=True)[:_JUDGED]
+        return next((length for length in lengths if not self.is_explained(length, stay)), 0)
 
-    def equal_samples(self, rate_hz: float) -> float:
+    def is_explained(self, length: int, stay: float) -> bool:
+        """Return whether as many runs of this length or more as there were are no surprise among so many samples, each
+        repeated with a probability of stay (Poisson)."""
+        seen = sum(count for runs in (self._now, self._before) for at, count in runs.items() if at >= length)
+        expected = sum(self._samples) * (1.0 - stay) * stay**length
+        fewer = sum(expected**k / factorial(k) for k in range(min(seen, _MOST_SEEN)))
+        return 1.0 - exp(-expected) * fewer > _SURPRISE
+
+    def equal_samples(self, rate_hz: float, stay: float) -> float:
         """Return what the tail of the runs allows, whatever the noise is like: as `equal_samples`.
 
-        0 as long as too few runs are known. Extrapolated from the shortest length that only _TAIL_RUNS runs have reached, and
-        how seldom those went on.
+        0 as long as too few runs are known, or where it is no longer than that of samples of which each is repeated with a
+        probability of stay. Extrapolated from the shortest length that only _TAIL_RUNS runs have reached, and how seldom those
+        went on.
         """
         reached = gone_on = length = 0
         lengths = sorted({*self._now, *self._before}, reverse=True)
@@ -131,6 +135,10 @@ class Runs:
             gone_on += reached * (length - next_length)
         if reached < _TAIL_RUNS or not gone_on:
             return 0.0
-        at_risk = gone_on + reached
-        seldom = log(FALSE_ALARM_S * rate_hz * reached / sum(self._samples))
+        at_risk, samples = gone_on + reached, sum(self._samples)
+        is_long = gone_on > at_risk * stay + _CLEARLY * sqrt(at_risk * stay * (1.0 - stay))
+        expected = samples * (1.0 - stay) * stay**length
+        if not is_long and reached <= expected + _CLEARLY * sqrt(expected):
+            return 0.0
+        seldom = log(FALSE_ALARM_S * rate_hz * reached / samples)
         return length + seldom / -log(gone_on / at_risk)

@@ -81,7 +81,9 @@ class StuckSensorCheck:
     def found_s(self) -> float:
         """Time, s, that a cell which freezes now repeats itself, the force at rest, until it is called frozen; inf: never."""
         limit = self._noise.limit if self._told_limit is None else self._told_limit
-        return max(self._frozen_s, ceil(limit) * self._noise.interval_s) if limit < inf else inf
+        if limit == inf:
+            return inf
+        return max(self._frozen_s, (ceil(limit) - 1) * self._noise.interval_s)  # the first of them was alive
 
     @property
     def slow_words(self) -> str:
