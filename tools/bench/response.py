@@ -22,6 +22,8 @@ from typing import Final
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+from gateway.bsfm.ladder.fault import LadderError
+
 from gateway.bsfm import Bsfm
 from gateway.control.settings import ControlSettings, LeadSettings, Trim
 from gateway.profiles import load_rig
@@ -88,7 +90,11 @@ def format_row(result: dict[str, object]) -> str:
 def write(seeds: Iterable[int], demo: Bsfm) -> None:
     """Calibrate these machines anew; the others stay as they were."""
     for seed in seeds:
-        one = calibrated(drawn(seed), demo)
+        try:
+            one = calibrated(drawn(seed), demo)
+        except LadderError as error:
+            print(f"plant {seed}: no calibration: {error}", flush=True)
+            continue
         KEPT.write_text(stored(dict(sorted((kept() | {seed: one}).items()))), encoding="utf-8")
         print(describe_machine(one), flush=True)
 

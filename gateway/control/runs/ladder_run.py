@@ -31,11 +31,12 @@ GUESSED_DWELL_S: Final = 0.65  # for the time left, until a stair has been timed
 SETTLED_SIGMA: Final = 2.0  # of the difference between the means of the halves: noise alone exceeds it once in twenty
 SMALLEST_DRIFT_N: Final = 0.03  # less is no drift, however quiet the cell: a third of a usual count (0.1 N)
 LEAST_EXPECTED_N: Final = 3.0  # smaller stairs of the check are not judged: friction may hold as much
+UNKNOWN_FRICTION_N: Final = 5.0  # of a rise that a machine's friction may keep, which is not the calibration's
 LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = (
     0.3,
     3.0,
     0.1,
-)  # of the expected rise: the first two as in supervision.plausibility
+)  # of the expected rise, the first of what is beyond friction; the first two as in supervision.plausibility
 
 
 class LadderRow(NamedTuple):
@@ -229,7 +230,10 @@ class LadderRun:
         volts = row.stair.voltage_v
         expected_n = self.model.force_n(volts, 1.0) - self.model.force_n(self._rest_v, 1.0)
         rise_n = row.force_n - self.rest_n
-        if expected_n < LEAST_EXPECTED_N or LOWEST_SHARE * expected_n <= rise_n <= HIGHEST_SHARE * expected_n:
+        least_n = LOWEST_SHARE * max(0.0, expected_n - UNKNOWN_FRICTION_N)
+        if expected_n < LEAST_EXPECTED_N or least_n < rise_n <= HIGHEST_SHARE * expected_n:
+            return
+        if least_n == 0.0 and abs(rise_n) < LOWEST_SHARE * expected_n:
             return
         if rise_n <= -LOWEST_SHARE * expected_n:
             self.stop_cause = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))

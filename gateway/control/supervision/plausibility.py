@@ -3,7 +3,8 @@
 There is no separate test move: the first rise in contact is the test. Expected is the model's force at the voltage
 after a first-order lag, above its force at rest. SIGN_INVERTED: the cell goes down where the model goes up, watched for
 as long as the output is enabled, with or without contact (a cell with swapped wires never reports contact). GAIN_WRONG:
-in contact, outside 30-300 % of the expected rise and off by more than friction explains, until one rise has passed;
+in contact, under 30 % of the expected rise beyond friction, or over 300 % of it and off by more than friction explains, until
+one rise has passed;
 later the same signature means lost air, which only warns. While the first rise is too high the target is held back
 (`is_too_high`), so that a wrong gain is named before it becomes over-force. Below the contact threshold a cell that
 reads ten times too little looks like air: the tool waits, and the warning A301 tells.
@@ -19,7 +20,7 @@ _SMOOTHING_S: Final = 0.05  # of the measured rise: five readings of a 100 Hz ce
 _LASTING_S: Final = 0.3  # a violation must last this long: impacts and lag do not
 _LEAST_RISE_N: Final = 1.0  # below it noise decides
 _PROVING_RISE_N: Final = 5.0  # a rise of this size with the right gain ends the gain check
-_LOWEST_SHARE: Final = 0.3  # of the expected rise: kgf read as N is a tenth
+_LOWEST_SHARE: Final = 0.3  # of the expected rise beyond friction: kgf read as N is a tenth
 _HIGHEST_SHARE: Final = 3.0  # of it: N read as kgf is ten times
 _SLACK_N: Final = 1.0  # beside what friction explains: zero and noise
 
@@ -118,7 +119,7 @@ class RiseCheck:
     def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
         off_n = self.measured_rise_n - expected_n
         self.is_too_high = off_n > slack_n + kept_n and self.measured_rise_n > _HIGHEST_SHARE * expected_n
-        too_low = -off_n > slack_n and self.measured_rise_n < _LOWEST_SHARE * expected_n
+        too_low = -off_n > slack_n and self.measured_rise_n < _LOWEST_SHARE * (expected_n - slack_n)
         wrong = self.is_too_high or too_low
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0
         self._right_gain_s = self._right_gain_s + interval_s if expected_n >= _PROVING_RISE_N and not wrong else 0.0

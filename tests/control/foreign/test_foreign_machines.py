@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gateway.control import CalibrationInUse, Controller, Trim
+from gateway.control.runs.ladder_stairs import QUICK
 from gateway.profiles import load_rig
 from gateway.registers.words import State
 from tests.control.foreign.course import SHORT_N, Course, allowed_s, course
@@ -112,6 +113,19 @@ def test_what_friction_kept_at_rest_is_no_wrong_unit_of_a_vented_tools_first_ris
     stand.worked().run(0.5)
     stand.force(5.0)
     assert stand.run(3.0).state is not State.FAULT, stand.events
+
+
+@pytest.mark.parametrize("seed", [21, 28])
+def test_friction_that_keeps_back_most_of_the_first_stair_is_no_wrong_unit(seed):
+    """A run begins with the calibration of another machine."""
+    controller = Controller(settings(), CalibrationInUse(load_rig("demo").calibration.model(), 1))
+    stand = Stand(drawn(seed), controller)
+    stand.run(0.3)
+    controller.active_run.ask(QUICK)
+    stand.run(4.0)
+    assert controller.active_run.running, stand.events
+    assert stand.output
+    assert stand.output.voltage_v > 1.5
 
 
 @pytest.mark.long
