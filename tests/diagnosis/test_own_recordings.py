@@ -65,6 +65,12 @@ def test_no_kind_of_clean_recording_gives_a_name(tmp_path: Path, kind: str, seed
     assert_nothing_is_named(answer(read(kind, seed, tmp_path, 70.0)))
 
 
+@pytest.mark.long
+def test_a_setting_that_nobody_recorded_is_no_jump_of_the_gain(tmp_path: Path) -> None:
+    """At 69.21 s the loop wakes late, and the 0 V of a fall's lead are in no row: before, 0.16 N and a verdict `unknown`."""
+    assert_nothing_is_named(answer(read("stairs", 5, tmp_path, 70.0)))
+
+
 class Ring:
     """What the watch reads: the rows up to a moment."""
 

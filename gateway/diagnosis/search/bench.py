@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.diagnosis.search.parameters import ModelParameters
-from gateway.diagnosis.search.recording_drive import begins_at_rest, replay_of, settled_s
+from gateway.diagnosis.search.recording_drive import (
+    begins_at_rest,
+    replay_of,
+    rows_after_unseen_settings,
+    settled_s,
+)
 from gateway.twin.plant import with_value
 from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Replay
@@ -183,11 +188,12 @@ def bench_of(measurements: Sequence[Measurement], motion: Motion = "inferred") -
 
 
 def _settling(measurements: Sequence[Measurement], channels: Sequence[Channel]) -> Flags:
-    """Rows before which nobody knows what went in; none where a recording begins at rest."""
+    """Rows before which nobody knows what went in: at the beginning unless a recording begins at rest, and after gaps."""
     parts = []
     for channel in channels:
         measurement = measurements[channel.recording]
-        parts.append(measurement.time_s < (0.0 if begins_at_rest(measurement) else settled_s(measurement)))
+        begins_s = 0.0 if begins_at_rest(measurement) else settled_s(measurement)
+        parts.append((measurement.time_s < begins_s) | rows_after_unseen_settings(measurement))
     return np.concatenate(parts)
 
 

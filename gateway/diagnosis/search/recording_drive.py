@@ -1,10 +1,11 @@
 """From a recording to what drives the twin in a replay, and when its unknown past does not matter any more."""
 
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.measurement import Measurement
+from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.robust import noise_from_second_differences
 from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Drive, Replay
@@ -17,6 +18,9 @@ _FORGOTTEN_SHARE: Final = (
     0.15  # of the drive's range: a drive that went so far has wiped out what friction remembered ...
 )
 _LATEST_SHARE: Final = 0.25  # ... and this share of a recording may go by until it has
+_AT_WORK_SHARE: Final = 0.05  # of the drive's range, by which it moves about a gap, and so may have moved in it
+_ABOUT_S: Final = 0.2  # after a gap: what a lead asks for at a step lasts so long
+_MOST_UNSEEN_SHARE: Final = 0.5  # of the rows of a recording
 REST_S: Final = 0.2  # command and force stand still for so long
 _REST_SLACK_SHARE: Final = 5.0e-3  # of the forces' range that a force at rest may wander
 
@@ -27,9 +31,39 @@ def settled_s(measurement: Measurement) -> float:
     drive = measurement.command_v if measurement.command_v is not None else measurement.pressure_pa
     if drive is None:
         return settled_s
-    gone = np.maximum.accumulate(drive) - np.minimum.accumulate(drive)
-    forgotten_s = float(measurement.time_s[int(np.argmax(gone >= _FORGOTTEN_SHARE * gone[-1]))])
+    forgotten_s = float(measurement.time_s[_forgetting_row(drive, 0)])
     return min(settled_s + forgotten_s, max(settled_s, _LATEST_SHARE * measurement.duration_s))
+
+
+def rows_after_unseen_settings(measurement: Measurement) -> Flags:
+    """Return the rows (rows,) that a setting may have moved which nobody recorded.
+
+    A recording of the gateway's own tells with each reading what was sent last. Where its loop woke late there is no
+    reading for some ticks, and of two settings sent meanwhile the first is lost: 0 V for 14 ms, the lead of a fall, left a
+    clean recording off by 2 N, and the rest seemed a jump of the gain. What went in is unknown then, as it is before the
+    first row, and rows are judged again once it is forgotten in the same way. Gaps while the command hardly moves lose
+    nothing that matters. Where more than half of a recording would go, nothing goes: it has no better witness.
+    """
+    unseen = np.zeros(measurement.rows, dtype=bool)
+    command_v = measurement.command_v
+    if measurement.even_s <= 0.0 or command_v is None:
+        return unseen
+    about, settling = (max(round(duration_s / measurement.even_s), 1) for duration_s in (_ABOUT_S, SETTLING_S))
+    for before, after in pairwise(np.flatnonzero(measurement.usable)):
+        moved_v = np.ptp(command_v[before : after + about]) if after > before + 1 else 0.0
+        if moved_v > _AT_WORK_SHARE * np.ptp(command_v):
+            settled = min(int(after) + settling, measurement.rows - 1)
+            latest = int(after) + round(_LATEST_SHARE * measurement.rows)
+            unseen[before + 1 : min(_forgetting_row(command_v, settled) + settling, latest)] = True
+    return unseen if np.mean(unseen) <= _MOST_UNSEEN_SHARE else np.zeros_like(unseen)
+
+
+def _forgetting_row(drive: Floats, first: int) -> int:
+    """The row at which the drive has gone so far since row `first` that friction has forgotten what it remembered there; the
+    last one where it never does."""
+    gone = np.maximum.accumulate(drive[first:]) - np.minimum.accumulate(drive[first:])
+    far = np.flatnonzero(gone >= _FORGOTTEN_SHARE * np.ptp(drive))
+    return first + int(far[0]) if far.size else drive.size - 1
 
 
 def begins_at_rest(measurement: Measurement) -> bool:
