@@ -24,6 +24,10 @@ _RESOLUTION_N: Final = 1.0e-4
 """What the simulation itself resolves: its rigid friction gives by a nanometre, 4e-5 N on the usual pad."""
 _SIGNIFICANCE: Final = 1.0e-3  # of a false answer over all questions
 _LEAST_SHARE: Final = 0.01  # of the whitened squared residual
+_OWN_POWER: Final = 1.0e-6  # of a column's power that the model must leave: rounding ...
+_OWN_POWER_IN_DOUBT: Final = (
+    0.01  # ... and where times are in doubt: of the rate, a fitted delay leaves the corners only
+)
 _REGRESSORS_AT_ONCE: Final = 60  # questions
 _MOST_DEPENDENCES: Final = 6
 _SURROUNDING_LINES: Final = 14  # lines to either side that a wandering line stands out of
@@ -64,28 +68,32 @@ def _strongest(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Itera
     """Some at a time: a thousand columns would be gigabytes at once."""
     model, white = whiten(fitted.jacobian), whiten(fitted.residual_n)
     total = max(float(white @ white), 1.0)
+    least_power = _OWN_POWER if whiten.knows_times else _OWN_POWER_IN_DOUBT
     tried, best = 0, None
     while some := list(islice(asked, _REGRESSORS_AT_ONCE)):
         tried += sum(each.among for each in some)
         columns = whiten(bench.reduced(np.vstack([each.columns for each in some])))
         found = [
             each
-            for each in _dependences(NormalEquations(model, columns, white), some, total)
+            for each in _dependences(NormalEquations(model, columns, white), some, total, least_power)
             if each.share >= _LEAST_SHARE
         ]
         best = min([*found, *([best] if best else [])], key=lambda each: each.log_chance, default=None)
     return best if best and best.log_chance < np.log(_SIGNIFICANCE / tried) else None
 
 
-def _dependences(normal: NormalEquations, asked: Sequence[Regressors], total: float) -> Iterator[Dependence]:
-    """Each question's gain beside the model; `normal` holds the columns of all of them in order."""
+def _dependences(
+    normal: NormalEquations, asked: Sequence[Regressors], total: float, least_power: float
+) -> Iterator[Dependence]:
+    """Each question's gain beside the model; `normal` holds the columns of all of them in order. A column of which the model
+    leaves less than the share `least_power` does not ask any more what its name says."""
     from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
 
     at = 0
     for regressors in asked:
         indices = list(range(at, at + regressors.columns.shape[0]))
         at += len(indices)
-        usable = [k for k in indices if normal.power[k] > 1.0e-6 * max(normal.raw_power[k], 1.0e-300)]
+        usable = [k for k in indices if normal.power[k] > least_power * max(normal.raw_power[k], 1.0e-300)]
         gain = normal.add(usable).gain if usable else 0.0
         chance = float(chi2_law.logsf(gain, len(indices))) + float(np.log(regressors.among))
         yield Dependence(regressors, gain, gain / total, chance)

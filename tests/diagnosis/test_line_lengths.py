@@ -14,7 +14,7 @@ from gateway.diagnosis.noise import Whitener, white_whitener
 from gateway.diagnosis.search.base_fit import base_parameters, fit_base
 from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.line_lengths import estimate_character_s, fit_line_lengths
+from gateway.diagnosis.search.line_lengths import fit_line_lengths
 from gateway.twin.plant import Plant, with_value
 from tests.watch.clean_runs import recorded
 
@@ -38,18 +38,16 @@ def base_of(measurement: Measurement, plant: Plant) -> tuple[Bench, FittedModel,
 
 
 def test_an_own_recording_shows_how_long_a_character_takes() -> None:
-    measurement, plant = own_recording()
-    assert estimate_character_s(*base_of(measurement, plant), STEP_V) == pytest.approx(AT_9600_BAUD_S, rel=0.3)
+    _, fitted = fit_line_lengths(*base_of(*own_recording()), STEP_V)
+    assert fitted.parameters.character_s == pytest.approx(AT_9600_BAUD_S, rel=0.3)
 
 
-def test_with_settings_as_their_lines_ended_the_model_leaves_less_and_asks_for_no_more() -> None:
-    """Driven so, the same recording shows no character any more."""
+def test_with_its_lines_the_model_leaves_less_and_is_nearer_to_the_machine() -> None:
     bench, base, whiten = base_of(*own_recording())
-    driven, fitted = fit_line_lengths(bench, base, whiten, STEP_V)
-    assert driven.rms_n(fitted.residual_n) < 0.98 * bench.rms_n(base.residual_n)
+    lined, fitted = fit_line_lengths(bench, base, whiten, STEP_V)
+    assert lined.rms_n(fitted.residual_n) < 0.98 * bench.rms_n(base.residual_n)
     assert fitted.chi2 < base.chi2 - 50.0
     assert abs(fitted.parameters.plant.cylinder.area_m2 / 95.0e-6 - 1.0) < 2.0e-3
-    assert estimate_character_s(driven, fitted, whiten, STEP_V) < 0.15 * AT_9600_BAUD_S
 
 
 @pytest.mark.parametrize(("even_s", "step_v"), [(0.0, STEP_V), (0.01, 0.0)], ids=["rows as recorded", "counts unknown"])
@@ -59,10 +57,11 @@ def test_what_is_not_known_to_be_settings_on_a_line_is_left_alone(even_s: float,
     assert fit_line_lengths(bench, base, whiten, step_v) == (bench, base)
 
 
-def test_lines_that_are_all_alike_show_no_character() -> None:
+def test_lines_that_are_all_alike_show_none() -> None:
     """A recording that the model itself makes from the settings as they stand, with the cell's noise."""
     measurement, plant = own_recording()
     bench, base, _ = base_of(measurement, plant)
     noise_n = np.random.default_rng(5).normal(0.0, 0.12, measurement.rows)
     made = replace(measurement, force_n=bench.simulate([base.parameters])[0] + noise_n)
-    assert estimate_character_s(*base_of(made, plant), STEP_V) == 0.0
+    _, fitted = fit_line_lengths(*base_of(made, plant), STEP_V)
+    assert fitted.parameters.character_s < 0.2 * AT_9600_BAUD_S

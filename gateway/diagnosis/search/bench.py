@@ -46,7 +46,8 @@ class Bench:
 
     raw_n, usable, block_of_row, young: (rows,) of all segments; usable: rows that count; block_of_row: the block that
     each is held out with; young: rows that still feel how their recording began. taken_out: columns (rows,) whose
-    share of every vector counts as explained: dependences that no effect has a name for.
+    share of every vector counts as explained: dependences that no effect has a name for. character_n_per_s: (rows,) what
+    the time of a character on the settings' line changes in the readings, None where it cannot matter.
     """
 
     measurements: tuple[Measurement, ...]
@@ -58,6 +59,7 @@ class Bench:
     block_of_row: NDArray[np.int64]
     young: Flags
     taken_out: tuple[Floats, ...] = ()
+    character_n_per_s: Floats | None = None
 
     @cached_property
     def measured_n(self) -> Floats:
@@ -96,6 +98,8 @@ class Bench:
                     result[:, channel.rows] = (
                         response.reading_n if channel.is_force else response.pressure_pa * NOMINAL_AREA_M2
                     )
+        if self.character_n_per_s is not None:
+            result += np.outer([parameters.character_s for parameters in parameter_sets], self.character_n_per_s)
         return result
 
     def residuals(self, simulated_n: Floats) -> Floats:

@@ -5,8 +5,9 @@ has ended, and `SET 0` ends earlier than `SET 870`: by 1.04 ms a digit at 9600 b
 2 ms earlier than rises, and neither the lines' delay, which is one for all settings, nor readings that are late by chance can
 say so. It is a misfit of the base model and no chance: on clean steps of the demo rig it left 0.132 N instead of 0.125 N,
 `command-nonlinearity` took a part of it, and every test of significance agreed, as it must. So the time of a character
-belongs to the base model like the lines' delay: estimated by least squares from the recording itself (1.03 +- 0.05 ms
-there), believed as far as lines can be that slow. A protocol whose lines are all alike shows none.
+is a parameter of the base model like the lines' delay, free in every model (it is 1.03 +- 0.05 ms there) and bounded by how
+slow lines can be. Were it fitted once and kept, it would take what belongs to a cause that is not in the model yet. It is a
+shift of a few milliseconds at most: its response is linear, and one column holds it.
 """
 
 from dataclasses import replace
@@ -16,44 +17,30 @@ import numpy as np
 
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.base_fit import refit
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import NormalEquations
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.search.parameters import CHARACTER
 
 _TRIED_S: Final = 1.0e-3  # of a character, for the secant: 9600 baud
-_SLOWEST_S: Final = 4.2e-3  # of a character: 10 bits at 2400 baud, the slowest that serial devices are set to
-_LEAST_CHI2: Final = 6.6  # chi-square of one parameter that chance exceeds in 1 % of all recordings
 _POWERS_OF_TEN: Final = 10.0 ** np.arange(1, 10)
+_WAVES: Final = 3  # of a model that is at its optimum but for this one parameter
 
 
 def fit_line_lengths(bench: Bench, base: FittedModel, whiten: Whitener, step_v: float) -> tuple[Bench, FittedModel]:
-    """Return the bench driven by settings as their lines ended, and the base model refitted to it; both as they are where the
-    recordings do not show it.
+    """Return the bench that knows what a character changes, and the base model refitted with its time; both as they are where
+    it cannot matter.
 
     step_v: one count of the regulator's setting, V; 0 where it is not known. Only recordings that are driven by what was
     sent (even rows) are asked.
     """
-    character_s = estimate_character_s(bench, base, whiten, step_v)
-    if character_s == 0.0:
-        return bench, base
-    bench = _with_characters(bench, step_v, character_s)
-    return bench, refit(bench, base, whiten)
-
-
-def estimate_character_s(bench: Bench, base: FittedModel, whiten: Whitener, step_v: float) -> float:
-    """Return how long a character of a setting's line takes, s; 0 where the recordings do not show it."""
     if step_v <= 0.0 or not any(map(_is_driven_by_settings, bench.measurements)):
-        return 0.0
-    tried = _with_characters(bench, step_v, _TRIED_S)
-    column = bench.reduced(np.diff([each.simulate([base.parameters])[0] for each in (bench, tried)], axis=0))
-    seen = NormalEquations(whiten(base.jacobian), whiten(column), whiten(base.residual_n)).add([0])
-    return float(np.clip(seen.sizes[0] * _TRIED_S, 0.0, _SLOWEST_S)) if seen.gain > _LEAST_CHI2 else 0.0
-
-
-def _with_characters(bench: Bench, step_v: float, character_s: float) -> Bench:
-    """The bench where a character takes so long."""
-    return bench.with_measurements([_earlier_settings(each, step_v, character_s) for each in bench.measurements])
+        return bench, base
+    tried = bench.with_measurements([_earlier_settings(each, step_v, _TRIED_S) for each in bench.measurements])
+    now_n, tried_n = (each.simulate([base.parameters])[0] for each in (bench, tried))
+    if np.array_equal(now_n, tried_n):
+        return bench, base
+    bench = replace(bench, character_n_per_s=(tried_n - now_n) / _TRIED_S)
+    return bench, refine(bench, [FitProblem(base.parameters, (*base.free, CHARACTER))], whiten, waves=_WAVES)[0]
 
 
 def _earlier_settings(measurement: Measurement, step_v: float, character_s: float) -> Measurement:

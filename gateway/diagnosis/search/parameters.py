@@ -11,7 +11,7 @@ from gateway.twin.replay.drive import Strains
 _ZERO: Final = "cell.zero_n"
 _UNSTRAINED: Final[Strains] = (0.0, 0.0, 0.0)
 STARTS: Final = "start"
-"""Section of the parameters that belong to a recording's beginning and to no plant."""
+"""Section of the parameters that belong to a recording (its beginning, its lines) and to no plant."""
 
 
 @dataclass(frozen=True, slots=True, init=False)
@@ -28,16 +28,22 @@ class InitialStrain(Parameter):
         object.__setattr__(self, "elements", elements)
 
 
+CHARACTER: Final = Parameter(STARTS, "character_s", "s", 0.0, 0.0, 4.2e-3, 1.0e-4)
+"""Time of a character on the line that carries settings, for all recordings; at most 10 bits at 2400 baud."""
+
+
 @dataclass(frozen=True, slots=True)
 class ModelParameters:
     """Everything that a simulation needs; hashable, so that simulations can be remembered.
 
     starts: what friction remembers at the beginning of each recording; None, or none at all: rest without pressure.
+    character_s: by which settings of fewer digits are there earlier, for each digit.
     """
 
     plant: Plant
     offsets_n: tuple[float, ...]
     starts: tuple[Strains | None, ...] = ()
+    character_s: float = 0.0
 
     def start(self, recording: int) -> Strains | None:
         """Return what friction remembers at the beginning of one recording; None: rest without pressure."""
@@ -48,6 +54,8 @@ class ModelParameters:
         if isinstance(parameter, InitialStrain):
             strains = self.start(parameter.recording) or _UNSTRAINED
             return sum(strains[element] for element in parameter.elements) / len(parameter.elements)
+        if parameter is CHARACTER:
+            return self.character_s
         if parameter.path == _ZERO:
             return self.offsets_n[0]
         return float(getattr(getattr(self.plant, parameter.section), parameter.name))
@@ -57,6 +65,8 @@ class ModelParameters:
         kept = min(max(float(value), parameter.low), parameter.high)
         if isinstance(parameter, InitialStrain):
             return self._with_strain(parameter, kept)
+        if parameter is CHARACTER:
+            return replace(self, character_s=kept)
         if parameter.path == _ZERO:  # of all recordings by as much
             return self.with_offsets([offset_n + kept - self.offsets_n[0] for offset_n in self.offsets_n])
         return replace(self, plant=with_value(self.plant, parameter.section, parameter.name, kept))

@@ -1,0 +1,30 @@
+"""The base model of a recording that hardly says anything: what is not known stays where the start has it."""
+
+import numpy as np
+import pytest
+
+from gateway.diagnosis import Measurement
+from gateway.diagnosis.noise import white_whitener
+from gateway.diagnosis.search.base_fit import base_parameters, fit_base
+from gateway.diagnosis.search.bench import bench_of
+from tests.diagnosis.machine import MACHINE, NOISE_N
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hold_says_nothing_of_the_gain(seed: int) -> None:
+    """A fifth of a second of 10 mV in 20 s: before, the noise's own gain gave an area of 1e-7 or 0.02 m2, and -4451 N."""
+    command_v = np.full(2000, 2.0)
+    command_v[460:480] += 0.01 * np.sin(np.arange(20.0))
+    hold = Measurement(
+        name="hold",
+        time_s=np.arange(2000) * 0.01,
+        force_n=17.0 + np.random.default_rng(seed).normal(0.0, NOISE_N, 2000),
+        usable=np.ones(2000, dtype=bool),
+        repeated=np.zeros(2000, dtype=bool),
+        command_v=command_v,
+    )
+    bench = bench_of([hold])
+    fitted = fit_base(bench, MACHINE, base_parameters(bench, frozenset()), white_whitener(bench, bench.measured_n))
+    assert bench.rms_n(fitted.residual_n) == pytest.approx(NOISE_N, rel=0.1)
+    assert fitted.parameters.plant.cylinder.area_m2 == pytest.approx(MACHINE.cylinder.area_m2, rel=0.05)
+    assert abs(fitted.parameters.offsets_n[0]) < 5.0
