@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 
 from gateway.bsfm import Bsfm, Calibration, CoefficientLimits, Coefficients, validate_coefficients
-from gateway.calibrations.selection import SelectionState
-from gateway.calibrations.store import UNKNOWN_N, CalibrationStore, StoreError
+from gateway.calibrations.store import UNKNOWN_N, CalibrationStore
+from gateway.numbered_documents.selection import SelectionState
+from gateway.numbered_documents.store import StoreError
 from gateway.registers.upload.coefficients import CoefficientSet
 from gateway.registers.upload.staging import Staged, StagedFault
 from gateway.registers.words import NO_NOTICE, CommitNotice

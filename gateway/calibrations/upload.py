@@ -19,10 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from gateway.bsfm import Calibration
 from gateway.calibrations.activation import Activation, ActiveCalibration, UnusableCalibration, make_uploaded
-from gateway.calibrations.store import SelectedCalibration, StoreError
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
+from gateway.numbered_documents.store import SelectedDocument, StoreError
 from gateway.processes.disk_worker import DiskWorker, Done, Work
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.refusal import Refusal
@@ -58,11 +59,11 @@ class UploadService:
         self,
         staging: StagingBlock,
         activation: Activation,
-        selected: SelectedCalibration,
+        selected: SelectedDocument[Calibration],
         rules: UploadRules,
         log: Callable[[str, str], None],
     ) -> None:
-        if selected.calibration is None:
+        if selected.document is None:
             raise ValueError("a gateway has a calibration, at least the rig's own")
         self.on_use: Callable[[ActiveCalibration], None] = lambda in_use: None
         self._thread = DiskWorker()
@@ -71,7 +72,7 @@ class UploadService:
         self._activation = activation
         self._rules = rules
         self._log = log
-        self._calibration = selected.calibration
+        self._calibration = selected.document
         self._pointer = replace(selected.pointer, active=selected.selection)
         self._doing = ""
         self._shows = False  # whether commit_status tells of what is being done

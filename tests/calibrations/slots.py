@@ -1,12 +1,12 @@
 """What the tests ask of a store beyond what the gateway does: the contents of a slot, and a step back."""
 
-from gateway.calibrations.selection import OWN, SelectionState, read_selection
 from gateway.calibrations.store import CalibrationStore
+from gateway.numbered_documents.selection import OWN, SelectionState, read_selection
 
 
 def slot_number(store: CalibrationStore, slot: int) -> int | None:
     """Return the number of the calibration in a slot (0 .. 7), that of the built-in one included; None: empty."""
-    number = read_selection(store.directory)[0].slots[slot]
+    number = read_selection(store.directory, store.noun)[0].slots[slot]
     return store.built_in.number if number == OWN and store.built_in else number
 
 

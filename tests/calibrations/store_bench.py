@@ -17,6 +17,6 @@ def used_store(state: Path) -> CalibrationStore:
 
 
 def active_mark(store: CalibrationStore) -> int:
-    found = CalibrationStore(store.directory.parent, OWN).find_selected().calibration
+    found = CalibrationStore(store.directory.parent, OWN).find_selected().document
     assert found is not None
     return mark_of(found)

@@ -7,8 +7,9 @@ from random import Random
 
 import pytest
 
-from gateway.calibrations.selection import BUILT_IN
-from gateway.calibrations.store import CalibrationStore, StoreError
+from gateway.calibrations.store import CalibrationStore
+from gateway.numbered_documents.selection import BUILT_IN
+from gateway.numbered_documents.store import StoreError
 from gateway.processes.durable_file import add_checksum, verify_checksum
 from tests.calibrations.coefficients import calibration, mark_of
 from tests.calibrations.slots import go_back
@@ -41,10 +42,10 @@ def test_a_damaged_calibration_in_use_gives_way_to_the_one_before_it(used):
     for damaged in damages(whole, Random(1)):
         path.write_bytes(damaged)
         selected = used.find_selected()
-        assert selected.calibration is not None
-        assert mark_of(selected.calibration) == 2, damaged
+        assert selected.document is not None
+        assert mark_of(selected.document) == 2, damaged
         assert "E432" in selected.notes[0] and "0003.yaml" in selected.notes[0]
-        assert used.list()[1].calibration is None and "E432" in used.list()[1].fault
+        assert used.list()[1].document is None and "E432" in used.list()[1].fault
         with pytest.raises(StoreError, match="E432"):
             used.use(3)
     path.write_bytes(whole)
@@ -55,7 +56,7 @@ def test_both_damaged_is_the_built_in_one(used):
     for name in ("0002.yaml", "0003.yaml"):
         (used.directory / name).write_bytes(b"number: 2\n")
     selected = used.find_selected()
-    assert selected.calibration == OWN
+    assert selected.document == OWN
     assert selected.selection == BUILT_IN
     assert len(selected.notes) == 2
     with pytest.raises(StoreError, match="0002"):
@@ -67,7 +68,7 @@ def test_a_damaged_selection_gives_way_to_the_generation_before_it(used):
     for damaged in damages(path.read_bytes(), Random(2)):
         path.write_bytes(damaged)
         selected = used.find_selected()
-        assert selected.calibration is not None and mark_of(selected.calibration) == 2, damaged
+        assert selected.document is not None and mark_of(selected.document) == 2, damaged
         assert "E432" in selected.notes[0] and "active.000002" in selected.notes[0]
 
 
@@ -75,7 +76,7 @@ def test_no_whole_selection_is_the_built_in_one_and_a_change_mends_it(used):
     for name in ("active.000001", "active.000002"):
         (used.directory / name).write_bytes(b"")
     selected = used.find_selected()
-    assert selected.calibration == OWN
+    assert selected.document == OWN
     assert len(selected.notes) == 2
     assert used.use(3).generation == 3
     assert active_mark(used) == 3
@@ -91,7 +92,7 @@ def test_after_damage_a_rollback_does_not_lead_to_the_damaged_one(used):
 
 def test_a_calibration_that_does_not_fit_the_rig_gives_way_too(used):
     selected = used.find_selected(lambda given: "E401 handle 2" if given.number == 3 else "")
-    assert selected.calibration is not None and mark_of(selected.calibration) == 2
+    assert selected.document is not None and mark_of(selected.document) == 2
     assert selected.notes == ("E401 handle 2; the one before it is used instead of calibration 3",)
 
 

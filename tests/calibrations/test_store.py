@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from gateway.calibrations.selection import BUILT_IN, Selection
-from gateway.calibrations.store import CalibrationStore, StoreError
+from gateway.calibrations.store import CalibrationStore
+from gateway.numbered_documents.selection import BUILT_IN, Selection
+from gateway.numbered_documents.store import StoreError
 from gateway.profiles import load_calibration
 from tests.calibrations.coefficients import calibration, mark_of
 from tests.calibrations.failing_disk import disk
@@ -86,7 +87,7 @@ def test_an_unknown_number_is_told_with_those_that_there_are(used):
 
 def test_nothing_stored_is_the_built_in_calibration(store):
     selected = store.find_selected()
-    assert (selected.calibration, selected.selection, selected.notes) == (OWN, BUILT_IN, ())
+    assert (selected.document, selected.selection, selected.notes) == (OWN, BUILT_IN, ())
     assert slot_number(store, 0) is None
     with pytest.raises(StoreError, match="nothing to go back to"):
         go_back(store)
@@ -238,5 +239,5 @@ def test_a_directory_that_may_not_be_read_is_said(used, monkeypatch):
     with disk() as there:
         monkeypatch.setattr(there, "_counted", lambda what: refuse)
         selected = used.find_selected()
-    assert selected.calibration == OWN
+    assert selected.document == OWN
     assert "cannot be read: Permission denied" in selected.notes[0]

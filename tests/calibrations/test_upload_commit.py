@@ -154,7 +154,7 @@ def test_a_set_that_fails_a_check_changes_nothing_and_says_where_and_why(bench, 
     before = bench.active_words
     assert bench.commit(words, action) == (FAILED, index, reason)
     assert bench.active_words == before
-    assert (bench.used, bench.store.list(), bench.store.find_selected().calibration) == ([], [], OWN)
+    assert (bench.used, bench.store.list(), bench.store.find_selected().document) == ([], [], OWN)
     (sentence,) = bench.log
     assert sentence.startswith("E401 ")
     assert reason.name.lower() in sentence
@@ -273,5 +273,5 @@ def test_force_limits_stay_with_their_set_and_the_smaller_of_them_and_the_rigs_h
 def test_a_gateway_without_any_calibration_is_a_defect(bench):
     with pytest.raises(ValueError, match="has a calibration"):
         type(bench.upload)(
-            bench.bank.staging, bench.upload._activation, replace(bench.selected, calibration=None), None, print
+            bench.bank.staging, bench.upload._activation, replace(bench.selected, document=None), None, print
         )

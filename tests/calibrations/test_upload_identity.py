@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gateway.bsfm import Calibration, CoefficientLimits, Coefficients, Response, validate_coefficients
 from gateway.calibrations.activation import make_uploaded
-from gateway.calibrations.store import StoreError
+from gateway.numbered_documents.store import StoreError
 from gateway.profiles import load_calibration
 from gateway.registers import RegisterMap
 from gateway.registers.upload.coefficients import HEAD_WORDS, CoefficientSet, model_hash, set_crc, words_of_block

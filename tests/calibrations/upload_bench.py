@@ -51,8 +51,8 @@ class Bench:
         )
         self.upload.run_in_background = lambda work, done: self.work.append((work, done))
         self.upload.on_use = self._on_use
-        assert self.selected.calibration
-        self.bank.set_active_model(self.selected.calibration, self.selected.selection.slot_word)
+        assert self.selected.document
+        self.bank.set_active_model(self.selected.document, self.selected.selection.slot_word)
 
     def _on_use(self, taken: ActiveCalibration) -> None:
         self.used.append(taken)

@@ -31,7 +31,7 @@ def open_store(directory: Path, rig_name: str) -> "CalibrationStore":
 
 def find_calibration(store: "CalibrationStore", which: str) -> "Calibration":
     """Return a calibration by its number in the store, a shipped name or a file."""
-    from gateway.calibrations.store import StoreError
+    from gateway.numbered_documents.store import StoreError
     from gateway.profiles import load_calibration
 
     if not which.isdecimal():
@@ -44,7 +44,7 @@ def find_calibration(store: "CalibrationStore", which: str) -> "Calibration":
 
 def in_use(store: "CalibrationStore") -> "Calibration":
     """Return the calibration in use, or the one that a gateway would start with."""
-    calibration = store.find_selected().calibration
+    calibration = store.find_selected().document
     if calibration is None:
         raise CliError(f"E433 nothing is stored in {store.directory}; --rig names the rig's own", exit_codes.DATA)
     return calibration
@@ -72,13 +72,13 @@ def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str,
 def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
     from gateway.bsfm import CoefficientLimits
     from gateway.calibrations.activation import Activation, UnusableCalibration
-    from gateway.calibrations.store import StoreError
+    from gateway.numbered_documents.store import StoreError
 
     rig, store = _rig(rig_name), open_store(directory, rig_name)
     activation = Activation(
         store, CoefficientLimits(cell_range_n=rig.load_cell.range_n if rig else defaults.LARGEST_CELL_N)
     )
-    before = store.find_selected().calibration
+    before = store.find_selected().document
     try:
         force = bool(request.get("force"))
         selected = (

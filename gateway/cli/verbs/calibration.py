@@ -17,7 +17,7 @@ from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration
-    from gateway.calibrations.store import CalibrationEntry, SelectedCalibration
+    from gateway.numbered_documents.store import SelectedDocument, StoredDocument
 
 
 @click.group(name="calibration")
@@ -30,8 +30,8 @@ def command() -> None:
 @json_option
 def list_command(*, state: StateChoice, as_json: bool) -> None:
     """List the calibrations of a state directory; * is in use, x was rejected."""
-    from gateway.calibrations.selection import OWN
     from gateway.cli.calibration.store_access import open_store
+    from gateway.numbered_documents.selection import OWN
 
     store = open_store(state.directory, state.rig)
     selected, entries = store.find_selected(), store.list()
@@ -51,12 +51,10 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         mark = "*" if selected.selection.number is None else " "
         click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, _slots(selected, OWN))} (the rig's own)")
     for entry in entries:
-        is_rejected = entry.calibration is not None and bool(entry.calibration.rejected)
+        is_rejected = entry.document is not None and bool(entry.document.rejected)
         mark = "*" if selected.selection.number == entry.number else "x" if is_rejected else " "
         description = (
-            _line(entry.calibration, _slots(selected, entry.number))
-            if entry.calibration
-            else f"unusable: {entry.fault}"
+            _line(entry.document, _slots(selected, entry.number)) if entry.document else f"unusable: {entry.fault}"
         )
         click.echo(f"{mark} {entry.number:<8}{description}")
 
@@ -169,13 +167,13 @@ def _write(texts: dict[Path, str], *, force: bool) -> None:
         click.echo(f"wrote {path}", err=True)
 
 
-def _number(selected: "SelectedCalibration") -> int | None:
-    return selected.calibration.number if selected.calibration else None
+def _number(selected: "SelectedDocument[Calibration]") -> int | None:
+    return selected.document.number if selected.document else None
 
 
-def _built_in(own: "Calibration | None", selected: "SelectedCalibration") -> dict[str, Any] | None:
+def _built_in(own: "Calibration | None", selected: "SelectedDocument[Calibration]") -> dict[str, Any] | None:
     """Return the rig's own calibration, which is no file of the store."""
-    from gateway.calibrations.selection import OWN
+    from gateway.numbered_documents.selection import OWN
     from gateway.registers.upload.coefficients import model_hash
 
     if own is None:
@@ -184,20 +182,20 @@ def _built_in(own: "Calibration | None", selected: "SelectedCalibration") -> dic
     return {"number": own.number, "name": own.name, "active": active, "slots": slots, "model_hash": model_hash(own)}
 
 
-def _facts(entry: "CalibrationEntry", selected: "SelectedCalibration") -> dict[str, Any]:
+def _facts(entry: "StoredDocument[Calibration]", selected: "SelectedDocument[Calibration]") -> dict[str, Any]:
     from gateway.registers.upload.coefficients import model_hash
 
     return {
         "number": entry.number,
         "active": selected.selection.number == entry.number,
         "slots": _slots(selected, entry.number),
-        "model_hash": entry.calibration and model_hash(entry.calibration),
+        "model_hash": entry.document and model_hash(entry.document),
         "fault": entry.fault or None,
-        "calibration": asdict(entry.calibration) if entry.calibration else None,
+        "calibration": asdict(entry.document) if entry.document else None,
     }
 
 
-def _slots(selected: "SelectedCalibration", number: int) -> list[int]:
+def _slots(selected: "SelectedDocument[Calibration]", number: int) -> list[int]:
     """Return the slots that hold this calibration."""
     return [slot for slot, number_there in enumerate(selected.pointer.slots) if number_there == number]
 

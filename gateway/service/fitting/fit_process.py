@@ -26,7 +26,8 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
     """
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.ladder.ladder_error import LadderError
-    from gateway.calibrations.store import CalibrationStore, StoreError
+    from gateway.calibrations.store import CalibrationStore
+    from gateway.numbered_documents.store import StoreError
     from gateway.profiles import ProfileError, load_rig
     from gateway.recording import RecordingError
     from gateway.service.fitting.ladder_fit import calibration_of, fit_recording
@@ -35,11 +36,11 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
     try:
         rig = load_rig(rig_name)
         store = CalibrationStore(state, rig.calibration)
-        selected = store.find_selected().calibration or rig.calibration
+        selected = store.find_selected().document or rig.calibration
         request = FitRequest(reference_span_n=selected.blend_span_n)
         fit = fit_recording(read_source(recording), request, RigContext(rig=rig_name, state=state))
         fresh = calibration_of(fit, rig.load_cell.range_n)
-        number = store.number_of(fresh.data_sha256)
+        number = store.find_data(fresh.data_sha256)
         return (
             _describe_result(fit, store, number)
             if number

@@ -132,4 +132,4 @@ def _reference(rig: Rig | None, state: Path | None) -> Calibration | None:
     if rig is None:
         return None
     selected = CalibrationStore(state, rig.calibration).find_selected() if state else None
-    return (selected.calibration if selected else None) or rig.calibration
+    return (selected.document if selected else None) or rig.calibration

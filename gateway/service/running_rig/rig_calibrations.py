@@ -20,7 +20,7 @@ class RigCalibrations:
         store = CalibrationStore(state, rig.calibration)
         self._activation = Activation(store, CoefficientLimits(cell_range_n=rig.load_cell.range_n))
         self._selected = selected = store.find_selected(self._activation.why_unusable)
-        calibration = selected.calibration or rig.calibration
+        calibration = selected.document or rig.calibration
         self.rig = replace(rig, calibration=calibration)
         number = selected.selection.number
         chosen = () if number is None else (f"calibration {number} of {calibration.date_utc} from {store.directory}",)

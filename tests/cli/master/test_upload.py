@@ -112,7 +112,7 @@ def test_a_calibration_that_the_gateway_knows_keeps_its_number_and_its_name(gate
             "demo is in use as calibration 2, slot 3: slip, 7 stops, durable, and read back word by word; "
             "the gateway knew it, and keeps its number and name\n"
         )
-    assert [(entry.number, entry.calibration.name) for entry in gateway.store.list()] == [(2, "demo")]
+    assert [(entry.number, entry.document.name) for entry in gateway.store.list()] == [(2, "demo")]
 
 
 def test_more_stops_than_the_registers_carry_are_told_before_anything_is_sent(call, tmp_path):

@@ -73,8 +73,8 @@ def active_mark(state: Path) -> int:
     assert not [entry.fault for entry in store.list() if entry.fault]
     selected = store.find_selected()
     assert selected.notes == ()
-    assert selected.calibration is not None
-    mark = mark_of(selected.calibration)
+    assert selected.document is not None
+    mark = mark_of(selected.document)
     assert selected.selection.slot == mark % 8
     assert slot_number(store, mark % 8) == selected.selection.number
     return mark

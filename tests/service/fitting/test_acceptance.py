@@ -10,7 +10,8 @@ import pytest
 
 from gateway.bsfm import CoefficientLimits
 from gateway.calibrations.activation import Activation
-from gateway.calibrations.store import CalibrationStore, StoreError
+from gateway.calibrations.store import CalibrationStore
+from gateway.numbered_documents.store import StoreError
 from gateway.profiles import load_rig
 from gateway.recording import Recorder
 from gateway.service.fitting.fit_process import fit_and_store
@@ -79,7 +80,7 @@ def test_what_is_out_of_band_or_worse_than_what_is_in_use_is_kept_and_not_offere
         activation.use_offered(rejected.number)
     assert store.find_selected().selection == before
     assert activation.use_offered(rejected.number, force=True).calibration == rejected
-    assert store_of(tmp_path).find_selected().calibration == rejected
+    assert store_of(tmp_path).find_selected().document == rejected
 
 
 def test_without_a_reversal_part_the_branches_are_judged_and_it_is_said(tmp_path: Path) -> None:

@@ -1,12 +1,13 @@
-"""Which calibration is in use, as a file of its own: generation files of which the highest whole one counts.
+"""Which document of a store is in use, as a file of its own: generation files of which the highest whole one counts.
 
 A change writes the next generation (gateway.processes.durable_file), so the active set is the old one or the new one
 and never a
 mixture: number, slot and all eight slots change together. The whole generation before is kept for the case that the
 newest is damaged; others are removed.
 
-A slot may hold the rig's built-in calibration: not its number, which another rig file may give to another set, but OWN,
-which means what the rig's file names, as "none chosen" does.
+Calibrations fill slots besides, which a master selects; plants fill none. A slot may hold the rig's built-in calibration:
+not its number, which another rig file may give to another set, but OWN, which means what the rig's file names, as "none
+chosen" does.
 """
 
 import json
@@ -25,7 +26,7 @@ _NAME: Final = re.compile(r"active\.(\d{6,})")
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """number: of a calibration in the store, None for the rig's built-in one; slot: where it was taken from, if from one."""
+    """number: of a document in the store, None for the rig's built-in one; slot: where it was taken from, if from one."""
 
     number: int | None = None
     slot: int | None = None
@@ -41,7 +42,7 @@ BUILT_IN: Final = Selection()
 
 @dataclass(frozen=True, slots=True)
 class SelectionState:
-    """active: what is in use; previous: what a rollback brings back; slots: number of the calibration in each, OWN for the
+    """active: what is in use; previous: what a rollback brings back; slots: number of the document in each, OWN for the
     rig's built-in one, None where it is empty."""
 
     generation: int = 0
@@ -51,7 +52,7 @@ class SelectionState:
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Calibrations of the store that this speaks of."""
+        """Documents of the store that this speaks of."""
         named = (self.active.number, self.previous.number, *self.slots)
         return tuple(number for number in named if number)
 
@@ -68,8 +69,9 @@ class SelectionState:
         return replace(self, active=selection, previous=previous, slots=tuple(slots))
 
 
-def read_selection(directory: Path) -> tuple[SelectionState, tuple[str, ...]]:
-    """Return the newest whole generation, and a sentence for each newer one that is not. Nothing stored is generation 0."""
+def read_selection(directory: Path, noun: str) -> tuple[SelectionState, tuple[str, ...]]:
+    """Return the newest whole generation, and a sentence for each newer one that is not. Nothing stored is generation 0.
+    noun: what the documents are, for the sentences."""
     damaged: list[str] = []
     for generation, name in reversed(_generations(directory)):
         try:
@@ -79,7 +81,7 @@ def read_selection(directory: Path) -> tuple[SelectionState, tuple[str, ...]]:
             continue
         consequence = f"the generation before it is used ({generation})"
         return pointer, tuple(f"E432 {sentence}; {consequence}" for sentence in damaged)
-    consequence = "no whole one is left, the rig's built-in calibration is used"
+    consequence = f"no whole one is left, the rig's built-in {noun} is used"
     return SelectionState(), tuple(f"E432 {sentence}; {consequence}" for sentence in damaged)
 
 
