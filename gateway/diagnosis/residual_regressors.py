@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.light_statistics import follow_exponentially
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import fast_noise_n
 from gateway.diagnosis.search.bench import BLOCKS, SURROUNDINGS, Bench
@@ -74,8 +75,6 @@ def _column_regressors(bench: Bench, force: Floats) -> Iterator[Regressors]:
 
 def _lagged_columns(bench: Bench, column: Floats) -> Floats:
     """The column behind first-order lags of 1, 4 and 16 s."""
-    from scipy.signal import lfilter
-
     found = np.zeros((len(_LAGS_S), bench.rows))
     for channel in bench.channels:
         if channel.is_force:
@@ -83,7 +82,7 @@ def _lagged_columns(bench: Bench, column: Floats) -> Floats:
             for k, late_s in enumerate(_LAGS_S):
                 share = 1.0 - np.exp(-row_s / late_s)
                 start = column[channel.rows][0]
-                found[k, channel.rows] = start + lfilter([share], [1.0, share - 1.0], column[channel.rows] - start)
+                found[k, channel.rows] = start + follow_exponentially(column[channel.rows] - start, share)
     return np.asarray(found * bench.force_rows)
 
 

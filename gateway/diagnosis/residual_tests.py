@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.light_statistics import chi2_tail, log_chi2_tail
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.residual_regressors import Regressors, list_regressors
@@ -87,15 +88,13 @@ def _dependences(
 ) -> Iterator[Dependence]:
     """Each question's gain beside the model; `normal` holds the columns of all of them in order. A column of which the model
     leaves less than the share `least_power` does not ask any more what its name says."""
-    from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
-
     at = 0
     for regressors in asked:
         indices = list(range(at, at + regressors.columns.shape[0]))
         at += len(indices)
         usable = [k for k in indices if normal.power[k] > least_power * max(normal.raw_power[k], 1.0e-300)]
         gain = normal.add(usable).gain if usable else 0.0
-        chance = float(chi2_law.logsf(gain, len(indices))) + float(np.log(regressors.among))
+        chance = log_chi2_tail(gain, len(indices)) + float(np.log(regressors.among))
         yield Dependence(regressors, gain, gain / total, chance)
 
 
@@ -119,8 +118,6 @@ def find_dependences(
 
 def _find_unsteadiness(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Iterator[Leftover]:
     """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
-    from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
-
     if bench.rms_n(fitted.residual_n) < _RESOLUTION_N:
         return
     white = whiten(fitted.residual_n)
@@ -134,7 +131,7 @@ def _find_unsteadiness(bench: Bench, fitted: FittedModel, whiten: Whitener) -> I
             levels = np.array([np.mean(block**2) for block in np.array_split(counted, BLOCKS)])
             usual = float(np.median(levels))
             apart = np.sum((levels / levels.mean() - 1.0) ** 2) * counted.size / BLOCKS / 2.0
-            if chi2_law.sf(apart, BLOCKS - 1) < _SIGNIFICANCE and times_are_sure:
+            if chi2_tail(apart, BLOCKS - 1) < _SIGNIFICANCE and times_are_sure:
                 share = float(np.sum(np.maximum(levels - usual, 0.0)) / np.sum(levels))
                 yield Leftover("time", "louder at some times than at others", share)
             if (share := _wandering_share(part)) > _LEAST_SHARE:

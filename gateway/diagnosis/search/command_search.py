@@ -16,6 +16,7 @@ import numpy as np
 
 from gateway.catalogue.cylinder import AREA, COULOMB
 from gateway.catalogue.regulator import DEAD_BAND, LAG
+from gateway.diagnosis.light_statistics import follow_exponentially
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench, Channel
@@ -158,10 +159,9 @@ def _rounding_error_v(given_v: Floats, command_v: Floats, row_s: float, paramete
 
 def _apply_lag(command_v: Floats, lag_s: float, row_s: float) -> Floats:
     """Behind the regulator's lag; a row sees the command of the row before."""
-    from scipy.signal import lfilter
-
     share = 1.0 - math.exp(-row_s / max(lag_s, 1.0e-6))
-    return np.asarray(lfilter([0.0, share], [1.0, share - 1.0], command_v, axis=0))
+    late = follow_exponentially(command_v, share)
+    return np.concatenate([np.zeros_like(late[:1]), late[:-1]])
 
 
 def _apply_friction_play(values: Floats, half_width: float) -> Floats:

@@ -13,6 +13,7 @@ from numpy.random import default_rng
 
 from gateway.catalogue.all_effects import BY_NAME
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
+from gateway.diagnosis.light_statistics import chi2_tail
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.candidates import (
@@ -103,9 +104,7 @@ class ModelComparison:
 
 def is_significant(refined: RefinedEffect, starts: int) -> bool:
     """Chi-square at 1 % over the number of starts."""
-    from scipy.stats import chi2 as chi2_law  # here, so that the catalogue costs no scipy
-
-    return bool(chi2_law.sf(refined.gain, max(refined.dof, 1)) < _FALSE_ALARMS / max(starts, 1))
+    return chi2_tail(refined.gain, max(refined.dof, 1)) < _FALSE_ALARMS / max(starts, 1)
 
 
 @dataclass(frozen=True, slots=True)
