@@ -20,6 +20,7 @@ SAME_V: Final = 2.0e-3  # commands closer than this are one: a read-back jitters
 TAIL_SHARE: Final = 0.25
 FEWEST_TAIL_ROWS: Final = 5
 SHORTEST_DWELL_S: Final = 0.1  # shorter stretches are the slew between two stairs
+FEWEST_DWELL_ROWS: Final = 2  # the same where readings are as far apart: one on the way is not settled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +71,7 @@ def _dwells(time_s: Floats, command_v: Floats, force_n: Floats, starts: Integers
     ends = np.append(starts[1:], len(time_s) - 1)  # the row of the next command still reads this one's force
     dwells, squares, readings = [], 0.0, 0
     for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        if time_s[end] - time_s[start] < SHORTEST_DWELL_S:
+        if time_s[end] - time_s[start] < SHORTEST_DWELL_S or end - start < FEWEST_DWELL_ROWS:
             continue
         tail = _tail(force_n[start + 1 : end + 1])
         half = len(tail) // 2

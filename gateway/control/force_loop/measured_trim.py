@@ -25,6 +25,7 @@ from gateway.control.limits import trim_limited
 from gateway.control.settings import LoopTiming, Trim
 from gateway.registers.words import LimitedBy
 
+HELD_S: Final = 0.01  # of the interval between samples, which the pace already has (response_timing)
 SMOOTHING_S: Final = 0.10
 LEAST_SEEN_S: Final = 0.04  # of an error, before it is believed
 SIGMAS: Final = 3.5  # of the smoothed error's noise: the least zone
@@ -137,11 +138,15 @@ class MeasuredTrim:
             self._way = 0
         if not self._way:
             return
-        pace_per_s = self._timing.integral_per_s * SLOWER**self._turns
+        pace_per_s = self._pace_per_s(interval_s) * SLOWER**self._turns
         wanted_n = self.value_n + pace_per_s * error_n * interval_s
         self.value_n, self.limited_by = trim_limited(wanted_n, self._settings.limit_v * slope_n_per_v)
         self._learned_n, self._learned_at_n, self._going_then = self.value_n, self._at_n, self._going
         self._own_n = self.value_n - self._common_here_n()
+
+    def _pace_per_s(self, interval_s: float) -> float:
+        """What is learned from one sample shows in the next: samples that are far apart slow the integral down."""
+        return 1.0 / (1.0 / self._timing.integral_per_s + max(0.0, interval_s - HELD_S))
 
     def _turn(self, way: int) -> None:
         if self._last_way and way != self._last_way:
