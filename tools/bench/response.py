@@ -22,9 +22,8 @@ from typing import Final
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
-from gateway.bsfm.ladder.fault import LadderError
-
 from gateway.bsfm import Bsfm
+from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.control.settings import ControlSettings, LeadSettings, Trim
 from gateway.profiles import load_rig
 from tests.control.foreign.course import Course, allowed_s, course
