@@ -15,16 +15,11 @@ from pathlib import Path
 from types import CodeType
 from typing import Any, Final, ParamSpec, TypeVar
 
+from gateway.extras import import_library
+
 _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
 _steps: Final[list[Callable[..., Any]]] = []
-
-
-class MissingExtraError(ImportError):
-    """numba is not installed."""
-
-    def __init__(self) -> None:
-        super().__init__("this needs numba, which is not installed: pip install 'force-gateway[analysis]'")
 
 
 def step(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
@@ -58,11 +53,10 @@ def _compile(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, 
 @cache
 def _numba() -> Any:
     """numba, with all steps made known to it."""
-    try:
-        import numba
-        from numba.extending import register_jitable
-    except ImportError as missing:
-        raise MissingExtraError from missing
+    import_library("numba")
+    import numba
+    from numba.extending import register_jitable
+
     chosen = numba.config.CACHE_DIR  # type: ignore[attr-defined]
     kept = Path(chosen) if chosen else Path(__file__).parent / "__pycache__"
     numba.config.CACHE_DIR = str(kept / f"compiled-{_fingerprint()}")  # type: ignore[attr-defined]

@@ -53,6 +53,8 @@ def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliE
         return CliError(str(error), exit_codes.CONFIGURATION)
     if _is_a(error, "gateway.recording.errors", "RecordingError"):
         return CliError(f"E403 {error}", exit_codes.DATA)
+    if _is_a(error, "gateway.extras", "MissingExtraError"):
+        return CliError(str(error), exit_codes.DEVICE)
     if _is_a(error, "gateway.ports", "PortError"):
         return CliError(str(error), getattr(error, "exit_code", exit_codes.DEVICE))
     if isinstance(error, OSError) and error.strerror:

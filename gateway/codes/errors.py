@@ -136,6 +136,14 @@ ERRORS: Final = (
         "Give a shorter --state DIR, on a local disk.",
     ),
     Explanation(
+        "E160",
+        "an extra is not installed",
+        "A library that this verb needs is not there, or does not load; holding a force does not need it.",
+        "The gateway was installed without the extra `analysis`: numba, which runs the simulation over recordings "
+        "(diagnose, simulate, the residual watch), and pyarrow, which reads and writes Parquet.",
+        "pip install 'force-gateway[analysis]' into the environment of the gateway; 250 MB more. CSV needs no extra.",
+    ),
+    Explanation(
         "E180",
         "the gateway was lost while a force was held",
         "The connection to the gateway broke and could not be had again while a lease may run.",

@@ -6,6 +6,6 @@ OK: Final = 0
 FAILED: Final = 1  # asked for and not done: a refusal, a full disk, an internal error
 USAGE: Final = 2  # the command line itself
 DATA: Final = 65  # an input file that is not what it should be
-DEVICE: Final = 69  # a port, a device or a gateway that is not there
+DEVICE: Final = 69  # a port, a device, a gateway or an extra that is not there
 PERMISSION: Final = 77
 CONFIGURATION: Final = 78  # a profile with a fault

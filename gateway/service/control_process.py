@@ -81,7 +81,7 @@ def sample_ring(descriptor: int | None) -> SampleRing | None:
 
 def watch_arguments(rig: Rig, ring: SampleRing | None) -> dict[str, Any] | None:
     """Return what the guardian tells the residual watch; None where there is none to start."""
-    if not rig.is_watched or ring is None:
+    if not rig.is_watched or rig.why_unwatched or ring is None:
         return None
     watch = rig.residual_watch
     return {"simulated": rig.simulated, "window_s": watch.window_s, "every_s": watch.every_s}

@@ -75,7 +75,7 @@ class RunningGateway:
         return self.status()["force_measured"] / 100
 
 
-def start(state: Path, *options: str, rig: str = "demo") -> RunningGateway:
+def start(state: Path, *options: str, rig: str = "demo", environment: dict[str, str] | None = None) -> RunningGateway:
     """A gateway that is READY; what it says on stderr goes to a file beside the state directory."""
     log = state.with_name(state.name + ".stderr")
     command = [
@@ -92,7 +92,7 @@ def start(state: Path, *options: str, rig: str = "demo") -> RunningGateway:
         *options,
     ]
     with log.open("w") as stderr:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True, env=environment)
     assert process.stdout
     line = process.stdout.readline()
     if not line:

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
-HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "pyarrow")
+from tests.cli.lean import lean_environment
+from tests.end_to_end.conftest import start, stop
+
+HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "pyarrow", "numba", "llvmlite")
 
 
 def mapped(pid: int) -> set[str]:
@@ -15,14 +18,20 @@ def mapped(pid: int) -> set[str]:
     return {line.split(maxsplit=5)[5] for line in lines if line.count("/") > 1}
 
 
+def heavy_files(pid: int, *others: str) -> list[str]:
+    """Files of heavy libraries, and of others, that a process has mapped."""
+    return [file for file in mapped(pid) for name in (*HEAVY, *others) if f"/{name}" in file]
+
+
 def loaded_by(statement: str) -> set[str]:
     code = f"import sys; {statement}; print(*{{name.split('.')[0] for name in sys.modules}})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return set(done.stdout.split())
 
 
-def test_control_never_maps_anything_heavy_while_it_works(rested):
-    """With a force commanded, a recording, the float blocks read and a refusal: nothing is left to load later."""
+def test_nobody_who_holds_the_force_maps_anything_heavy_while_it_works(rested):
+    """Control, the simulated rig and what they are forked from: with a force commanded, a recording, the float blocks read
+    and a refusal, nothing is left to load later."""
     assert not rested.write(0, 1, 1000).isError()
     rested.wait_until(lambda status: status["state"] == 3)
     rested.words(200, 60)
@@ -33,14 +42,14 @@ def test_control_never_maps_anything_heavy_while_it_works(rested):
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    files = mapped(rested.ready["pids"]["control"])
-    assert not [file for file in files for name in HEAVY if f"/{name}" in file]
+    for name in ("control", "rig", "fork_server"):
+        assert heavy_files(rested.ready["pids"][name]) == [], name
 
 
 def test_the_guardian_maps_no_numpy(rested):
-    files = mapped(rested.ready["pids"]["guardian"])
-    assert files, "the list can be read"
-    assert not [file for file in files for name in (*HEAVY, "numpy", "pydantic_core", "yaml") if f"/{name}" in file]
+    guardian = rested.ready["pids"]["guardian"]
+    assert mapped(guardian), "the list can be read"
+    assert heavy_files(guardian, "numpy", "pydantic_core", "yaml") == []
 
 
 @pytest.mark.parametrize(
@@ -56,3 +65,19 @@ def test_the_guardian_maps_no_numpy(rested):
 )
 def test_each_process_imports_only_what_it_needs(statement, absent):
     assert loaded_by(statement).isdisjoint(absent)
+
+
+def test_a_gateway_without_the_extra_holds_a_force_and_records(tmp_path):
+    """Only the residual watch is off, and one line says so."""
+    gateway = start(tmp_path / "state", "--sim", "--record", environment=lean_environment(tmp_path))
+    try:
+        assert not gateway.write(0, 1, 1000).isError()
+        gateway.wait_until(lambda status: abs(status["force_measured"] - 1000) < 100)
+        assert "watch" not in gateway.ready["pids"]
+    finally:
+        assert stop(gateway) == 0
+    kept = (tmp_path / "state" / "events.jsonl").read_text().splitlines()
+    said = [line for line in kept if "the residual watch is off: numba is not installed" in line]
+    assert len(said) == 1
+    assert len([note for note in gateway.ready["notes"] if note.startswith("E160")]) == 1
+    assert list((tmp_path / "state" / "recordings").glob("*.fgr"))

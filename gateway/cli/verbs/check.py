@@ -11,7 +11,7 @@ from gateway.cli.options import count_of, json_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
-    from gateway.profiles import Checked, ProfileFault
+    from gateway.profiles import Checked, ProfileFault, Rig
 
 
 @click.command()
@@ -52,10 +52,14 @@ def _print(file: str, checked: "Checked") -> None:
         return
     for name, value in facts(checked).items():
         click.echo(f"{name:<12} {value}")
-    for note in checked.value.notes if is_rig else ():
+    for note in _notes(checked.value) if is_rig else ():
         click.echo(f"{'note':<12} {note}")
     warnings = f", {count_of(checked.warnings, 'warning')}" if checked.warnings else ""
     click.echo(f"{'ok':<12} no faults{warnings}")
+
+
+def _notes(rig: "Rig") -> list[str]:
+    return [*rig.notes, *([rig.why_unwatched] if rig.why_unwatched else [])]
 
 
 def _document(checked: "Checked") -> dict[str, Any]:

@@ -79,7 +79,9 @@ def command(**options: Any) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
+    from gateway.extras import require
 
+    require("numba")
     _check_effect(options["without"])
     sources = read_sources(
         options["recordings"], rig=options["rig"], columns=options["columns"], state=options["state"]

@@ -40,8 +40,10 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
     """
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
+    from gateway.extras import require
     from gateway.profiles import load_plant
 
+    require("numba")
     profile = load_plant(plant) if plant else None
     sources = read_sources([recording], **options)
     measurement, profile = sources.measurements[0], profile or sources.plant

@@ -13,6 +13,7 @@ from gateway.control.compensation.compensation import NO_COMPENSATION, Compensat
 from gateway.control.inputs import CalibrationInUse
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
+from gateway.extras import is_installed, missing_note
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.compensated_effects import in_simulation
 from gateway.profiles.rigs.rig_file import Network, ResidualWatch
@@ -92,9 +93,14 @@ class Rig:
 
     @property
     def is_watched(self) -> bool:
-        """Decide whether a residual watch runs: the rig names a plant, and is simulated or enables the watch."""
+        """Decide whether a residual watch is wanted: the rig names a plant, and is simulated or enables the watch."""
         enabled = self.residual_watch.enabled
         return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
+
+    @property
+    def why_unwatched(self) -> str:
+        """Why the residual watch that the rig wants is off: its libraries are not installed. Empty where it runs."""
+        return missing_note("numba", "the residual watch") if self.is_watched and not is_installed("numba") else ""
 
     @property
     def lacks_device_watchdog(self) -> bool:

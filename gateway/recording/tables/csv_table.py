@@ -2,7 +2,7 @@
 
 Two ways to the same numbers: pyarrow reads a clean table at hundreds of megabytes per second; the first thing that it
 does not understand (a word, a row too short, a comment or a blank line between rows) sends the file down the exact way,
-line by line, which knows every rule and names row and column.
+line by line, which knows every rule and names row and column. Without pyarrow (extra `analysis`) every file takes that way.
 
 strict (the diagnosis): a cell of a contract column that is no number, or a row with too few or too many cells, is a
 RecordingError. lenient (the fit, which needs stairs and not every row): it is told in the notes, and left out.
@@ -15,6 +15,7 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from gateway.extras import is_installed
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
 from gateway.recording.tables.column_mapping import EXAMPLE, ColumnMapping, SelectedColumn, join_names, select_columns
@@ -77,12 +78,12 @@ def _convert(values: "NDArray[np.float64]", pick: SelectedColumn) -> "NDArray[np
 
 
 def _read_fast(form: CsvDialect, chosen: Sequence[SelectedColumn]) -> NumberTable | None:
-    """All rows at once; None when there is anything between them that is no row of numbers."""
+    """All rows at once; None when there is anything between them that is no row of numbers, and without pyarrow."""
+    if not chosen or not form.sample or not is_installed("pyarrow"):
+        return None
     import pyarrow as pa
     from pyarrow import csv
 
-    if not chosen or not form.sample:
-        return None
     pa.enable_signal_handlers(False)  # they would hold a pipe open from now on, and Ctrl-C is Python's
     names = [str(k) for k in range(len(form.names))]
     wanted_names = [names[pick.index] for pick in chosen]

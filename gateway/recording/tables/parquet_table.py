@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from gateway.extras import import_library
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
 from gateway.recording.tables.column_mapping import ColumnMapping, SelectedColumn, join_names, select_columns
@@ -27,8 +28,9 @@ _TICKS_PER_S: Final = {"s": 1.0, "ms": 1.0e3, "us": 1.0e6, "ns": 1.0e9}
 def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
     """Return the columns and facts of a Parquet file.
 
-    RecordingError when the file is damaged or a contract column holds no numbers.
+    RecordingError when the file is damaged or a contract column holds no numbers, MissingExtraError without pyarrow.
     """
+    import_library("pyarrow")
     import pyarrow as pa
     from pyarrow import parquet
 

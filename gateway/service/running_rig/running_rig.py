@@ -180,6 +180,8 @@ class RunningRig:
 
     async def _notes(self, restarted: Ending | None) -> tuple[str, ...]:
         notes = [*self._rig.notes, *self._calibrations.notes]
+        if self._rig.why_unwatched:
+            notes.append(self._rig.why_unwatched)
         if restarted:
             notes.append(f"restarted in OFF after: {restarted.sentence}")
         else:
