@@ -51,7 +51,7 @@ class Sources:
 
 def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, state: Path | None) -> Sources:
     """Read everything that the diagnosis takes. RecordingError and CliError (65) for data, ProfileError for a rig."""
-    paths = tuple(_path(name, rig, state) for name in names)
+    paths = tuple(recording_path(name, rig, state) for name in names)
     known = load_rig(rig) if rig else None
     mapping = column_mapping(columns)
     recordings = [read_table(path, mapping) for path in paths]
@@ -83,7 +83,8 @@ def _quantum_n(rig: Rig | None) -> float:
     return cell_host(line.device, line.sign, line.unit).resolution_n
 
 
-def _path(name: str, rig: str | None, state: Path | None) -> Path:
+def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
+    """Return the file of a recording given by number or path. CliError (65) where there is none."""
     path = Path(name)
     if name.isdecimal() and not path.exists():
         return find_recording(state_directory(state, rig or _ANY_STATE), int(name))

@@ -24,6 +24,17 @@ if TYPE_CHECKING:
 
 _STDOUT: Final = Path("-")
 _FAILS: Final = {"partial": ("partial", "unknown"), "unknown": ("unknown",)}
+_OF_A_DIAGNOSIS: Final = (
+    "recordings",
+    "without",
+    "noise_floor_n",
+    "report",
+    "extend",
+    "plan_file",
+    "fail_on",
+    "closed_loop",
+)
+"""Options that a comparison of two runs has no use for."""
 _OUTPUT: Final = click.Path(path_type=Path, dir_okay=False)
 
 
@@ -49,7 +60,7 @@ class Answer:
 
 
 @click.command()
-@click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True)
+@click.argument("recordings", metavar="RECORDING...", nargs=-1)
 @click.option("--rig", metavar="R.yaml", help="The rig whose plant is the start; default the recording's own.")
 @click.option("--without", metavar="EFFECT", help="Switch one effect of the base model off, to see it found again.")
 @click.option(
@@ -69,6 +80,8 @@ class Answer:
 @click.option("--columns", metavar="MAP", help="time_s=1:ms,force_n=7:n for foreign tables, or a YAML file.")
 @click.option("--fail-on", type=click.Choice(list(_FAILS)), help="Exit 1 on this verdict or a worse one.")
 @click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory, for numbers.")
+@click.option("--before", metavar="A", help="With --after: what B gained in commanded force over A, two real runs.")
+@click.option("--after", metavar="B", help="See --before.")
 @click.option("--closed-loop", is_flag=True, help="Measure on the twin what the extension is worth in commanded force.")
 def command(**options: Any) -> None:
     """Say what the simulation gets wrong on a recording, and why.
@@ -77,6 +90,11 @@ def command(**options: Any) -> None:
     pressure_kpa. Several are explained by one model.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
+    if options["before"] or options["after"]:
+        _show_before_after(options)
+        return
+    if not options["recordings"]:
+        raise click.UsageError("Missing argument 'RECORDING...'.")
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
     from gateway.extras import require
@@ -104,6 +122,26 @@ def command(**options: Any) -> None:
         click.echo(printed, nl=False)
     if options["fail_on"] and diagnosis.verdict in _FAILS[options["fail_on"]]:
         raise click.exceptions.Exit(exit_codes.FAILED)
+
+
+def _show_before_after(options: dict[str, Any]) -> None:
+    """Compare two runs by the error of the commanded force; nothing is diagnosed."""
+    given = [name for name in _OF_A_DIAGNOSIS if options[name]]
+    if given:
+        raise click.UsageError(f"--before A --after B compares two runs, without {', '.join(given)}")
+    if not (options["before"] and options["after"]):
+        raise click.UsageError("--before A and --after B go together: the run before a change and the one after it")
+    from gateway.cli.diagnosis import before_after
+    from gateway.cli.diagnosis.outputs import write_all
+
+    found = before_after.run(options["before"], options["after"], options["columns"], options["rig"], options["state"])
+    text = json.dumps(before_after.document(found), indent=2, allow_nan=False) + "\n"
+    if options["json_file"] == _STDOUT:
+        click.echo(text, nl=False)
+        return
+    click.echo("\n".join(before_after.sentences(found)))
+    if options["json_file"]:
+        write_all({options["json_file"]: text})
 
 
 def _check_effect(name: str | None) -> None:

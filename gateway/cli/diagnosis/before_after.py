@@ -1,0 +1,167 @@
+"""`diagnose --before A --after B`: what a change has gained in commanded force, from two real runs.
+
+A reading that was straightened by the plant in use is not the reading of before. So both runs are compared as the plant of
+the one and as the plant of the other has the cell; where the two answers differ, only another cell could tell.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from gateway.cli.diagnosis.inputs import recording_path
+from gateway.cli.errors import CliError
+from gateway.control.compensation.cell_map import CellMap
+from gateway.diagnosis.force_error import (
+    CommandedForce,
+    ErrorBlock,
+    ForceChange,
+    GainVerdict,
+    commanded_force,
+    compare_runs,
+    error_blocks,
+)
+from gateway.diagnosis.measurement import Floats
+from gateway.processes import exit_codes
+from gateway.recording import read_table
+from gateway.recording.tables.mapping_file import column_mapping
+
+_ANOTHER_CELL: Final = (
+    "with the cell as the other plant has it the answer is another one: only a second load cell can tell"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """A recording as far as the comparison needs it. plant: number in use while it was made, 0 the rig's own; cell: what of
+    the readings that plant has straightened; voltage_v: on the output, by row."""
+
+    name: str
+    plant: int
+    cell: CellMap | None
+    force: CommandedForce
+    voltage_v: Floats
+
+    def blocks(self, cell: CellMap | None) -> tuple[ErrorBlock, ...]:
+        """Return the blocks of this run, its force as read through `cell`."""
+        if cell == self.cell:
+            return error_blocks(self.force)
+        through = np.array(
+            [_through(n, v, self.cell, cell) for n, v in zip(self.force.measured_n, self.voltage_v, strict=True)]
+        )
+        return error_blocks(replace(self.force, measured_n=through))
+
+
+@dataclass(frozen=True, slots=True)
+class BeforeAfter:
+    """The comparison of two runs: of all rows, of held forces alone, and of the ways between them."""
+
+    before: RecordedRun
+    after: RecordedRun
+    whole: ForceChange
+    held: ForceChange
+    moving: ForceChange
+
+
+def read_run(name: str, *, rig: str | None, columns: str | None, state: Path | None) -> RecordedRun:
+    """Read one run, by number or file. CliError (65) where nobody knows what was asked in it."""
+    path = recording_path(name, rig, state)
+    recording = read_table(path, column_mapping(columns))
+    try:
+        force = commanded_force(recording.columns)
+    except ValueError as error:
+        why = f"{path}: {error}; force-gateway record writes setpoint_n: the force that the master asked for"
+        raise CliError(f"E403 {why}", exit_codes.DATA) from None
+    in_use = recording.header.get("plant_in_use") or {}
+    in_use = json.loads(in_use) if isinstance(in_use, str) else in_use
+    cell = CellMap(**in_use["cell"]) if in_use.get("cell") else None
+    voltage_v = recording.columns.get("sent_v", recording.columns.get("command_v", np.full(force.time_s.size, nan)))
+    return RecordedRun(path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
+
+
+def compare_before_after(before: RecordedRun, after: RecordedRun) -> BeforeAfter:
+    """Return what the later run gained. `cannot be told` where it depends on which plant is right about the cell."""
+    views = [_compare_through(before, after, cell) for cell in dict.fromkeys((after.cell, before.cell))]
+    result = views[0]
+    if len({view.whole.verdict for view in views}) > 1:
+        result = replace(result, whole=replace(result.whole, verdict=GainVerdict.UNKNOWN, why=_ANOTHER_CELL))
+    return result
+
+
+def _compare_through(before: RecordedRun, after: RecordedRun, cell: CellMap | None) -> BeforeAfter:
+    runs = (before.blocks(cell), after.blocks(cell))
+    held, moving = ([[b for b in run if b.settled is settled] for run in runs] for settled in (True, False))
+    return BeforeAfter(before, after, compare_runs(*runs), compare_runs(*held), compare_runs(*moving))
+
+
+def _through(measured_n: float, voltage_v: float, known: CellMap | None, other: CellMap | None) -> float:
+    """Return what a reading straightened by `known` would be when straightened by `other`. The tare is left as it is."""
+    raw_n = known.reading_n(measured_n, nan, voltage_v) if known else measured_n
+    return other.force_n(raw_n, nan, voltage_v) if other else raw_n
+
+
+def document(found: BeforeAfter) -> dict[str, Any]:
+    """Return the comparison as JSON has it (format 1); numbers that are not known are null."""
+    runs = {
+        when: {"recording": run.name, "plant": run.plant}
+        for when, run in (("before", found.before), ("after", found.after))
+    }
+    parts = {"force_error": found.whole, "held": found.held, "moving": found.moving}
+    return {"format": 1, **runs, "verdict": found.whole.verdict.value} | {
+        name: _facts(part) for name, part in parts.items()
+    }
+
+
+def _facts(change: ForceChange) -> dict[str, Any]:
+    return {name: _known(value) for name, value in asdict(change).items()}
+
+
+def _known(value: Any) -> Any:
+    if isinstance(value, tuple):
+        known = [_known(each) for each in value]
+        return None if None in known else known
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def sentences(found: BeforeAfter) -> Iterator[str]:
+    """Yield the comparison in lines for a terminal."""
+    whole = found.whole
+    yield f"error of the commanded force: {_run(found.before)} -> {_run(found.after)}"
+    for name, part in (("all", whole), ("held", found.held), ("on the way", found.moving)):
+        yield f"  {name:<11}{_line(part)}"
+    shares = " and ".join(f"{share:.0%}" for share in whole.comparable_share)
+    stretches = f"{whole.blocks[0]} and {whole.blocks[1]} stretches"
+    yield f"compared where the same was asked of both: {shares} of their rows, in {stretches}"
+    if whole.verdict is GainVerdict.UNKNOWN:
+        yield f"cannot be told: {whole.why}"
+        return
+    low, high = whole.gain_ci95
+    word, sign = ("gained", 1.0) if whole.verdict is GainVerdict.BETTER else ("lost", -1.0)
+    ends = sorted((sign * low, sign * high))
+    yield f"{whole.verdict.value}: {sign * whole.gain_n:.2f} N {word}, 95 % interval {ends[0]:.2f} .. {ends[1]:.2f} N"
+
+
+def _run(run: RecordedRun) -> str:
+    return f"{run.name} ({f'plant {run.plant}' if run.plant else 'no plant in use'})"
+
+
+def _line(change: ForceChange) -> str:
+    if not isfinite(change.ratio):
+        return "nothing to compare"
+    interval = (
+        f", 95 % interval {change.ratio_ci95[0]:.2f} .. {change.ratio_ci95[1]:.2f}"
+        if isfinite(change.ratio_ci95[0])
+        else ""
+    )
+    numbers = f"{change.before_rms_n:.2f} -> {change.after_rms_n:.2f} N RMS"
+    return f"{numbers}, after / before {change.ratio:.2f}{interval}: {change.verdict.value}"
+
+
+def run(before: str, after: str, columns: str | None, rig: str | None, state: Path | None) -> BeforeAfter:
+    """Read both runs and compare them."""
+    runs: Sequence[RecordedRun] = [read_run(name, rig=rig, columns=columns, state=state) for name in (before, after)]
+    return compare_before_after(runs[0], runs[1])

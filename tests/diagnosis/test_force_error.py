@@ -1,0 +1,71 @@
+"""What two real runs say of the force that was commanded: same tasks, blocks, an interval, and an honest `cannot be told`."""
+
+import numpy as np
+import pytest
+
+from gateway.diagnosis.force_error import CommandedForce, ErrorBlock, GainVerdict, compare_runs, error_blocks, rms_n
+
+ROWS_HZ = 50.0
+
+
+def run(error_n: float, seed: int, *, levels=(5.0, 20.0, 10.0, 30.0, 15.0), hold_s=3.0, noise_n=0.05) -> CommandedForce:
+    """Held forces, each with an error that decays after the step to a share of `error_n` of either sign."""
+    rng = np.random.default_rng(seed)
+    wanted_n = np.repeat(levels, int(hold_s * ROWS_HZ)).astype(float)
+    time_s = np.arange(wanted_n.size) / ROWS_HZ
+    since_s = time_s % hold_s
+    before_n = np.repeat((0.0, *levels[:-1]), int(hold_s * ROWS_HZ))
+    measured_n = wanted_n + (before_n - wanted_n) * np.exp(-since_s / 0.15) + rng.normal(0.0, noise_n, wanted_n.size)
+    measured_n += np.where(
+        since_s > 0.6, error_n * rng.choice((-1.0, 1.0), wanted_n.size // 25 + 1).repeat(25)[: time_s.size], 0.0
+    )
+    return CommandedForce(time_s, wanted_n, measured_n, np.ones(time_s.size, dtype=bool))
+
+
+def test_the_blocks_are_all_rows_that_count_cut_where_the_task_changes():
+    blocks = error_blocks(run(0.2, 1))
+    assert sum(block.rows for block in blocks) == 5 * 150
+    assert [(block.from_n, block.to_n, block.rising) for block in blocks if not block.settled] == [
+        (5.0, 20.0, True),
+        (20.0, 10.0, False),
+        (10.0, 30.0, True),
+        (30.0, 15.0, False),
+    ], "the recording begins at 5 N: nobody knows how it came there"
+    assert all(block.from_n == block.to_n for block in blocks if block.settled)
+
+
+def test_an_enable_is_a_step_from_0_n():
+    started = run(0.0, 1, levels=(10.0, 10.0))
+    started.counts[:75] = False
+    first, *_ = error_blocks(started)
+    assert (first.from_n, first.to_n, first.settled) == (0.0, 10.0, False)
+
+
+def test_a_smaller_error_is_better_a_larger_one_worse_and_the_interval_excludes_1():
+    small, large = (error_blocks(run(error_n, seed, hold_s=6.0)) for error_n, seed in ((0.2, 1), (2.0, 2)))
+    better, worse = compare_runs(large, small), compare_runs(small, large)
+    assert (better.verdict, worse.verdict) == (GainVerdict.BETTER, GainVerdict.WORSE)
+    assert better.ratio_ci95[0] <= better.ratio <= better.ratio_ci95[1] < 1.0 < worse.ratio_ci95[0]
+    assert better.gain_ci95[0] > 0.0
+    assert better.gain_n == pytest.approx(better.before_rms_n - better.after_rms_n)
+    assert better.before_rms_n == pytest.approx(rms_n(large)), "the same was asked of both: everything is compared"
+
+
+def test_the_same_machine_twice_cannot_be_told_apart():
+    """Of 60 pairs few may be called different: the interval holds 95 %."""
+    told = [
+        compare_runs(error_blocks(run(0.3, seed)), error_blocks(run(0.3, 1000 + seed))).verdict for seed in range(60)
+    ]
+    assert told.count(GainVerdict.UNKNOWN) >= 54
+
+
+def test_only_what_was_asked_of_both_is_compared():
+    """The later run holds forces besides that the earlier one never held, badly."""
+    before, after = error_blocks(run(0.2, 1)), error_blocks(run(0.2, 2))
+    more = [ErrorBlock(38.0, 38.0, True, True, 500, 5000.0)] * 20
+    change = compare_runs(before, (*after, *more))
+    assert change.after_rms_n < 10.0 * change.before_rms_n
+    assert change.comparable_share[1] < 0.5
+    apart = compare_runs(before, more)
+    assert (apart.verdict, apart.blocks) == (GainVerdict.UNKNOWN, (0, 0))
+    assert "are needed" in apart.why
