@@ -21,6 +21,10 @@ from gateway.robust import noise_from_second_differences
 _LEAST_LEFT: Final = 0.15
 _BINS: Final = 64
 _NOWHERE: Final = 1.0e-12  # centre of a Lorentzian that falls from frequency 0
+_FIRST_DAMPING: Final = 0.1
+_FLAT: Final = 1.0e-9  # curvature of a number that changes nothing
+_MOST_SCORINGS: Final = 60
+_LEAST_SCORED: Final = 1.0e-6  # of a log-likelihood: less is no progress
 _MEDIAN_OF_EXPONENTIAL: Final = float(np.log(2.0))
 
 
@@ -163,17 +167,33 @@ def _highest_bins(levels: Floats) -> list[int]:
 
 
 def _minimise_misfit(start: list[float], centres: Floats, levels: Floats, weights: Floats) -> tuple[float, Floats]:
-    def misfit(logs: Floats) -> tuple[float, Floats]:
-        numbers = np.exp(np.clip(logs, -200.0, 200.0))
-        value, gradient = Spectrum(numbers).with_gradient(centres)
+    """Return the least negative log-likelihood and its numbers: damped steps of Fisher's scoring in their logarithms.
+
+    The spectrum's own derivatives give the expected curvature, so a step costs no more than its slope does.
+    """
+
+    def look(logs: Floats) -> tuple[float, Floats, Floats]:
+        value, gradient = Spectrum(np.exp(logs)).with_gradient(centres)
+        relative = gradient / value
         cost = float(np.sum(weights * (np.log(value) + levels / value)))
-        slope = weights * (1.0 / value - levels / value**2)
-        return cost, gradient @ slope
+        return cost, relative @ (weights * (1.0 - levels / value)), (relative * weights) @ relative.T
 
-    from scipy.optimize import minimize  # here, so that the catalogue costs no scipy
-
-    found = minimize(misfit, np.log(start), jac=True, method="L-BFGS-B", options={"maxiter": 60})
-    return float(found.fun), np.exp(np.clip(found.x, -200.0, 200.0))
+    logs, damping = np.log(start), _FIRST_DAMPING
+    cost, slope, curvature = look(logs)
+    for _ in range(_MOST_SCORINGS):
+        own = np.diag(np.diag(curvature)) * damping + np.eye(logs.size) * _FLAT
+        tried = np.clip(logs - np.clip(np.linalg.solve(curvature + own, slope), -1.0, 1.0), -200.0, 200.0)
+        found = look(tried)
+        if not found[0] < cost:
+            damping *= 8.0
+            if damping > 1.0e6:
+                break
+            continue
+        gain, damping = cost - found[0], max(damping * 0.2, 1.0e-9)
+        logs, (cost, slope, curvature) = tried, found
+        if gain < _LEAST_SCORED:
+            break
+    return cost, np.exp(logs)
 
 
 @dataclass(frozen=True, slots=True)

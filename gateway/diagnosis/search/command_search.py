@@ -16,10 +16,10 @@ import numpy as np
 
 from gateway.catalogue.cylinder import AREA, COULOMB
 from gateway.catalogue.regulator import DEAD_BAND, LAG
-from gateway.diagnosis.light_statistics import follow_exponentially
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench, Channel
+from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves, fill_rounding_errors
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.normal_equations import NormalEquations
 from gateway.diagnosis.search.parameters import ModelParameters
@@ -105,14 +105,12 @@ def _first_wave_scores(bench: Bench, fitted: FittedModel, whiten: Whitener, trie
     for channel, command_v, row_s in _commanded_channels(bench):
         bunch = max(int(_BUNCH_SHARE_OF_LAG * fitted.parameters.value(LAG) / row_s), 1)
         rows = np.arange(0, command_v.size, bunch)
-        sums, some_v = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0)), command_v[rows]
-        for part in _column_parts(tried.size, rows.size):
-            waves = _rounding_error_v(
-                _first_wave_of_teeth(some_v[:, None], tried[part]), some_v, bunch * row_s, fitted.parameters
-            )
-            waves -= waves.mean(axis=0)
-            slope[part] += sums @ waves
-            power[part] += bunch * np.einsum("ij,ij->j", waves, waves)
+        sums = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0))
+        alike, squares = np.empty(tried.size), np.empty(tried.size)
+        chain = _force_chain(fitted.parameters, bunch * row_s)
+        fill_first_waves(command_v[rows], sums, tried, chain, (alike, squares))
+        slope += alike
+        power += bunch * squares
     return np.asarray(np.maximum(slope, 0.0) ** 2 / power)
 
 
@@ -130,46 +128,25 @@ def _commanded_channels(bench: Bench) -> Iterator[tuple[Channel, Floats, float]]
             yield channel, measurement.command_v, float(np.median(np.diff(measurement.time_s)))
 
 
-def _first_wave_of_teeth(command_v: Floats, steps_v: Floats) -> Floats:
-    """The command, rounded to steps whose teeth are their first wave only."""
-    return np.asarray(command_v - steps_v / math.pi * np.sin(2.0 * math.pi / steps_v * command_v))
-
-
 def _chi2_gains(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
     """Chi-square that each step explains of the whitened residual."""
     found = np.zeros(tried.size)
     for part in _column_parts(tried.size, bench.rows):
         vectors = np.zeros((tried[part].size, bench.rows))
         for channel, command_v, row_s in _commanded_channels(bench):
-            rounded = np.round(command_v[:, None] / tried[part]) * tried[part]
-            vectors[:, channel.rows] = _rounding_error_v(rounded, command_v, row_s, fitted.parameters).T
+            columns_v = np.empty((tried[part].size, command_v.size))
+            fill_rounding_errors(command_v, tried[part], _force_chain(fitted.parameters, row_s), columns_v)
+            vectors[:, channel.rows] = columns_v
         normal = NormalEquations(whiten(fitted.jacobian), whiten(bench.reduced(vectors)), whiten(fitted.residual_n))
         power = np.maximum(normal.power, 1.0e-300)
         found[part] = np.where(normal.slope > _LEAST_WHOLE_STEP * power, normal.slope**2 / power, 0.0)
     return found
 
 
-def _rounding_error_v(given_v: Floats, command_v: Floats, row_s: float, parameters: ModelParameters) -> Floats:
-    """What it makes of the force, in volts, that these were given (rows, steps) and not the command (rows,)."""
-    both = _apply_lag(np.concatenate([given_v, command_v[:, None]], axis=1), parameters.value(LAG), row_s)
+def _force_chain(parameters: ModelParameters, row_s: float) -> ForceChain:
+    """What lies between command and force."""
     regulator, friction_pa = parameters.plant.regulator, parameters.value(COULOMB) / parameters.value(AREA)
-    played = _apply_friction_play(both, friction_pa * regulator.full_scale_v / regulator.full_scale_pa)
-    return np.asarray(played[:, :-1] - played[:, -1:])
-
-
-def _apply_lag(command_v: Floats, lag_s: float, row_s: float) -> Floats:
-    """Behind the regulator's lag; a row sees the command of the row before."""
-    share = 1.0 - math.exp(-row_s / max(lag_s, 1.0e-6))
-    late = follow_exponentially(command_v, share)
-    return np.concatenate([np.zeros_like(late[:1]), late[:-1]])
-
-
-def _apply_friction_play(values: Floats, half_width: float) -> Floats:
-    """Play operator along the rows: what rigid friction lets through."""
-    low, high, found = values - half_width, values + half_width, np.empty_like(values)
-    state = np.maximum(low[0], 0.0)
-    for least, most, out in zip(low, high, found, strict=True):
-        np.maximum(state, least, out=out)
-        np.minimum(out, most, out=out)
-        state = out
-    return found
+    return ForceChain(
+        share=1.0 - math.exp(-row_s / max(parameters.value(LAG), 1.0e-6)),
+        play_v=2.0 * friction_pa * regulator.full_scale_v / regulator.full_scale_pa,
+    )

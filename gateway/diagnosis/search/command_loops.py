@@ -1,0 +1,88 @@
+"""The compiled loops of the search for steps of the command: what a step makes of the force, in volts.
+
+A command that was rounded goes through the regulator's lag, then through rigid friction, a play; so does the command as it
+was sent; their difference is the step's column. A row sees the command of the row before, from 0 V at the first.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from gateway.compiled import loop, step
+from gateway.diagnosis.measurement import Floats
+from gateway.twin.lags import apply_play
+
+_TURN = 2.0 * math.pi
+
+
+class ForceChain(NamedTuple):
+    """Between command and force. share: of the way that the lag goes in a row; play_v: full width of the friction's loop."""
+
+    share: float
+    play_v: float
+
+
+@step
+def sine_of_turns(turns: float) -> float:
+    """Return the sine of an angle in turns, to 6e-8: a polynomial, of which a compiled loop does several at once."""
+    part = turns - math.floor(turns + 0.5)
+    way = abs(part)
+    angle = _TURN * min(way, 0.5 - way)
+    square = angle * angle
+    sine = angle * (
+        1.0 + square * (-1.0 / 6 + square * (1.0 / 120 + square * (-1.0 / 5040 + square * (1.0 / 362880 - square / 39916800))))
+    )
+    return sine if part > 0.0 else -sine
+
+
+@step
+def fill_force_v(given_v: Floats, chain: ForceChain, force_v: Floats) -> None:
+    """Fill in what lag and play make of a command, all (rows,)."""
+    late_v = state = 0.0
+    for row in range(given_v.size):
+        state = apply_play(state, late_v, chain.play_v)
+        force_v[row] = state
+        late_v += chain.share * (given_v[row] - late_v)
+
+
+@loop
+def fill_first_waves(
+    command_v: Floats, told: Floats, steps_v: Floats, chain: ForceChain, found: tuple[Floats, Floats]
+) -> None:
+    """Fill in, for each step, how its wave is like `told` (rows,), and the wave's own sum of squares about its mean.
+
+    The wave: what it makes of the force that teeth are rounded off which are their first harmonic only.
+    """
+    rows = command_v.size
+    given_v, sent_v, wave_v = np.empty(rows), np.empty(rows), np.empty(rows)
+    fill_force_v(command_v, chain, sent_v)
+    told_sum = told.sum()
+    for k in range(steps_v.size):
+        per_v, size_v = 1.0 / steps_v[k], steps_v[k] / math.pi
+        for row in range(rows):
+            given_v[row] = command_v[row] - size_v * sine_of_turns(command_v[row] * per_v)
+        fill_force_v(given_v, chain, wave_v)
+        total = squares = alike = 0.0
+        for row in range(rows):
+            wave = wave_v[row] - sent_v[row]
+            total += wave
+            squares += wave * wave
+            alike += told[row] * wave
+        found[0][k] = alike - told_sum * total / rows
+        found[1][k] = squares - total * total / rows
+
+
+@loop
+def fill_rounding_errors(command_v: Floats, steps_v: Floats, chain: ForceChain, columns_v: Floats) -> None:
+    """Fill in what it makes of the force that the command was rounded to each step, (steps, rows)."""
+    rows = command_v.size
+    given_v, sent_v = np.empty(rows), np.empty(rows)
+    fill_force_v(command_v, chain, sent_v)
+    for k in range(steps_v.size):
+        size_v = steps_v[k]
+        for row in range(rows):
+            given_v[row] = np.rint(command_v[row] / size_v) * size_v
+        fill_force_v(given_v, chain, columns_v[k])
+        for row in range(rows):
+            columns_v[k, row] -= sent_v[row]
