@@ -31,7 +31,9 @@ def sine_of_turns(turns: float) -> float:
     angle = _TURN * min(way, 0.5 - way)
     square = angle * angle
     sine = angle * (
-        1.0 + square * (-1.0 / 6 + square * (1.0 / 120 + square * (-1.0 / 5040 + square * (1.0 / 362880 - square / 39916800))))
+        1.0
+        + square
+        * (-1.0 / 6 + square * (1.0 / 120 + square * (-1.0 / 5040 + square * (1.0 / 362880 - square / 39916800))))
     )
     return sine if part > 0.0 else -sine
 
