@@ -181,7 +181,8 @@ def test_the_header_says_where_it_comes_from_and_what_it_is_not():
     header = sources["bsfm_demo.h"].split("*/")[0]
     text = ('1 "demo" of 2026-11-22', "twin of plant paper-slide", "RMS 0.131 N", "0 .. 8 V")
     text = (*text, "slip stops: 7, which give way over 0.144, 0.445, 0.589, 1.04, 1.37, 1.82, 3.2 V")
-    for words in (*text, "force-gateway 0.1.0", "sha256 9698ef5c", "not a safety device", "bsfm_demo_command(&state,"):
+    data = f"sha256 {CASES['demo'].data_sha256}"
+    for words in (*text, "force-gateway 0.1.0", data, "not a safety device", "bsfm_demo_command(&state,"):
         assert words in header
 
 
