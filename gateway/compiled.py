@@ -5,7 +5,8 @@ same function. A `loop` walks over arrays. numba belongs to the extra `analysis`
 so that a process which never searches does not load it.
 
 numba keeps compiled loops by the file they stand in, and does not see that a step in another file has changed. So they
-are kept in a folder of their own per state of all steps, beside Python's bytecode (or where NUMBA_CACHE_DIR says).
+are kept in a folder of their own per state of all steps, in the folder of `compiled_folder`. Where files are not taken (any
+more), loops are compiled anew in each process.
 """
 
 import hashlib
@@ -15,11 +16,17 @@ from pathlib import Path
 from types import CodeType
 from typing import Any, Final, ParamSpec, TypeVar
 
+from gateway import progress
+from gateway.compiled_folder import find_folder
 from gateway.extras import import_library
 
 _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
 _steps: Final[list[Callable[..., Any]]] = []
+_loops: Final[list[Callable[..., Any]]] = []
+_unkept: Final[set[Callable[..., Any]]] = set()
+PREPARING: Final = "preparing the simulation for this machine, once"
+"""What is reported while loops are compiled, as which of all loops that there are."""
 
 
 def step(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
@@ -34,35 +41,64 @@ def loop(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Res
     Its arguments are numbers, named tuples of numbers and contiguous arrays; it calls steps and numpy's scalar functions.
     """
 
-    @cache
-    def compiled() -> Callable[_Parameters, _Result]:
-        return _compile(function)
+    _loops.append(function)
 
     @wraps(function)
     def run(*arguments: _Parameters.args, **named: _Parameters.kwargs) -> _Result:
-        return compiled()(*arguments, **named)
+        result: _Result
+        try:
+            result = _compiled(function, function not in _unkept)(*arguments, **named)
+        except OSError:  # of the folder, which is full or gone: loops themselves read and write nothing
+            _unkept.add(function)
+            result = _compiled(function, False)(*arguments, **named)
+        return result
 
     return run
 
 
-def _compile(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
-    compiled: Callable[_Parameters, _Result] = _numba().njit(cache=True, nogil=True, error_model="numpy")(function)
+@cache
+def _compiled(function: Callable[_Parameters, _Result], is_kept: bool) -> Callable[_Parameters, _Result]:
+    """Return the function with a compiler before it: what it compiles for the types of its arguments is kept on disk."""
+    numba, has_folder = _numba()
+    compiler = numba.njit(cache=is_kept and has_folder, nogil=True, error_model="numpy")
+    compiled: Callable[_Parameters, _Result] = compiler(function)
     return compiled
 
 
 @cache
-def _numba() -> Any:
-    """numba, with all steps made known to it."""
-    import_library("numba")
-    import numba
+def _numba() -> tuple[Any, bool]:
+    """Return numba, with all steps made known to it, and whether there is a folder for what it compiles."""
+    numba = import_library("numba")
+    from numba.core import event
     from numba.extending import register_jitable
 
-    chosen = numba.config.CACHE_DIR  # type: ignore[attr-defined]
-    kept = Path(chosen) if chosen else Path(__file__).parent / "__pycache__"
-    numba.config.CACHE_DIR = str(kept / f"compiled-{_fingerprint()}")  # type: ignore[attr-defined]
+    folder = find_folder(numba.config.CACHE_DIR, Path(__file__).parent)
+    if folder:
+        numba.config.CACHE_DIR = str(folder / f"compiled-{_fingerprint()}")
     for function in _steps:
         register_jitable(error_model="numpy")(function)
-    return numba
+    _report_compilations(event)
+    return numba, folder is not None
+
+
+def _report_compilations(event: Any) -> None:
+    """Have numba report what it compiles; it tells of compilations within others, too. event: its module of that name."""
+    begun: list[progress.Progress] = []
+    compiled: set[Any] = set()
+
+    class Listener(event.Listener):  # type: ignore[misc]  # numba is imported late
+        def on_start(self, event: Any) -> None:
+            begun.append(progress.current())
+            if len(begun) == 1:
+                compiled.add(event.data["dispatcher"].py_func)
+                progress.report(PREPARING, min(len(compiled), len(_loops)), len(_loops))
+
+        def on_end(self, event: Any) -> None:
+            before = begun.pop()
+            if not begun:
+                progress.resume(before)
+
+    event.register("numba:compile", Listener())
 
 
 def _fingerprint() -> str:

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway import progress
 from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.cylinder import COULOMB, DRAG_ASYMMETRY
 from gateway.catalogue.effect import Effect, Parameter
@@ -64,6 +65,7 @@ def diagnose(
     options = options or Options()
     measurements = [take_excerpt(each, max(MOST_ROWS // len(measurements), 1)) for each in measurements]
     given = plant or DEFAULT_PLANT
+    progress.report("checking the columns")
     suspected = find_suspects(measurements, given, is_own=options.is_own)
     if any(each.is_sure for each in suspected):
         return _diagnosis_of_wrong_columns(measurements, given, suspected)
@@ -79,6 +81,7 @@ def diagnose(
 
 def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options: Options) -> Diagnosis:
     """Return the diagnosis of columns that are what they say: base model, search, residual tests, verdict."""
+    progress.report("fitting the base model")
     hidden = frozenset({options.without} if options.without else ())
     bench, base, whiten = _fit_base_model(measurements, _without_hidden(given, hidden), hidden, options.late_s)
     quantum_n = max(options.quantum_n, given.cell.quantum_n)
@@ -88,6 +91,7 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
         bench, base = fit_line_lengths(bench, base, whiten, given.regulator.command_step_v)
     effects = _effects_to_search(base.free, hidden, options.late_s)
     found = search_effects(bench, base, effects, whiten)
+    progress.report("testing what is left")
     left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])
     return compose_diagnosis(SearchFindings(bench, found, evidence, left, effects), options.noise_floor_n)
 

@@ -2,10 +2,13 @@
 
 import errno
 import os
+import threading
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import click
+
+from gateway.cli.diagnosis.progress_line import handled_interrupt
 
 
 def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
@@ -23,13 +26,22 @@ def write_all(texts: Mapping[Path, str]) -> None:
     """Write each text beside its name first, and rename them only when all are on the disk. OSError, and no file has
     changed.
 
-    A device (/dev/null, a terminal) is written to in the end: nobody wants it replaced by a file.
+    A device (/dev/null, a terminal) is written to in the end: nobody wants it replaced by a file. Ctrl-C before the first
+    is renamed: KeyboardInterrupt, and no file has changed either; later it comes too late.
     """
+    pressed = threading.Event()
+    with handled_interrupt(lambda number, frame: pressed.set()):
+        _write_all(texts, pressed)
+
+
+def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
     devices = [path for path in texts if path.exists() and not path.is_file()]
     beside = {path: path.with_name(f".{path.name}.{os.getpid()}") for path in texts if path not in devices}
     try:
         for path, fresh in beside.items():
             fresh.write_text(texts[path], encoding="utf-8")
+        if pressed.is_set():
+            raise KeyboardInterrupt
         for path, fresh in beside.items():
             fresh.replace(path)
     finally:

@@ -97,13 +97,15 @@ def command(**options: Any) -> None:
         raise click.UsageError("Missing argument 'RECORDING...'.")
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
+    from gateway.cli.diagnosis.progress_line import shown_progress
     from gateway.extras import require
 
     require("numba")
     _check_effect(options["without"])
-    sources = read_sources(
-        options["recordings"], rig=options["rig"], columns=options["columns"], state=options["state"]
-    )
+    with shown_progress("reading"):
+        sources = read_sources(
+            options["recordings"], rig=options["rig"], columns=options["columns"], state=options["state"]
+        )
     files = [
         file
         for file in (options["json_file"], options["report"], options["extend"], options["plan_file"])
@@ -158,8 +160,7 @@ def _check_effect(name: str | None) -> None:
 
 
 def _run_diagnosis(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis, float]":
-    from rich.console import Console
-
+    from gateway.cli.diagnosis.progress_line import shown_progress
     from gateway.diagnosis import Options, diagnose
     from gateway.diagnosis.input_checks import name_options
 
@@ -171,18 +172,17 @@ def _run_diagnosis(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagno
         is_own=sources.is_own,
     )
     began_s = time.perf_counter()
-    with Console(stderr=True).status("diagnosing"):
+    with shown_progress("diagnosing"):
         diagnosis = diagnose(sources.measurements, sources.plant.plant, engine_options)
     diagnosis = replace(diagnosis, suspects=name_options(diagnosis.suspects, options["columns"] or ""))
     return diagnosis, time.perf_counter() - began_s
 
 
 def _measure_gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoopGain | str":
-    from rich.console import Console
-
     from gateway.cli.diagnosis.closed_loop import measured_gain
+    from gateway.cli.diagnosis.progress_line import shown_progress
 
-    with Console(stderr=True).status("closing the loop on the twin"):
+    with shown_progress("closing the loop on the twin"):
         return measured_gain(diagnosis, sources)
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway import progress
 from gateway.catalogue.effect import Effect, EffectForm, SearchHints, Start
 from gateway.defaults import UNLIMITED
 from gateway.diagnosis.measurement import Floats
@@ -58,6 +59,8 @@ def simulate_candidates(
                     candidates.append(Candidate(effect, form, start, indices))
     if not parameter_sets:
         return CandidateColumns((), np.empty((0, bench.rows)))
+    names = [each.effect.name for each in candidates]
+    progress.report(f"trying {len(candidates)} forms and sizes of {len(set(names))} effects")
     centre = bench.measured_n - fitted.residual_n
     return CandidateColumns(tuple(candidates), bench.reduced(bench.simulate(parameter_sets) - centre * bench.usable))
 

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway import progress
 from gateway.catalogue.effect import Parameter
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench
@@ -51,9 +52,10 @@ def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten, waves: 
     """Move each problem's free parameters and offsets to the least whitened squares, in at most `waves` waves."""
     fitted = linearise(bench, problems, whiten)
     active = list(range(len(fitted)))
-    for _ in range(waves):
+    for wave in range(waves):
         if not active:
             break
+        progress.advance(wave + 1, waves)
         better = _try_steps(bench, [fitted[index] for index in active], whiten)
         moving = []
         for index, found in zip(active, better, strict=True):

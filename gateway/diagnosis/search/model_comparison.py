@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.random import default_rng
 
+from gateway import progress
 from gateway.catalogue.all_effects import BY_NAME
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
 from gateway.diagnosis.light_statistics import chi2_tail
@@ -127,6 +128,7 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     promised = score_candidates(found, fitted, whiten)
     best = best_scores(promised, competitors.most)
     problems = [FitProblem(each.parameters, joined_parameters(fitted, each.candidate.form)) for each in best]
+    progress.report(f"refining {progress.few([each.candidate.effect.name for each in best])}")
     refined = refine(bench, problems, whiten, _WAVES)
     ranked = [
         refined_effect(bench, (score.candidate.effect, score.candidate.form), each, fitted, whiten)

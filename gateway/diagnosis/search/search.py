@@ -20,6 +20,7 @@ import numpy as np
 from numpy.random import default_rng
 from numpy.typing import NDArray
 
+from gateway import progress
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
 from gateway.diagnosis.noise import Whitener, coloured_whitener
 from gateway.diagnosis.residual_tests import Dependence, strongest_dependence
@@ -102,6 +103,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
                 winner = _pick_with_companions(bench, comparison, _not_accepted(effects, accepted), whiten)
                 saved = saved if winner is comparison.winner else _saved_share(bench, fitted, winner, whiten, explained)
             saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH_SAVED
+        progress.report("looking for what no effect explains")
         dependence = strongest_dependence(bench, fitted, whiten, [each.leftover for each in unnamed], outside=True)
         strongest = comparison.winner if saved > 0.0 else None
         if dependence is not None and _is_clearly_stronger(dependence, strongest, explained):
@@ -133,6 +135,7 @@ def _compare_under_noise(
     Where even the winner leaves several times that noise, no model is near the truth yet, and a whitening that believes
     in one would look at the fastest details only: the noise is then what the best model leaves.
     """
+    progress.report("looking for lines, steps and jumps in the residual")
     hints = search_hints(bench, fitted, whiten)
     found = simulate_candidates(bench, fitted, effects, hints)
     whiten = coloured_whitener(bench, *unexplained_residual(found, fitted), whiten.weights)
@@ -272,6 +275,7 @@ def _exchange_effects(found: SearchResult, effects: Sequence[Effect]) -> SearchR
         if len(found.accepted) < 2:
             break
         incumbent, before, after = found.accepted[index], found.accepted[:index], found.accepted[index + 1 :]
+        progress.report(f"comparing {incumbent.effect.name} with all others once more")
         lone = refit_without(bench, found, incumbent, (*before, *after))
         hints = search_hints(bench, lone, whiten)
         held = refined_effect(bench, (incumbent.effect, incumbent.form), found.fitted, lone, whiten)

@@ -1,0 +1,167 @@
+"""What a long calculation says while it lasts, and that Ctrl-C ends it and leaves nothing behind, whenever it comes."""
+
+import io
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gateway.diagnosis
+from gateway import progress
+from gateway.cli.diagnosis import progress_line
+from gateway.cli.diagnosis.outputs import write_all
+from gateway.cli.diagnosis.progress_line import ProgressLine, shown_progress
+from tests.cli.verbs.test_diagnose import table
+from tests.reports.fake_diagnosis import diagnosis
+
+
+class Terminal(io.StringIO):
+    """Tells when it was written to."""
+
+    def __init__(self, *, is_terminal: bool) -> None:
+        super().__init__()
+        self.is_terminal = is_terminal
+        self.was_written = threading.Semaphore(0)
+
+    def isatty(self) -> bool:
+        return self.is_terminal
+
+    def flush(self) -> None:
+        self.was_written.release()
+
+
+@pytest.fixture
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("_QUIET_S", "_REWRITTEN_S", "_NOW_AND_THEN_S"):
+        monkeypatch.setattr(progress_line, name, 0.001)
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_the_newest_stage_is_shown_as_it_is_asked_for(at_once: None, is_terminal: bool) -> None:
+    stream = Terminal(is_terminal=is_terminal)
+    line = ProgressLine("diagnosing", stream, iter(range(10_000)).__next__)
+    line.text = "refining leak: 3 of 16"
+    with line.written():
+        assert all(stream.was_written.acquire(timeout=10) for _ in range(2))
+    if is_terminal:
+        assert stream.getvalue().startswith("\r\x1b[2Kdiagnosing, 1 s: refining leak: 3 of 16\r\x1b[2Kdiagnosing, 2 s")
+        assert stream.getvalue().endswith("\r\x1b[2K"), "nothing of it stays"
+    else:
+        assert stream.getvalue().startswith("diagnosing, 1 s: refining leak: 3 of 16\ndiagnosing, 2 s")
+
+
+def test_what_is_quick_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with shown_progress("diagnosing"):
+        progress.report("fitting the base model")
+    assert capsys.readouterr().err == ""
+
+
+def test_stages_come_back_after_what_was_in_between() -> None:
+    told: list[str] = []
+    with progress.listen(lambda each: told.append(str(each))):
+        progress.report("refining")
+        progress.advance(3, 16)
+        before = progress.current()
+        progress.report("preparing", 1, 8)
+        progress.resume(before)
+    progress.report("nobody listens")
+    assert told == ["refining", "refining: 3 of 16", "preparing: 1 of 8", "refining: 3 of 16"]
+
+
+def press_ctrl_c() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def swallow_ctrl_c() -> None:
+    """As a callback of a library does."""
+    try:
+        press_ctrl_c()
+    except KeyboardInterrupt:
+        pass
+    progress.report("the next stage")
+
+
+@contextmanager
+def pressed_in(method: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Ctrl-C in the middle of a method of paths."""
+    original = getattr(Path, method)
+
+    def pressed(self: Path, *arguments: Any, **named: Any) -> Any:
+        done = original(self, *arguments, **named)
+        press_ctrl_c()
+        return done
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, method, pressed)
+        yield
+
+
+@pytest.mark.parametrize("press", [press_ctrl_c, swallow_ctrl_c])
+def test_ctrl_c_while_it_calculates_writes_nothing(
+    press: Callable[[], None], tmp_path: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diagnose(*_: Any) -> Any:
+        press()
+        return diagnosis()
+
+    monkeypatch.setattr(gateway.diagnosis, "diagnose", diagnose)
+    path = table(tmp_path / "run.csv")
+    files = [word for name in ("json", "report", "extend", "plan") for word in (f"--{name}", tmp_path / f"out.{name}")]
+    answer = call("diagnose", path, *files)
+    assert (answer.exit_code, answer.stderr.strip()) == (1, "Aborted!")
+    assert list(tmp_path.iterdir()) == [path]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ctrl_c_while_files_are_written_leaves_none_and_a_later_one_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts = {tmp_path / name: name for name in ("one", "two", "three")}
+    with pressed_in("write_text", monkeypatch), pytest.raises(KeyboardInterrupt):
+        write_all(texts)
+    assert not list(tmp_path.iterdir())
+    with pressed_in("replace", monkeypatch):
+        write_all(texts)
+    assert {path: path.read_text() for path in tmp_path.iterdir()} == texts
+
+
+@pytest.mark.parametrize("stage", ["preparing the simulation for this machine, once", "looking for lines"])
+def test_ctrl_c_in_the_real_verb(stage: str, tmp_path: Path) -> None:
+    """On a terminal, while loops are compiled and in the middle of the search; the line is gone afterwards."""
+    path = table(tmp_path / "run.csv", facts="")
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "gateway", "diagnose", path.name, "--report", "out.html", "--plan", "plan.yaml"]
+    environment = os.environ | ({"NUMBA_CACHE_DIR": str(tmp_path / "kept")} if "once" in stage else {})
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs, env=environment, text=True
+    ) as process:
+        os.close(theirs)
+        said = read_until(ours, stage)
+        process.send_signal(signal.SIGINT)
+        said += read_until(ours, "Aborted!")
+        assert process.stdout
+        assert process.stdout.read() == ""
+    os.close(ours)
+    assert process.returncode == 1
+    assert "Traceback" not in said
+    assert "\r\x1b[2K\r\nAborted!" in said
+    assert {each.name for each in tmp_path.iterdir()} <= {path.name, "kept"}
+
+
+def read_until(descriptor: int, words: str) -> str:
+    said = ""
+    while words not in said:
+        try:
+            said += os.read(descriptor, 4096).decode()
+        except OSError:  # the other end is closed
+            break
+    assert words in said, said
+    return said

@@ -1,0 +1,89 @@
+"""Compiled loops are kept where files may be written, and everything works where that is nowhere."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import gateway
+from gateway.compiled_folder import find_folder
+
+HOME = {"HOME": "/home/me"}
+
+
+def unwritable(path: Path) -> Path:
+    """A path at which no folder can be made, not even by root: a file lies there."""
+    path.write_text("")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("environment", "expected"),
+    [
+        ({"HOME": "home"}, None),
+        ({"HOME": "{}/home"}, "home/.cache/force-gateway"),
+        ({"HOME": "{}/home", "XDG_CACHE_HOME": "{}/cache"}, "cache/force-gateway"),
+        ({"HOME": "{}/home", "CACHE_DIRECTORY": "{}/service:{}/other"}, "service"),
+        ({"HOME": "{}/file", "XDG_CACHE_HOME": ""}, None),
+        ({}, None),
+    ],
+)
+def test_an_installed_package_keeps_them_in_the_users_cache(
+    environment: dict[str, str], expected: str | None, tmp_path: Path
+) -> None:
+    unwritable(tmp_path / "__pycache__")
+    unwritable(tmp_path / "file")
+    given = {name: value.replace("{}", str(tmp_path)) for name, value in environment.items()}
+    assert find_folder("", tmp_path, given) == (tmp_path / expected if expected else None)
+
+
+def test_a_clone_keeps_them_beside_its_bytecode_and_a_choice_goes_before_all(tmp_path: Path) -> None:
+    assert find_folder("", tmp_path, HOME) == tmp_path / "__pycache__"
+    assert find_folder(str(tmp_path / "chosen"), tmp_path, HOME) == tmp_path / "chosen"
+    assert find_folder(str(unwritable(tmp_path / "file") / "chosen"), tmp_path, HOME) is None
+
+
+LOOP = """
+from gateway.compiled import loop
+from gateway import progress
+@loop
+def double(value):
+    return 2.0 * value
+"""
+RUN = """
+from compiled_here import double, progress
+with progress.listen(print):
+    print(double(21.0))
+"""
+
+
+def run_with(package: Path, home: str) -> list[str]:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "XDG_CACHE"))}
+    done = subprocess.run(
+        [sys.executable, "-c", RUN],
+        cwd=package,
+        env=environment | {"HOME": home, "PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.splitlines()
+
+
+def test_an_installed_package_is_compiled_once_and_without_a_home_each_time(tmp_path: Path) -> None:
+    ours, room = Path(gateway.__file__).parent, tmp_path / "gateway"
+    room.mkdir()
+    for name in ("compiled", "compiled_folder", "extras", "progress"):
+        (room / f"{name}.py").write_text((ours / f"{name}.py").read_text(encoding="utf-8"), encoding="utf-8")
+    (room / "__init__.py").write_text("")
+    (tmp_path / "compiled_here.py").write_text(LOOP)
+    unwritable(room / "__pycache__")
+    compiling = "preparing the simulation for this machine, once: 1 of 1"
+    home = str(tmp_path / "home")
+    assert run_with(tmp_path, home)[0] == compiling
+    assert list((tmp_path / "home" / ".cache" / "force-gateway").glob("compiled-*/*/*.nbc"))
+    assert run_with(tmp_path, home) == ["42.0"]
+    nowhere = str(unwritable(tmp_path / "file"))
+    assert [run_with(tmp_path, nowhere)[0] for _ in range(2)] == [compiling] * 2
