@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from gateway.cli.diagnosis import progress_line
 from gateway.cli.main import command
 from gateway.codes.refusals import RefusalReason
 from gateway.fieldbus import ModbusTcpServer, ServerSettings
@@ -135,6 +136,12 @@ def serve() -> Iterator[Callable[..., Server]]:
 @pytest.fixture
 def fake(register_map: RegisterMap, serve: Callable[..., Server]) -> Server:
     return serve(PlainBank(register_map))
+
+
+@pytest.fixture(autouse=True)
+def hardly_any_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seconds are long on a busy machine, and lines of progress would stand between those that tests compare."""
+    monkeypatch.setattr(progress_line, "_QUIET_S", 60.0)
 
 
 @pytest.fixture
