@@ -27,6 +27,7 @@ VERBS: Final = (
     "explain",
     "events",
     "calibration",
+    "plant",
     "upload",
     "record",
     "recordings",

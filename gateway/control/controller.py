@@ -96,6 +96,24 @@ class Controller:
         self._commands.use(calibration.model)
         self.calibration_id = calibration.number
 
+    @property
+    def can_compensate_anew(self) -> bool:
+        """Decide whether what is compensated may change now: nothing presses, and no run has the output."""
+        return not self._machine.is_enabled
+
+    def compensate(self, settings: ControlSettings, compensation: Compensation, calibration: CalibrationInUse) -> None:
+        """Compensate something else from now on. settings: of the rig file; calibration: the one in use, as this compensation
+        has it. ValueError while the output is enabled: a reading and a voltage that both jump are a step of the force."""
+        if not self.can_compensate_anew:
+            raise ValueError(
+                f"what is compensated changes only while the output is disabled, not while {self.state.name}"
+            )
+        self._rig_settings = compensation.settings(settings)
+        self._compensation = compensation
+        self._conditioner.use(compensation.cell)
+        self._loop.take_timing(compensation.timing)
+        self.use(calibration)
+
     def refusal_of(self, now_s: float, proposal: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
         is_busy = self.state is State.CALIBRATING or self._machine.is_ramping_down or self._machine.is_stopping

@@ -48,6 +48,14 @@ class SampleConditioner:
         self._timeout_s = supervision.sample_timeout_s
         self._last_s = nan
 
+    def use(self, cell: CellMap | None) -> None:
+        """Take other defects of the cell. The tare stays the force that was zero then; recent samples are no zero any more."""
+        zero_n = self._zero.zero_n
+        raw_n = self._cell.reading_n(zero_n, nan, 0.0) if self._cell else zero_n
+        self._zero.zero_n = cell.force_n(raw_n, nan, 0.0) if cell else raw_n
+        self._zero.forget()
+        self._cell = cell
+
     def read(
         self, now_s: float, sample: ForceSample | None, gravity_n: float, around: tuple[float, float] = (nan, 0.0)
     ) -> Reading:

@@ -70,3 +70,4 @@ class Status:
     calibration_stored: int = 0
     calibration_time_left_s: float = 0.0
     residual_cause: int = 0  # ResidualCause
+    plant_id: int = 0

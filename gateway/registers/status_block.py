@@ -49,6 +49,7 @@ _SOURCES: Final = {
     "calibration_stored": "calibration_stored",
     "residual_cause": "residual_cause",
     "calibration_time_left": "calibration_time_left_s",
+    "plant_id": "plant_id",
 }
 """Register -> field of Status."""
 

@@ -1,8 +1,9 @@
 """`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
 
-record on|off|status, calibration runs, the calibration in use and its change, last writers of each register and the sentence
-of the last refusal, which rig runs and its lease, what the residual watch has found (its process tells it here, others may
-read it), the loop's health, and faults of a simulated rig (passed on to the rig's own socket by the tools themselves).
+record on|off|status, calibration runs, the calibration and the plant in use and their change, last writers of each register
+and the sentence of the last refusal, which rig runs and its lease, what the residual watch has found (its process tells it
+here, others may read it), the loop's health, and faults of a simulated rig (passed on to the rig's own socket by the tools
+themselves).
 Mode 0600: whoever may write the state directory may ask. What each verb takes stands in gateway.service.socket_requests.
 """
 
@@ -17,6 +18,7 @@ from gateway.registers import RegisterBank
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.published_status import LoopHealth
 from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.rig_plants import RigPlants
 from gateway.service.socket_requests import CalibrationRequest, EmptyRequest, RecordRequest, parse_request
 from gateway.service.watch_reports import WatchReports
 
@@ -31,6 +33,7 @@ class RunningParts:
     upload: UploadService
     calibration_runs: CalibrationRuns
     watch: WatchReports
+    plants: RigPlants
     running: dict[str, Any] = field(default_factory=dict)
     """What does not change while it runs: rig, port of Modbus TCP, lease_s (null: none), lease_action."""
 
@@ -42,6 +45,7 @@ class ControlSocket(JsonLineServer):
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,
+            "plant": parts.plants.answer,
             "calibrate": parts.calibration_runs.answer,
             "last-writer": self._last_writer,
             "last-refusal": self._last_refusal,

@@ -49,6 +49,15 @@ class CalibrationRequest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PlantRequest:
+    """Neither: what is in use. use 0: the rig's own."""
+
+    __pydantic_config__ = _STRICT
+    use: Number | None = None
+    rollback: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrateRequest:
     """plan: as a plan file has it; its own reader judges it. continues: recordings of the run that is resumed. name: of the
     calibration that comes of it; empty for one made up."""
@@ -85,6 +94,7 @@ for _shape in (
     EmptyRequest,
     RecordRequest,
     CalibrationRequest,
+    PlantRequest,
     CalibrateRequest,
     ResidualRequest,
     FaultRequest,

@@ -75,8 +75,8 @@ def test_markdown_has_all_blocks_and_the_masters_own_words(register_map):
     assert "| 40203/30203 | 202 | 0x00CA | RW | force_setpoint | float32 ABCD | 1 | N |" in text
     assert "0 off, 1 ready, 2 ramping, 3 holding, 4 fault" in text
     assert "MB_MODE 1 writes, MB_DATA_ADDR 40001, MB_DATA_LEN 13" in text
-    assert "mbpoll -1 -p 5020 -t 4:float -B -r 201 -c 47 HOST" in text
-    assert "mbpoll -1 -p 5020 -t 4:float -r 301 -c 47 HOST" in text
+    assert "mbpoll -1 -p 5020 -t 4:float -B -r 201 -c 48 HOST" in text
+    assert "mbpoll -1 -p 5020 -t 4:float -r 301 -c 48 HOST" in text
     widths = {line.count("|") for line in text.splitlines() if line.startswith("|")}
     assert widths == {11}
 

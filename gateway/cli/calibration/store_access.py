@@ -1,24 +1,17 @@
 """What the calibration verb does with a store: find, and change with or without a running gateway."""
 
-import fcntl
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from gateway import defaults
-from gateway.cli.control_socket import ask
-from gateway.cli.errors import CliError, disk_hangs
+from gateway.cli.change_in_use import ask_until_done, not_running
+from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration
     from gateway.calibrations.store import CalibrationStore
     from gateway.profiles import Rig
-
-_PATIENCE_S: Final = defaults.COMMIT_PATIENCE_S
-_POLL_S: Final = 0.02
 
 
 def open_store(directory: Path, rig_name: str) -> "CalibrationStore":
@@ -54,16 +47,10 @@ def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str,
     """Use another calibration or roll back. request: {"use": N, "force": bool} or {"rollback": True}.
 
     Return the gateway's answer when it is through, or what was done here where none runs."""
-    with _not_running(directory) as is_free:
+    with not_running(directory) as is_free:
         if is_free:
             return _change_without_gateway(directory, rig_name, request)
-    job = ask(directory, {"do": "calibration", **request})
-    answer, deadline_s = job, time.monotonic() + _PATIENCE_S
-    while answer["busy"] and answer["job"] == job["job"]:
-        if time.monotonic() > deadline_s:
-            raise disk_hangs(f"the gateway has not answered for {_PATIENCE_S:g} s")
-        time.sleep(_POLL_S)
-        answer = ask(directory, {"do": "calibration"})
+    answer = ask_until_done(directory, "calibration", request)
     if answer["failed"]:
         raise CliError(answer["said"], _exit_code(answer["reason"]))
     return answer
@@ -114,18 +101,3 @@ def _rig(name: str) -> "Rig | None":
         return load_rig(name)
     except ProfileError:
         return None
-
-
-@contextmanager
-def _not_running(directory: Path) -> Iterator[bool]:
-    """Whether no gateway runs on this directory; while True none can start."""
-    if not directory.is_dir():
-        yield True
-        return
-    with (directory / "lock").open("a") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            yield False
-            return
-        yield True

@@ -4,28 +4,17 @@ A reading that was straightened by the plant in use is not the reading of before
 the one and as the plant of the other has the cell; where the two answers differ, only another cell could tell.
 """
 
-import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from math import isfinite, nan
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
-
-import numpy as np
 
 from gateway.cli.diagnosis.inputs import recording_path
 from gateway.cli.errors import CliError
 from gateway.control.compensation.cell_map import CellMap
-from gateway.diagnosis.force_error import (
-    CommandedForce,
-    ErrorBlock,
-    ForceChange,
-    GainVerdict,
-    commanded_force,
-    compare_runs,
-    error_blocks,
-)
-from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.force_error import ForceChange, GainVerdict, compare_runs
+from gateway.plants.recorded_force import RecordedRun, recorded_run
 from gateway.processes import exit_codes
 from gateway.recording import read_table
 from gateway.recording.tables.mapping_file import column_mapping
@@ -33,27 +22,6 @@ from gateway.recording.tables.mapping_file import column_mapping
 _ANOTHER_CELL: Final = (
     "with the cell as the other plant has it the answer is another one: only a second load cell can tell"
 )
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedRun:
-    """A recording as far as the comparison needs it. plant: number in use while it was made, 0 the rig's own; cell: what of
-    the readings that plant has straightened; voltage_v: on the output, by row."""
-
-    name: str
-    plant: int
-    cell: CellMap | None
-    force: CommandedForce
-    voltage_v: Floats
-
-    def blocks(self, cell: CellMap | None) -> tuple[ErrorBlock, ...]:
-        """Return the blocks of this run, its force as read through `cell`."""
-        if cell == self.cell:
-            return error_blocks(self.force)
-        through = np.array(
-            [_through(n, v, self.cell, cell) for n, v in zip(self.force.measured_n, self.voltage_v, strict=True)]
-        )
-        return error_blocks(replace(self.force, measured_n=through))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,17 +38,11 @@ class BeforeAfter:
 def read_run(name: str, *, rig: str | None, columns: str | None, state: Path | None) -> RecordedRun:
     """Read one run, by number or file. CliError (65) where nobody knows what was asked in it."""
     path = recording_path(name, rig, state)
-    recording = read_table(path, column_mapping(columns))
     try:
-        force = commanded_force(recording.columns)
+        return recorded_run(read_table(path, column_mapping(columns)))
     except ValueError as error:
         why = f"{path}: {error}; force-gateway record writes setpoint_n: the force that the master asked for"
         raise CliError(f"E403 {why}", exit_codes.DATA) from None
-    in_use = recording.header.get("plant_in_use") or {}
-    in_use = json.loads(in_use) if isinstance(in_use, str) else in_use
-    cell = CellMap(**in_use["cell"]) if in_use.get("cell") else None
-    voltage_v = recording.columns.get("sent_v", recording.columns.get("command_v", np.full(force.time_s.size, nan)))
-    return RecordedRun(path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
 
 
 def compare_before_after(before: RecordedRun, after: RecordedRun) -> BeforeAfter:
@@ -96,12 +58,6 @@ def _compare_through(before: RecordedRun, after: RecordedRun, cell: CellMap | No
     runs = (before.blocks(cell), after.blocks(cell))
     held, moving = ([[b for b in run if b.settled is settled] for run in runs] for settled in (True, False))
     return BeforeAfter(before, after, compare_runs(*runs), compare_runs(*held), compare_runs(*moving))
-
-
-def _through(measured_n: float, voltage_v: float, known: CellMap | None, other: CellMap | None) -> float:
-    """Return what a reading straightened by `known` would be when straightened by `other`. The tare is left as it is."""
-    raw_n = known.reading_n(measured_n, nan, voltage_v) if known else measured_n
-    return other.force_n(raw_n, nan, voltage_v) if other else raw_n
 
 
 def document(found: BeforeAfter) -> dict[str, Any]:
@@ -163,5 +119,5 @@ def _line(change: ForceChange) -> str:
 
 def run(before: str, after: str, columns: str | None, rig: str | None, state: Path | None) -> BeforeAfter:
     """Read both runs and compare them."""
-    runs: Sequence[RecordedRun] = [read_run(name, rig=rig, columns=columns, state=state) for name in (before, after)]
-    return compare_before_after(runs[0], runs[1])
+    first, second = (read_run(name, rig=rig, columns=columns, state=state) for name in (before, after))
+    return compare_before_after(first, second)

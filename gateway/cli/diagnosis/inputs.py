@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from gateway import defaults
 from gateway.cli.errors import no_such_recording
@@ -11,6 +11,7 @@ from gateway.cli.options import state_directory
 from gateway.devices import cell_host
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.search.base_fit import without_effects
+from gateway.plants.recorded_force import header_in_use
 from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.measurement import measurement_of
@@ -29,7 +30,8 @@ class Sources:
 
     paths: of the recordings, as given; rig: its name, empty for none; known_rig: where it is known here; notes: what was
     decided; late_s: how late the wires may have made the readings; quantum_n: their known step; is_own: the plant is that
-    of the rig that the recordings were made on.
+    of the rig that the recordings were made on; straightened: what a plant in use has taken back of the first recording's
+    readings, by the cell's numbers.
     """
 
     paths: tuple[Path, ...]
@@ -41,6 +43,7 @@ class Sources:
     late_s: float = 0.0
     quantum_n: float = 0.0
     is_own: bool = False
+    straightened: dict[str, Any] | None = None
 
     @property
     def name(self) -> str:
@@ -71,6 +74,7 @@ def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, 
         notes=notes,
         late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
         quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
+        straightened=header_in_use(recordings[0].header).get("cell"),
         is_own=plant is (known.plant_profile if known else plant_of_first),
     )
 

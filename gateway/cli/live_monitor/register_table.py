@@ -36,6 +36,7 @@ _FIRST: Final = (
     "missed_ticks",
     "loop_time",
     "calibration_id",
+    "plant_id",
     "calibration_phase",
     "calibration_progress",
     "calibration_time_left",

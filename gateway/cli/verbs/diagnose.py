@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway import defaults
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.cli.diagnosis.inputs import Sources
     from gateway.diagnosis.experiments.experiments import Plan
     from gateway.diagnosis.result import Diagnosis
+    from gateway.profiles import PlantProfile
     from gateway.service.closed_loop.study import ClosedLoopGain
 
 _STDOUT: Final = Path("-")
@@ -74,6 +76,7 @@ class Answer:
 )
 @click.option("--report", type=_OUTPUT, metavar="OUT.html", help="Write the report with all plots.")
 @click.option("--extend", type=_OUTPUT, metavar="PLANT.yaml", help="Write the extended plant.")
+@click.option("--save", is_flag=True, help="Keep the extended plant as the rig's next number, for `plant use`.")
 @click.option(
     "--plan", "plan_file", type=_OUTPUT, metavar="PLAN.yaml", help="Write what to record next, for calibrate --plan."
 )
@@ -118,8 +121,11 @@ def command(**options: Any) -> None:
     texts = _render_files(answer, options)
     printed = texts.pop(_STDOUT, None)
     write_all(texts)
+    saved = _save(answer, options) if options["save"] else None
     if printed is None:
         _show(answer, texts)
+        if saved:
+            click.echo(f"plant {saved}; force-gateway plant use {saved} compensates what can be of it")
     else:
         click.echo(printed, nl=False)
     if options["fail_on"] and diagnosis.verdict in _FAILS[options["fail_on"]]:
@@ -204,7 +210,7 @@ def _render_files(answer: Answer, options: dict[str, Any]) -> dict[Path, str]:
     return texts
 
 
-def _extends(answer: Answer, file: Path) -> bool:
+def _extends(answer: Answer, file: Path | str) -> bool:
     """Is there a plant to write? Where the force says nothing, or columns are wrong, what was refitted means nothing."""
     from gateway.reports.diagnosis.wording import why_blind
 
@@ -267,10 +273,32 @@ def _report(answer: Answer) -> str:
 
 def _plant(diagnosis: "Diagnosis", sources: "Sources", name: str) -> str:
     from gateway.profiles.kinds.plant_writer import plant_text
+
+    profile = _extended(diagnosis, sources, name)
+    return plant_text(profile, f"Written by force-gateway diagnose; verdict: {diagnosis.verdict}")
+
+
+def _extended(diagnosis: "Diagnosis", sources: "Sources", name: str) -> "PlantProfile":
     from gateway.reports.diagnosis.extended_plant import extended_plant
 
     profile = extended_plant(diagnosis, sources.plant, sources.name, f"{datetime.now(UTC):%Y-%m-%d}")
-    return plant_text(replace(profile, name=name), f"Written by force-gateway diagnose; verdict: {diagnosis.verdict}")
+    return replace(profile, name=name)
+
+
+def _save(answer: Answer, options: dict[str, Any]) -> int | None:
+    """Keep the extended plant as the next number of the rig; None, and why, where there is none."""
+    from gateway.cli.options import state_directory
+    from gateway.cli.plants.store_access import save_diagnosed
+
+    diagnosis, sources = answer.diagnosis, answer.sources
+    if not diagnosis.causes:
+        click.echo("no plant is kept: nothing was found", err=True)
+        return None
+    if not _extends(answer, "the plant"):
+        return None
+    directory = state_directory(options["state"], options["rig"] or sources.rig or defaults.RIG)
+    name = f"{sources.plant.name}-{'-'.join(cause.name for cause in diagnosis.causes[:2])}"
+    return save_diagnosed(directory, diagnosis, sources, _extended(diagnosis, sources, name))
 
 
 def _show(answer: Answer, written: dict[Path, str]) -> None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 from typing import Final
 
+COMPENSATED_CELL_TERMS: Final = ("quadratic_per_n", "cubic_per_n2", "span_per_k", "zero_n_per_k", "crosstalk_n_per_v")
+"""Numbers of a plant's cell that a map takes back; each is 0 where it leaves one."""
 _ROUNDS: Final = 20
 _CLOSE_N: Final = 1.0e-9
 _FLATTEST: Final = 0.2  # slope of the bent reading below which it tells no force any more

@@ -41,7 +41,7 @@ class ForceLoop:
     """Owns the applied target, the trim, the band, the voltage on the output and the force that the model expects of it."""
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
-        self._timing = timing
+        self._timing, self._is_retimed = timing, False
         self._tune(settings, model)
         self.feedforward = Feedforward(model, settings.limits, *self._course(settings))
         self.expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
@@ -53,6 +53,10 @@ class ForceLoop:
         self._was_touching = False
         self._wanted_v = 0.0
 
+    def take_timing(self, timing: TimingCompensation | None) -> None:
+        """Take another timing of the rig; the next `use` puts it into effect."""
+        self._timing, self._is_retimed = timing, True
+
     def use(self, model: Bsfm, given_n: float, settings: ControlSettings) -> None:
         """Swap the calibration and the timing that goes with it. given_n: contact force that the slide need not give.
 
@@ -63,7 +67,8 @@ class ForceLoop:
         law.use(model, given_n)
         self.expected.retime(settings.supervision.response_lag_s)
         self.expected.use(model)
-        if not is_same:
+        if not is_same or self._is_retimed:
+            self._is_retimed = False
             self._retime(model, settings, given_n)
 
     def _retime(self, model: Bsfm, settings: ControlSettings, given_n: float) -> None:

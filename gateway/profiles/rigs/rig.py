@@ -8,6 +8,7 @@ from typing import Final
 
 from gateway import defaults
 from gateway.bsfm.model import Bsfm, Calibration, Response
+from gateway.control.compensation.cell_map import COMPENSATED_CELL_TERMS
 from gateway.control.compensation.command_map import apply_command_map
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.inputs import CalibrationInUse
@@ -20,6 +21,7 @@ from gateway.profiles.rigs.rig_file import Network, ResidualWatch
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.words import ControlBit
 from gateway.twin import Plant
+from gateway.twin.plant import with_value
 
 SUPPORTED_BITS: Final = (
     ControlBit.ENABLE
@@ -59,6 +61,14 @@ class CellLine(_SerialLine):
     range_n: float
 
 
+@dataclass(frozen=True, slots=True)
+class PlantInUse:
+    """A numbered plant that was taken into use on a rig: what control compensates comes from it."""
+
+    number: int
+    profile: PlantProfile
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rig:
     """One cell. texts: every file it was read from, as it was; fingerprint: their SHA-256; notes: what was decided because
@@ -85,6 +95,7 @@ class Rig:
     fingerprint: str
     notes: tuple[str, ...] = ()
     compensation: Compensation = NO_COMPENSATION
+    plant_in_use: PlantInUse | None = None
 
     @property
     def plant(self) -> Plant | None:
@@ -92,10 +103,22 @@ class Rig:
         return self.plant_profile.plant if self.plant_profile else None
 
     @property
+    def reference_plant(self) -> Plant | None:
+        """The plant that a run of this rig is compared with: the one in use, with the cell as straight as control makes its
+        readings, else the rig's own; None where neither is known."""
+        if self.plant_in_use is None:
+            return self.plant
+        plant, cell = self.plant_in_use.profile.plant, self.compensation.cell
+        for name in COMPENSATED_CELL_TERMS if cell else ():
+            if getattr(cell, name):
+                plant = with_value(plant, "cell", name, 0.0)
+        return plant
+
+    @property
     def is_watched(self) -> bool:
         """Decide whether a residual watch is wanted: the rig names a plant, and is simulated or enables the watch."""
         enabled = self.residual_watch.enabled
-        return self.plant_profile is not None and (self.simulated if enabled is None else enabled)
+        return self.reference_plant is not None and (self.simulated if enabled is None else enabled)
 
     @property
     def why_unwatched(self) -> str:

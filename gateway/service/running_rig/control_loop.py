@@ -85,6 +85,7 @@ class ControlLoop:
         self.warnings = WarningBit(0)
         self.restart_cause = FaultCode.NONE
         self.residual_cause = ResidualCause.NONE
+        self.plant_id = 0
         self._cell = cell
         self._clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
@@ -226,7 +227,7 @@ class ControlLoop:
             self.bank.release_owner()
         self.health.loop_time_s = self._clock() - now_s
         stored = self.calibration_runs.stored if self.calibration_runs else 0
-        known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause)
+        known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
         status = status_of(decision, self.health, self.output.pressure_pa, known)
         if decision.warnings & WarningBit.RESTARTED and not decision.fault:
             status = replace(status, fault_code=self.restart_cause)

@@ -34,11 +34,12 @@ class LoopHealth:
 
 @dataclass(frozen=True, slots=True)
 class BackgroundStatus:
-    """Status that the service knows beside the loop: calibrations by number, and the residual watch's cause."""
+    """Status that the service knows beside the loop: calibrations and plant by number, and the residual watch's cause."""
 
     calibration_id: int
     calibration_stored: int = 0
     residual_cause: int = 0
+    plant_id: int = 0
 
 
 def status_of(output: Output, health: LoopHealth, pressure_pa: float, known: BackgroundStatus) -> Status:
@@ -69,4 +70,5 @@ def status_of(output: Output, health: LoopHealth, pressure_pa: float, known: Bac
         calibration_time_left_s=output.calibration_time_left_s,
         calibration_stored=known.calibration_stored,
         residual_cause=known.residual_cause,
+        plant_id=known.plant_id,
     )

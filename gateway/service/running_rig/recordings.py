@@ -5,6 +5,7 @@ from typing import Any
 
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample
+from gateway.plants.in_use import in_use_facts
 from gateway.processes.event_log import EventLog
 from gateway.profiles import Rig
 from gateway.recording import Recorder
@@ -21,6 +22,7 @@ class Recordings:
         self._log = log
         self._current: RunRecording | None = None
         self.calibration_number = rig.calibration.number
+        self.plant_in_use = in_use_facts(rig)
 
     def start(self) -> dict[str, Any]:
         """Begin a recording; ValueError when one is running."""
@@ -32,11 +34,25 @@ class Recordings:
             "rig_fingerprint": rig.fingerprint,
             "rig_texts": dict(rig.texts),
             "calibration": self.calibration_number,
+            "plant_in_use": self.plant_in_use,
             "simulated": rig.simulated,
             "seed": rig.seed,
         }
         self._current = RunRecording(Recorder(self._directory, header, COLUMNS))
         return self.status()
+
+    def use_plant(self, rig: Rig) -> None:
+        """Note the plant that is in use from now on. A recording that runs goes on in another file: it says of all its rows
+        how they were read."""
+        self.plant_in_use = in_use_facts(rig)
+        if self._current:
+            ended = self.stop()
+            try:
+                self._log(
+                    "recording", f"{ended['written']} ends with the plant in use, {self.start()['recording']} goes on"
+                )
+            except OSError as error:
+                self._log("recording", f"{ended['written']} ends with the plant in use, not recording: {error}")
 
     def stop(self) -> dict[str, Any]:
         """End the recording, if there is one; return where it is and how many rows it has."""

@@ -36,6 +36,7 @@ from gateway.service.running_rig.load_cell_line import CellExchange
 from gateway.service.running_rig.output_line import OutputExchange
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
+from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
 from gateway.service.running_rig.rig_ports import RigPorts
 from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, listen, warning_notes
 from gateway.service.watch_reports import WatchReports
@@ -53,7 +54,9 @@ class RunningRig:
 
     def __init__(self, rig: Rig, ports: dict[str, str], state: Path, guardian: GuardianLine, log: EventLog) -> None:
         self._calibrations = RigCalibrations(rig, state)
-        self._rig = rig = self._calibrations.rig
+        self._plants = RigPlants(self._calibrations.rig, state)
+        self._rig = rig = self._plants.rig
+        self._calibration = rig.calibration
         self._state = state
         self._guardian = guardian
         self._log = log
@@ -93,6 +96,14 @@ class RunningRig:
             self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
         )
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
+        self._plants.serve(
+            PlantEdges(
+                lambda: self.controller.can_compensate_anew,
+                self._on_plant,
+                time.monotonic,
+                self._log.speaking_for("plant"),
+            )
+        )
         self.watch_reports = WatchReports(self.loop, time.monotonic, self._log.speaking_for("watch"))
         self._control_socket = ControlSocket(
             self._state,
@@ -103,6 +114,7 @@ class RunningRig:
                 upload=self._upload,
                 calibration_runs=self._calibration_runs,
                 watch=self.watch_reports,
+                plants=self._plants,
                 running=self._running,
             ),
             self._log,
@@ -133,6 +145,7 @@ class RunningRig:
         self.loop.recordings = self._recordings
         self.loop.ring = self.ring
         self.loop.restart_cause = cause
+        self.loop.plant_id = rig.plant_in_use.number if rig.plant_in_use else 0
         self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
@@ -179,7 +192,7 @@ class RunningRig:
         return ()
 
     async def _notes(self, restarted: Ending | None) -> tuple[str, ...]:
-        notes = [*self._rig.notes, *self._calibrations.notes]
+        notes = [*self._rig.notes, *self._calibrations.notes, *self._plants.notes]
         if self._rig.why_unwatched:
             notes.append(self._rig.why_unwatched)
         if restarted:
@@ -228,6 +241,7 @@ class RunningRig:
         self._calibration_runs.close()
         self._ports.close()
         self._upload.close()
+        self._plants.close()
         self._counters.close()
         self._lateness.close()
         self._shutdown_marker.clear()
@@ -245,16 +259,26 @@ class RunningRig:
         self._guardian.heartbeat()
         self._recordings.flush(time.monotonic())
         self._calibration_runs.flush(time.monotonic())
+        self._plants.take_waiting()
         if self._line.acknowledged_v is not None and self.loop.sample is not None:
             self._spoke.set()
 
     def _on_calibration(self, active: ActiveCalibration) -> None:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
+        self._calibration = active.calibration
         self.controller.use(self._rig.calibration_in_use(active.calibration, active.model))
         self._recordings.calibration_number = active.calibration.number
         lowered = self.bank.set_active_model(active.calibration, active.pointer.active.slot_word)
         if lowered:
             self._log("calibration", lowered)
+        self.loop.refresh()
+
+    def _on_plant(self, rig: Rig) -> None:
+        """Take the rig with another plant in use; the output is disabled."""
+        self._rig = rig
+        self.controller.compensate(rig.control, rig.compensation, rig.calibration_in_use(self._calibration))
+        self._recordings.use_plant(rig)
+        self.loop.plant_id = rig.plant_in_use.number if rig.plant_in_use else 0
         self.loop.refresh()
 
     def _on_peer_closed(self, peer: Peer) -> None:

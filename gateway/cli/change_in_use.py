@@ -1,0 +1,42 @@
+"""Changing which calibration or plant is in use, with or without a gateway that runs on the state directory."""
+
+import fcntl
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from gateway import defaults
+from gateway.cli.control_socket import ask
+from gateway.cli.errors import disk_hangs
+
+_PATIENCE_S: Final = defaults.COMMIT_PATIENCE_S
+_POLL_S: Final = 0.02
+
+
+def ask_until_done(directory: Path, verb: str, request: dict[str, Any]) -> dict[str, Any]:
+    """Ask the running gateway for a change; return its answer when it is through. CliError when it does not come to an end."""
+    job = ask(directory, {"do": verb, **request})
+    answer, deadline_s = job, time.monotonic() + _PATIENCE_S
+    while answer["busy"] and answer["job"] == job["job"]:
+        if time.monotonic() > deadline_s:
+            raise disk_hangs(f"the gateway has not answered for {_PATIENCE_S:g} s")
+        time.sleep(_POLL_S)
+        answer = ask(directory, {"do": verb})
+    return answer
+
+
+@contextmanager
+def not_running(directory: Path) -> Iterator[bool]:
+    """Yield whether no gateway runs on this directory; while True none can start."""
+    if not directory.is_dir():
+        yield True
+        return
+    with (directory / "lock").open("a") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+            return
+        yield True

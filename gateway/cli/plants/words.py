@@ -1,0 +1,62 @@
+"""What is said of a numbered plant: where it comes from, what of it is compensated on a rig, and how two differ."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from gateway.plants.in_use import compensation_on
+from gateway.plants.store import FoundCause, NumberedPlant
+from gateway.profiles import PlantProfile, Rig
+from gateway.profiles.rigs.compensated_effects import compensation_words
+from gateway.twin.plant import values
+
+
+def describe_provenance(plant: NumberedPlant) -> Iterator[str]:
+    """Yield where a plant comes from: its recordings and causes."""
+    told = plant.provenance
+    yield f"plant {plant.number} ({plant.profile.name}), made {told.made_utc} by force-gateway {told.version}"
+    if told.file:
+        yield f"added from {told.file}"
+    for recording in told.recordings:
+        yield f"diagnosed from {recording.name}, sha256 {recording.sha256[:16]}, starting from {told.start}: {told.verdict}"
+    for cause in told.causes:
+        yield f"  {cause.name}: {_numbers(cause)}, confidence {cause.confidence:.2f}"
+
+
+def _numbers(cause: FoundCause) -> str:
+    return ", ".join(
+        f"{name} {each['value']:.4g} {each['unit']} [{each['ci95'][0]:.4g}, {each['ci95'][1]:.4g}]"
+        for name, each in cause.parameters.items()
+    )
+
+
+def describe_compensation(plant: NumberedPlant, rig: Rig | None) -> tuple[str, ...]:
+    """Return what control would take back of a plant on this rig, and of what not and why."""
+    if rig is None:
+        return ("what is compensated depends on the rig: --rig names it",)
+    return (f"plant {plant.number} on rig {rig.name}", *compensation_words(compensation_on(rig, plant.profile)))
+
+
+def compensation_facts(plant: NumberedPlant, rig: Rig | None) -> dict[str, Any]:
+    """Return the same as JSON has it; null where the rig is not known."""
+    if rig is None:
+        return {"compensated": None, "not_compensated": None}
+    compensation = compensation_on(rig, plant.profile)
+    limited = [{"name": name, "why": why} for name, why in compensation.limited]
+    return {"compensated": list(compensation.acts), "not_compensated": limited}
+
+
+def differing_numbers(a: PlantProfile, b: PlantProfile) -> dict[str, list[float]]:
+    """Return every number in which two plants differ, by path: [a, b]."""
+    second = {f"{section}.{name}": value for section, name, value in values(b.plant)}
+    first = {f"{section}.{name}": value for section, name, value in values(a.plant)}
+    return {path: [float(first[path]), float(second[path])] for path in first if first[path] != second[path]}
+
+
+def describe_difference(differing: dict[str, list[float]], a: str, b: str) -> Iterator[str]:
+    """Yield a line for each number that differs."""
+    if not differing:
+        yield f"plants {a} and {b} have the same numbers"
+        return
+    yield f"{'':<36}{a:>14} {b:>14}"
+    for path, (first, second) in differing.items():
+        yield f"{path:<36}{first:>14.6g} {second:>14.6g}"

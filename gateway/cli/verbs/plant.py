@@ -1,0 +1,148 @@
+"""`plant`: the numbered plants of a rig: list, show, compare, add, use, go back.
+
+What control compensates of a plant, and what it cannot and why, is said before it is used. A running gateway is asked
+through its control socket; without one the store is changed under the lock that a gateway would hold.
+"""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gateway.cli.options import StateChoice, json_option, state_options
+
+if TYPE_CHECKING:
+    from gateway.numbered_documents.store import StoredDocument
+    from gateway.plants.store import NumberedPlant
+
+
+@click.group(name="plant")
+def command() -> None:
+    """List, show, compare, add and use plants."""
+
+
+@command.command(name="list")
+@state_options
+@json_option
+def list_command(*, state: StateChoice, as_json: bool) -> None:
+    """List the plants of a state directory; * is in use, 0 the rig's own."""
+    from gateway.cli.plants.store_access import open_store, plant_facts
+
+    store = open_store(state.directory)
+    selected, entries = store.find_selected(), store.list()
+    active = selected.selection.number or 0
+    if as_json:
+        plants = [plant_facts(entry, is_active=entry.number == active) for entry in entries]
+        click.echo(json.dumps({"active": active, "notes": selected.notes, "plants": plants}, indent=2))
+        return
+    for note in selected.notes:
+        click.echo(note, err=True)
+    click.echo("  NUMBER  made                  verdict     causes and recordings")
+    click.echo(f"{'*' if active == 0 else ' '} 0       the rig's own")
+    for entry in entries:
+        click.echo(f"{'*' if entry.number == active else ' '} {entry.number:<8}{_line(entry)}")
+
+
+def _line(entry: "StoredDocument[NumberedPlant]") -> str:
+    if entry.document is None:
+        return f"unusable: {entry.fault}"
+    told = entry.document.provenance
+    causes = ", ".join(cause.name for cause in told.causes) or "no cause"
+    source = told.file or ", ".join(each.name for each in told.recordings)
+    return f"{told.made_utc:<22}{told.verdict or 'added':<12}{causes} · from {source}"
+
+
+@command.command(name="show")
+@click.argument("number", metavar="N", type=click.IntRange(min=1))
+@state_options
+@json_option
+def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
+    """Show plant N: where it comes from, what is compensated of it, and its file."""
+    from gateway.cli.plants.store_access import load_rig_or_none, load_stored, open_store, shown_facts
+    from gateway.cli.plants.words import describe_compensation, describe_provenance
+    from gateway.plants.store import as_text
+
+    plant, rig = load_stored(open_store(state.directory), number), load_rig_or_none(state)
+    if as_json:
+        click.echo(json.dumps(shown_facts(plant, rig), indent=2))
+        return
+    for line in (*describe_provenance(plant), *describe_compensation(plant, rig), "", as_text(plant).rstrip()):
+        click.echo(line)
+
+
+@command.command(name="compare")
+@click.argument("a", metavar="A")
+@click.argument("b", metavar="B")
+@state_options
+@json_option
+def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool) -> None:
+    """Compare plants A and B: every number that differs.
+
+    Numbers of the store (0: the rig's own), shipped names or files.
+    """
+    from gateway.cli.plants.store_access import find_plant
+    from gateway.cli.plants.words import describe_difference, differing_numbers
+
+    first, second = find_plant(state, a), find_plant(state, b)
+    differing = differing_numbers(first, second)
+    if as_json:
+        click.echo(json.dumps({"a": a, "b": b, "differing": differing}, indent=2))
+        return
+    click.echo("\n".join(describe_difference(differing, a, b)))
+
+
+@command.command(name="add")
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path, dir_okay=False))
+@state_options
+@json_option
+def add_command(*, file: Path, state: StateChoice, as_json: bool) -> None:
+    """Add a plant file as the next number; `diagnose --save` adds what it has found by itself."""
+    from gateway.cli.plants.store_access import add_file
+
+    number = add_file(state, file)
+    click.echo(
+        json.dumps({"number": number}) if as_json else f"plant {number}; force-gateway plant use {number} uses it"
+    )
+
+
+@command.command(name="use")
+@click.argument("number", metavar="N", type=click.IntRange(min=0))
+@click.option(
+    "--before", metavar="RECORDING", help="The run that the watch compares with; default the newest one before."
+)
+@click.option("--dry-run", is_flag=True, help="Only say what would be compensated.")
+@state_options
+@json_option
+def use_command(*, number: int, before: str | None, dry_run: bool, state: StateChoice, as_json: bool) -> None:
+    """Compensate what plant N says from now on; 0: the rig's own plant.
+
+    A running gateway takes it while its output is disabled. `plant rollback` goes back.
+    """
+    from gateway.cli.plants.store_access import change, load_rig_or_none, load_stored, open_store
+    from gateway.cli.plants.words import compensation_facts, describe_compensation
+
+    plant, rig = load_stored(open_store(state.directory), number) if number else None, load_rig_or_none(state)
+    if not as_json and plant:
+        click.echo("\n".join(describe_compensation(plant, rig)))
+    answer: dict[str, Any] = {"number": number} | (compensation_facts(plant, rig) if plant else {})
+    if not dry_run:
+        answer |= change(state, {"use": number}, before)
+    click.echo(json.dumps(answer)) if as_json else _tell(answer)
+
+
+@command.command(name="rollback")
+@state_options
+@json_option
+def rollback_command(*, state: StateChoice, as_json: bool) -> None:
+    """Use again what was in use before the last change."""
+    from gateway.cli.plants.store_access import change
+
+    answer = change(state, {"rollback": True}, None)
+    click.echo(json.dumps(answer)) if as_json else _tell(answer)
+
+
+def _tell(answer: dict[str, Any]) -> None:
+    for name in ("said", "reference"):
+        if answer.get(name):
+            click.echo(answer[name])

@@ -1,0 +1,59 @@
+"""A recorded run as its commanded force is judged: the plant that was in use, and the readings as that one had the cell."""
+
+import json
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from gateway.control.compensation.cell_map import CellMap
+from gateway.diagnosis.force_error import CommandedForce, ErrorBlock, commanded_force, error_blocks
+from gateway.diagnosis.measurement import Floats
+from gateway.recording import Recording
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """plant: number in use while the run was recorded, 0 the rig's own; cell: what of the readings that plant has
+    straightened; voltage_v: on the output, by row."""
+
+    name: str
+    plant: int
+    cell: CellMap | None
+    force: CommandedForce
+    voltage_v: Floats
+
+    def blocks(self, cell: CellMap | None) -> tuple[ErrorBlock, ...]:
+        """Return the blocks of this run, its force as read through `cell`. The tare is left as it is."""
+        if cell == self.cell:
+            return error_blocks(self.force)
+        rows = zip(self.force.measured_n, self.voltage_v, strict=True)
+        measured_n = np.array([_through(force_n, voltage_v, self.cell, cell) for force_n, voltage_v in rows])
+        return error_blocks(replace(self.force, measured_n=measured_n))
+
+
+def recorded_run(recording: Recording) -> RecordedRun:
+    """Return the run of a recording. ValueError names the column without which nobody knows what was asked."""
+    force = commanded_force(recording.columns)
+    in_use = header_in_use(recording.header)
+    cell = CellMap(**in_use["cell"]) if in_use.get("cell") else None
+    columns = recording.columns
+    voltage_v = columns.get("sent_v", columns.get("command_v", np.full(force.time_s.size, nan)))
+    return RecordedRun(recording.path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
+
+
+def header_in_use(header: dict[str, Any]) -> dict[str, Any]:
+    """Return what a recording says of the plant that was in use; empty for one that says nothing. A CSV holds it as JSON."""
+    in_use = header.get("plant_in_use") or {}
+    try:
+        in_use = json.loads(in_use) if isinstance(in_use, str) else in_use
+    except ValueError:
+        return {}
+    return in_use if isinstance(in_use, dict) else {}
+
+
+def _through(measured_n: float, voltage_v: float, known: CellMap | None, other: CellMap | None) -> float:
+    """Return what a reading straightened by `known` would be when straightened by `other`."""
+    raw_n = known.reading_n(measured_n, nan, voltage_v) if known else measured_n
+    return other.force_n(raw_n, nan, voltage_v) if other else raw_n

@@ -1,0 +1,75 @@
+"""The reference that is kept when a plant is taken into use: how large the error of the commanded force was before.
+
+It stands beside the plants as `reference.json`, for one number; another plant in use has none. What is in it comes from a
+real run of this rig, made before: the newest recording in which a force was commanded without that plant.
+"""
+
+import json
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+from gateway.control.compensation.cell_map import CellMap
+from gateway.diagnosis.force_error import FEWEST_BLOCKS, ErrorBlock
+from gateway.plants.recorded_force import recorded_run
+from gateway.processes.durable_file import make_directory
+from gateway.recording import Recording, RecordingError, list_recordings, read_recording
+
+_FILE: Final = "reference.json"
+_NEWEST: Final = 8
+"""Recordings that are looked at, the newest first: further back the machine was another one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForceReference:
+    """plant: the number that it was kept for; recording: the run before, under plant_before; blocks: of its force."""
+
+    plant: int
+    recording: str
+    plant_before: int
+    blocks: tuple[ErrorBlock, ...]
+
+
+def find_reference(state: Path, plant: int, cell: CellMap | None) -> ForceReference | None:
+    """Return the reference from the newest recording before; None where no run tells enough. cell: as the plant has it."""
+    for entry in list(reversed(list_recordings(state)))[:_NEWEST]:
+        try:
+            reference = reference_of(read_recording(entry.path), plant, cell)
+        except (OSError, RecordingError, ValueError):
+            continue
+        if reference.plant_before != plant and len(reference.blocks) >= FEWEST_BLOCKS:
+            return reference
+    return None
+
+
+def reference_of(recording: Recording, plant: int, cell: CellMap | None) -> ForceReference:
+    """Return the reference that one recording gives. ValueError where it does not say what was asked."""
+    run = recorded_run(recording)
+    return ForceReference(plant, run.name, run.plant, run.blocks(cell))
+
+
+def keep_reference(state: Path, reference: ForceReference | None) -> None:
+    """Keep the reference, None: none, for the watch. OSError where the disk refuses."""
+    path = state / "plants" / _FILE
+    if reference is None:
+        path.unlink(missing_ok=True)
+        return
+    make_directory(path.parent)
+    beside = path.with_name(f".{_FILE}.{os.getpid()}")
+    try:
+        beside.write_text(json.dumps(asdict(reference)), encoding="utf-8")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def read_reference(state: Path, plant: int) -> ForceReference | None:
+    """Return the reference that was kept for this plant; None where there is none, or a damaged one."""
+    try:
+        facts = json.loads((state / "plants" / _FILE).read_text(encoding="utf-8"))
+        blocks = tuple(ErrorBlock(**block) for block in facts.pop("blocks"))
+        reference = ForceReference(**facts, blocks=blocks)
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    return reference if reference.plant == plant else None

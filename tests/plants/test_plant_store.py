@@ -1,0 +1,94 @@
+"""Numbered plants: what is stored reads back whole, is an ordinary plant file, and says where it comes from."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.numbered_documents.store import StoreError
+from gateway.plants.in_use import compensation_on, in_use_facts, with_cell_terms, with_plant_in_use
+from gateway.plants.store import FoundCause, NumberedPlant, PlantStore, Provenance, SourceRecording
+from gateway.profiles import PlantProfile, load_calibration, load_plant, load_rig
+from gateway.profiles.kinds.plant_writer import with_origins
+from gateway.twin.plant import with_value
+
+BOWED = {"value": 0.06, "unit": "1", "ci95": [0.055, 0.065]}
+TOLD = Provenance(
+    made_utc="2026-11-22T17:30:00Z",
+    version="0.1.0",
+    rig="demo",
+    start="paper-slide",
+    verdict="confirmed",
+    recordings=(SourceRecording(name="0001.fgr", sha256="ab" * 32),),
+    causes=(FoundCause(name="command-nonlinearity", confidence=0.99, parameters={"command_bow": BOWED}),),
+)
+
+
+def bowed(**more: float) -> PlantProfile:
+    """The paper's slide behind a bowed command map, as a diagnosis writes it. more: section__field = value."""
+    start = load_plant("paper-slide")
+    plant = with_value(start.plant, "regulator", "command_bow", 0.06)
+    for path, value in more.items():
+        plant = with_value(plant, *path.split("__"), value)
+    return with_origins(replace(start, name="bowed"), plant, {"regulator.command_bow": "diagnosed"})
+
+
+def numbered(profile: PlantProfile | None = None) -> NumberedPlant:
+    return NumberedPlant(number=0, profile=profile or bowed(), provenance=TOLD)
+
+
+def test_a_plant_reads_back_with_its_provenance_and_is_an_ordinary_plant_file(tmp_path):
+    store = PlantStore(tmp_path)
+    assert [store.add(numbered()), store.add(numbered(bowed(cell__quadratic_per_n=1e-3)))] == [1, 2]
+    assert (store.load(1).provenance, store.load(1).number) == (TOLD, 1)
+    assert load_plant(tmp_path / "plants" / "0001.yaml").plant == store.load(1).profile.plant == bowed().plant
+
+
+def test_none_is_in_use_at_first_and_a_rollback_goes_back_to_it(tmp_path):
+    store = PlantStore(tmp_path)
+    assert store.find_selected().document is None
+    store.add(numbered())
+    store.use(1)
+    assert store.find_selected().selection.number == 1
+    store.use(store.previous().number)
+    assert store.find_selected().document is None
+
+
+def test_a_damaged_plant_is_named_and_the_rigs_own_is_used(tmp_path):
+    store = PlantStore(tmp_path)
+    store.use(store.add(numbered()))
+    file = tmp_path / "plants" / "0001.yaml"
+    file.write_bytes(file.read_bytes().replace(b"0.06", b"0.09", 1))
+    selected = store.find_selected()
+    assert selected.document is None
+    assert "E432" in selected.notes[0] and "plant 1" in selected.notes[0]
+    with pytest.raises(StoreError, match="there is no plant 7"):
+        store.load(7)
+
+
+def test_a_rig_compensates_what_it_can_of_the_plant_in_use_and_says_what_not():
+    rig = load_rig("demo")
+    used = with_plant_in_use(rig, numbered(bowed(contact__spindle_n=1.0)))
+    assert used.compensation.acts == ("command-nonlinearity",)
+    assert any("spindle-vibration: " in note for note in used.notes)
+    assert used.plant == rig.plant, "the world of a simulated rig stays what it is"
+    assert used.reference_plant == bowed(contact__spindle_n=1.0).plant
+    assert with_plant_in_use(rig, None) is rig
+
+
+def test_a_calibration_of_this_very_rig_has_measured_the_command_map_itself():
+    rig = load_rig("demo")
+    calibrated = replace(rig, calibration=replace(load_calibration("demo"), rig="demo"))
+    compensation = compensation_on(calibrated, bowed())
+    assert (compensation.acts, compensation.command) == ((), None)
+    ((name, why),) = compensation.limited
+    assert name == "command-nonlinearity" and "has measured it" in why
+
+
+def test_what_was_diagnosed_from_straightened_readings_comes_on_top_of_what_straightened_them():
+    rig = with_plant_in_use(load_rig("demo"), numbered(bowed(cell__quadratic_per_n=0.002)))
+    facts = in_use_facts(rig)
+    assert set(facts["compensated"]) == {"sensor-quadratic", "command-nonlinearity"}
+    assert rig.reference_plant is not None and rig.reference_plant.cell.quadratic_per_n == 0.0
+    again = with_cell_terms(bowed(cell__quadratic_per_n=0.0005), facts["cell"])
+    assert again.plant.cell.quadratic_per_n == pytest.approx(0.0025)
+    assert with_cell_terms(bowed(), None) == bowed()
