@@ -20,6 +20,13 @@ ASYMMETRY: Final = effect.Parameter("friction", "asymmetry_n", "N", 0.0, -50.0, 
 DRAG_ASYMMETRY: Final = effect.Parameter("friction", "asymmetry_n_s_per_m", "N s/m", 0.0, -1.0e5, 1.0e5, 20.0)
 STICTION: Final = effect.Parameter("friction", "dwell_stiction_n", "N", 0.0, 0.0, 50.0, 0.1)
 STICTION_TIME: Final = effect.Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.8, 100.0, 0.2, shape=True)
+PLACE: Final = effect.Parameter("friction", "place_n_per_mm", "N/mm", 0.0, -20.0, 20.0, 0.002)
+PLACE_CURVE: Final = effect.Parameter("friction", "place_n_per_mm2", "N/mm2", 0.0, -20.0, 20.0, 1.0e-4)
+PLACE_ASYMMETRY: Final = effect.Parameter("friction", "place_asymmetry_n_per_mm", "N/mm", 0.0, -20.0, 20.0, 0.002)
+PLACE_ASYMMETRY_CURVE: Final = effect.Parameter(
+    "friction", "place_asymmetry_n_per_mm2", "N/mm2", 0.0, -20.0, 20.0, 1.0e-4
+)
+CHAMBER_LAG: Final = effect.Parameter("cylinder", "chamber_lag_s", "s", 0.0, 0.0, 2.0, 0.002)
 STICTION_TIME_SHORT: Final = effect.Parameter("friction", "dwell_stiction_s", "s", 5.0, 0.02, 0.8, 0.01, shape=True)
 
 LEAST_DRAG: Final = 25.0
@@ -37,6 +44,10 @@ _LOAD_STARTS: Final = ((0.003,), (0.02,))  # N/N
 _ASYMMETRY_STARTS: Final = ((0.2,),)  # N; the response is proportional
 _DRAG_ASYMMETRY_STARTS: Final = ((40.0,), (-40.0,), (300.0,), (-300.0,))  # N s/m, either way
 _STICTION_STARTS: Final = ((0.3, 1.0), (0.3, 5.0))  # N, s: short and long rests
+
+_PLACE_STARTS: Final = ((0.01, 0.0), (0.0, 5.0e-4))  # N/mm, N/mm2: 0.2 N at the ends of a stroke of 40 mm
+_PLACE_STARTS_BY_DIRECTION: Final = ((0.01, 0.0, 0.0, 0.0), (0.0, 5.0e-4, 0.0, 0.0), (0.0, 0.0, 0.01, 0.0))
+_CHAMBER_LAG_STARTS: Final = ((0.005,), (0.02,), (0.06,))  # s: a short hose, a long one, a throttle
 
 _ONE_SPEED: Final = ("coulomb-friction", "viscous-friction", "presliding")
 _AT_THREE_SPEEDS: Final = effect.Recipe(parts=(effect.PartName.RAMPS, effect.PartName.STROKES), columns=effect.PRESSURE)
@@ -157,5 +168,54 @@ CYLINDER: Final = (
         treatments=(effect.Treatment(why_not="the model has no memory of how long the slide has rested"),),
         forms=(effect.EffectForm(parameters=(STICTION, STICTION_TIME), probes=effect.fixed_starts(*_STICTION_STARTS)),),
         group=("stribeck-friction",),
+    ),
+    entry(
+        name="position-dependent-friction",
+        number=44,
+        what="friction that depends on the place in the stroke: a worn, bent or badly greased tube",
+        signature="the loop is wider at some places of the stroke than at others",
+        excitation="strokes forth and back over the whole way, more than once, recorded as position_mm",
+        experiment="slow strokes over the whole way, at two pressures and two speeds, with position_mm recorded",
+        recipe=effect.Recipe(
+            parts=(effect.PartName.REVERSALS,),
+            columns=effect.PRESSURE,
+            meanwhile="move the slide over its whole way, forth and back, at two speeds",
+        ),
+        treatments=(effect.Treatment(why_not="the command block carries no place in the stroke"),),
+        forms=(
+            effect.EffectForm(
+                parameters=(PLACE, PLACE_CURVE),
+                probes=effect.fixed_starts(*_PLACE_STARTS),
+                needs=("position_mm",),
+                proportional=True,
+            ),
+            effect.EffectForm(
+                parameters=(PLACE, PLACE_CURVE, PLACE_ASYMMETRY, PLACE_ASYMMETRY_CURVE),
+                probes=effect.fixed_starts(*_PLACE_STARTS_BY_DIRECTION),
+                needs=("position_mm",),
+                proportional=True,
+            ),
+        ),
+        group=("position-dependence", "side-load"),
+        rarity=6.0,
+    ),
+    entry(
+        name="pressure-lag",
+        number=45,
+        what="the chamber's pressure comes later than the gauge's: a hose or a throttle between them",
+        signature="fast changes of the pressure show in the force late and small",
+        excitation="a measured pressure that changes fast, with the motion going on",
+        experiment="steps of the pressure with the slide at rest, and strokes at one pressure: a lag shows in the first only",
+        recipe=effect.Recipe(parts=(effect.PartName.STEPS, effect.PartName.STROKES), columns=effect.PRESSURE),
+        treatments=(effect.Treatment(why_not="it is between the gauge and the slide, where control has no sensor"),),
+        least=7.0e-4,
+        forms=(
+            effect.EffectForm(
+                parameters=(CHAMBER_LAG,),
+                probes=effect.fixed_starts(*_CHAMBER_LAG_STARTS),
+                needs=effect.PRESSURE,
+            ),
+        ),
+        group=shared.SLOW_LAGS,
     ),
 )

@@ -4,7 +4,7 @@ from typing import Final
 
 from gateway.catalogue.effect import PRESSURE, PartName, Recipe
 
-SLOW_LAGS: Final = ("transport-delay", "clock-offset", "extra-lag", "viscous-friction")
+SLOW_LAGS: Final = ("transport-delay", "clock-offset", "extra-lag", "viscous-friction", "pressure-lag")
 """All make the force late."""
 LIMITS: Final = (
     "sensor-quadratic",

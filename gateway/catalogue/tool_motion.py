@@ -63,7 +63,7 @@ TOOL_MOTION: Final = (
                 parameters=(SIDE_POSITION,), probes=effect.fixed_starts((0.002,), (0.02,)), needs=("position_mm",)
             ),
         ),
-        group=("load-dependent-friction",),
+        group=("load-dependent-friction", "position-dependent-friction"),
     ),
     entry(
         name="tilt-gravity",

@@ -17,6 +17,7 @@ import math
 from typing import Final
 
 from gateway.compiled import step
+from gateway.twin.effects.term import is_switched_on
 from gateway.twin.elementwise import Real, exponential, positive_part, sine
 from gateway.twin.sections import Friction
 from gateway.twin.surroundings import TwinConditions
@@ -27,6 +28,7 @@ ELEMENTS: Final = 3
 RIGID_M: Final = 1.0e-9
 FREE_N_PER_M: Final = 1.0e-3  # stands for no stiffness at all, where a slide without mass and drag moves freely
 BREAKAWAY_M: Final = 2.0e-5  # motion after which a rest is forgotten, where presliding is shorter
+PLACE_FIELDS: Final = ("place_n_per_mm", "place_n_per_mm2", "place_asymmetry_n_per_mm", "place_asymmetry_n_per_mm2")
 
 
 def side_load_n(friction: Friction, conditions: TwinConditions) -> Real:
@@ -41,6 +43,26 @@ def side_load_n(friction: Friction, conditions: TwinConditions) -> Real:
     return load
 
 
+def has_place(friction: Friction) -> bool:
+    """Return whether friction depends on the place in the stroke."""
+    return is_switched_on(friction, PLACE_FIELDS)
+
+
+def place_limit_n(friction: Friction, conditions: TwinConditions) -> Real:
+    """position-dependent-friction: what the place in the stroke adds to the limit in both directions, N."""
+    if conditions.aside_mm is None:
+        return 0.0
+    return (friction.place_n_per_mm + friction.place_n_per_mm2 * conditions.aside_mm) * conditions.aside_mm
+
+
+def place_asymmetry_n(friction: Friction, conditions: TwinConditions) -> Real:
+    """position-dependent-friction by direction: what the place adds to the limit moving out and takes moving in, N."""
+    if conditions.aside_mm is None:
+        return 0.0
+    slope, curvature = friction.place_asymmetry_n_per_mm, friction.place_asymmetry_n_per_mm2
+    return (slope + curvature * conditions.aside_mm) * conditions.aside_mm
+
+
 def side_share(friction: Friction, conditions: TwinConditions) -> Real:
     """side-load: the surface's grip grows with the thrust as soon as the tool is dragged, N/N."""
     if conditions.feed_mm_s is None:
@@ -48,9 +70,9 @@ def side_share(friction: Friction, conditions: TwinConditions) -> Real:
     return friction.side_load_n_per_n * (1.0 - exponential(-abs(conditions.feed_mm_s) / _DRAGGED_MM_PER_S))
 
 
-def yield_travels_m(presliding_m: float, least_m: float = RIGID_M) -> tuple[float, float, float]:
+def yield_travels_m(presliding_m: float) -> tuple[float, float, float]:
     """Return the travel from rest after which each element slides, the stiffest first, m."""
-    one, two, three = (max(presliding_m * (j / ELEMENTS), least_m) for j in range(1, ELEMENTS + 1))
+    one, two, three = (max(presliding_m * (j / ELEMENTS), RIGID_M) for j in range(1, ELEMENTS + 1))
     return one, two, three
 
 
@@ -61,7 +83,7 @@ def directional_drags(friction: Friction) -> tuple[float, float]:
 
 
 @step
-def two_sided_limit(limit: Real, asymmetry_n: float) -> tuple[Real, Real]:
+def two_sided_limit(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
     """asymmetric-friction: (limit, centre) of a friction that is larger moving out than moving in, neither below 0.
 
     Friction is then centre + limit x strain. Rejected: a limit that jumps with the direction, which chatters at rest.
@@ -91,6 +113,15 @@ def strain_element(strain: float, shift: float) -> float:
     """Return the strain of an element after a shift in units of its yield travel."""
     strained = strain + shift
     return -1.0 if strained < -1.0 else 1.0 if strained > 1.0 else strained
+
+
+@step
+def relax_strain(strain: float, towards: float, travel: float) -> float:
+    """Return the strain of an element that a motion leads towards that of sliding.
+
+    travel: of the step, as a multiple of the element's yield travel.
+    """
+    return towards + (strain - towards) * math.exp(-travel)
 
 
 @step

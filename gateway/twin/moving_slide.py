@@ -1,6 +1,7 @@
 """The slide of the running twin: the step of slide.py with what changes while it moves - surface, side load, disturbance."""
 
 from gateway.defaults import UNLIMITED
+from gateway.twin.lags import follow_ramp, ramp_shares
 from gateway.twin.plant import Plant
 from gateway.twin.slide import SlideState, advance_slide, slide_of, with_gap
 
@@ -13,7 +14,10 @@ class MovingSlide:
         self._slide = slide_of(plant)
         self._surface_gap_m = self._contact_gap_m = self._slide.gap_m
         self._touching = True
-        self._side_n = self._side_share = self._disturbance_n = 0.0
+        self._side_n = self._side_share = self._more_out_n = self._disturbance_n = 0.0
+        lag_s = plant.cylinder.chamber_lag_s
+        self._chamber = ramp_shares(lag_s, step_s) if lag_s != 0.0 else None
+        self._gauge_pa = self._chamber_pa = 0.0
         self.state = SlideState()
 
     @property
@@ -39,9 +43,12 @@ class MovingSlide:
         self._surface_gap_m = self._contact_gap_m - height_m
         self._place()
 
-    def set_side_load(self, load_n: float, share: float = 0.0) -> None:
-        """Set by how much what presses the slide sideways raises its friction, N, and this share of the thrust; 0 is null."""
-        self._side_n, self._side_share = load_n, share
+    def set_side_load(self, load_n: float, share: float = 0.0, more_out_n: float = 0.0) -> None:
+        """Set by how much what is around the slide raises its friction, N, and this share of the thrust; 0 is null.
+
+        more_out_n: by how much more moving out, and less moving in.
+        """
+        self._side_n, self._side_share, self._more_out_n = load_n, share, more_out_n
 
     def set_disturbance(self, force_n: float) -> None:
         """Set an outside force on the slide, positive towards the workpiece; 0 is null."""
@@ -49,8 +56,11 @@ class MovingSlide:
 
     def step(self, pressure_pa: float) -> float:
         """Advance one step under this pressure."""
+        if self._chamber is not None:
+            self._chamber_pa = follow_ramp(self._chamber_pa, self._chamber, self._gauge_pa, pressure_pa)
+            self._gauge_pa, pressure_pa = pressure_pa, self._chamber_pa
         thrust_n = self._slide.area_m2 * pressure_pa
-        loads_n = (thrust_n, self._side_n + self._side_share * thrust_n, self._disturbance_n)
+        loads_n = (thrust_n, self._side_n + self._side_share * thrust_n, self._more_out_n, self._disturbance_n)
         self.state = state = advance_slide(self._slide, self.state, loads_n, self._step_s, self._step_s)
         return state.force_n
 

@@ -55,6 +55,7 @@ class Cylinder:
     __pydantic_config__ = STRICT
     area_m2: Positive = 1.0e-4  # effective, of all pistons
     stroke_m: Positive = UNLIMITED  # travel from the back stop to the end stop
+    chamber_lag_s: NotNegative = 0.0  # first-order lag of the chamber's pressure behind the gauge's (hose, throttle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +77,10 @@ class Friction:
     side_load_n_per_n: NotNegative = 0.0  # more friction per newton of thrust while the feed moves (needs the feed)
     side_load_tilt_n: NotNegative = 0.0  # more friction by the sine of the tilt (needs the tilt)
     side_load_n_per_mm: NotNegative = 0.0  # more friction per distance from the middle (needs the position)
+    place_n_per_mm: float = 0.0  # slope of the friction along the stroke (needs the position)
+    place_n_per_mm2: float = 0.0  # curvature of the same
+    place_asymmetry_n_per_mm: float = 0.0  # slope of what moving out has more, and moving in less
+    place_asymmetry_n_per_mm2: float = 0.0  # curvature of the same
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ from typing import Final
 from numpy.random import default_rng
 
 from gateway.twin.contact import ContactState
-from gateway.twin.friction import side_load_n, side_share
+from gateway.twin.friction import place_asymmetry_n, place_limit_n, side_load_n, side_share
 from gateway.twin.load_cell import LoadCellState
 from gateway.twin.moving_slide import MovingSlide
 from gateway.twin.plant import Plant, plain
@@ -133,7 +133,9 @@ class Twin:
         self._conditions.update(around)
         self._regulator.supply_kpa = self._conditions.supply_kpa
         friction = self.plant.friction
-        self._slide.set_side_load(side_load_n(friction, self._conditions), side_share(friction, self._conditions))
+        load_n = side_load_n(friction, self._conditions) + place_limit_n(friction, self._conditions)
+        share, more_out_n = side_share(friction, self._conditions), place_asymmetry_n(friction, self._conditions)
+        self._slide.set_side_load(load_n, share, more_out_n)
         self._contact.select_active_effects(self._slide.force_n)
         self._cell.select_active_effects(self._conditions)
 

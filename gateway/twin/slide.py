@@ -16,6 +16,7 @@ from gateway.twin.friction import (
     BREAKAWAY_M,
     age_stiction,
     directional_drags,
+    has_place,
     strain_elements,
     stribeck_limit_n,
     travel_against_friction,
@@ -46,6 +47,7 @@ class Slide(NamedTuple):
     weight_n: float
     coulomb_n: float
     load_dependent_n_per_n: float
+    is_two_sided: bool
     asymmetry_n: float
     stribeck_n: float
     stribeck_m_per_s: float
@@ -91,6 +93,7 @@ def slide_of(plant: Plant) -> Slide:
         weight_n=weight_n(contact.mass_kg, contact.tilt_deg),
         coulomb_n=friction.coulomb_n,
         load_dependent_n_per_n=friction.load_dependent_n_per_n,
+        is_two_sided=friction.asymmetry_n != 0.0 or has_place(friction),
         asymmetry_n=friction.asymmetry_n,
         stribeck_n=friction.stribeck_n,
         stribeck_m_per_s=friction.stribeck_speed_m_per_s,
@@ -128,20 +131,21 @@ def without_mass(slide: Slide) -> Slide:
 
 @step
 def advance_slide(
-    slide: Slide, state: SlideState, loads_n: tuple[float, float, float], step_s: float, last_step_s: float
+    slide: Slide, state: SlideState, loads_n: tuple[float, float, float, float], step_s: float, last_step_s: float
 ) -> SlideState:
     """Return the state after one step.
 
-    loads_n: thrust of the pressure, what surroundings add to the friction's limit, force from outside towards the workpiece.
+    loads_n: thrust of the pressure, what surroundings add to the friction's limit, what of it moving out has more and moving
+    in less, force from outside towards the workpiece.
     last_step_s: length of the step in which the slide made its last travel.
     """
-    thrust_n, side_n, outside_n = loads_n
+    thrust_n, side_n, more_out_n, outside_n = loads_n
     limit_n = slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n + state.stiction_n
     if slide.stribeck_n != 0.0:
         limit_n += stribeck_limit_n(slide.stribeck_n, state.travel_m / (slide.stribeck_m_per_s * last_step_s))
     centre_n, drive_n = 0.0, thrust_n + slide.weight_n + outside_n
-    if slide.asymmetry_n != 0.0:
-        limit_n, centre_n = two_sided_limit(limit_n, slide.asymmetry_n)
+    if slide.is_two_sided:
+        limit_n, centre_n = two_sided_limit(limit_n, slide.asymmetry_n + more_out_n)
         drive_n -= centre_n
     inertia = slide.mass_kg / step_s
     drive_n += inertia * state.travel_m / last_step_s

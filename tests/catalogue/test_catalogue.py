@@ -1,4 +1,4 @@
-"""The catalogue is a contract: 43 names, each with parameters that the plant has, and null means off."""
+"""The catalogue is a contract: 45 names, each with parameters that the plant has, and null means off."""
 
 from collections.abc import Iterator
 
@@ -18,11 +18,12 @@ creep contact-nonlinearity end-stop side-load tilt-gravity feed-drag spindle-vib
 position-ripple backlash
 thermal-zero-drift thermal-span-drift warm-up linear-drift sensor-quadratic sensor-cubic mains-hum clock-offset clock-skew
 repeated-samples outliers sensor-quantisation valve-crosstalk sign-loss
+position-dependent-friction pressure-lag
 """.split()
-FAMILIES = {"regulator": 11, "cylinder": 7, "contact and tool": 11, "sensing and logging": 14}
+FAMILIES = {"regulator": 11, "cylinder": 9, "contact and tool": 11, "sensing and logging": 14}
 INDISTINGUISHABLE = (
     ("regulator-hysteresis", "coulomb-friction"),
-    ("transport-delay", "clock-offset", "extra-lag", "viscous-friction"),
+    ("transport-delay", "clock-offset", "extra-lag", "viscous-friction", "pressure-lag"),
     ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift"),
     ("sensor-quadratic", "sensor-cubic", "supply-saturation", "contact-nonlinearity"),
     ("coulomb-friction", "viscous-friction", "presliding"),
@@ -45,7 +46,7 @@ def parameters() -> Iterator[tuple[Effect, Parameter]]:
 
 def test_the_names_are_those_of_the_contract() -> None:
     assert sorted(effect.name for effect in EFFECTS) == sorted(NAMES)
-    assert len(EFFECTS) == 43
+    assert len(EFFECTS) == 45
     assert [BY_NAME[name].name for name in NAMES] == NAMES
 
 

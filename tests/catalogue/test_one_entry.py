@@ -79,10 +79,10 @@ def test_an_added_effect_says_why_control_does_not_compensate_it(places: dict[st
 
 
 def test_numbers_are_those_of_the_map_since_version_1() -> None:
-    """43 effects in the catalogue's order from 1 on; a number that a master knows never means anything else."""
-    assert [effect.number for effect in EFFECTS] == list(range(1, 44))
+    """45 effects in the catalogue's order from 1 on; a number that a master knows never means anything else."""
+    assert [effect.number for effect in EFFECTS] == list(range(1, 46))
     assert {ResidualCause.of_effect(effect.name).value: effect.name for effect in EFFECTS} == {
-        number: ResidualCause(number).effect for number in range(1, 44)
+        number: ResidualCause(number).effect for number in range(1, 46)
     }
     assert (ResidualCause.NONE, ResidualCause.UNKNOWN) == (0, 99)
     assert ResidualCause.of_effect("gremlins") is ResidualCause.UNKNOWN

@@ -94,6 +94,10 @@ EXAMPLES: Final = (
     Hidden(name="asymmetric-friction", changes={"friction.asymmetry_n": 2.5}, around={"friction.coulomb_n": 3.0}),
     Hidden(name="dwell-stiction", changes={"friction.dwell_stiction_n": 3.0, "friction.dwell_stiction_s": 3.0},
            factor=2.0),
+    Hidden(name="position-dependent-friction",
+           changes={"friction.place_n_per_mm": 0.03, "friction.place_n_per_mm2": 1.0e-3}, around={"friction.coulomb_n": 2.0},
+           columns=_PLACE),
+    Hidden(name="pressure-lag", changes={"cylinder.chamber_lag_s": 0.02}, columns=("pressure_kpa",)),
     Hidden(name="creep", changes={"contact.creep_share": 0.055, "contact.creep_s": 5.0}),
     Hidden(name="contact-nonlinearity", changes={"contact.hardening": 0.065}),
     Hidden(name="end-stop", changes={"cylinder.stroke_m": 1.0e-3}),
@@ -129,6 +133,9 @@ EXAMPLES: Final = (
 OTHER_FORMS: Final = (
     Hidden(name="asymmetric-friction", changes={"friction.asymmetry_n_s_per_m": 500.0}),
     Hidden(name="side-load", changes={"friction.side_load_n_per_n": 0.06}, columns=_FEED),
+    Hidden(name="position-dependent-friction",
+           changes={"friction.place_n_per_mm": 0.03, "friction.place_asymmetry_n_per_mm": -0.03},
+           around={"friction.coulomb_n": 2.0}, columns=_PLACE),
     Hidden(name="stribeck-friction", changes={"friction.dwell_stiction_n": 1.0, "friction.dwell_stiction_s": 0.15},
            factor=2.0),
 )  # fmt: skip

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from gateway.diagnosis import Measurement
 from gateway.recording.tables.row_validity import flag_repeated
 from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
-from gateway.twin.replay.replay import Drive, Replay
+from gateway.twin.replay.replay import Drive, Replay, ReplayResult
 from gateway.twin.surroundings import Surroundings
 
 Floats = NDArray[np.float64]
 
 NOISE_N: Final = 0.1
+NOISE_KPA: Final = 0.3
+GAUGE: Final = "pressure_kpa"
 MACHINE: Final = Plant(
     regulator=Regulator(lag_s=0.055),
     cylinder=Cylinder(area_m2=88.0e-6),
@@ -102,16 +104,21 @@ def plant(changes: Mapping[str, float], start: Plant = MACHINE) -> Plant:
     return start
 
 
+def replayed(machine: Plant, time_s: Floats, volts: Floats, columns: Mapping[str, Floats]) -> ReplayResult:
+    """What the twin does, without noise."""
+    drive = Drive(time_s=time_s, command_v=volts, surroundings=Surroundings(**columns))
+    return Replay(drive, most_steps=2 * time_s.size).run([machine])
+
+
 def readings_n(machine: Plant, time_s: Floats, volts: Floats, columns: Mapping[str, Floats]) -> Floats:
     """What the twin reads, without noise."""
-    drive = Drive(time_s=time_s, command_v=volts, surroundings=Surroundings(**columns))
-    return Replay(drive, most_steps=2 * time_s.size).run([machine]).reading_n[0]
+    return replayed(machine, time_s, volts, columns).reading_n[0]
 
 
 def measurement(time_s: Floats, volts: Floats | None, force_n: Floats, columns: Mapping[str, Floats]) -> Measurement:
     """As the reader hands it on."""
-    others = {name: values for name, values in columns.items() if name != "position_mm"}
-    position_mm = columns.get("position_mm")
+    others = {name: values for name, values in columns.items() if name not in ("position_mm", GAUGE)}
+    position_mm, gauge_kpa = columns.get("position_mm"), columns.get(GAUGE)
     return Measurement(
         name="machine",
         time_s=time_s,
@@ -119,6 +126,7 @@ def measurement(time_s: Floats, volts: Floats | None, force_n: Floats, columns: 
         usable=np.isfinite(force_n),
         repeated=flag_repeated(force_n)[0],
         command_v=volts,
+        pressure_pa=None if gauge_kpa is None else gauge_kpa * 1.0e3,
         position_m=None if position_mm is None else position_mm * 1.0e-3,
         covariates=others,
     )
@@ -136,7 +144,10 @@ def recorded(
     """A recording of the machine with these fields changed, white noise on top, and what `spoil` makes of the readings."""
     time_s = times_s() if time_s is None else time_s
     rng = np.random.default_rng(seed)
-    logged = {name: LOGGED[name](time_s) for name in columns}
+    logged = {name: LOGGED[name](time_s) for name in columns if name != GAUGE}
     volts = command_v(time_s)
-    force_n = readings_n(plant(changes or {}), time_s, volts, logged) + rng.normal(0.0, noise_n, time_s.size)
+    found = replayed(plant(changes or {}), time_s, volts, logged)
+    force_n = found.reading_n[0] + rng.normal(0.0, noise_n, time_s.size)
+    if GAUGE in columns:
+        logged[GAUGE] = found.pressure_pa[0] * 1.0e-3 + rng.normal(0.0, NOISE_KPA, time_s.size)
     return measurement(time_s, volts, spoil(force_n, rng) if spoil else force_n, logged)

@@ -1,7 +1,7 @@
 """Each effect of the catalogue, strong and excited, is named with its size; without it the same recording shows nothing.
 
 The twin makes these recordings: the least that a search must do. The push gate asks eight effects of different families and
-two recordings without any; --long asks all 43, with and without.
+two recordings without any; --long asks all 45, with and without.
 """
 
 import pytest

@@ -19,7 +19,7 @@ from tests.reports.fake_diagnosis import WARMTH, diagnosis
 RIG = load_rig("demo")
 MODEL, LIMITS = RIG.calibration.model(), RIG.control.limits
 HZ = 50.0
-SLOW_LAGS = ("transport-delay", "clock-offset", "extra-lag", "viscous-friction")
+SLOW_LAGS = ("transport-delay", "clock-offset", "extra-lag", "viscous-friction", "pressure-lag")
 
 
 def without(*paths: str) -> Plant:

@@ -4,7 +4,7 @@ Every loop fills its last argument. Series are contiguous, (points,); steps_s[i]
 """
 
 from gateway.compiled import loop
-from gateway.twin.friction import age_stiction
+from gateway.twin.friction import age_stiction, relax_strain
 from gateway.twin.lags import apply_play, follow_ramp, ramp_shares
 from gateway.twin.regulator import (
     HeldTarget,
@@ -79,23 +79,31 @@ def march_pressure(
 
 @loop
 def march_slide(
-    slides: tuple[Slide, Slide], start: SlideState, thrust_n: Floats, side_n: Floats, steps_s: Floats, force_n: Floats
+    slides: tuple[Slide, Slide],
+    start: SlideState,
+    loads_n: tuple[Floats, Floats, Floats],
+    steps_s: Floats,
+    force_n: Floats,
 ) -> None:
     """Fill in the force at each point.
 
+    loads_n: thrust, what surroundings add to the friction's limit, and what of it moving out has more.
     slides: as it moves, and as it comes to rest. start: the state at the first point where its force is above 0; else the
     slide comes to rest there, from that state.
     """
     slide, resting = slides
+    thrust_n, side_n, more_out_n = loads_n
     state = start
     if not start.force_n > 0.0:
-        rest = advance_slide(resting, start, (thrust_n[0], side_n[0], 0.0), steps_s[0], steps_s[0])
+        loads = (thrust_n[0], side_n[0], more_out_n[0], 0.0)
+        rest = advance_slide(resting, start, loads, steps_s[0], steps_s[0])
         state = SlideState(rest.position_m, 0.0, 0.0, rest.strains, rest.force_n, rest.friction_n)
     force_n[0] = state.force_n
     last_s = steps_s[0]
     for point in range(1, thrust_n.size):
         step_s = steps_s[point - 1]
-        state = advance_slide(slide, state, (thrust_n[point], side_n[point], 0.0), step_s, last_s)
+        loads = (thrust_n[point], side_n[point], more_out_n[point], 0.0)
+        state = advance_slide(slide, state, loads, step_s, last_s)
         force_n[point] = state.force_n
         last_s = step_s
 
@@ -108,6 +116,14 @@ def march_stiction(full_n: float, rest_s: float, travels: Floats, steps_s: Float
         _, stiction_n[point] = age_stiction(
             stiction_n[point - 1], full_n, steps_s[point - 1] / rest_s, travels[point - 1]
         )
+
+
+@loop
+def march_strain(towards: Floats, travels: Floats, strain: Floats) -> None:
+    """Fill in the strain at each point, from sliding. travels: of each step, as multiples of the yield travel."""
+    strain[0] = towards[0]
+    for point in range(1, strain.size):
+        strain[point] = relax_strain(strain[point - 1], towards[point], travels[point - 1])
 
 
 @loop

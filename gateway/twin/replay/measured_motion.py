@@ -1,12 +1,15 @@
 """A slide whose motion was measured: friction follows the position, and the force is thrust - friction, without a pad.
 
 Without noise, elements are moved by the position's own increments. With noise, rigid friction takes its direction from
-the speed, tanh(v / v0) with v0 a quarter of the usual speed and the slope over a twelfth of a stroke: in a real cylinder
-the friction falls before the rod stands (Zillen's data: 0.50 and 0.25 N left, against 0.81 and 0.44 N by the sign of the
-travel). At rest nobody knows where between its limits friction stands; 0 is the middle. Presliding elements are at
-least four standard deviations wide. The speed, for drag and Stribeck's curve, is the slope over 50 ms.
+the speed, tanh(v / v0) with v0 two fifths of the usual speed and the slope over a 24th of a stroke: in a real cylinder
+the friction falls before the rod stands (Zillen's data, 1 bar: 0.55 and 0.27 N left, against 0.81 and 0.44 N by the sign of
+the travel). At rest nobody knows where between its limits friction stands; 0 is the middle. Presliding elements follow that
+direction over their yield travel, so that presliding grows from nothing without a jump (0.47 and 0.24 N left; by the
+position's own increments, which noise makes wide, it did not help at all). The speed, for drag and Stribeck's curve, is the
+slope over 50 ms.
 """
 
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -23,15 +26,15 @@ from gateway.twin.friction import (
 from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.loops import march_play, march_stiction
+from gateway.twin.replay.loops import march_play, march_stiction, march_strain
 from gateway.twin.sections import Friction
 from gateway.twin.slide import Slide
 
 NOISE_WIDTHS: Final = 4.0
 _SLOPE_S: Final = 0.025  # to either side
-_DIRECTION_STROKES: Final = 1.0 / 24.0  # to either side
+_DIRECTION_STROKES: Final = 1.0 / 48.0  # to either side
 _LONGEST_S: Final = 0.25
-_SOFT_SHARE: Final = 0.25  # of the usual speed
+_SOFT_SHARE: Final = 0.4  # of the usual speed
 
 
 class Motions:
@@ -45,10 +48,14 @@ class Motions:
         self._speed_m_per_s = self._slope(_SLOPE_S)
         self._strains = Cache()
 
-    def force_n(self, slide: Slide, friction: Friction, thrust_n: Floats, side_n: Floats) -> Floats:
-        """Force on the grid, N: thrust - friction outward, seen from the position's own direction."""
+    def force_n(self, slide: Slide, friction: Friction, loads_n: tuple[Floats, Floats, Floats]) -> Floats:
+        """Force on the grid, N: thrust - friction outward, seen from the position's own direction.
+
+        loads_n: thrust, what surroundings add to the friction's limit, and what of it moving out has more.
+        """
+        thrust_n, side_n, more_out_n = loads_n
         limit = slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n
-        limit, centre = two_sided_limit(limit, slide.asymmetry_n)
+        limit, centre = two_sided_limit(limit, slide.asymmetry_n + more_out_n)
         limit, strain = self._moving_limit_n(friction, limit), self._mean_strain(friction.presliding_m)
         out, back = directional_drags(friction)
         speed = self._speed_m_per_s
@@ -78,14 +85,24 @@ class Motions:
         found = self._strains.get(presliding_m)
         if found is not None:
             return found
-        if presliding_m == 0.0 and self._noise_m > 0.0:
-            return self._strains.put(presliding_m, self._direction())
-        count = ELEMENTS if presliding_m > 0.0 else 1
-        least_m = max(RIGID_M, NOISE_WIDTHS * self._noise_m)
-        widths = yield_travels_m(presliding_m, least_m)[:count]
+        if self._noise_m > 0.0:
+            return self._strains.put(presliding_m, self._smooth_strain(presliding_m))
+        widths = yield_travels_m(presliding_m)[: ELEMENTS if presliding_m > 0.0 else 1]
         strains = [(self._position_m - _drag_element(self._position_m, width)) / width for width in widths]
-        return self._strains.put(presliding_m, np.clip(sum(strains[1:], start=strains[0]) / count, -1.0, 1.0))
+        return self._strains.put(presliding_m, np.clip(sum(strains[1:], start=strains[0]) / len(widths), -1.0, 1.0))
 
+    def _smooth_strain(self, presliding_m: float) -> Floats:
+        """The mean strain under a noisy position: each element follows the direction over its yield travel."""
+        direction = self._direction
+        if presliding_m == 0.0:
+            return direction
+        travels_m, strains = np.abs(self._speed_m_per_s[1:]) * self._grid.steps_s, []
+        for width_m in yield_travels_m(presliding_m):
+            strains.append(np.empty_like(direction))
+            march_strain(direction, travels_m / width_m, strains[-1])
+        return np.asarray(sum(strains[1:], start=strains[0]) / ELEMENTS)
+
+    @cached_property
     def _direction(self) -> Floats:
         """-1 .. 1: the way of the motion, by a speed smooth enough to be sure of it."""
         steady, duration_s = np.abs(self._slope(0.1)), float(self._grid.time_s[-1]) + self._grid.step_s

@@ -6,12 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.twin.elementwise import Real
-from gateway.twin.friction import ELEMENTS, side_load_n, side_share, two_sided_limit
+from gateway.twin.friction import (
+    ELEMENTS,
+    has_place,
+    place_asymmetry_n,
+    place_limit_n,
+    side_load_n,
+    side_share,
+    two_sided_limit,
+)
 from gateway.twin.plant import Plant
 from gateway.twin.replay.cache import Cache
 from gateway.twin.replay.drive import Drive, Floats, Strains
 from gateway.twin.replay.grid import Grid
-from gateway.twin.replay.loops import march_slide
+from gateway.twin.replay.loops import march_lag, march_slide
 from gateway.twin.replay.measured_motion import Motions
 from gateway.twin.slide import Slide, SlideState, slide_of, without_mass, without_motion
 
@@ -56,29 +64,47 @@ class Slides:
     def _moved(self, plant: Plant, pressure_pa: Floats, start: Strains | None) -> Floats:
         """The force of the quasi-static slide, by its own motion or by the measured one."""
         slide = without_mass(slide_of(plant))
-        thrust_n = slide.area_m2 * pressure_pa
-        side_n = np.ascontiguousarray(np.broadcast_to(self._side_n(plant, thrust_n), thrust_n.shape))
+        thrust_n = slide.area_m2 * self._in_chamber(plant, pressure_pa)
+        side_n, more_out_n = self._side_loads_n(plant, thrust_n)
+        loads_n = (thrust_n, self._as_series(side_n), self._as_series(more_out_n))
         if self._motions is not None:
-            return self._motions.force_n(slide, plant.friction, thrust_n, side_n)
-        state = SlideState() if start is None else start_state(slide, start, float(thrust_n[0]), float(side_n[0]))
+            return self._motions.force_n(slide, plant.friction, loads_n)
+        state = SlideState() if start is None else start_state(slide, start, [float(load[0]) for load in loads_n])
         force_n = np.empty_like(thrust_n)
-        march_slide((slide, without_motion(slide)), state, thrust_n, side_n, self._grid.steps_s, force_n)
+        march_slide((slide, without_motion(slide)), state, loads_n, self._grid.steps_s, force_n)
         return force_n
 
-    def _side_n(self, plant: Plant, thrust_n: Floats) -> Real:
-        """The side load on the grid."""
+    def _in_chamber(self, plant: Plant, pressure_pa: Floats) -> Floats:
+        """pressure-lag: the chamber's pressure behind the gauge's."""
+        if plant.cylinder.chamber_lag_s == 0.0:
+            return pressure_pa
+        late_pa = np.empty_like(pressure_pa)
+        march_lag(plant.cylinder.chamber_lag_s, pressure_pa, self._grid.steps_s, late_pa)
+        return late_pa
+
+    def _as_series(self, load_n: Real) -> Floats:
+        return np.ascontiguousarray(np.broadcast_to(load_n, (self._grid.points,)))
+
+    def _side_loads_n(self, plant: Plant, thrust_n: Floats) -> tuple[Real, Real]:
+        """What surroundings add to the friction's limit, and what of it moving out has more, on the grid."""
         friction, conditions = plant.friction, self._grid.conditions
         side: Real = side_load_n(friction, conditions)
-        return side + side_share(friction, conditions) * thrust_n if friction.side_load_n_per_n else side
+        if friction.side_load_n_per_n:
+            side = side + side_share(friction, conditions) * thrust_n
+        if not has_place(friction):
+            return side, 0.0
+        return side + place_limit_n(friction, conditions), place_asymmetry_n(friction, conditions)
 
 
-def start_state(slide: Slide, start: Strains, thrust_n: float, side_n: float) -> SlideState:
+def start_state(slide: Slide, start: Strains, loads_n: Sequence[float]) -> SlideState:
     """Return the state of a slide that rests with these strains; without a force where there is none to begin with.
 
-    No element is strained by more than the thrust: a pad does not pull. Rigid friction has their mean.
+    loads_n: thrust, what surroundings add to the friction's limit, and what of it moving out has more. No element is
+    strained by more than the thrust: a pad does not pull. Rigid friction has their mean.
     """
+    thrust_n, side_n, more_out_n = loads_n
     limit_n, centre_n = two_sided_limit(
-        slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n, slide.asymmetry_n
+        slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n, slide.asymmetry_n + more_out_n
     )
     drive_n = thrust_n + slide.weight_n - centre_n
     if limit_n <= 0.0:

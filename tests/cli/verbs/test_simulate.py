@@ -99,7 +99,7 @@ def test_the_series_may_not_replace_the_recording(call: Call, recording: Path) -
 
 def test_effects_as_json_has_the_contract_s_fields_for_every_effect(call: Call) -> None:
     document = json.loads(call("effects", "--json").stdout)
-    assert document["format"] == 1 and len(document["effects"]) == len(EFFECTS) == 43
+    assert document["format"] == 1 and len(document["effects"]) == len(EFFECTS) == 45
     for effect in document["effects"]:
         assert {"name", "what", "signature", "excitation", "parameters", "group"} <= set(effect)
         assert all({"name", "unit", "null"} <= set(parameter) for parameter in effect["parameters"])

@@ -43,6 +43,10 @@ STATIC: list[tuple[Any, float]] = [
     (Friction(side_load_n_per_n=0.05), -0.05 * THRUST_N),
     (Friction(side_load_tilt_n=2.0), -2.0 * math.sin(math.radians(60.0))),
     (Friction(side_load_n_per_mm=0.1), -1.2),
+    (Friction(coulomb_n=2.0, place_n_per_mm=0.05), -2.6),
+    (Friction(coulomb_n=2.0, place_n_per_mm=-0.5), 0.0),  # never below 0
+    (Friction(coulomb_n=2.0, place_n_per_mm2=0.005), -2.72),
+    (Friction(coulomb_n=2.0, place_asymmetry_n_per_mm=0.05, place_asymmetry_n_per_mm2=-0.005), -1.88),
     (Contact(backlash_n=1.0), -0.5),
     (Contact(hardening=0.05), 0.05 * THRUST_N * math.sqrt(3.6)),
     (Contact(wear_per_m=0.02), -0.1 * THRUST_N),

@@ -52,7 +52,8 @@ def responses(plant: Plant, commands_v: Floats) -> Floats:
         (pressure_pa,), _ = Pressures(drive, grid).of([plant.regulator])
         moved_n = np.empty(grid.points)
         start = (slide, without_motion(slide))
-        march_slide(start, SlideState(), slide.area_m2 * pressure_pa, np.zeros(grid.points), grid.steps_s, moved_n)
+        nothing_n = np.zeros(grid.points)
+        march_slide(start, SlideState(), (slide.area_m2 * pressure_pa, nothing_n, nothing_n), grid.steps_s, moved_n)
         force_n[:, lane] = moved_n[1:]
     return force_n
 
