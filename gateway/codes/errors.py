@@ -139,8 +139,8 @@ ERRORS: Final = (
         "E160",
         "an extra is not installed",
         "A library that this verb needs is not there, or does not load; holding a force does not need it.",
-        "The gateway was installed without the extra `analysis`: numba, which runs the simulation over recordings "
-        "(diagnose, simulate, the residual watch), and pyarrow, which reads and writes Parquet.",
+        "The gateway was installed without the extra `analysis`: numba (simulates recordings: diagnose, simulate, watch) "
+        "and pyarrow (Parquet).",
         "pip install 'force-gateway[analysis]' into the environment of the gateway; 250 MB more. CSV needs no extra.",
     ),
     Explanation(

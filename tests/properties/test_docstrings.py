@@ -13,7 +13,7 @@ ROOMS = sorted(path.name for path in GATEWAY.iterdir() if list(path.glob("*.py")
 NOT_YET = frozenset(["diagnosis", "twin"])
 VERBS = frozenset(
     """Abort Accept Act Add Admit Advance Allow Announce Answer Append Apply Ask Begin Build Calculate Calibrate Call Cancel
-    Change Check Choose Clear Climb Close Collect Combine Come Compare Compile Compose Compute Continue Convert Copy
+    Change Check Choose Clear Climb Close Collect Combine Come Compare Compensate Compile Compose Compute Continue Convert Copy
     Count Create Cut Decide Decode Delay Derive Descend Diagnose Draw Drop Enable Encode End Ensure Estimate
     Evaluate Exclude Execute Expect Explain Export Extend Fade Fetch Fill Find Finish Fit Fold Follow Forget
     Fork Format Give Go Greet Group Guard Hand Handle Have Hold Import Include Index Insert Install Interpolate

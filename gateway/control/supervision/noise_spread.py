@@ -78,7 +78,7 @@ class Window:
 
     @property
     def is_full(self) -> bool:
-        """Whether it has WINDOW samples."""
+        """Tell whether it has WINDOW samples."""
         return self.size >= WINDOW
 
     def add(self, level: int, count: int) -> int:
@@ -99,7 +99,7 @@ class Window:
 
     @property
     def is_still(self) -> bool:
-        """Whether the force stood still: its halves differ by no more than the noise makes of them."""
+        """Tell whether the force stood still: its halves differ by no more than the noise makes of them."""
         moved = abs(self._half_sums[1] - self._half_sums[0]) / (WINDOW // 2)
         return moved <= max(STILL_COUNTS, self.travel / WINDOW)
 
@@ -121,7 +121,7 @@ class Window:
 
     @property
     def expected_changes(self) -> float:
-        """Of independent samples of this spread."""
+        """Return the number of changes that independent samples of this spread would show."""
         return WINDOW - sum(count * count for count in self._levels.values()) / WINDOW
 
 

@@ -122,7 +122,7 @@ class Rig:
 
     @property
     def why_unwatched(self) -> str:
-        """Why the residual watch that the rig wants is off: its libraries are not installed. Empty where it runs."""
+        """Tell why the residual watch that the rig wants is off: its libraries are not installed. Empty where it runs."""
         return missing_note("numba", "the residual watch") if self.is_watched and not is_installed("numba") else ""
 
     @property

@@ -57,8 +57,8 @@ class RigPlants:
         self._thread.close()
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
-        """{"use": number} (0: the rig's own) or {"rollback": true} begin a change; neither tells what is in use and how the
-        last change went. ValueError while another is under way."""
+        """Answer a request: {"use": number} (0: the rig's own) or {"rollback": true} begin a change; neither tells what is in
+        use and how the last change went. ValueError while another is under way."""
         query = parse_request(PlantRequest, request)
         if query.rollback or query.use is not None:
             if self._doing:
