@@ -1,7 +1,7 @@
 """One calibration run, stair by stair: what to put out now, how far it is, and when a stair has settled.
 
 A stair is left when the data say that it has settled: the means of the two halves of a window differ by no more than the
-noise, measured before the first stair, explains. The window begins when, by the pace of the check's stairs (ladder_pace),
+noise, measured before the first stair, explains. The window begins when, by the pace of the check's stairs (blind_time),
 the transient of a step of this size is over: no transport delay can look like rest, nor the slow end of a lag. A stair that
 never settles is left after MOST_DWELL_S and counted. The voltage changes with a reading only: the recording's rows say when.
 Supervision is not here: the controller watches as always. Only what a ladder alone can see is judged: each settled stair
@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.messages import gain_sentence, ladder_silent_sentence, sign_sentence
-from gateway.control.runs.ladder_pace import LadderPace, Trace
+from gateway.control.runs.blind_time import BlindTime, Trace
 from gateway.control.runs.ladder_stairs import CalibrationPlan, PlannedStair, stairs_of
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
@@ -82,7 +82,7 @@ class LadderRun:
         self._stair_s: float | None = None
         self._window: deque[tuple[float, float]] = deque()
         self._dwelt_s = 0.0
-        self._pace, self._trace = LadderPace(), Trace()
+        self._pace, self._trace = BlindTime(), Trace()
         self._last_n = 0.0
 
     @property

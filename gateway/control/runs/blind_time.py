@@ -25,7 +25,7 @@ LEAST_LEFT_N: Final = 0.07  # of a transient: nobody sees less
 LEFT_NOISE: Final = 0.4
 
 
-class LadderPace:
+class BlindTime:
     """`observe` each stair of the check; `blind_s` then says how long another one moves."""
 
     def __init__(self) -> None:
