@@ -118,3 +118,15 @@ class WarningBit(IntFlag):
             is_warning=True,
         ),
     )
+    # the residual watch finds the error of the commanded force larger than before the plant in use was taken
+    COMPENSATION_WORSE = (
+        1 << 9,
+        Explanation(
+            "A347",
+            "the plant in use makes the force worse",
+            "Two looks in a row, the commanded force was further off than in the run before the plant came into use.",
+            "What the plant describes is not what is wrong, or the machine has changed since it was diagnosed.",
+            "force-gateway plant rollback; then record, and diagnose anew.",
+            is_warning=True,
+        ),
+    )

@@ -72,11 +72,12 @@ class CalibrateRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResidualRequest:
-    """Report of the residual watch; without a cause it is a question."""
+    """Report of the residual watch; without a cause it is a question. worse: what the plant in use has made worse."""
 
     __pydantic_config__ = _STRICT
     cause: Number | None = None
     sentence: str = ""
+    worse: str = ""
     counters: dict[str, Any] = field(default_factory=dict)
 
 

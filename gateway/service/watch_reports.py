@@ -30,6 +30,12 @@ class WatchReports:
         self._counters: dict[str, float] = {}
         self._warnings = 0
         self._heard_s: float | None = None
+        self._plant = (0, 0.0)
+
+    def follow_plant(self, number: int, since_s: float) -> None:
+        """Note the plant in use, 0 the rig's own, for the watch to hear of; what was said of another one is no longer true."""
+        self._plant = (number, since_s)
+        self._hear_worse("")
 
     def answer(self, request: Answer) -> Answer:
         """Take the watch's report, or answer how it stands. ValueError refuses.
@@ -37,7 +43,8 @@ class WatchReports:
         report = parse_request(ResidualRequest, request)
         if report.cause is not None:
             self._hear(report.cause, report)
-        return self.figures() | {"sentence": self._sentence}
+        number, since_s = self._plant
+        return self.figures() | {"sentence": self._sentence, "plant": number, "plant_since_s": since_s}
 
     def figures(self) -> Answer:
         """Return cause by number and name, how often a warning rose, the watch's counters, and the age of it all."""
@@ -54,6 +61,18 @@ class WatchReports:
         self._sentence = report.sentence[:_LONGEST_SENTENCE]
         if cause is not before:
             self._change(cause)
+        self._hear_worse(report.worse[:_LONGEST_SENTENCE])
+
+    def _hear_worse(self, sentence: str) -> None:
+        """Warn while the plant in use makes the force worse; each change is told once."""
+        loop, bit = self._loop, WarningBit.COMPENSATION_WORSE
+        if bool(sentence) == bool(loop.warnings & bit):
+            return
+        loop.warnings = loop.warnings | bit if sentence else loop.warnings & ~bit
+        self._log(
+            "compensation", f"A347 {sentence}" if sentence else "the force is no worse than before the plant in use"
+        )
+        loop.refresh()
 
     def _change(self, cause: ResidualCause) -> None:
         loop = self._loop

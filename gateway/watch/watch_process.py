@@ -24,10 +24,12 @@ from gateway.recording.ring import RingReader
 if TYPE_CHECKING:
     from gateway.diagnosis import Diagnosis, Measurement
     from gateway.twin.plant import Plant
+    from gateway.watch.force_watch import ForceWatch, PlantSince
     from gateway.watch.residual_watch import Watch
 
 SHARE: Final = 0.25
 """Of one core, on average."""
+_ALL_ROWS: Final = 1 << 30
 _ANSWER_S: Final = 5.0
 _LONGEST_ANSWER: Final = 1 << 16
 _FIRST_AMONG_THE_KILLED: Final = "900"
@@ -55,25 +57,34 @@ def exit_with_guardian(link: socket.socket) -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def report_to_control(state: Path, message: dict[str, Any]) -> None:
-    """Say it to control; a control that is being restarted hears it the next time."""
+def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:
+    """Say it to control and return its answer, empty from a control that is being restarted: it hears it the next time."""
     with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as control:
         control.settimeout(_ANSWER_S)
         control.connect(str(state / "control.sock"))
         control.sendall(json.dumps({"do": "residual"} | message).encode() + b"\n")
-        control.recv(_LONGEST_ANSWER)
+        with contextlib.suppress(ValueError):
+            answer = json.loads(control.recv(_LONGEST_ANSWER))
+            return answer if isinstance(answer, dict) else {}
+    return {}
 
 
-def make_watch(ring: RingReader, options: dict[str, Any]) -> "Watch":
-    """Return the watch over the rig's plant. Everything heavy is imported here."""
+def make_watch(ring: RingReader, options: dict[str, Any]) -> tuple["Watch", "ForceWatch"]:
+    """Return the watch over the rig's plant, the one in use where there is one, and that over the force. Everything heavy is
+    imported here."""
+    from gateway.plants.in_use import with_selected_plant
     from gateway.profiles import load_rig
+    from gateway.watch.force_watch import ForceWatch
     from gateway.watch.reference import WatchReference
     from gateway.watch.residual_watch import Watch, WatchSettings
 
-    rig = load_rig(options["rig"], simulated=options["simulated"])
-    assert rig.plant is not None  # or nobody had started us
-    setup = WatchSettings(options["window_s"], options["every_s"], rig.control.defaults.in_band_tolerance_n)
-    return Watch(ring, WatchReference(rig.plant), setup, diagnose_window, time.monotonic)
+    state = Path(options["state"])
+    rig, _ = with_selected_plant(load_rig(options["rig"], simulated=options["simulated"]), state)
+    assert rig.reference_plant is not None  # or nobody had started us
+    tolerance_n = rig.control.defaults.in_band_tolerance_n
+    setup = WatchSettings(options["window_s"], options["every_s"], tolerance_n)
+    watch = Watch(ring, WatchReference(rig.reference_plant), setup, diagnose_window, time.monotonic)
+    return watch, ForceWatch(state, tolerance_n)
 
 
 def diagnose_window(measurements: "Sequence[Measurement]", plant: "Plant") -> "Diagnosis":
@@ -89,20 +100,36 @@ def pause_s(every_s: float, spent_s: float) -> float:
 
 
 def watch_forever(options: dict[str, Any]) -> None:
-    """Look, tell, sleep; for ever."""
+    """Look, tell, sleep; for ever. Begin anew where another plant has come into use."""
     ring, state, every_s = RingReader(options["ring"]), Path(options["state"]), options["every_s"]
     time.sleep(options["window_s"])
-    watch = make_watch(ring, options)
+    watch, force = make_watch(ring, options)
+    known: PlantSince | None = None
     while True:
         began_s = time.process_time()
         watch.check_newest_window()
+        force.look(ring.newest(_ALL_ROWS), ring.columns)
         spent_s = time.process_time() - began_s
         rest_s = pause_s(every_s, spent_s)
         counters = watch.counters | {"cpu_s": time.process_time(), "pause_s": rest_s}
         counters = {name: value for name, value in counters.items() if isfinite(value)}  # JSON has no NaN
         published = watch.published
-        report_to_control(state, {"cause": int(published.cause), "sentence": published.sentence, "counters": counters})
+        said = {"cause": int(published.cause), "sentence": published.sentence, "worse": force.sentence}
+        plant = _plant_of(report_to_control(state, said | {"counters": counters}))
         time.sleep(rest_s)
+        if plant is not None and plant != known:
+            if known is not None:  # rows from before the change were read and commanded otherwise
+                time.sleep(max(0.0, options["window_s"] - (time.monotonic() - plant.since_s)))
+                watch, force = make_watch(ring, options)
+            known = plant
+            force.follow(plant)
+
+
+def _plant_of(answer: dict[str, Any]) -> "PlantSince | None":
+    """Return the plant in use as control says; None where it has not answered."""
+    from gateway.watch.force_watch import PlantSince
+
+    return PlantSince(answer["plant"], answer["plant_since_s"]) if "plant" in answer else None
 
 
 def main(arguments: list[str]) -> int:

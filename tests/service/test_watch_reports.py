@@ -65,7 +65,7 @@ def test_counters_and_age_can_be_read(wired, reports):
 @pytest.mark.parametrize(
     "request_",
     [
-        {"cause": 44},
+        {"cause": 98},
         {"cause": "friction"},
         {"cause": True},
         {"cause": -1},

@@ -14,7 +14,7 @@ from typing import Any
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
-from gateway.control import CalibrationInUse, Controller
+from gateway.control import Controller
 from gateway.devices import PacedWire, cell_host, output_host
 from gateway.modbus import Peer
 from gateway.profiles import CellLine, OutputLine, Rig
@@ -115,8 +115,9 @@ class Wired:
         self.exchange = OutputExchange(output_host(rig.output.device), self._write, rig.output.device.reply_timeout_s)
         self.controller = Controller(
             rig.control,
-            CalibrationInUse(rig.calibration.model(), rig.calibration.number, rig.response_of(rig.calibration)),
+            rig.calibration_in_use(rig.calibration),
             unclean_restart=unclean,
+            compensation=rig.compensation,
         )
         self.loop = ControlLoop(
             self.bank,

@@ -105,6 +105,7 @@ class RunningRig:
             )
         )
         self.watch_reports = WatchReports(self.loop, time.monotonic, self._log.speaking_for("watch"))
+        self._follow_plant()
         self._control_socket = ControlSocket(
             self._state,
             RunningParts(
@@ -145,7 +146,6 @@ class RunningRig:
         self.loop.recordings = self._recordings
         self.loop.ring = self.ring
         self.loop.restart_cause = cause
-        self.loop.plant_id = rig.plant_in_use.number if rig.plant_in_use else 0
         self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
@@ -278,8 +278,13 @@ class RunningRig:
         self._rig = rig
         self.controller.compensate(rig.control, rig.compensation, rig.calibration_in_use(self._calibration))
         self._recordings.use_plant(rig)
-        self.loop.plant_id = rig.plant_in_use.number if rig.plant_in_use else 0
+        self._follow_plant()
         self.loop.refresh()
+
+    def _follow_plant(self) -> None:
+        status = self._plants.status()
+        self.loop.plant_id = status["active"]
+        self.watch_reports.follow_plant(status["active"], status["since_s"])
 
     def _on_peer_closed(self, peer: Peer) -> None:
         if peer.host == self.bank.owner:
