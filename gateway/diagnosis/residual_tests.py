@@ -67,13 +67,13 @@ def strongest_dependence(
 
 def _strongest(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Iterator[Regressors]) -> Dependence | None:
     """Some at a time: a thousand columns would be gigabytes at once."""
-    model, white = whiten(fitted.jacobian), whiten(fitted.residual_n)
+    model, white = whiten.spectra(fitted.jacobian), whiten.spectra(fitted.residual_n)
     total = max(float(white @ white), 1.0)
     least_power = _OWN_POWER if whiten.knows_times else _OWN_POWER_IN_DOUBT
     tried, best = 0, None
     while some := list(islice(asked, _REGRESSORS_AT_ONCE)):
         tried += sum(each.among for each in some)
-        columns = whiten(bench.reduced(np.vstack([each.columns for each in some])))
+        columns = whiten.spectra(bench.reduced(np.vstack([each.columns for each in some])))
         found = [
             each
             for each in _dependences(NormalEquations(model, columns, white), some, total, least_power)

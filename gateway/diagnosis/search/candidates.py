@@ -11,9 +11,10 @@ from gateway import progress
 from gateway.catalogue.effect import Effect, EffectForm, SearchHints, Start
 from gateway.defaults import UNLIMITED
 from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel, Whiten
-from gateway.diagnosis.search.normal_equations import ColumnGain, NormalEquations
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.search.normal_equations import ColumnGain, NormalEquations, beside_model
 from gateway.diagnosis.search.parameters import ModelParameters, apply_start
 
 _LARGEST_STRETCH: Final = 3.0  # how far beyond its start a response that is not proportional is believed
@@ -92,9 +93,9 @@ class CandidateScore:
     alone: float = 0.0
 
 
-def score_candidates(found: CandidateColumns, fitted: FittedModel, whiten: Whiten) -> list[CandidateScore]:
+def score_candidates(found: CandidateColumns, fitted: FittedModel, whiten: Whitener) -> list[CandidateScore]:
     """Return every candidate's promise beside the present model."""
-    normal = NormalEquations(whiten(fitted.jacobian), whiten(found.columns), whiten(fitted.residual_n))
+    normal = beside_model(fitted, found.columns, whiten)
     return [
         _with_power(_score_candidate(candidate, normal, fitted.parameters), normal) for candidate in found.candidates
     ]

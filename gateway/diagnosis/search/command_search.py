@@ -21,7 +21,7 @@ from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench, Channel
 from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves, fill_rounding_errors
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import NormalEquations
+from gateway.diagnosis.search.normal_equations import beside_model
 from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.twin.elementwise import Real, smaller
 from gateway.twin.plant import Plant
@@ -57,7 +57,7 @@ def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) ->
         columns = bench.reduced(
             bench.simulate([rigid.with_value(DEAD_BAND, band_pa) for band_pa in bands_pa[part]]) - without
         )
-        normal = NormalEquations(whiten(fitted.jacobian), whiten(columns), whiten(fitted.residual_n))
+        normal = beside_model(fitted, columns, whiten)
         cost[part] = normal.power - 2.0 * normal.slope
     return tuple(bands_pa[np.argsort(cost)[:_MOST_ANSWERS]].tolist())
 
@@ -137,7 +137,7 @@ def _chi2_gains(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floa
             columns_v = np.empty((tried[part].size, command_v.size))
             fill_rounding_errors(command_v, tried[part], _force_chain(fitted.parameters, row_s), columns_v)
             vectors[:, channel.rows] = columns_v
-        normal = NormalEquations(whiten(fitted.jacobian), whiten(bench.reduced(vectors)), whiten(fitted.residual_n))
+        normal = beside_model(fitted, bench.reduced(vectors), whiten)
         power = np.maximum(normal.power, 1.0e-300)
         found[part] = np.where(normal.slope > _LEAST_WHOLE_STEP * power, normal.slope**2 / power, 0.0)
     return found

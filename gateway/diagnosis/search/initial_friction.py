@@ -90,7 +90,7 @@ def drop_unfelt_strains(bench: Bench, fitted: FittedModel, whiten: Whitener) -> 
     """Return the same fit without strains that its recording does not feel, on a bench whose young rows are those that feel
     them."""
     offsets = len(fitted.parameters.offsets_n)
-    columns = whiten(fitted.jacobian)
+    columns = whiten.spectra(fitted.jacobian)
     kept = [
         not isinstance(parameter, InitialStrain) or float(np.sum(column**2)) > _LEAST_CHI2
         for parameter, column in zip(fitted.free, columns[offsets:], strict=True)

@@ -4,7 +4,7 @@ A wave costs about the same for one plant and for sixty, so candidates are refin
 tried for each of them in one wave.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -13,10 +13,9 @@ import numpy as np
 from gateway import progress
 from gateway.catalogue.effect import Parameter
 from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.parameters import ModelParameters
-
-Whiten = Callable[[Floats], Floats]
 
 _DAMPINGS: Final = (0.0, 1.0, 30.0)  # tried side by side: Gauss-Newton, and two steps as careful as that goes wrong
 _SECANT_SHARE: Final = 0.02  # of a size that is there: large against the twin's steps, small against its bends
@@ -48,7 +47,7 @@ class FitProblem:
     free: tuple[Parameter, ...]
 
 
-def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten, waves: int) -> list[FittedModel]:
+def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whitener, waves: int) -> list[FittedModel]:
     """Move each problem's free parameters and offsets to the least whitened squares, in at most `waves` waves."""
     fitted = linearise(bench, problems, whiten)
     active = list(range(len(fitted)))
@@ -74,7 +73,7 @@ def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten, waves: 
     return fitted
 
 
-def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten) -> list[FittedModel]:
+def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whitener) -> list[FittedModel]:
     """Return the residual and derivatives of each problem where it stands; one wave."""
     if not problems:
         return []
@@ -93,9 +92,7 @@ def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whiten) -> l
         at += 1 + len(problem.free)
         residual = bench.residuals(centre)
         jacobian = bench.reduced(np.array(rows)) if rows else np.empty((0, bench.rows))
-        result.append(
-            FittedModel(problem.parameters, problem.free, residual, float(np.sum(whiten(residual) ** 2)), jacobian)
-        )
+        result.append(FittedModel(problem.parameters, problem.free, residual, float(_chi2(residual, whiten)), jacobian))
     return result
 
 
@@ -116,12 +113,12 @@ def _offset_column(bench: Bench, recording: int) -> Floats:
     return column
 
 
-def _try_steps(bench: Bench, fitted: Sequence[FittedModel], whiten: Whiten) -> list[FittedModel | None]:
+def _try_steps(bench: Bench, fitted: Sequence[FittedModel], whiten: Whitener) -> list[FittedModel | None]:
     """The best of a few damped steps of each problem; None where no step is better."""
-    trials = [[_damped_step(each, whiten, damping) for damping in _DAMPINGS] for each in fitted]
+    trials = [_damped_steps(each, whiten) for each in fitted]
     simulated = bench.simulate([parameters for parameter_sets in trials for parameters in parameter_sets])
     residuals = bench.residuals(simulated).reshape(len(fitted), len(_DAMPINGS), -1)
-    chi2 = np.sum(whiten(residuals) ** 2, axis=-1)
+    chi2 = _chi2(residuals, whiten)
     result: list[FittedModel | None] = []
     for k, each in enumerate(fitted):
         best = int(np.argmin(chi2[k]))
@@ -134,10 +131,21 @@ def _try_steps(bench: Bench, fitted: Sequence[FittedModel], whiten: Whiten) -> l
     return result
 
 
-def _damped_step(fitted: FittedModel, whiten: Whiten, damping: float) -> ModelParameters:
-    """Where a damped Gauss-Newton step leads; a parameter that would leave its bounds stays, the others step again."""
-    columns, residual = whiten(fitted.jacobian), whiten(fitted.residual_n)
-    normal_matrix, slope = columns @ columns.T, columns @ residual
+def _chi2(residuals: Floats, whiten: Whitener) -> Floats:
+    """Whitened sum of squares of each residual (..., rows)."""
+    spectra = whiten.spectra(residuals)
+    return np.asarray(np.einsum("...i,...i->...", spectra, spectra))
+
+
+def _damped_steps(fitted: FittedModel, whiten: Whitener) -> list[ModelParameters]:
+    """Where Gauss-Newton steps of each damping lead."""
+    columns = whiten.spectra(fitted.jacobian)
+    normal_matrix, slope = columns @ columns.T, columns @ whiten.spectra(fitted.residual_n)
+    return [_damped_step(fitted, normal_matrix, slope, damping) for damping in _DAMPINGS]
+
+
+def _damped_step(fitted: FittedModel, normal_matrix: Floats, slope: Floats, damping: float) -> ModelParameters:
+    """Where a damped step leads; a parameter that would leave its bounds stays, the others step again."""
     scale = np.sqrt(np.maximum(np.diag(normal_matrix), 1.0e-300))
     scaled = normal_matrix / np.outer(scale, scale) + np.diag(np.full(scale.size, 1.0e-9 + 0.1 * damping))
     held = np.zeros(scale.size, dtype=bool)

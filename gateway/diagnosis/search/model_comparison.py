@@ -16,6 +16,7 @@ from gateway.catalogue.all_effects import BY_NAME
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
 from gateway.diagnosis.light_statistics import chi2_tail
 from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.candidates import (
     CandidateColumns,
@@ -24,7 +25,7 @@ from gateway.diagnosis.search.candidates import (
     score_candidates,
     simulate_candidates,
 )
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, Whiten, refine
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.search.normal_equations import block_sums
 
 MOST_REFINED: Final = 6  # effects; a wave of simulations serves all of them
@@ -121,7 +122,7 @@ class Competitors:
     most: int = MOST_REFINED
 
 
-def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors, whiten: Whiten) -> ModelComparison:
+def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors, whiten: Whitener) -> ModelComparison:
     """Return how well each of these effects explains what the model `fitted` leaves, which stands at its own optimum."""
     hints, incumbent = competitors.hints, competitors.incumbent
     found = simulate_candidates(bench, fitted, competitors.effects, hints)
@@ -153,7 +154,7 @@ def joined_parameters(fitted: FittedModel, form: EffectForm) -> tuple[Parameter,
 
 
 def refined_effect(
-    bench: Bench, named: tuple[Effect, EffectForm], refined: FittedModel, beside: FittedModel, whiten: Whiten
+    bench: Bench, named: tuple[Effect, EffectForm], refined: FittedModel, beside: FittedModel, whiten: Whitener
 ) -> RefinedEffect:
     """Return an effect, in one of its forms, at its optimum against the model without it."""
     block_chi2 = block_sums(bench, whiten(refined.residual_n) ** 2)

@@ -11,8 +11,9 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel, Whiten
+from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 
 _SAME_COLUMN: Final = 1.0e-8  # share of a column that the model does not span: rounding
 _RIDGE: Final = 0.01  # of a parameter's whole weight: a block that holds all of it says nothing about itself
@@ -27,20 +28,22 @@ class ColumnGain:
 
 
 class NormalEquations:
-    """Normal equations of candidate columns beside the columns of the present model (whitened, (k, rows))."""
+    """Normal equations of candidate columns beside the columns of the present model (whitened, (k, rows), or their spectra).
+
+    raw_power: sum of squares of each column; power: of what the model does not span of it; slope: that by the residual.
+    """
 
     def __init__(self, model: Floats, columns: Floats, residual: Floats) -> None:
         scale = np.sqrt(np.maximum(np.sum(model**2, axis=1), 1.0e-300))
         basis = orthonormal(model / scale[:, None])
-        self.columns = columns - (columns @ basis.T) @ basis
-        self.residual = residual - (residual @ basis.T) @ basis
+        self._columns, self._spanned = columns, columns @ basis.T
         self.raw_power = np.einsum("ij,ij->i", columns, columns)
-        self.power = np.einsum("ij,ij->i", self.columns, self.columns)
-        self.slope = self.columns @ self.residual
+        self.power = np.maximum(self.raw_power - np.sum(self._spanned**2, axis=1), 0.0)
+        self.slope = columns @ (residual - (residual @ basis.T) @ basis)
 
     @cached_property
     def normal_matrix(self) -> Floats:
-        return np.asarray(self.columns @ self.columns.T)
+        return np.asarray(self._columns @ self._columns.T - self._spanned @ self._spanned.T)
 
     def add(self, indices: list[int]) -> ColumnGain:
         """Return the gain and sizes when these columns join the model; nothing where they are part of it already."""
@@ -51,6 +54,11 @@ class NormalEquations:
         sizes = np.linalg.lstsq(normal_matrix, self.slope[indices] / scale, rcond=1.0e-9)[0]
         gain = float(sizes @ (self.slope[indices] / scale))
         return ColumnGain(gain, sizes / scale)
+
+
+def beside_model(fitted: FittedModel, columns: Floats, whiten: Whitener) -> NormalEquations:
+    """Return the normal equations of columns (k, rows) beside a fitted model, whitened."""
+    return NormalEquations(*(whiten.spectra(each) for each in (fitted.jacobian, columns, fitted.residual_n)))
 
 
 def orthonormal(rows: Floats) -> Floats:
@@ -94,7 +102,7 @@ class HeldOutErrors:
         return np.asarray(np.sqrt((blocks - 1.0) / blocks * np.sum(apart**2, axis=0)))
 
 
-def held_out_errors(bench: Bench, fitted: FittedModel, whiten: Whiten) -> HeldOutErrors:
+def held_out_errors(bench: Bench, fitted: FittedModel, whiten: Whitener) -> HeldOutErrors:
     """Leave out one block after the other.
 
     To first order around the fitted point: the step that leaving out a block would cause is computed from the blocks'
@@ -119,9 +127,9 @@ def held_out_errors(bench: Bench, fitted: FittedModel, whiten: Whiten) -> HeldOu
     return HeldOutErrors(errors, counts, steps, squares)
 
 
-def covariance(fitted: FittedModel, whiten: Whiten) -> Floats:
+def covariance(fitted: FittedModel, whiten: Whitener) -> Floats:
     """Return the covariance of offsets and free parameters, from the whitened derivatives; (size, size)."""
-    columns = whiten(fitted.jacobian)
+    columns = whiten.spectra(fitted.jacobian)
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
     normal_matrix = (columns @ columns.T) / np.outer(scale, scale)
     return np.linalg.pinv(normal_matrix, rcond=1.0e-10) / np.outer(scale, scale)

@@ -28,7 +28,7 @@ from gateway.diagnosis.search.base_fit import refit
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.candidates import simulate_candidates, unexplained_residual
 from gateway.diagnosis.search.hints import search_hints
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, Whiten, refine
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.search.model_comparison import (
     Competitors,
     ModelComparison,
@@ -230,7 +230,7 @@ def _is_noticeable(refined: RefinedEffect, before: FittedModel) -> bool:
     )
 
 
-def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whiten) -> FittedModel:
+def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whitener) -> FittedModel:
     """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
     parameters = reset_parameters(base.parameters, usual.fitted.parameters, usual.form.parameters)
     return refine(bench, [FitProblem(parameters, joined_parameters(base, usual.form))], whiten, waves=_WAVES_WIDENED)[0]
