@@ -10,6 +10,8 @@ more), loops are compiled anew in each process.
 """
 
 import hashlib
+import importlib
+import sys
 from collections.abc import Callable
 from functools import cache, wraps
 from pathlib import Path
@@ -25,6 +27,7 @@ _Result = TypeVar("_Result")
 _steps: Final[list[Callable[..., Any]]] = []
 _loops: Final[list[Callable[..., Any]]] = []
 _unkept: Final[set[Callable[..., Any]]] = set()
+_LINEAR_ALGEBRA: Final = ("scipy.linalg", "scipy.linalg.cython_blas")
 PREPARING: Final = "preparing the simulation for this machine, once"
 """What is reported while loops are compiled, as which of all loops that there are."""
 
@@ -68,7 +71,7 @@ def _compiled(function: Callable[_Parameters, _Result], is_kept: bool) -> Callab
 @cache
 def _numba() -> tuple[Any, bool]:
     """Return numba, with all steps made known to it, and whether there is a folder for what it compiles."""
-    numba = import_library("numba")
+    numba = _import_numba()
     from numba.core import event
     from numba.extending import register_jitable
 
@@ -79,6 +82,20 @@ def _numba() -> tuple[Any, bool]:
         register_jitable(error_model="numpy")(function)
     _report_compilations(event)
     return numba, folder is not None
+
+
+def _import_numba() -> Any:
+    """Return numba without scipy's linear algebra, which it looks for at its import: no loop multiplies matrices, and half of
+    the time until the first loop runs would go there."""
+    blocked = not any(name in sys.modules for name in _LINEAR_ALGEBRA)
+    try:
+        sys.modules.update(dict.fromkeys(_LINEAR_ALGEBRA) if blocked else {})  # type: ignore[arg-type]  # None: not there
+        numba = import_library("numba")
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        for name in _LINEAR_ALGEBRA if blocked else ():
+            del sys.modules[name]
+    return numba
 
 
 def _report_compilations(event: Any) -> None:

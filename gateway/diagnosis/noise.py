@@ -7,7 +7,6 @@ on logarithmic bins. Bins are medians where they hold enough lines: a spectral l
 sqrt(S) in the frequency domain, row by row (rows count as evenly spaced), and leaves a variance of 1.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.search.bench import Bench, Channel
 from gateway.robust import noise_from_second_differences
+from gateway.side_by_side import side_by_side
 
 _LEAST_LEFT: Final = 0.15
 _BINS: Final = 64
@@ -43,6 +43,13 @@ class Noise:
         """Of the FFT: even."""
         return 2 * (self.weights.size - 1)
 
+    @property
+    def scale(self) -> Floats:
+        """What turns lines into coordinates with the same sums of products: all but the first and the last stand for two."""
+        scale = np.full(self.weights.size, np.sqrt(2.0 / self.length))
+        scale[[0, -1]] = np.sqrt(1.0 / self.length)
+        return scale
+
 
 @dataclass(frozen=True, slots=True)
 class Whitener:
@@ -59,12 +66,14 @@ class Whitener:
         """Whitened vectors (..., rows)."""
         whitened = np.empty_like(vectors)
         flat, found = vectors.reshape(-1, vectors.shape[-1]), whitened.reshape(-1, vectors.shape[-1])
-        for channel, noise in zip(self.channels, self.noises, strict=True):
-            for some in _some_at_once(flat.shape[0]):
+
+        def fill(some: slice) -> None:
+            for channel, noise in zip(self.channels, self.noises, strict=True):
+                rows = channel.rows.stop - channel.rows.start
                 lines = self._lines(flat[some, channel.rows], channel, noise)
-                found[some, channel.rows] = np.fft.irfft(lines, noise.length)[
-                    :, : channel.rows.stop - channel.rows.start
-                ]
+                found[some, channel.rows] = np.fft.irfft(lines, noise.length)[:, :rows]
+
+        side_by_side(fill, _some_at_once(flat.shape[0]))
         return whitened
 
     def spectra(self, vectors: Floats) -> Floats:
@@ -72,15 +81,16 @@ class Whitener:
         products of one with another, is the same, for half the work."""
         flat = vectors.reshape(-1, vectors.shape[-1])
         found = np.empty((flat.shape[0], sum(each.length + 2 for each in self.noises)))
-        at = 0
-        for channel, noise in zip(self.channels, self.noises, strict=True):
-            scale = np.full(noise.weights.size, np.sqrt(2.0 / noise.length))
-            scale[[0, -1]] = np.sqrt(1.0 / noise.length)
-            for some in _some_at_once(flat.shape[0]):
+
+        def fill(some: slice) -> None:
+            at = 0
+            for channel, noise in zip(self.channels, self.noises, strict=True):
                 lines = self._lines(flat[some, channel.rows], channel, noise)
-                lines *= scale
+                lines *= noise.scale
                 found[some, at : at + noise.length + 2] = lines.view(np.float64)
-            at += noise.length + 2
+                at += noise.length + 2
+
+        side_by_side(fill, _some_at_once(flat.shape[0]))
         return found.reshape(*vectors.shape[:-1], -1)
 
     def _lines(self, part: Floats, channel: Channel, noise: Noise) -> NDArray[np.complex128]:
@@ -105,9 +115,9 @@ class Whitener:
         return float(np.sqrt(sum(power * rows for power, rows in forces) / sum(rows for _, rows in forces)))
 
 
-def _some_at_once(vectors: int) -> Iterator[slice]:
+def _some_at_once(vectors: int) -> list[slice]:
     """Few vectors at a time: what is done to them one after another stays in the processor's cache."""
-    yield from (slice(first, first + _AT_ONCE) for first in range(0, vectors, _AT_ONCE))
+    return [slice(first, first + _AT_ONCE) for first in range(0, vectors, _AT_ONCE)]
 
 
 @cache

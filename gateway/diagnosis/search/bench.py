@@ -94,10 +94,11 @@ class Bench:
             ]
             response = replay.run(plants, [parameters.start(recording) for parameters in parameter_sets])
             for channel in self.channels:
-                if channel.recording == recording:
-                    result[:, channel.rows] = (
-                        response.reading_n if channel.is_force else response.pressure_pa * NOMINAL_AREA_M2
-                    )
+                if channel.recording == recording and channel.is_force:
+                    result[:, channel.rows] = response.reading_n
+                elif channel.recording == recording:
+                    result[:, channel.rows] = response.pressure_pa
+                    result[:, channel.rows] *= NOMINAL_AREA_M2
         if self.character_n_per_s is not None:
             result += np.outer([parameters.character_s for parameters in parameter_sets], self.character_n_per_s)
         return result

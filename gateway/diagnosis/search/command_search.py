@@ -36,7 +36,7 @@ _MOST_ANSWERS: Final = 3
 _LEAST_WHOLE_STEP: Final = 0.35  # a step that explains best when shrunk below this share of itself is not the step
 _FINE_POINTS: Final = ("presliding_m", "stribeck_n", "dwell_stiction_n", "viscous_n_s_per_m", "asymmetry_n_s_per_m")
 _BUNCH_SHARE_OF_LAG: Final = 0.25  # of the lag
-_MOST_NUMBERS_AT_ONCE: Final = 400_000  # numbers of one kind in memory; ten times as many are no faster
+_MOST_NUMBERS_AT_ONCE: Final = 1_000_000  # numbers of one kind in memory; three times as many are no faster
 
 
 def likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:

@@ -1,11 +1,14 @@
 """Results kept between calls: the least recently used go when there is no more room."""
 
 from collections import OrderedDict
-from collections.abc import Hashable
-from typing import Final
+from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
+from typing import Final, TypeVar
 
+from gateway.side_by_side import side_by_side
 from gateway.twin.replay.drive import Floats
 
+_Key = TypeVar("_Key", bound=Hashable)
 ROOM_BYTES: Final = 12_000_000
 """Per stage: 125 series of a minute at 200 Hz, more than a wave shares; four times as much is no faster."""
 
@@ -20,8 +23,17 @@ class Cache:
     def get(self, key: Hashable) -> Floats | None:
         found = self._kept.get(key)
         if found is not None:
-            self._kept.move_to_end(key)
+            with suppress(KeyError):  # another thread has made room since
+                self._kept.move_to_end(key)
         return found
+
+    def get_all(self, keys: Sequence[_Key], make: Callable[[_Key], Floats]) -> list[Floats]:
+        """Return the series of different keys; those that are not kept are made, side by side."""
+        found = {key: self.get(key) for key in keys}
+        missing = [key for key, series in found.items() if series is None]
+        for key, series in zip(missing, side_by_side(make, missing), strict=True):
+            found[key] = self.put(key, series)
+        return [series for series in found.values() if series is not None]
 
     def put(self, key: Hashable, series: Floats) -> Floats:
         """Keep a series, which nobody may write to any more."""

@@ -35,7 +35,7 @@ class Pressures:
             return [self._measured()], np.zeros(len(regulators), dtype=np.intp)
         places: dict[Regulator, int] = {}
         which = np.array([places.setdefault(regulator, len(places)) for regulator in regulators], dtype=np.intp)
-        return [self._pressure(regulator) for regulator in places], which
+        return self._pressures.get_all(list(places), self._followed), which
 
     def _measured(self) -> Floats:
         pressure = self._pressures.get("measured")
@@ -44,10 +44,6 @@ class Pressures:
         assert self._drive.pressure_pa is not None
         column = np.array(self._drive.pressure_pa, dtype=float)
         return self._pressures.put("measured", self._grid.from_rows(column))
-
-    def _pressure(self, regulator: Regulator) -> Floats:
-        pressure = self._pressures.get(regulator)
-        return self._pressures.put(regulator, self._followed(regulator)) if pressure is None else pressure
 
     def _followed(self, regulator: Regulator) -> Floats:
         """What lags and delay make of the target, then ceiling, leak and hunting."""

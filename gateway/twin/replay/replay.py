@@ -28,11 +28,14 @@ __all__ = ["Drive", "Replay", "ReplayResult"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReplayResult:
-    """What each plant gives at the rows' times, shape (plants, rows). force_n: true contact force; reading_n: recorded."""
+    """What each plant gives at the rows' times, shape (plants, rows). force_n: true contact force; reading_n: recorded.
+
+    pressure_pa: one series (rows,) for each plant; plants with equal regulators share theirs.
+    """
 
     reading_n: Floats
     force_n: Floats
-    pressure_pa: Floats
+    pressure_pa: Sequence[Floats]
 
 
 @dataclass(slots=True, eq=False)
@@ -79,5 +82,4 @@ class Replay:
             contact_n = self._forces.on_grid(plant.contact, slide_n)
             self._forces.at_rows(plant.contact, contact_n, force[lane])
             self._readings.fill(plant, contact_n, force[lane], reading[lane])
-        at_rows = np.stack([self.grid.at_rows(pressure) for pressure in pressures])
-        return ReplayResult(reading, force, at_rows[which])
+        return ReplayResult(reading, force, [self.grid.at_rows(pressures[place]) for place in which])

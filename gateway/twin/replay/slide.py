@@ -42,13 +42,16 @@ class Slides:
         starts: Sequence[Strains | None],
     ) -> list[Floats]:
         """Return one force per plant; equal ones are the same array."""
-        given = zip(plants, which, starts, strict=True)
-        return [self._force_n(plant, pressures[place], start) for plant, place, start in given]
+        keys = [(self._key(plant), start) for plant, start in zip(plants, starts, strict=True)]
+        first = {key: place for place, key in reversed(list(enumerate(keys)))}
 
-    def _force_n(self, plant: Plant, pressure_pa: Floats, start: Strains | None) -> Floats:
-        key = (self._key(plant), start)
-        force = self._forces.get(key)
-        return self._forces.put(key, self._moved(plant, self._settled(pressure_pa), start)) if force is None else force
+        def move(key: tuple[Hashable, Strains | None]) -> Floats:
+            place = first[key]
+            return self._moved(plants[place], self._settled(pressures[which[place]]), starts[place])
+
+        different = list(dict.fromkeys(keys))
+        forces = dict(zip(different, self._forces.get_all(different, move), strict=True))
+        return [forces[key] for key in keys]
 
     def _settled(self, pressure_pa: Floats) -> Floats:
         """The pressure, until it is sure that of the moment from which it is."""
