@@ -174,8 +174,10 @@ def coloured_whitener(bench: Bench, remainder_n: Floats, basis: Floats, weights:
     noises = []
     for channel in bench.channels:
         part, usable = remainder_n[channel.rows] * weights[channel.rows], bench.usable[channel.rows]
-        lines = fast_length(part.size)
-        taken = sum(np.abs(np.fft.rfft(column[channel.rows], lines)) ** 2 for column in basis) / part.size
+        length = fast_length(part.size)
+        taken = np.zeros(length // 2 + 1)
+        for column in basis:  # one at a time: there are hundreds
+            taken += np.abs(np.fft.rfft(column[channel.rows], length)) ** 2 / part.size
         noises.append(_fit_spectrum(part, np.clip(1.0 - taken, _LEAST_LEFT, 1.0) * max(float(np.mean(usable)), 0.05)))
     return Whitener(bench.channels, tuple(noises), weights)
 
