@@ -102,7 +102,9 @@ def error_blocks(run: CommandedForce) -> tuple[ErrorBlock, ...]:
     """Return the blocks of a run in the order of time."""
     run = replace(run, wanted_n=np.where(run.counts, run.wanted_n, 0.0))  # where nothing is asked, 0 N is
     settled, from_n = _since_change(run)
-    counts = run.counts & np.isfinite(run.measured_n) & np.isfinite(run.wanted_n) & (run.wanted_n > _SAME_N)
+    began = np.maximum.accumulate(np.abs(run.wanted_n - run.wanted_n[:1]) > _SAME_N)
+    is_known = began | (run.time_s - run.time_s[:1] >= SETTLED_S)  # a run may begin on the way to its first force
+    counts = run.counts & is_known & np.isfinite(run.measured_n) & np.isfinite(run.wanted_n) & (run.wanted_n > _SAME_N)
     squares_n2 = (run.measured_n - run.wanted_n) ** 2
     blocks = []
     for first, stop in _stretches(run, counts, settled):

@@ -34,7 +34,7 @@ def test_a_gain_is_told_with_its_interval(tmp_path):
     before, after = table(tmp_path / "a.csv", 0.8, 1), table(tmp_path / "b.csv", 0.3, 2)
     told = diagnose("--before", before, "--after", after, "--json", tmp_path / "out.json")
     assert told.exit_code == 0, told.output
-    assert "better: 0.49 N gained, 95 % interval 0.49 .. 0.5" in told.output
+    assert "better: 0.49 N gained, 95 % interval 0.48 .. 0.50 N" in told.output
     assert "compared where the same was asked of both: 100% and 100% of their rows" in told.output
     document = json.loads((tmp_path / "out.json").read_text())
     assert (document["format"], document["verdict"]) == (1, "better")
