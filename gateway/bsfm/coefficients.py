@@ -1,8 +1,8 @@
 """A model's numbers before anybody trusts them, and what a fault in one of them is called.
 
 A fault's index counts the numbers of the upload: 32 per branch (rising, falling), 16 handles then 16 weights each, so
-that it is branch * 32 + (16 if weight) + i; then 16 radii and 16 shares of slip stops; then dead time, lag and second lag
-of the response. A fault of a whole branch, or of all stops, has the index of its first number; one of the whole set -1.
+that it is branch * 32 + (16 if weight) + i; then 16 radii and 16 shares of slip stops; then dead time, lag, second lag and
+damping of the response. A fault of a whole branch, or of all stops, has the index of its first number; one of the whole set -1.
 """
 
 import struct
@@ -72,6 +72,7 @@ class CoefficientLimits:
     slip_radius_max_v: float = 100.0
     dead_time_max_s: float = 1.0
     lag_max_s: float = 2.0
+    damping_max: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +167,7 @@ def _round_response(response: Response) -> Response:
         dead_time_s=float32(response.dead_time_s),
         lag_s=float32(response.lag_s),
         second_lag_s=float32(response.second_lag_s),
+        damping=float32(response.damping),
     )
 
 

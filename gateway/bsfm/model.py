@@ -104,12 +104,15 @@ class Bsfm:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
     """How the plant follows a voltage, as a calibration measured it: dead time, then two first-order lags in series, in
-    seconds; second_lag_s 0 where one lag explains it. source: from which data, with what spread."""
+    seconds; second_lag_s 0 where one lag explains it. damping: below 1 where the plant rings, of a pair of complex poles whose
+    mean delay is the sum of both lags (gateway.bsfm.response.second_order); 0 where it does not. source: from which data, with
+    what spread."""
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles
     dead_time_s: float
     lag_s: float
     second_lag_s: float = 0.0
+    damping: float = 0.0
     source: str = ""
 
 

@@ -5,6 +5,7 @@ add up to 1, or they are so stiff that the voltage after a reversal is not uniqu
 """
 
 from collections.abc import Iterator
+from typing import Final
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.coefficients import (
@@ -20,6 +21,8 @@ from gateway.bsfm.coefficients import (
 )
 from gateway.bsfm.model import Response
 from gateway.bsfm.slip.slip_stops import STOPS_MAX, SUM_TOLERANCE, SlipStops
+
+RINGS_LEAST: Final = 0.1  # damping: no regulator that anybody would buy rings more
 
 
 def stop_faults(stored: Coefficients, limits: CoefficientLimits) -> Iterator[CoefficientFault]:
@@ -69,13 +72,17 @@ def response_faults(response: Response | None, limits: CoefficientLimits) -> Ite
     if response is None:
         return
     bounds = (
-        ("dead time", response.dead_time_s, limits.dead_time_max_s),
-        ("lag", response.lag_s, limits.lag_max_s),
-        ("second lag", response.second_lag_s, limits.lag_max_s),
+        ("dead time", response.dead_time_s, limits.dead_time_max_s, "s"),
+        ("lag", response.lag_s, limits.lag_max_s, "s"),
+        ("second lag", response.second_lag_s, limits.lag_max_s, "s"),
+        ("damping", response.damping, limits.damping_max, ""),
     )
-    for i, (name, number_s, high_s) in enumerate(bounds):
-        allowed = Allowed(name, 0.0, high_s, "s", CoefficientReason.RESPONSE)
-        yield from allowed.faults(RESPONSE_FROM + i, number_s)
-    if not any(number_s for _, number_s, _ in bounds):
+    for i, (name, number, high, unit) in enumerate(bounds):
+        allowed = Allowed(name, 0.0, high, unit, CoefficientReason.RESPONSE)
+        yield from allowed.faults(RESPONSE_FROM + i, number)
+    if 0.0 < response.damping < RINGS_LEAST or (0.0 < response.damping <= 1.0 and not response.second_lag_s > 0.0):
+        text = f"damping {response.damping:g}: 0 for real lags, or {RINGS_LEAST:g} and more with two lags"
+        yield CoefficientFault(RESPONSE_FROM + 3, CoefficientReason.RESPONSE, text)
+    if not any(number for _, number, _, _ in bounds):
         text = "dead time and both lags are 0: no plant is that fast; leave the response out where it was not measured"
         yield CoefficientFault(RESPONSE_FROM, CoefficientReason.RESPONSE, text)

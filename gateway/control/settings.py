@@ -8,6 +8,7 @@ from typing import Annotated
 from annotated_types import Ge, Gt, Le
 
 from gateway import defaults
+from gateway.bsfm.response.second_order import SecondOrder
 from gateway.defaults import STRICT
 
 
@@ -74,8 +75,7 @@ class LoopTiming:
     correction by N of error; zone_n: errors within it are stiction's and noise's."""
 
     dead_time_s: float
-    lag_s: float
-    second_lag_s: float
+    lags: SecondOrder
     landing_s: float  # how much later than dead time the force arrives with the lags inverted
     integral_per_s: float
 

@@ -140,11 +140,14 @@ CHECKS = [
     (slipping(slip_shares=(0.25, 0.5, 0.2501)), 80, CoefficientReason.SLIP_SHARE),
     (slipping(slip_shares=(swapped(0.25), 0.5, 0.25)), 80, CoefficientReason.WORDS_SWAPPED),
     (slipping(slip_radii_v=(0.001, 0.5, 1.0)), 64, CoefficientReason.SLIP_STIFFNESS),
-    (slipping(response_s=(1.5, 0.1, 0.0)), 96, CoefficientReason.RESPONSE),
-    (slipping(response_s=(0.0, -0.1, 0.0)), 97, CoefficientReason.RESPONSE),
-    (slipping(response_s=(0.0, 0.1, 2.5)), 98, CoefficientReason.RESPONSE),
-    (slipping(response_s=(float("nan"), 0.1, 0.0)), 96, CoefficientReason.NOT_FINITE),
-    (slipping(response_s=(swapped(0.08), 0.1, 0.0)), 96, CoefficientReason.WORDS_SWAPPED),
+    (slipping(response_s=(1.5, 0.1, 0.0, 0.0)), 96, CoefficientReason.RESPONSE),
+    (slipping(response_s=(0.0, -0.1, 0.0, 0.0)), 97, CoefficientReason.RESPONSE),
+    (slipping(response_s=(0.0, 0.1, 2.5, 0.0)), 98, CoefficientReason.RESPONSE),
+    (slipping(response_s=(0.0, 0.1, 0.1, 1.5)), 99, CoefficientReason.RESPONSE),
+    (slipping(response_s=(0.0, 0.1, 0.1, 0.01)), 99, CoefficientReason.RESPONSE),
+    (slipping(response_s=(0.0, 0.1, 0.0, 0.5)), 99, CoefficientReason.RESPONSE),
+    (slipping(response_s=(float("nan"), 0.1, 0.0, 0.0)), 96, CoefficientReason.NOT_FINITE),
+    (slipping(response_s=(swapped(0.08), 0.1, 0.0, 0.0)), 96, CoefficientReason.WORDS_SWAPPED),
 ]
 
 

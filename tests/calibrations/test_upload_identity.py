@@ -21,7 +21,7 @@ from tests.calibrations.upload_bench import COMMIT, DRY_RUN, OWN, PEER, Bench
 
 COMMITTED = (CommitStatus.COMMITTED, 0, 0)
 DEMO = load_calibration("demo")
-RESPONSE = Response(dead_time_s=0.0803, lag_s=0.0721, second_lag_s=0.031, source="from 12 steps")
+RESPONSE = Response(dead_time_s=0.0803, lag_s=0.0721, second_lag_s=0.031, damping=0.62, source="from 12 steps")
 
 
 def stops(count: int) -> dict[str, tuple[float, ...]]:
@@ -170,8 +170,10 @@ def calibrations(draw: st.DrawFn) -> Calibration:
     if draw(st.booleans()):
         given = replace(given, force_limits_n=(third, 30.0 * third))
     if draw(st.booleans()):
-        seconds = draw(st.tuples(st.floats(0.0, 1.0), st.floats(0.001, 2.0), st.floats(0.0, 2.0)))
-        given = replace(given, response=Response(dead_time_s=seconds[0], lag_s=seconds[1], second_lag_s=seconds[2]))
+        late_s, lag_s, second_s = draw(st.tuples(st.floats(0.0, 1.0), st.floats(0.001, 2.0), st.floats(0.0, 2.0)))
+        damping = draw(st.sampled_from([0.0, 0.0, 0.35, 0.6]))
+        response = Response(dead_time_s=late_s, lag_s=lag_s, second_lag_s=second_s, damping=damping)
+        given = replace(given, response=response)
     return given
 
 
@@ -209,8 +211,9 @@ def test_the_model_hash_covers_all_that_changes_a_voltage():
     changed |= {
         model_hash(replace(DEMO, response=slower)),
         model_hash(replace(DEMO, response=replace(slower, dead_time_s=0.0))),
+        model_hash(replace(DEMO, response=replace(slower, damping=0.0))),
     }
-    assert len(changed) == len(CHANGES) + 3
+    assert len(changed) == len(CHANGES) + 4
     assert model_hash(replace(DEMO, name="x", number=7, source="y", rms_n=1.0)) == model_hash(DEMO)
 
 

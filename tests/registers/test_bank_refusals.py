@@ -212,7 +212,7 @@ def test_every_refusal_is_told_with_its_peer(bank, master):
 
 def test_reserved_words_accept_zero(bank, master):
     before = bank.command
-    for address in (14, 226, 227, 264, 401, 1646, 1659):
+    for address in (14, 226, 227, 264, 401, 1646, 1651):
         master.write(address, 0)
     master.write(13, 0, 0, 0)
     assert bank.command.force_setpoint_n == before.force_setpoint_n

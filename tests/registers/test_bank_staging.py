@@ -64,7 +64,7 @@ def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
         stops=3,
         slip_radii_v=(0.25, 0.5, 1.5),
         slip_shares=(0.5, 0.375, 0.125),
-        response_s=(0.0625, 0.125, 0.25),
+        response_s=(0.0625, 0.125, 0.25, 0.5),
     )
     words = given.to_words()
     bank.write_registers(1000, words[:200], master.peer)
@@ -79,7 +79,7 @@ def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
         "falling_b_2": 32.0,
     }
     expected |= {"falling_w_0": 40.0, "force_low": 1.0, "force_high": 59.0, "blend_span": 3.0}
-    expected |= {"slip_stops": 3, "dead_time": 0.0625, "lag": 0.125, "second_lag": 0.25}
+    expected |= {"slip_stops": 3, "dead_time": 0.0625, "lag": 0.125, "second_lag": 0.25, "damping": 0.5}
     expected |= {
         "slip_radius_0": 0.25,
         "slip_radius_2": 1.5,
@@ -101,7 +101,6 @@ def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
         ((1001, 1), RefusalReason.RESERVED),
         ((1140, 140, 1), RefusalReason.RESERVED),
         ((1151, 5), RefusalReason.RESERVED),
-        ((1157, 0, 5), RefusalReason.RESERVED),
         ((1146, 3), RefusalReason.READ_ONLY),
         ((1145, 1), RefusalReason.COEFFICIENTS),
         ((1145, 9), RefusalReason.OUT_OF_RANGE),

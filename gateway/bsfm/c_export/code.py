@@ -129,11 +129,10 @@ def _reversal(calibration: Calibration, tables: Tables, names: dict[str, str]) -
     policy = "slip" if tables.radii_v else "blend"
     own = _slip(tables) if tables.radii_v else _BLEND
     response = calibration.response
-    lags = (
-        f"dead time {response.dead_time_s:g} s, lags {response.lag_s:g} and {response.second_lag_s:g} s"
-        if response
-        else ""
-    )
+    lags = ""
+    if response:
+        rings = f", damping {response.damping:g}" if response.damping else ""
+        lags = f"dead time {response.dead_time_s:g} s, lags {response.lag_s:g} and {response.second_lag_s:g} s{rings}"
     response_note = {"response_told": f" *   response     {lags}: not in this code\n" if lags else ""}
     filled = {
         name: Template(_template(f"reversal_{policy}{end}")).substitute({**names, **own}).rstrip("\n") + last

@@ -1,70 +1,103 @@
-"""Dead time and one or two lags that predict step responses best, and how sure they are.
+"""Dead time and one or two lags, or a pair of complex poles, that predict step responses best, and how sure they are.
 
-Two lags are taken where they predict the steps that were held out better than one. The interval is that of the estimate
+Two lags are taken where they predict the steps that were held out better than one, a pair where it does so better than both.
+The interval is that of the estimate
 over whole steps (a sandwich estimator, White 1980), because errors within a step are not independent.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from gateway.bsfm.response.step_responses import SHORTEST_LAG_S, Floats, Lags, StepResponse, tail_rows
 
-RATIOS: Final = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0)  # second lag over first
+
+class Shape(NamedTuple):
+    """What is held while dead time and the sum of the lags are fitted. ratio: second lag over first; damping: of a pair of
+    complex poles, 0 for real lags."""
+
+    ratio: float
+    damping: float = 0.0
+
+
+Shapes = tuple[Shape, ...]
+ONE_LAG: Final[Shapes] = (Shape(0.0),)
+TWO_LAGS: Final[Shapes] = tuple(Shape(ratio) for ratio in (0.1, 0.2, 0.35, 0.5, 0.7, 1.0))
+RINGING: Final[Shapes] = tuple(Shape(1.0, damping) for damping in (0.3, 0.5, 0.7, 0.85))
+STARTS: Final = (0.15, 0.45, 0.75)  # dead time as a share of the whole, from which the fit starts besides its guess
 HUBER: Final = 1.5  # of the noise, beyond which an error counts linearly
 ROUNDS: Final = 12
 BETTER: Final = 0.985  # held-out error of two lags over one, from which the second is believed
+NEARLY_EQUAL: Final = 0.8  # ratio of two lags, from which the poles may be complex
+MUCH_BETTER: Final = 0.9  # the same of a pair over lags: friction at a turn looks a little like ringing
 LEAST_SCALE_N: Final = 0.05  # what any model is off on the way
 
 
 @dataclass(frozen=True, slots=True)
 class LagFit:
-    """Dead time, sum of both lags in s, and the second over the first; loss: Huber's; rms_n: of the residuals."""
+    """Dead time, sum of both lags in s, and their shape; loss: Huber's; rms_n: of the residuals."""
 
     dead_time_s: float
     lags_s: float
-    ratio: float
+    shape: Shape
     loss: float
     rms_n: float
 
     @property
     def lags(self) -> Lags:
         """Dead time and both lags."""
-        return _split_lags(self.dead_time_s, self.lags_s, self.ratio)
+        return _split_lags(self.dead_time_s, self.lags_s, self.shape)
 
 
-def fit_lags(steps: Sequence[StepResponse], ratios: Sequence[float]) -> LagFit:
-    """Return the best of these ratios, refined between its neighbours."""
-    scale_n, guess, fits = _scale_n(steps), _guess(steps), []
-    for ratio in ratios:
-        fits.append(_fit_at_ratio(steps, ratio, scale_n, guess))
+def fit_lags(steps: Sequence[StepResponse], shapes: Shapes) -> LagFit:
+    """Return the best of these shapes, refined between its neighbours."""
+    scale_n, fits = _scale_n(steps), []
+    guess = _best_start(steps, shapes[-1], scale_n)
+    for shape in reversed(shapes):
+        fits.append(_fit_at_shape(steps, shape, scale_n, guess))
         guess = (fits[-1].dead_time_s, fits[-1].lags_s)
     best = min(fits, key=lambda fit: fit.loss)
-    if len(ratios) > 1:
-        best = _refine(steps, ratios, best, scale_n)
+    if len(shapes) > 1:
+        best = _refine(steps, shapes, best, scale_n)
     return best
 
 
-def choose_ratios(steps: Sequence[StepResponse]) -> tuple[float, ...]:
-    """Return the ratios to fit: those of two lags where they predict steps better that neither has seen, else of one."""
-    scale_n, single, double = _scale_n(steps), 0.0, 0.0
-    for fold in range(2):
-        training, held_out = steps[fold::2], steps[1 - fold :: 2]
-        for ratios in (RATIOS[:1], RATIOS[1:]):
-            fit = fit_lags(training, ratios)
-            loss = _loss(np.concatenate(_residuals(held_out, fit.lags)), scale_n)
-            single, double = (single + loss, double) if ratios == RATIOS[:1] else (single, double + loss)
-    return RATIOS[1:] if double < BETTER * single else RATIOS[:1]
+def choose_shapes(steps: Sequence[StepResponse]) -> Shapes:
+    """Return the shapes to fit: those that predict steps best that the fit has not seen. The simpler ones first: two lags
+    have to be better than one, and a pair of complex poles, asked for where the best lags are equal, much better than both."""
+    one, two = (_held_out(steps, shapes) for shapes in (ONE_LAG, TWO_LAGS))
+    if two.loss >= BETTER * one.loss:
+        return ONE_LAG
+    if two.are_equal and _held_out(steps, RINGING).loss < MUCH_BETTER * two.loss:
+        return RINGING
+    return TWO_LAGS
+
+
+class _HeldOut(NamedTuple):
+    """Huber's loss of each half of the steps by the fit of the other; whether both fits took equal lags."""
+
+    loss: float
+    are_equal: bool
+
+
+def _held_out(steps: Sequence[StepResponse], shapes: Shapes) -> _HeldOut:
+    halves = steps[::2], steps[1::2]
+    fits = [fit_lags(half, shapes) for half in halves]
+    scale_n = _scale_n(steps)
+    loss = sum(
+        _loss(np.concatenate(_residuals(half, fit.lags)), scale_n) for half, fit in zip(halves, fits[::-1], strict=True)
+    )
+    return _HeldOut(loss, all(fit.shape.ratio > NEARLY_EQUAL for fit in fits))
 
 
 def interval(fit: LagFit, steps: Sequence[StepResponse]) -> tuple[Floats, Floats]:
-    """Return both ends of the 95 % interval of (dead time, sum of lags), s, the ratio held."""
+    """Return both ends of the 95 % interval of (dead time, sum of lags), s, the shape held."""
     place = np.array([fit.dead_time_s, fit.lags_s])
     normal, spread = np.zeros((2, 2)), np.zeros((2, 2))
     for step in steps:
-        residual = _residual_at((step,), fit.ratio)
+        residual = _residual_at((step,), fit.shape)
         error_n = residual(place)
         slopes = _slopes(residual, place, error_n)
         score = slopes.T @ error_n
@@ -75,18 +108,18 @@ def interval(fit: LagFit, steps: Sequence[StepResponse]) -> tuple[Floats, Floats
     return place - half, place + half
 
 
-def _split_lags(dead_time_s: float, lags_s: float, ratio: float) -> Lags:
-    lag_s = lags_s / (1.0 + ratio)
-    return Lags(dead_time_s, lag_s, lags_s - lag_s)
+def _split_lags(dead_time_s: float, lags_s: float, shape: Shape) -> Lags:
+    lag_s = lags_s / (1.0 + shape.ratio)
+    return Lags(dead_time_s, lag_s, lags_s - lag_s, shape.damping)
 
 
 def _residuals(steps: Sequence[StepResponse], lags: Lags) -> list[Floats]:
     return [step.force_n - step.expected_n(lags) for step in steps]
 
 
-def _residual_at(steps: Sequence[StepResponse], ratio: float) -> Callable[[Floats], Floats]:
+def _residual_at(steps: Sequence[StepResponse], shape: Shape) -> Callable[[Floats], Floats]:
     """The residuals as a function of (dead time, sum of lags)."""
-    return lambda place: np.concatenate(_residuals(steps, _split_lags(float(place[0]), float(place[1]), ratio)))
+    return lambda place: np.concatenate(_residuals(steps, _split_lags(float(place[0]), float(place[1]), shape)))
 
 
 def _loss(residual_n: Floats, scale_n: float) -> float:
@@ -94,18 +127,27 @@ def _loss(residual_n: Floats, scale_n: float) -> float:
     return float(np.sum(np.where(size < HUBER, 0.5 * size**2, HUBER * (size - 0.5 * HUBER))))
 
 
-def _refine(steps: Sequence[StepResponse], ratios: Sequence[float], best: LagFit, scale_n: float) -> LagFit:
-    at = list(ratios).index(best.ratio)
-    near = (ratios[max(0, at - 1)], ratios[min(len(ratios) - 1, at + 1)])
-    for ratio in (0.5 * (near[0] + best.ratio), 0.5 * (near[1] + best.ratio)):
-        trial = _fit_at_ratio(steps, ratio, scale_n, (best.dead_time_s, best.lags_s))
+def _refine(steps: Sequence[StepResponse], shapes: Shapes, best: LagFit, scale_n: float) -> LagFit:
+    at = shapes.index(best.shape)
+    for near in (shapes[max(0, at - 1)], shapes[min(len(shapes) - 1, at + 1)]):
+        between = Shape(0.5 * (near.ratio + best.shape.ratio), 0.5 * (near.damping + best.shape.damping))
+        trial = _fit_at_shape(steps, between, scale_n, (best.dead_time_s, best.lags_s))
         best = trial if trial.loss < best.loss else best
     return best
 
 
-def _fit_at_ratio(steps: Sequence[StepResponse], ratio: float, scale_n: float, guess: tuple[float, float]) -> LagFit:
-    """Dead time and sum of lags at this ratio, by damped Gauss-Newton with Huber weights."""
-    place, damping, residual = np.array(guess), 1.0e-3, _residual_at(steps, ratio)
+def _best_start(steps: Sequence[StepResponse], shape: Shape, scale_n: float) -> tuple[float, float]:
+    """Where the fit starts: the best of a guess and of other ways to share the same whole between dead time and lags. With few
+    readings on the way the guess may lie at a wrong minimum."""
+    guess = _guess(steps)
+    whole_s, residual = sum(guess), _residual_at(steps, shape)
+    starts = [guess, *((share * whole_s, (1.0 - share) * whole_s) for share in STARTS)]
+    return min(starts, key=lambda start: _loss(residual(np.array(start)), scale_n))
+
+
+def _fit_at_shape(steps: Sequence[StepResponse], shape: Shape, scale_n: float, guess: tuple[float, float]) -> LagFit:
+    """Dead time and sum of lags at this shape, by damped Gauss-Newton with Huber weights."""
+    place, damping, residual = np.array(guess), 1.0e-3, _residual_at(steps, shape)
     error_n = residual(place)
     loss = _loss(error_n, scale_n)
     for _ in range(ROUNDS):
@@ -125,7 +167,7 @@ def _fit_at_ratio(steps: Sequence[StepResponse], ratio: float, scale_n: float, g
                 break
         else:
             damping = 10.0 * max(damping, 1.0e-3)
-    return LagFit(float(place[0]), float(place[1]), ratio, loss, float(np.sqrt(np.mean(error_n**2))))
+    return LagFit(float(place[0]), float(place[1]), shape, loss, float(np.sqrt(np.mean(error_n**2))))
 
 
 def _slopes(residual: Callable[[Floats], Floats], place: Floats, error_n: Floats) -> Floats:

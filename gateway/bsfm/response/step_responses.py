@@ -4,6 +4,9 @@ Of each step the model gives the way from the settled force before to the settle
 neither a bent characteristic nor friction after a reversal passes for a lag); both ends are the measured ones, so an error
 of the model's level does not matter. The voltages are linearized (gateway.bsfm.drive_map), because a regulator's lags carry
 what its command map has bent.
+
+A regulator whose poles are complex passes the end and comes back, and friction keeps a part of that: the force is the model's
+way on to the peak, and its way back from there, and what is settled is what has stayed.
 """
 
 from dataclasses import dataclass, replace
@@ -16,6 +19,7 @@ from numpy.typing import NDArray
 from gateway.bsfm.drive_map import DriveMap
 from gateway.bsfm.ladder.settled_points import SAME_V, TAIL_SHARE
 from gateway.bsfm.model import Bsfm
+from gateway.bsfm.response.second_order import SecondOrder
 from gateway.bsfm.slip.reversal import Memory
 from gateway.defaults import TICK_S
 
@@ -29,6 +33,7 @@ LONGEST_S: Final = 2.0  # a lag or dead time beyond it is no response but drift
 SHORTEST_LAG_S: Final = 1.0e-3
 MOST_MISSING: Final = 0.2  # of a step at its end, that is believed to come still
 SHORTEST_HOLD_S: Final = 0.1  # a command held for less is a part of a slew
+BACK_N: Final = (0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 6.0)  # of the way back from a peak, where the model is asked
 MOST_CHANGES: Final = 40  # of the command that are remembered from step to step
 
 
@@ -47,11 +52,12 @@ class RecordedRun:
 
 @dataclass(frozen=True, slots=True)
 class Lags:
-    """Dead time and one or two lags in series, s."""
+    """Dead time and one or two lags in series, s; with a damping they are a pair of complex poles (SecondOrder)."""
 
     dead_time_s: float
     lag_s: float
     second_lag_s: float = 0.0
+    damping: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +65,8 @@ class StepResponse:
     """One step of the command, and what came back.
 
     changes: (seconds, volts by which the command went) of this step and of those before it whose effect may last; path_v,
-    path_n: what the model makes of each voltage on the way.
+    path_n: what the model makes of each voltage on the way; back_v, back_n: by how much the force goes back, N, where the
+    voltage goes back from the step's end, V.
     """
 
     time_s: Floats
@@ -68,19 +75,46 @@ class StepResponse:
     end_v: float
     path_v: Floats
     path_n: Floats
+    back_v: Floats
+    back_n: Floats
+
+    @property
+    def way(self) -> float:
+        """1 up, -1 down."""
+        return 1.0 if self.changes[-1][1] > 0.0 else -1.0
 
     def expected_n(self, lags: Lags) -> Floats:
         """Return the force by the model, N, at the times of the readings."""
-        arrived_v = np.full_like(self.time_s, self.end_v)
-        for at_s, moved_v in self.changes:
-            since_s = self.time_s - at_s - lags.dead_time_s
-            arrived_v -= moved_v * missing_share(since_s, lags.lag_s, lags.second_lag_s)
-        return np.interp(arrived_v, self.path_v, self.path_n)
+        changes = np.array(self.changes)
+        since_s = self.time_s[:, None] - (changes[:, 0] + lags.dead_time_s)
+        arrived_v = self.end_v - missing_share(since_s, lags.lag_s, lags.second_lag_s, lags.damping) @ changes[:, 1]
+        on_way_n = np.interp(arrived_v, self.path_v, self.path_n)
+        return self._with_overshoot(arrived_v, on_way_n) if lags.damping else on_way_n
+
+    def _with_overshoot(self, arrived_v: Floats, on_way_n: Floats) -> Floats:
+        """The way beyond the end and back. What friction keeps of it is in the settled force, so the way itself is shorter."""
+        beyond_v = self.way * (arrived_v - self.end_v)
+        peak_v = np.maximum.accumulate(np.maximum(beyond_v, 0.0))
+        start_n, end_n = (self.path_n[0], self.path_n[-1]) if self.way > 0.0 else (self.path_n[-1], self.path_n[0])
+        last = slice(-2, None) if self.way > 0.0 else slice(0, 2)
+        slope = float(np.ptp(self.path_n[last]) / max(np.ptp(self.path_v[last]), SAME_V))
+        lost_n = np.interp(np.where(peak_v > 0.0, peak_v - beyond_v, 0.0), self.back_v, self.back_n)
+        kept_n = slope * peak_v[-1] - float(np.interp(peak_v[-1], self.back_v, self.back_n))
+        share = (np.where(peak_v > 0.0, end_n, on_way_n) - start_n) / (end_n - start_n)
+        expected_n = start_n + share * (end_n - self.way * kept_n - start_n) + self.way * (slope * peak_v - lost_n)
+        return np.asarray(expected_n, dtype=np.float64)
 
 
-def missing_share(since_s: Floats, lag_s: float, second_lag_s: float) -> Floats:
-    """Return the share of a step that has not arrived yet behind two lags in series; 1 before it begins."""
+def missing_share(since_s: Floats, lag_s: float, second_lag_s: float, damping: float = 0.0) -> Floats:
+    """Return the share of a step that has not arrived yet behind two lags in series, or behind a pair of complex poles; 1
+    before it begins."""
     since_s = np.maximum(since_s, 0.0)
+    if damping:
+        pair = SecondOrder(lag_s, second_lag_s, damping)
+        decay_per_s = 0.5 * pair.delay_s / pair.bend_s2
+        swing_per_s = np.sqrt(1.0 - damping**2) / pair.natural_s
+        swing = np.cos(swing_per_s * since_s) + decay_per_s / swing_per_s * np.sin(swing_per_s * since_s)
+        return np.asarray(np.exp(-decay_per_s * since_s) * swing)
     if second_lag_s < SHORTEST_LAG_S:
         return np.exp(-since_s / lag_s)
     if abs(lag_s - second_lag_s) < 1.0e-4 * lag_s:
@@ -156,7 +190,9 @@ def _correct_ends(settled_n: list[float], plateaus: list[_Plateau], time_s: Floa
         now = plateaus[k]
         since_s = time_s[now.first + 1 : now.end + 1] - time_s[now.first] - lags.dead_time_s
         tail_s = since_s[-tail_rows(len(since_s)) :]
-        share = float(np.mean(missing_share(tail_s, lags.lag_s, lags.second_lag_s))) if len(tail_s) else 0.0
+        share = (
+            float(np.mean(missing_share(tail_s, lags.lag_s, lags.second_lag_s, lags.damping))) if len(tail_s) else 0.0
+        )
         ends_n.append(ends_n[-1] + (settled_n[k] - ends_n[-1]) / (1.0 - min(share, MOST_MISSING)))
     return ends_n
 
@@ -180,9 +216,9 @@ def _changes(at_s: float, from_v: float, to_v: float, slew_v_per_s: float) -> tu
 
 def _way(
     model: Bsfm, memory: Memory, volts: tuple[float, float], forces_n: tuple[float, float]
-) -> tuple[Floats, Floats] | None:
-    """(V, N) on the way by the model, stretched so that it goes through both settled readings, by rising voltage; None where
-    the model sees no way."""
+) -> tuple[Floats, Floats, Floats, Floats] | None:
+    """(V, N) on the way by the model, stretched so that it goes through both settled readings, by rising voltage; then the
+    same on the way back from the end. None where the model sees no way."""
     (from_v, to_v), (from_n, to_n) = volts, forces_n
     if abs(to_n - from_n) < LEAST_STEP_N or (to_n - from_n) * (to_v - from_v) <= 0.0:
         return None
@@ -194,7 +230,20 @@ def _way(
     way_v = np.maximum.accumulate((np.array(path_v) - path_v[0]) / (path_v[-1] - path_v[0] or 1.0))
     way_v = way_v / way_v[-1] if way_v[-1] > 0.5 else np.linspace(0.0, 1.0, PATH_POINTS)
     stretched_v = from_v + way_v * (to_v - from_v)
-    return (stretched_v, path_n) if to_v > from_v else (stretched_v[::-1].copy(), path_n[::-1].copy())
+    back_n = np.array(BACK_N)
+    back_v = to_v + _back_v(model, model.memory_after(memory, from_n, to_n), to_n, np.sign(to_n - from_n) * back_n)
+    if to_v > from_v:
+        return stretched_v, path_n, back_v, back_n
+    return stretched_v[::-1].copy(), path_n[::-1].copy(), back_v, back_n
+
+
+def _back_v(model: Bsfm, memory: Memory, from_n: float, back_n: Floats) -> Floats:
+    """By how much the voltage changes where the force goes back."""
+    asked_v = []
+    for force_n in (from_n - back_n).tolist():
+        share = model.branch_share(model.memory_after(memory, from_n, force_n))
+        asked_v.append(model.voltage_v(force_n, share)[0])
+    return np.array(asked_v) - asked_v[0]
 
 
 def _linearize(step: StepResponse, scale: DriveMap) -> StepResponse:
@@ -206,4 +255,6 @@ def _linearize(step: StepResponse, scale: DriveMap) -> StepResponse:
         changes.append((at_s, scale.linear_v(after_v) - scale.linear_v(before_v)))
         after_v = before_v
     path_v = np.array([scale.linear_v(volts) for volts in step.path_v.tolist()])
-    return replace(step, changes=tuple(reversed(changes)), end_v=scale.linear_v(step.end_v), path_v=path_v)
+    end_v = scale.linear_v(step.end_v)
+    back_v = np.maximum.accumulate(np.abs([scale.linear_v(volts) - end_v for volts in step.back_v.tolist()]))
+    return replace(step, changes=tuple(reversed(changes)), end_v=end_v, path_v=path_v, back_v=back_v)

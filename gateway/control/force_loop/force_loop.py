@@ -86,7 +86,7 @@ class ForceLoop:
         self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim
         if self._measured:
-            self._lead = LinearizedLagInverse(settings.lead, settings.limits, model)
+            self._lead = LinearizedLagInverse(self._measured.lags, settings.limits, model)
             self._trim = MeasuredTrim(settings.trim, self._measured)
         else:
             self._lead, self._trim = LeadCompensator(settings.lead, settings.limits), TrimIntegral(settings.trim)

@@ -2,8 +2,8 @@
 
 As the lead of the rig file (gateway.control.force_loop.lead_compensator), this carries a model of the two lags behind the
 voltage that really stood on the output, and asks for what brings the model to the wish. But how fast is not one number.
-With a horizon h the law is
-that of a second-order system of natural frequency 1/h and damping DAMPING. The shortest horizon is used from which the push
+With a horizon h the law is that of a second-order system of natural frequency 1/h and damping DAMPING, whether the plant's
+own poles are real or complex. The shortest horizon is used from which the push
 and the brake that must follow it both stay within what the output can do: two pulses of length h that bring the model from
 where it is to rest at the wish. So a small step is nearly over when the dead time is, a large one runs along the limits, and
 none is pushed harder than it can be braked; a step from 0 V, where there is little to brake with, is the example.
@@ -16,13 +16,14 @@ LinearizedLagInverse.
 """
 
 from dataclasses import replace
-from math import exp, inf
+from math import exp, inf, pi, sqrt
 from typing import Final, NamedTuple
 
 from gateway.bsfm.drive_map import DriveMap
 from gateway.bsfm.model import Bsfm
+from gateway.bsfm.response.second_order import SecondOrder, Transition
 from gateway.control.limits import TICK_S
-from gateway.control.settings import LeadSettings, Limits
+from gateway.control.settings import Limits
 
 SHORTEST_S: Final = 0.02
 FAST_PERIODS: Final = 0.7  # the same for short lags, which let go of what is wrong by themselves
@@ -41,35 +42,37 @@ SLOW_WIRES: Final = 2.5  # a push that lasts one setting is most of the way, and
 SLOWEST_S: Final = 0.1
 EQUAL_V: Final = 1.0e-3  # below what an output can resolve: no push, the wish itself
 LEAST_LAG_S: Final = 1.0e-3
+HALF_SWING_SHARE: Final = 0.6  # of half a period of a plant that rings: after a whole one two pulses do the same
 
 
 class Pulses(NamedTuple):
-    """Two pulses of horizon_s from a state to rest. By what the states' distances count for the first pulse and, with it, the
-    second: up = a1 e1 + a2 e2, down = b1 e1 + b2 e2 + b3 up, all distances to the wish."""
+    """Two pulses of horizon_s from a state to rest. By what the states' distances count for the first pulse and for the
+    second: up = a1 e1 + a2 e2, down = b1 e1 + b2 e2, all distances to the wish."""
 
     horizon_s: float
     a1: float
     a2: float
     b1: float
-    b3: float
+    b2: float
 
 
 class LagInverse:
     """first_v, second_v: where the model's lags are."""
 
-    def __init__(self, settings: LeadSettings, limits: Limits) -> None:
-        longer_s, shorter_s = sorted((settings.lag_s, settings.second_lag_s), reverse=True)
-        if shorter_s > (1.0 - 1.0e-3) * longer_s:
-            longer_s, shorter_s = 1.0005 * longer_s, 0.9995 * shorter_s  # the general form is 0/0 for equal ones
-        self._lag_s, self._second_lag_s = longer_s, shorter_s if shorter_s >= LEAST_LAG_S else 0.0
+    def __init__(self, lags: SecondOrder, limits: Limits) -> None:
+        self._plant = lags = _sort_lags(lags)
+        self._lag_s, self._second_lag_s = lags.lag_s, lags.second_lag_s if lags.second_lag_s >= LEAST_LAG_S else 0.0
         self.first_v = self.second_v = limits.safe_voltage_v
         self._limits = limits
-        self._lags_s = lags_s = longer_s + self._second_lag_s
+        self._lags_s = lags_s = 2.0 * lags.natural_s if lags.is_ringing else lags.lag_s + self._second_lag_s
         self._is_slow, self._damping = True, DAMPING
-        self._horizons = [SHORTEST_S * GROWTH**k for k in range(HORIZONS)]
+        longest_s = _longest_horizon_s(lags)
+        self._horizons = [
+            SHORTEST_S * GROWTH**k for k in range(HORIZONS) if k == 0 or SHORTEST_S * GROWTH**k < longest_s
+        ]
         if self._second_lag_s:
-            self._later = [_decays(self._lag_s, self._second_lag_s, 0.06 * lags_s * 1.35**k) for k in range(12)]
-            self._pulses = [_pulses(self._lag_s, self._second_lag_s, horizon_s) for horizon_s in self._horizons]
+            self._later = [lags.after(0.06 * lags_s * 1.35**k) for k in range(12)]
+            self._pulses = [_pulses(lags, horizon_s) for horizon_s in self._horizons]
         self._wire_s = inf
         self.set_wire_time(WIRE_S)
 
@@ -83,7 +86,7 @@ class LagInverse:
         least_s = max(SHARE * self._lags_s, PERIODS * wire_s + LATE_S) if self._is_slow else FAST_PERIODS * wire_s
         if not self._second_lag_s:  # it follows at once: a setting that outlasts its horizon goes beyond the wish
             least_s = wire_s + LATE_S + TICK_S
-        self._first = next((k for k, at_s in enumerate(self._horizons) if at_s >= least_s), HORIZONS - 1)
+        self._first = next((k for k, at_s in enumerate(self._horizons) if at_s >= least_s), len(self._horizons) - 1)
         self.horizon_s = self._horizons[self._first]
         self._decay = exp(-self.horizon_s / self._lag_s)
 
@@ -95,14 +98,11 @@ class LagInverse:
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """Advance the model of the lags: voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
         first_v, second_v = self.first_v - voltage_v, self.second_v - voltage_v
-        decay = exp(-dt_s / self._lag_s)
-        self.first_v = voltage_v + decay * first_v
         if not self._second_lag_s:
-            self.second_v = self.first_v
+            self.first_v = self.second_v = voltage_v + exp(-dt_s / self._lag_s) * first_v
             return
-        second_decay = exp(-dt_s / self._second_lag_s)
-        passed = self._lag_s * (decay - second_decay) / (self._lag_s - self._second_lag_s)
-        self.second_v = voltage_v + second_decay * second_v + passed * first_v
+        first_v, second_v = _move(self._plant.after(dt_s), first_v, second_v)
+        self.first_v, self.second_v = voltage_v + first_v, voltage_v + second_v
 
     def compensated_v(self, wanted_v: float, standing_v: float) -> float:
         """Return the voltage to ask for now, V. standing_v: on the output. A wish outside the range passes."""
@@ -125,7 +125,7 @@ class LagInverse:
         asked_v = wanted_v
         for k, pulses in enumerate(self._pulses[self._first :]):
             up_v = pulses.a1 * first_v + pulses.a2 * second_v
-            brake_v = wanted_v + pulses.b1 * first_v + pulses.b3 * up_v
+            brake_v = wanted_v + pulses.b1 * first_v + pulses.b2 * second_v
             asked_v = wanted_v + (self._linear(first_v, second_v) if k == 0 else up_v)
             rise_v = SLEW_SHARE * pulses.horizon_s * self._limits.voltage_slew_v_per_s
             is_rising, pushed_v = up_v > 0.0, wanted_v + up_v
@@ -148,39 +148,50 @@ class LagInverse:
         if way * second_v >= 0.0:
             return False
         rises_s = 0.0 if way > 0.0 else 0.5 * (brake_v - push_v) / self._limits.voltage_slew_v_per_s
-        first_decay, second_decay, passed = _decays(self._lag_s, self._second_lag_s, self._wire_s + LATE_S + rises_s)
-        first_v, second_v = first_v - push_v, second_v - push_v
-        first_v, second_v = push_v + first_decay * first_v, push_v + second_decay * second_v + passed * first_v
-        first_v, second_v = first_v - brake_v, second_v - brake_v
-        later = (brake_v + second_decay * second_v + passed * first_v for _, second_decay, passed in self._later)
+        first_v, second_v = _move(
+            self._plant.after(self._wire_s + LATE_S + rises_s), first_v - push_v, second_v - push_v
+        )
+        first_v, second_v = first_v + push_v - brake_v, second_v + push_v - brake_v
+        later = (brake_v + moved.ss * second_v + moved.sf * first_v for moved in self._later)
         return way * (second_v + brake_v) < 0.0 and all(way * at_v < 0.0 for at_v in later)
 
     def _linear(self, first_v: float, second_v: float) -> float:
         """The second-order law of the shortest horizon, as a distance to the wish."""
         speed = (first_v - second_v) / self._second_lag_s
         bend = -(second_v / self.horizon_s + 2.0 * self._damping * speed) / self.horizon_s
-        return first_v + self._lag_s * (speed + self._second_lag_s * bend)
+        return second_v + self._plant.delay_s * speed + self._plant.bend_s2 * bend
 
 
-def _decays(lag_s: float, second_lag_s: float, after_s: float) -> tuple[float, float, float]:
-    """What is left of the first lag's distance and of the second's, and what the second takes over of the first's."""
-    first_decay, second_decay = exp(-after_s / lag_s), exp(-after_s / second_lag_s)
-    return first_decay, second_decay, lag_s * (first_decay - second_decay) / (lag_s - second_lag_s)
+def _sort_lags(lags: SecondOrder) -> SecondOrder:
+    """The longer first, and equal ones a little apart: the general form is 0/0 for them."""
+    if lags.is_ringing:
+        return replace(lags, lag_s=0.5 * lags.delay_s, second_lag_s=0.5 * lags.delay_s)
+    longer_s, shorter_s = sorted((lags.lag_s, lags.second_lag_s), reverse=True)
+    if shorter_s > (1.0 - 1.0e-3) * longer_s:
+        longer_s, shorter_s = 1.0005 * longer_s, 0.9995 * shorter_s
+    return SecondOrder(longer_s, shorter_s)
 
 
-def _pulses(lag_s: float, second_lag_s: float, horizon_s: float) -> Pulses:
+def _longest_horizon_s(lags: SecondOrder) -> float:
+    return HALF_SWING_SHARE * pi * lags.natural_s / sqrt(1.0 - lags.damping**2) if lags.is_ringing else inf
+
+
+def _move(by: Transition, first_v: float, second_v: float) -> tuple[float, float]:
+    return by.ff * first_v + by.fs * second_v, by.sf * first_v + by.ss * second_v
+
+
+def _pulses(lags: SecondOrder, horizon_s: float) -> Pulses:
     """Both states at rest after 2 horizons: two equations, linear in the two pulses."""
-    first_decay, second_decay = exp(-horizon_s / lag_s), exp(-horizon_s / second_lag_s)
-    passed = lag_s * (first_decay - second_decay) / (lag_s - second_lag_s)
-    given = 1.0 - second_decay - passed  # of a pulse, what the second lag has of it after one horizon
-    share = passed - given * first_decay / (1.0 - first_decay)
-    by = -1.0 / (second_decay * given + share * (1.0 - first_decay))
+    once, twice = lags.after(horizon_s), lags.after(2.0 * horizon_s)
+    late = 1.0 - once.ff - once.fs, 1.0 - once.sf - once.ss  # what the second pulse has done by the end
+    early = _move(once, *late)  # and the first
+    by = 1.0 / (early[0] * late[1] - early[1] * late[0])
     return Pulses(
         horizon_s,
-        by * (second_decay * passed + share * first_decay),
-        by * second_decay * second_decay,
-        -first_decay * first_decay / (1.0 - first_decay),
-        -first_decay,
+        by * (late[0] * twice.sf - late[1] * twice.ff),
+        by * (late[0] * twice.ss - late[1] * twice.fs),
+        by * (early[1] * twice.ff - early[0] * twice.sf),
+        by * (early[1] * twice.fs - early[0] * twice.ss),
     )
 
 
@@ -188,11 +199,11 @@ class LinearizedLagInverse:
     """The same for a bent command map. The range is bent like the volts; the slew is taken as it is, for it is the same on
     average. first_v, second_v: where the model's lags are, in volts that would keep them there."""
 
-    def __init__(self, settings: LeadSettings, limits: Limits, model: Bsfm | None = None) -> None:
+    def __init__(self, lags: SecondOrder, limits: Limits, model: Bsfm | None = None) -> None:
         self._limits = limits
         self._map = scale = DriveMap(model)
         self._inverse = LagInverse(
-            settings,
+            lags,
             replace(
                 limits,
                 voltage_min_v=scale.linear_v(limits.voltage_min_v),

@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import Final
 
 from gateway.bsfm.model import Response
+from gateway.bsfm.response.second_order import SecondOrder
 from gateway.control.force_loop.lag_inverse import LagInverse
 from gateway.control.settings import ControlSettings, LeadSettings, LoopTiming, ResponseSource
 
@@ -31,12 +32,12 @@ def timing_of(response: Response | None, settings: ControlSettings) -> ControlSe
         return replace(settings, timing=None)
     lags_s = response.lag_s + response.second_lag_s
     lead = LeadSettings(lag_s=_within(response.lag_s), second_lag_s=min(LONGEST_LAG_S, response.second_lag_s))
-    landing_s = LagInverse(lead, settings.limits).landing_s
+    lags = SecondOrder(lead.lag_s, lead.second_lag_s, response.damping)
+    landing_s = LagInverse(lags, settings.limits).landing_s
     slow_s = response.dead_time_s + landing_s + HELD_S
     timing = LoopTiming(
         dead_time_s=response.dead_time_s,
-        lag_s=lead.lag_s,
-        second_lag_s=lead.second_lag_s,
+        lags=lags,
         landing_s=landing_s,
         integral_per_s=1.0 / (LAMBDA_SHARE * slow_s),
     )

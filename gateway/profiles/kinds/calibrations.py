@@ -19,7 +19,7 @@ from gateway.profiles.strict_yaml.typed import build
 
 _BRANCHES: Final = ("rising_handles_n", "rising_weights", "falling_handles_n", "falling_weights")
 _ARRAYS: Final = (*_BRANCHES, "slip_radii_v", "slip_shares")
-_RESPONSE: Final = ("dead_time_s", "lag_s", "second_lag_s")
+_RESPONSE: Final = ("dead_time_s", "lag_s", "second_lag_s", "damping")
 _OF_ALL_STOPS: Final = (CoefficientReason.SLIP_STOPS, CoefficientReason.SLIP_STIFFNESS)
 
 

@@ -2,8 +2,9 @@
 
 190 words in two stretches of a block, by address. 140 words at its start: order, one unused, x range, then rising b, rising
 w, falling b, falling w with a fixed stride of 16 float32 (unused ones 0), force limits, blend span. 50 words at +150: number
-of slip stops, one unused, dead time and two lags of the response in s (all 0: not measured), two unused, ten radii, ten
-shares. Big-endian, high word first. The CRC-32 (zlib, initial 0) of an upload covers exactly these bytes, and is model_hash.
+of slip stops, one unused, dead time and two lags of the response in s (all 0: not measured) and its damping (0: it does not
+ring), ten radii, ten shares. Big-endian, high word first. The CRC-32 (zlib, initial 0) of an upload covers exactly these
+bytes, and is model_hash.
 
 The first stretch alone was the whole set in version 1 of the map; masters may still send it, as a set without slip stops
 and response. A test compares the offsets with the map.
@@ -21,7 +22,7 @@ from gateway.bsfm.slip.slip_stops import STOPS_CARRIED
 from gateway.registers.values import decimal
 
 _HEAD: Final = Struct(f">H2x2f{4 * STRIDE}f3f")
-_TAIL: Final = Struct(f">H2x3f4x{2 * STOPS_CARRIED}f")
+_TAIL: Final = Struct(f">H2x4f{2 * STOPS_CARRIED}f")
 HEAD_BYTES: Final = _HEAD.size
 HEAD_WORDS: Final = HEAD_BYTES // 2
 """Length of a set without slip stops and response."""
@@ -29,17 +30,17 @@ SET_BYTES: Final = HEAD_BYTES + _TAIL.size
 SET_WORDS: Final = SET_BYTES // 2
 TAIL_FROM: Final = 150  # in words, from a block's first address
 BLOCK_BYTES: Final = 2 * TAIL_FROM + _TAIL.size
-UNUSED_WORDS: Final = (1, TAIL_FROM + 1, TAIL_FROM + 8, TAIL_FROM + 9)  # of a block: they keep floats at even addresses
+UNUSED_WORDS: Final = (1, TAIL_FROM + 1)  # of a block: they keep floats at even addresses
 
 Numbers = tuple[float, ...]
-NOT_MEASURED: Final = (0.0, 0.0, 0.0)
+NOT_MEASURED: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class CoefficientSet:
     """As carried: arrays of up to 16 numbers, stops of up to 10, not judged. Handles and limits in N, range and radii in V.
 
-    stops: how many the model has, which may be more than are carried. response_s: dead time, lag, second lag.
+    stops: how many the model has, which may be more than are carried. response_s: dead time, lag, second lag in s, and damping.
     """
 
     order: int
@@ -55,7 +56,7 @@ class CoefficientSet:
     stops: int = 0
     slip_radii_v: Numbers = ()
     slip_shares: Numbers = ()
-    response_s: tuple[float, float, float] = NOT_MEASURED
+    response_s: tuple[float, float, float, float] = NOT_MEASURED
 
     @property
     def arrays(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
@@ -67,8 +68,8 @@ class CoefficientSet:
         """The response, as the decimals that were meant; None where it was not measured."""
         if self.response_s == NOT_MEASURED:
             return None
-        dead_time_s, lag_s, second_lag_s = map(decimal, self.response_s)
-        return Response(dead_time_s=dead_time_s, lag_s=lag_s, second_lag_s=second_lag_s)
+        dead_time_s, lag_s, second_lag_s, damping = map(decimal, self.response_s)
+        return Response(dead_time_s=dead_time_s, lag_s=lag_s, second_lag_s=second_lag_s, damping=damping)
 
     @classmethod
     def of_calibration(cls, calibration: Calibration) -> "CoefficientSet":
@@ -90,7 +91,7 @@ class CoefficientSet:
             stops=len(calibration.slip_radii_v),
             slip_radii_v=calibration.slip_radii_v[:STOPS_CARRIED],
             slip_shares=calibration.slip_shares[:STOPS_CARRIED],
-            response_s=(response.dead_time_s, response.lag_s, response.second_lag_s) if response else NOT_MEASURED,
+            response_s=_numbers_of(response) if response else NOT_MEASURED,
         )
 
     def to_words(self) -> bytes:
@@ -110,10 +111,10 @@ class CoefficientSet:
         order, x0, x1, *rest = _HEAD.unpack(words[:HEAD_BYTES])
         rising_b, rising_w, falling_b, falling_w = (tuple(rest[k : k + STRIDE]) for k in range(0, 4 * STRIDE, STRIDE))
         low, high, span = rest[4 * STRIDE :]
-        stops, dead_time, lag, second_lag, *slip = _TAIL.unpack(words[HEAD_BYTES:] or bytes(_TAIL.size))
+        stops, dead_time, lag, second_lag, damping, *slip = _TAIL.unpack(words[HEAD_BYTES:] or bytes(_TAIL.size))
         return cls(
             order, x0, x1, rising_b, rising_w, falling_b, falling_w, low, high, span,
-            stops, tuple(slip[:STOPS_CARRIED]), tuple(slip[STOPS_CARRIED:]), (dead_time, lag, second_lag),
+            stops, tuple(slip[:STOPS_CARRIED]), tuple(slip[STOPS_CARRIED:]), (dead_time, lag, second_lag, damping),
         )  # fmt: skip
 
 
@@ -139,6 +140,10 @@ def _limits_n(calibration: Calibration) -> tuple[float, float]:
     low_n, high_n = replace(calibration, force_limits_n=()).allowed_n
     own_low_n, own_high_n = calibration.allowed_n
     return max(low_n, own_low_n), min(high_n, own_high_n)
+
+
+def _numbers_of(response: Response) -> tuple[float, float, float, float]:
+    return response.dead_time_s, response.lag_s, response.second_lag_s, response.damping
 
 
 def _pad(array: Numbers, room: int) -> Numbers:

@@ -24,26 +24,39 @@ def model(bow_n: float = 0.0) -> Bsfm:
 class Plant:
     """The model's own force behind a dead time and two lags: return-point memory is the model's, so friction is in it."""
 
-    def __init__(self, dead_time_s: float, lag_s: float, second_lag_s: float) -> None:
-        self.dead_time_s, self.lags_s = dead_time_s, (lag_s, second_lag_s)
+    def __init__(self, dead_time_s: float, lag_s: float, second_lag_s: float, damping: float = 0.0) -> None:
+        self.dead_time_s, self.lags_s, self.damping = dead_time_s, (lag_s, second_lag_s), damping
+        self.speed = 0.0
         self.first_v = self.second_v = 0.0
         self.bsfm = model()
         self.memory, self.force_n = self.bsfm.reversal.start(), self.bsfm.branches.falling.value(0.0)
 
     def force(self, voltage_v: float, step_s: float) -> float:
+        self._follow(voltage_v, step_s)
+        way = 1.0 if voltage_v > self.second_v else -1.0
+        if self.damping:
+            way = 1.0 if self.speed > 0.0 else -1.0
+        target_n = self._settled_n(self.second_v, way)
+        if (target_n - self.force_n) * way > 0.0:
+            self.memory = self.bsfm.memory_after(self.memory, self.force_n, target_n)
+            self.force_n = target_n
+        return self.force_n
+
+    def _follow(self, voltage_v: float, step_s: float) -> None:
         first_s, second_s = self.lags_s
+        if self.damping:
+            natural_s = 0.5 * (first_s + second_s) / self.damping
+            self.speed += (
+                step_s * ((voltage_v - self.second_v) / natural_s - 2.0 * self.damping * self.speed) / natural_s
+            )
+            self.second_v += step_s * self.speed
+            return
         self.first_v += (1.0 - exp(-step_s / first_s)) * (voltage_v - self.first_v)
         self.second_v += (
             (1.0 - exp(-step_s / second_s)) * (self.first_v - self.second_v)
             if second_s
             else self.first_v - self.second_v
         )
-        way = 1.0 if voltage_v > self.second_v else -1.0
-        target_n = self._settled_n(self.second_v, way)
-        if (target_n - self.force_n) * way > 0.0:
-            self.memory = self.bsfm.memory_after(self.memory, self.force_n, target_n)
-            self.force_n = target_n
-        return self.force_n
 
     def _settled_n(self, voltage_v: float, way: float) -> float:
         """The force on the way from here at which the model asks for this voltage, by bisection."""
@@ -59,8 +72,12 @@ class Plant:
 def run(
     dead_time_s: float, lag_s: float, second_lag_s: float, rate_hz: float = 100.0, noise_n: float = 0.1
 ) -> MeasuredResponse:
+    return run_on(Plant(dead_time_s, lag_s, second_lag_s), rate_hz, noise_n)
+
+
+def run_on(plant: Plant, rate_hz: float = 100.0, noise_n: float = 0.1) -> MeasuredResponse:
     """Steps between three levels, as a run's recording has them; the fit is given another, bent model."""
-    plant, rng, step_s = Plant(dead_time_s, lag_s, second_lag_s), Random(4), 0.005
+    rng, step_s, dead_time_s = Random(4), 0.005, plant.dead_time_s
     rows, sent, sample_s, level, changed_s = [], [(0.0, 0.0)], 0.0, 0, 0.0
     for k in range(round(len(LEVELS_V) * HELD_S / step_s)):
         now_s = k * step_s
@@ -100,6 +117,19 @@ def test_one_lag_is_not_taken_for_two_and_two_not_for_one():
     assert one.second_lag_s < 0.15 * one.lag_s
     assert two
     assert two.second_lag_s > 0.5 * two.lag_s
+
+
+@pytest.mark.parametrize("damping", [0.4, 0.6])
+def test_a_plant_that_rings_is_measured_with_its_damping_and_one_of_two_equal_lags_is_not_taken_for_it(damping):
+    measured = run_on(Plant(0.05, 0.08 * damping, 0.08 * damping, damping))
+    assert measured.response
+    assert measured.response.damping == pytest.approx(damping, abs=0.06)
+    assert measured.response.dead_time_s == pytest.approx(0.05, abs=0.008)
+    assert measured.response.lag_s + measured.response.second_lag_s == pytest.approx(0.16 * damping, rel=0.06)
+    assert f"ringing with damping {measured.response.damping:.2f}" in measured.response.source
+    equal = run(0.05, 0.06, 0.06).response
+    assert equal
+    assert equal.damping == 0.0
 
 
 def test_the_source_tells_from_what_and_how_sure():

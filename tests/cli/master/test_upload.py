@@ -214,7 +214,7 @@ def test_printed_frames_played_by_anybody_make_the_upload(gateway, call, file, f
     assert slot_number(gateway.store, 6) == 2
     assert gateway.store.load(2).slip_radii_v == (0.25, 0.5, 1.0)
     assert gateway.words(1500, 100) == CoefficientSet.of_calibration(calibration(16)).to_words()[:200]
-    assert len(frames) == (192 if fc06 else 6)
+    assert len(frames) == (194 if fc06 else 6)
 
 
 def test_printing_with_a_dry_run_needs_no_gateway(call, file):

@@ -4,12 +4,13 @@ from random import Random
 
 import pytest
 
+from gateway.bsfm.response.second_order import SecondOrder
 from gateway.control import Trim
 from gateway.control.force_loop.measured_trim import MOST_TURNS, NEW_TARGET_N, MeasuredTrim
 from gateway.control.settings import LoopTiming
 from gateway.registers.words import LimitedBy
 
-TIMING = LoopTiming(dead_time_s=0.08, lag_s=0.07, second_lag_s=0.07, landing_s=0.07, integral_per_s=3.0)
+TIMING = LoopTiming(dead_time_s=0.08, lags=SecondOrder(0.07, 0.07), landing_s=0.07, integral_per_s=3.0)
 SLOPE_N_PER_V = 8.0
 SAMPLE_S = 0.01
 

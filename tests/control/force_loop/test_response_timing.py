@@ -11,7 +11,7 @@ from gateway.bsfm.model import Response
 from gateway.control import CalibrationInUse, Trim
 from gateway.control.force_loop.lag_inverse import LagInverse
 from gateway.control.force_loop.response_timing import timing_of
-from gateway.control.settings import LeadSettings, ResponseSource
+from gateway.control.settings import ResponseSource
 from tests.control.bench import Bench, bsfm, settings
 
 RESPONSES = [
@@ -27,13 +27,13 @@ def loop(response: Response, off: tuple[float, float, float] = (1.0, 1.0, 1.0)) 
     timing = timing_of(response, settings()).timing
     assert timing
     push, s = (
-        LagInverse(LeadSettings(lag_s=timing.lag_s, second_lag_s=timing.second_lag_s), settings().limits),
+        LagInverse(timing.lags, settings().limits),
         1j * FREQUENCIES,
     )
-    bend_s2 = push.horizon_s**2 if timing.second_lag_s else 0.0
+    bend_s2 = push.horizon_s**2 if timing.lags.second_lag_s else 0.0
     predicted = np.exp(-s * response.dead_time_s) / (s * s * bend_s2 + s * push.landing_s + 1.0)
     plant = off[0] * predicted * np.exp(-s * ((off[1] - 1.0) * response.dead_time_s + HELD_S))
-    for lag_s in (timing.lag_s, timing.second_lag_s):
+    for lag_s in (timing.lags.lag_s, timing.lags.second_lag_s):
         plant *= (lag_s * s + 1.0) / (off[2] * lag_s * s + 1.0)
     return timing.integral_per_s / (s + timing.integral_per_s * (1.0 - predicted)) * plant
 

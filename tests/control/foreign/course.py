@@ -2,7 +2,8 @@
 
 The bound of a step is the fastest that any command brings the force within BAND_N for good: dead time and wire, then the
 best of the bang-bang family through the two lags, one pulse along the limit and one back, within voltage range and slew. Two
-lags in series need no more switches. Friction, the cell and the force ramp are left out of it: the bound is a little low.
+lags in series need no more switches, and a regulator that rings none within its first half period. Friction, the cell and the
+force ramp are left out of it: the bound is a little low.
 """
 
 from collections.abc import Sequence
@@ -202,13 +203,20 @@ def _settled_s(
     push_s, brake_s = pulses_s
     output = np.full(len(push_s), from_v)
     first, second, settled_s = output.copy(), output.copy(), np.zeros(len(push_s))
+    natural = 1.0 / max(1.0e-6, (machine.lag_s * machine.second_lag_s) ** 0.5)
+    if machine.damping < 1.0:
+        first[:] = 0.0  # its speed
     shares = [1.0 - np.exp(-GRID_S / max(lag_s, 1.0e-6)) for lag_s in (machine.lag_s, machine.second_lag_s)]
     longest_s = float(push_s.max() + brake_s.max()) + 0.3
     for k in range(round(longest_s / GRID_S)):
         now_s = k * GRID_S
         wanted = np.where(now_s < push_s, push_v, np.where(now_s < push_s + brake_s, brake_v, to_v))
         output = np.minimum(wanted, output + slew_v_per_s * GRID_S)
-        first += shares[0] * (output - first)
-        second += shares[1] * (first - second)
+        if machine.damping < 1.0:
+            first += GRID_S * natural * (natural * (output - second) - 2.0 * machine.damping * first)
+            second += GRID_S * first
+        else:
+            first += shares[0] * (output - first)
+            second += shares[1] * (first - second)
         settled_s = np.where(np.abs(second - to_v) > band_v, now_s + GRID_S, settled_s)
     return settled_s

@@ -133,10 +133,13 @@ def test_friction_that_keeps_back_most_of_the_first_stair_is_no_wrong_unit(seed)
 def test_a_regulator_that_rings_is_held_and_better_with_the_trim_than_without(damping):
     ringing = Machine(damping=damping, lag_s=0.06, second_lag_s=0.06)
     one = calibrated(ringing, load_rig("demo").calibration.model())
+    assert one.response
+    assert one.response.damping == pytest.approx(damping, abs=0.06)
     off, on = (course(ringing, one.calibration, settings(trim), SHORT_N, tracks=False) for trim in (Trim(), None))
     assert on.hold_n <= off.hold_n + NEVER_WORSE_N
     assert on.after_1_s_n <= off.after_1_s_n + NEVER_WORSE_N
     assert on.swing_n < 0.5
+    assert float(np.median([step.settled_s / allowed_s(ringing, step) for step in on.steps])) <= 1.5
 
 
 def test_a_cell_of_ten_samples_a_second_does_not_make_the_trim_swing():
