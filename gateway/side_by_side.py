@@ -6,23 +6,34 @@ core did what: every call stands for itself. Two, because that is what a control
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 from functools import cache
-from typing import TypeVar
+from typing import Final, TypeVar
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+_is_inside: Final[ContextVar[bool]] = ContextVar("is_inside", default=False)
 
 
 def side_by_side(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
-    """Return the function of each item, in order; every second one is done by another thread meanwhile."""
-    if len(items) < 2:
+    """Return the function of each item, in order; every second one is done by another thread meanwhile, unless this is
+    called within such a call."""
+    if len(items) < 2 or _is_inside.get():
         return [function(item) for item in items]
-    others = _helper().submit(lambda: [function(item) for item in items[1::2]])
+    others = _helper().submit(_call_each, function, items[1::2])
     try:
-        own = [function(item) for item in items[::2]]
+        own = _call_each(function, items[::2])
     finally:
         found = others.result()
     return [result for pair in zip(own, found, strict=False) for result in pair] + own[len(found) :]
+
+
+def _call_each(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    token = _is_inside.set(True)
+    try:
+        return [function(item) for item in items]
+    finally:
+        _is_inside.reset(token)
 
 
 @cache

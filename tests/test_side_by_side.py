@@ -17,6 +17,11 @@ def test_two_threads_work_at_once():
     assert len(set(side_by_side(lambda _: (both.wait(), threading.get_ident())[1], [1, 2]))) == 2
 
 
+def test_a_call_within_a_call_waits_for_nobody():
+    table = side_by_side(lambda row: side_by_side(lambda column: row * column, [1, 2, 3]), [1, 2, 3])
+    assert table == [[1, 2, 3], [2, 4, 6], [3, 6, 9]]
+
+
 @pytest.mark.parametrize("bad", [0, 1, 2])
 def test_what_fails_in_either_thread_fails(bad):
     def divide(item):

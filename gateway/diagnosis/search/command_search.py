@@ -23,6 +23,7 @@ from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves,
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.normal_equations import beside_model
 from gateway.diagnosis.search.parameters import ModelParameters
+from gateway.side_by_side import side_by_side
 from gateway.twin.elementwise import Real, smaller
 from gateway.twin.plant import Plant
 
@@ -101,13 +102,19 @@ def _most_likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener, tr
 def _first_wave_scores(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
     """How much the first wave of each step's teeth is like the residual, in no unit; rows in bunches: a lag is slow."""
     told = whiten(whiten(fitted.residual_n)) * bench.usable
+    halves = side_by_side(lambda some: _likeness(bench, fitted.parameters, told, some), np.array_split(tried, 2))
+    return np.concatenate(halves)
+
+
+def _likeness(bench: Bench, parameters: ModelParameters, told: Floats, tried: Floats) -> Floats:
+    """How much the first waves of some steps are like `told` (rows,)."""
     slope, power = np.zeros(tried.size), np.full(tried.size, 1.0e-300)
     for channel, command_v, row_s in _commanded_channels(bench):
-        bunch = max(int(_BUNCH_SHARE_OF_LAG * fitted.parameters.value(LAG) / row_s), 1)
+        bunch = max(int(_BUNCH_SHARE_OF_LAG * parameters.value(LAG) / row_s), 1)
         rows = np.arange(0, command_v.size, bunch)
         sums = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0))
         alike, squares = np.empty(tried.size), np.empty(tried.size)
-        chain = _force_chain(fitted.parameters, bunch * row_s)
+        chain = _force_chain(parameters, bunch * row_s)
         fill_first_waves(command_v[rows], sums, tried, chain, (alike, squares))
         slope += alike
         power += bunch * squares
