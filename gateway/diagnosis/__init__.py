@@ -5,11 +5,13 @@ In the order of the work: measurement (what came in), excerpt, input_checks (wro
 the readings tell by themselves), hints, candidates, model_comparison and search (naming one of the effects of
 gateway/catalogue), normal_equations and levenberg_marquardt (the mathematics of it), significance (what is a finding);
 noise, residual_tests and residual_regressors (what is left), noise_floor, experiments/ (what the recording cannot show, and
-what to record next), verdict and notes, diagnose (the whole), result (the answer). Pure: time and chance are arguments.
+what to record next), verdict and notes, diagnose (the whole), against/ (what has changed between two
+recordings), result (the answer). Pure: time and chance are arguments.
 """
 
 from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
+from gateway.diagnosis.against.compare_recordings import find_changes
 from gateway.diagnosis.diagnose import Options, diagnose
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.result import Diagnosis, Verdict
@@ -24,4 +26,5 @@ __all__ = [
     "Parameter",
     "Verdict",
     "diagnose",
+    "find_changes",
 ]

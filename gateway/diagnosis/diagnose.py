@@ -53,6 +53,17 @@ class Options:
     is_own: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class SearchStart:
+    """Where a search begins. evidence: what the readings tell by themselves; effects: those to search for."""
+
+    bench: Bench
+    base: FittedModel
+    whiten: Whitener
+    evidence: tuple[DirectEvidence, ...]
+    effects: tuple[Effect, ...]
+
+
 def diagnose(
     measurements: Sequence[Measurement], plant: Plant | None = None, options: Options | None = None
 ) -> Diagnosis:
@@ -68,35 +79,41 @@ def diagnose(
     progress.report("checking the columns")
     suspected = find_suspects(measurements, given, is_own=options.is_own)
     if any(each.is_sure for each in suspected):
-        return _diagnosis_of_wrong_columns(measurements, given, suspected)
+        return diagnosis_of_wrong_columns(measurements, given, suspected)
     result = _diagnose_columns(measurements, given, options)
     return replace(
         result,
         notes=(*result.notes, *_notes_on_the_start(measurements, given, options, result, suspected)),
         suspects=suspected,
-        base=_with_readings_of(given, result.base),
-        plant=_with_readings_of(given, result.plant),
+        base=with_readings_of(given, result.base),
+        plant=with_readings_of(given, result.plant),
     )
 
 
 def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options: Options) -> Diagnosis:
     """Return the diagnosis of columns that are what they say: base model, search, residual tests, verdict."""
+    start = prepare_search(measurements, given, options)
+    found = search_effects(start.bench, start.base, start.effects, start.whiten)
+    progress.report("testing what is left")
+    left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])
+    findings = SearchFindings(start.bench, found, start.evidence, left, start.effects)
+    return compose_diagnosis(findings, options.noise_floor_n)
+
+
+def prepare_search(measurements: Sequence[Measurement], given: Plant, options: Options) -> SearchStart:
+    """Return where a search begins: the base model, and what the readings tell by themselves."""
     progress.report("fitting the base model")
     hidden = frozenset({options.without} if options.without else ())
-    bench, base, whiten = _fit_base_model(measurements, _without_hidden(given, hidden), hidden, options.late_s)
+    bench, base, whiten = _fit_base_model(measurements, without_hidden(given, hidden), hidden, options.late_s)
     quantum_n = max(options.quantum_n, given.cell.quantum_n)
     bench, base, evidence = _take_direct_evidence(bench, base, whiten, quantum_n)
     if options.late_s > 0.0 or any(each.even_s for each in measurements):
-        base, whiten = _doubt_times(bench, base, whiten, options.late_s)
+        base, whiten = doubt_times(bench, base, whiten, options.late_s)
         bench, base = fit_line_lengths(bench, base, whiten, given.regulator.command_step_v)
-    effects = _effects_to_search(base.free, hidden, options.late_s)
-    found = search_effects(bench, base, effects, whiten)
-    progress.report("testing what is left")
-    left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])
-    return compose_diagnosis(SearchFindings(bench, found, evidence, left, effects), options.noise_floor_n)
+    return SearchStart(bench, base, whiten, evidence, effects_to_search(base.free, hidden, options.late_s))
 
 
-def _doubt_times(bench: Bench, base: FittedModel, whiten: Whitener, late_s: float) -> tuple[FittedModel, Whitener]:
+def doubt_times(bench: Bench, base: FittedModel, whiten: Whitener, late_s: float) -> tuple[FittedModel, Whitener]:
     """Return the base model where readings whose times are a matter of chance weigh less, and that weighting."""
     simulated_n = bench.simulate([base.parameters])[0]
     noise_n = fast_noise_n(base.residual_n[bench.judged])
@@ -128,13 +145,13 @@ def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
     return _CHANCE_SHARE * late_s
 
 
-def _diagnosis_of_wrong_columns(
+def diagnosis_of_wrong_columns(
     measurements: Sequence[Measurement], given: Plant, suspected: tuple[Suspect, ...]
 ) -> Diagnosis:
     """The answer where columns are wrong: what stands in them, and no cause."""
     bench = bench_of(measurements)
     simulated_n = bench.simulate(
-        [ModelParameters(_without_hidden(given, frozenset()), tuple(0.0 for _ in measurements))]
+        [ModelParameters(without_hidden(given, frozenset()), tuple(0.0 for _ in measurements))]
     )[0]
     rms_n = float(np.std((bench.measured_n - simulated_n)[bench.judged]))
     floor_n = min(fast_noise_n(bench.measured_n[bench.judged]), rms_n)
@@ -158,7 +175,7 @@ def _diagnosis_of_wrong_columns(
     )
 
 
-def _without_hidden(plant: Plant, hidden: frozenset[str]) -> Plant:
+def without_hidden(plant: Plant, hidden: frozenset[str]) -> Plant:
     """The plant without noise and rounding, and without the effects that are to be found again."""
     plant = with_value(with_value(plant, "cell", "noise_n", 0.0), "cell", "quantum_n", 0.0)
     for name in hidden:
@@ -176,7 +193,7 @@ def _has_effect(plant: Plant, name: str) -> bool:
     return any(getattr(getattr(plant, each.section), each.name) != each.null for each in sizes)
 
 
-def _with_readings_of(given: Plant, plant: Plant) -> Plant:
+def with_readings_of(given: Plant, plant: Plant) -> Plant:
     """The plant with the noise and the rounding that were known before, unless a coarser rounding was found."""
     quantum_n = max(given.cell.quantum_n, plant.cell.quantum_n)
     return with_value(with_value(plant, "cell", "noise_n", given.cell.noise_n), "cell", "quantum_n", quantum_n)
@@ -220,7 +237,7 @@ def _take_direct_evidence(
     return bench, base, tuple(found)
 
 
-def _effects_to_search(free: Sequence[Parameter], hidden: frozenset[str], late_s: float) -> tuple[Effect, ...]:
+def effects_to_search(free: Sequence[Parameter], hidden: frozenset[str], late_s: float) -> tuple[Effect, ...]:
     """Effects that may be found: all that the base model does not fit anyway.
 
     Where wires may be late by themselves, a drag that differs by direction is not looked for: on the pad it comes late

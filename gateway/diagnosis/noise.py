@@ -171,6 +171,7 @@ def coloured_whitener(bench: Bench, remainder_n: Floats, basis: Floats, weights:
     They took most at the slow end, where trends and steps live: each line of the periodogram is divided by the share
     that they left there, or the noise would look too small just where false causes are likeliest.
     """
+    basis = np.vstack([basis, bench.nuisance.T])
     noises = []
     for channel in bench.channels:
         part, usable = remainder_n[channel.rows] * weights[channel.rows], bench.usable[channel.rows]

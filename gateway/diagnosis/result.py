@@ -99,6 +99,28 @@ class Extended:
 
 
 @dataclass(frozen=True, slots=True)
+class OwnEffect:
+    """An effect that the machine had before, with its parameters."""
+
+    name: str
+    parameters: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What belongs to the machine, by older recordings of it: no finding. recordings: their names.
+
+    common_error_n: RMS of what its model gets wrong in the same way every time; left_n: RMS that is left in the old recordings
+    beside it, the noise floor of the new ones.
+    """
+
+    recordings: tuple[str, ...]
+    effects: tuple[OwnEffect, ...]
+    common_error_n: float
+    left_n: float
+
+
+@dataclass(frozen=True, slots=True)
 class Trace:
     """Arrays of one recording for the report: simulated readings of the base and the extended model, N, shape (rows,)."""
 
@@ -111,7 +133,8 @@ class Trace:
 class Diagnosis:
     """The whole answer. base and plant: the refitted base model and the extended one (its intervals in `causes`).
 
-    suspects: columns that are probably not what their names say: before anything else is believed.
+    suspects: columns that are probably not what their names say: before anything else is believed. machine: what belongs to the
+    machine, where its older recordings were given: then causes are changes since, and base is the plant as it was.
     """
 
     verdict: Verdict
@@ -128,3 +151,4 @@ class Diagnosis:
     experiments: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     suspects: tuple[Suspect, ...] = ()
+    machine: Machine | None = None

@@ -134,7 +134,7 @@ def _notes(
 
 def _base_estimates(bench: Bench, reported: ReportedModels) -> dict[str, Estimate]:
     of_plant = [each for each in reported.base.free if each.section != STARTS]
-    return _estimates(bench, reported.base, of_plant, reported.whiten)
+    return estimates_of(bench, reported.base, of_plant, reported.whiten)
 
 
 def _decide_verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reached: bool, unexplained: bool) -> Verdict:
@@ -154,7 +154,7 @@ def _causes(bench: Bench, found: SearchResult, reported: ReportedModels, floor_n
             accepted.effect.name,
             accepted.comparison.group(accepted.effect.name),
             accepted.comparison.shares.get(accepted.effect.name, 0.0),
-            _estimates(bench, reported.fitted, accepted.form.parameters, reported.whiten),
+            estimates_of(bench, reported.fitted, accepted.form.parameters, reported.whiten),
             gain_of(held_out_errors(bench, without, reported.whiten), reported.held_out, floor_n),
         )
         for accepted, without in zip(found.accepted, reported.without, strict=True)
@@ -194,13 +194,13 @@ def _interval(value: float, error: float) -> tuple[float, float]:
     return value - _DEVIATIONS * error, value + _DEVIATIONS * error
 
 
-def _estimates(
+def estimates_of(
     bench: Bench, fitted: FittedModel, parameters: Sequence[Parameter], whiten: Whitener
 ) -> dict[str, Estimate]:
     own = np.sqrt(np.maximum(np.diag(covariance(fitted, whiten)), 0.0))
     errors = np.maximum(own, held_out_errors(bench, fitted, whiten).jackknife)[len(fitted.parameters.offsets_n) :]
     settled = [(each, 0.0) for each in parameters if each.settled]
-    estimates = {}
+    estimates: dict[str, Estimate] = {}
     for parameter, error in (*zip(fitted.free, errors, strict=True), *settled):
         if parameter in parameters:
             value = fitted.parameters.value(parameter)
@@ -211,14 +211,14 @@ def _estimates(
 
 
 def _plant_of(fitted: FittedModel) -> Plant:
-    return with_value(fitted.parameters.plant, "cell", "zero_n", float(np.mean(fitted.parameters.offsets_n)))
+    return with_value(fitted.parameters.plant_of(0), "cell", "zero_n", float(np.mean(fitted.parameters.offsets_n)))
 
 
 def _extended_plant(reported: ReportedModels, causes: Sequence[Cause]) -> Plant:
     """The extended plant, with what the readings told by themselves."""
     plant = _plant_of(reported.fitted)
     for cause in causes:
-        if BY_NAME[cause.name].direct:
+        if cause.name in BY_NAME and BY_NAME[cause.name].direct:
             for name, estimate in cause.parameters.items():
                 plant = with_value(plant, estimate.section, name, estimate.value)
     return plant
@@ -256,4 +256,4 @@ def _traces(bench: Bench, reported: ReportedModels) -> tuple[Trace, ...]:
 def _experiments(causes: Sequence[Cause]) -> tuple[str, ...]:
     """What to record to tell the members of each group apart."""
     names = [name for cause in causes if len(cause.group) > 1 for name in cause.group]
-    return tuple(dict.fromkeys(BY_NAME[name].experiment for name in names))
+    return tuple(dict.fromkeys(BY_NAME[name].experiment for name in names if name in BY_NAME))

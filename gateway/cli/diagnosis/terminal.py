@@ -39,6 +39,8 @@ def render_diagnosis(
     yield Text(words.sentence(diagnosis))
     yield Text()
     yield _line("off by", _initial_error(diagnosis))
+    if diagnosis.machine is not None:
+        yield _line("before", words.machine_sentence(diagnosis))
     if diagnosis.causes:
         yield _line("left", _remaining_error(diagnosis))
     yield from _cause_table(diagnosis)
@@ -65,8 +67,9 @@ def _line(keyword: str, text: str, style: str = "") -> RenderableType:
 def _initial_error(diagnosis: Diagnosis) -> str:
     baseline = diagnosis.baseline
     readings = f"{baseline.samples:,}".replace(",", " ")
+    model = "the base model refitted" if diagnosis.machine is None else "the machine as it was"
     return (
-        f"{words.force(baseline.rms_n)} N RMS with the base model refitted; noise floor "
+        f"{words.force(baseline.rms_n)} N RMS with {model}; noise floor "
         f"{words.force(baseline.noise_floor_n)} N ({readings} readings, {baseline.duration_s:.1f} s)"
     )
 

@@ -28,6 +28,7 @@ _STDOUT: Final = Path("-")
 _FAILS: Final = {"partial": ("partial", "unknown"), "unknown": ("unknown",)}
 _OF_A_DIAGNOSIS: Final = (
     "recordings",
+    "against",
     "without",
     "noise_floor_n",
     "report",
@@ -83,6 +84,12 @@ class Answer:
 @click.option("--columns", metavar="MAP", help="time_s=1:ms,force_n=7:n for foreign tables, or a YAML file.")
 @click.option("--fail-on", type=click.Choice(list(_FAILS)), help="Exit 1 on this verdict or a worse one.")
 @click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory, for numbers.")
+@click.option(
+    "--against",
+    metavar="OLD",
+    multiple=True,
+    help="What has changed since this recording of the same machine; again for more of them.",
+)
 @click.option("--before", metavar="A", help="With --after: what B gained in commanded force over A, two real runs.")
 @click.option("--after", metavar="B", help="See --before.")
 @click.option("--closed-loop", is_flag=True, help="Measure on the twin what the extension is worth in commanded force.")
@@ -105,17 +112,20 @@ def command(**options: Any) -> None:
 
     require("numba")
     _check_effect(options["without"])
+    if options["against"] and options["without"]:
+        raise click.UsageError("--against compares two recordings of one machine, without --without")
     with shown_progress("reading"):
         sources = read_sources(
             options["recordings"], rig=options["rig"], columns=options["columns"], state=options["state"]
         )
+        old = _read_old(options)
     files = [
         file
         for file in (options["json_file"], options["report"], options["extend"], options["plan_file"])
         if file not in (None, _STDOUT)
     ]
-    check_targets(files, sources.paths)
-    diagnosis, runtime_s = _run_diagnosis(sources, options)
+    check_targets(files, (*sources.paths, *(old.paths if old else ())))
+    diagnosis, runtime_s = _run_diagnosis(sources, old, options)
     gain = _measure_gain(diagnosis, sources) if options["closed_loop"] else None
     answer = _add_plan(Answer(diagnosis, sources, runtime_s, gain), options["plan_file"])
     texts = _render_files(answer, options)
@@ -165,21 +175,34 @@ def _check_effect(name: str | None) -> None:
     raise click.UsageError(f"--without: {name} is no effect of the catalogue; {meant}")
 
 
-def _run_diagnosis(sources: "Sources", options: dict[str, Any]) -> "tuple[Diagnosis, float]":
+def _read_old(options: dict[str, Any]) -> "Sources | None":
+    """The recordings that the new ones are compared with; None where --against names none."""
+    from gateway.cli.diagnosis.inputs import read_sources
+
+    if not options["against"]:
+        return None
+    return read_sources(options["against"], rig=options["rig"], columns=options["columns"], state=options["state"])
+
+
+def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str, Any]) -> "tuple[Diagnosis, float]":
     from gateway.cli.diagnosis.progress_line import shown_progress
-    from gateway.diagnosis import Options, diagnose
+    from gateway.diagnosis import Options, diagnose, find_changes
     from gateway.diagnosis.input_checks import name_options
 
     engine_options = Options(
         without=options["without"],
         noise_floor_n=options["noise_floor_n"],
-        late_s=sources.late_s,
+        late_s=min(sources.late_s, old.late_s) if old else sources.late_s,
         quantum_n=sources.quantum_n,
         is_own=sources.is_own,
     )
+    plant = sources.plant.plant
     began_s = time.perf_counter()
     with shown_progress("diagnosing"):
-        diagnosis = diagnose(sources.measurements, sources.plant.plant, engine_options)
+        if old:
+            diagnosis = find_changes(sources.measurements, old.measurements, plant, engine_options)
+        else:
+            diagnosis = diagnose(sources.measurements, plant, engine_options)
     diagnosis = replace(diagnosis, suspects=name_options(diagnosis.suspects, options["columns"] or ""))
     return diagnosis, time.perf_counter() - began_s
 

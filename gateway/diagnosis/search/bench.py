@@ -21,7 +21,6 @@ from gateway.diagnosis.search.recording_drive import (
     rows_after_unseen_settings,
     settled_s,
 )
-from gateway.twin.plant import with_value
 from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Replay
 from gateway.twin.surroundings import COLUMNS
@@ -47,7 +46,8 @@ class Bench:
     raw_n, usable, block_of_row, young: (rows,) of all segments; usable: rows that count; block_of_row: the block that
     each is held out with; young: rows that still feel how their recording began. taken_out: columns (rows,) whose
     share of every vector counts as explained: dependences that no effect has a name for. character_n_per_s: (rows,) what
-    the time of a character on the settings' line changes in the readings, None where it cannot matter.
+    the time of a character on the settings' line changes in the readings, None where it cannot matter. witnesses: recordings
+    that a model is judged by, None for all; the others are fitted with them.
     """
 
     measurements: tuple[Measurement, ...]
@@ -59,6 +59,7 @@ class Bench:
     block_of_row: NDArray[np.int64]
     young: Flags
     taken_out: tuple[Floats, ...] = ()
+    witnesses: frozenset[int] | None = None
     character_n_per_s: Floats | None = None
 
     @cached_property
@@ -72,7 +73,8 @@ class Bench:
         return np.concatenate([np.full(each.rows.stop - each.rows.start, each.is_force) for each in self.channels])
 
     @cached_property
-    def _nuisance(self) -> Floats:
+    def nuisance(self) -> Floats:
+        """Orthonormal columns (rows, k) that count as explained in every vector."""
         return _nuisance_basis(self)
 
     @property
@@ -81,17 +83,17 @@ class Bench:
 
     @cached_property
     def judged(self) -> Flags:
-        """Force rows that count."""
-        return np.asarray(self.force_rows & self.usable)
+        """Force rows that count, of the recordings that a model is judged by."""
+        if self.witnesses is None:
+            return np.asarray(self.force_rows & self.usable)
+        asked = [np.full(each.rows.stop - each.rows.start, each.recording in self.witnesses) for each in self.channels]
+        return np.asarray(self.force_rows & self.usable & np.concatenate(asked))
 
     def simulate(self, parameter_sets: Sequence[ModelParameters]) -> Floats:
         """Return readings, N; shape (points, rows), all rows."""
         result = np.empty((len(parameter_sets), self.rows))
         for recording, replay in enumerate(self.replays):
-            plants = [
-                with_value(parameters.plant, "cell", "zero_n", parameters.offsets_n[recording])
-                for parameters in parameter_sets
-            ]
+            plants = [parameters.plant_of(recording) for parameters in parameter_sets]
             response = replay.run(plants, [parameters.start(recording) for parameters in parameter_sets])
             for channel in self.channels:
                 if channel.recording == recording and channel.is_force:
@@ -110,8 +112,8 @@ class Bench:
     def reduced(self, columns: Floats) -> Floats:
         """Return the same vectors (..., rows) with rows that do not count at zero and the transducer's own errors taken out."""
         masked: Floats = columns * self.usable
-        if self._nuisance.shape[1]:
-            masked = masked - (masked @ self._nuisance) @ self._nuisance.T
+        if self.nuisance.shape[1]:
+            masked = masked - (masked @ self.nuisance) @ self.nuisance.T
         return masked
 
     def without_rows(self, rows: Flags) -> "Bench":

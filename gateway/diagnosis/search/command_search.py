@@ -22,7 +22,7 @@ from gateway.diagnosis.search.bench import Bench, Channel
 from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves, fill_rounding_errors
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.normal_equations import beside_model
-from gateway.diagnosis.search.parameters import ModelParameters
+from gateway.diagnosis.search.parameters import ChangedValue, ModelParameters
 from gateway.side_by_side import side_by_side
 from gateway.twin.elementwise import Real, smaller
 from gateway.twin.plant import Plant
@@ -52,11 +52,12 @@ def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) ->
     regulator = fitted.parameters.plant.regulator
     bands_pa = _BANDS_V * regulator.full_scale_pa / regulator.full_scale_v
     rigid = replace(fitted.parameters, plant=_with_rigid_friction(fitted.parameters.plant))
+    dead_band = DEAD_BAND if bench.witnesses is None else ChangedValue(DEAD_BAND, bench.witnesses)
     without = bench.simulate([rigid])
     cost = np.zeros(bands_pa.size)
     for part in _column_parts(bands_pa.size, bench.rows):
         columns = bench.reduced(
-            bench.simulate([rigid.with_value(DEAD_BAND, band_pa) for band_pa in bands_pa[part]]) - without
+            bench.simulate([rigid.with_value(dead_band, band_pa) for band_pa in bands_pa[part]]) - without
         )
         normal = beside_model(fitted, columns, whiten)
         cost[part] = normal.power - 2.0 * normal.slope
@@ -131,7 +132,8 @@ def _commanded_channels(bench: Bench) -> Iterator[tuple[Channel, Floats, float]]
     """Forces that a command drives: where they stand, the command of each row, V, and the usual distance of rows, s."""
     for channel in bench.channels:
         measurement = bench.measurements[channel.recording]
-        if channel.is_force and measurement.command_v is not None:
+        is_asked = bench.witnesses is None or channel.recording in bench.witnesses
+        if channel.is_force and is_asked and measurement.command_v is not None:
             yield channel, measurement.command_v, float(np.median(np.diff(measurement.time_s)))
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.random import default_rng
 
 from gateway import progress
-from gateway.catalogue.all_effects import BY_NAME
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
 from gateway.diagnosis.light_statistics import chi2_tail
 from gateway.diagnosis.measurement import Floats
@@ -92,7 +91,7 @@ class ModelComparison:
         nearly as much: no form of an effect is exact, so a small lead of one form proves nothing among relatives.
         """
         own = max((each.gain for each in self.ranked if each.effect.name == name), default=0.0)
-        relatives = BY_NAME[name].group
+        relatives = {each for other in self.ranked if other.effect.name == name for each in other.effect.group}
         alike = {
             each.effect.name
             for each in self.ranked

@@ -1,7 +1,7 @@
 """The parameters of one model in the search: a plant, and an offset for each recording. They are read and moved by name."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 from gateway.catalogue.effect import EffectForm, Parameter, Start
@@ -32,18 +32,44 @@ CHARACTER: Final = Parameter(STARTS, "character_s", "s", 0.0, 0.0, 4.2e-3, 1.0e-
 """Time of a character on the line that carries settings, for all recordings; at most 10 bits at 2400 baud."""
 
 
+@dataclass(frozen=True, slots=True, init=False)
+class ChangedValue(Parameter):
+    """A number of the plant as it is in some of the recordings, while the others have the plant's own."""
+
+    recordings: frozenset[int] = frozenset()
+
+    def __init__(self, parameter: Parameter, recordings: frozenset[int]) -> None:
+        Parameter.__init__(self, *(getattr(parameter, each.name) for each in fields(Parameter)))
+        object.__setattr__(self, "recordings", recordings)
+
+    @property
+    def path(self) -> str:
+        """`changed.section.name`: it moves beside the plant's own."""
+        return f"changed.{self.section}.{self.name}"
+
+
 @dataclass(frozen=True, slots=True)
 class ModelParameters:
     """Everything that a simulation needs; hashable, so that simulations can be remembered.
 
     starts: what friction remembers at the beginning of each recording; None, or none at all: rest without pressure.
     character_s: by which settings of fewer digits are there earlier, for each digit.
+    changes: numbers that are others in some recordings than in the plant.
     """
 
     plant: Plant
     offsets_n: tuple[float, ...]
     starts: tuple[Strains | None, ...] = ()
     character_s: float = 0.0
+    changes: tuple[tuple[ChangedValue, float], ...] = ()
+
+    def plant_of(self, recording: int) -> Plant:
+        """Return the plant as it is in one recording, with the recording's offset as its zero."""
+        plant = with_value(self.plant, "cell", "zero_n", self.offsets_n[recording])
+        for parameter, value in self.changes:
+            if recording in parameter.recordings:
+                plant = with_value(plant, parameter.section, parameter.name, value)
+        return plant
 
     def start(self, recording: int) -> Strains | None:
         """Return what friction remembers at the beginning of one recording; None: rest without pressure."""
@@ -58,6 +84,8 @@ class ModelParameters:
             return self.character_s
         if parameter.path == _ZERO:
             return self.offsets_n[0]
+        if isinstance(parameter, ChangedValue) and parameter in (changes := dict(self.changes)):
+            return changes[parameter]
         return float(getattr(getattr(self.plant, parameter.section), parameter.name))
 
     def with_value(self, parameter: Parameter, value: float) -> "ModelParameters":
@@ -67,6 +95,8 @@ class ModelParameters:
             return self._with_strain(parameter, kept)
         if parameter is CHARACTER:
             return replace(self, character_s=kept)
+        if isinstance(parameter, ChangedValue):
+            return replace(self, changes=tuple((dict(self.changes) | {parameter: kept}).items()))
         if parameter.path == _ZERO:  # of all recordings by as much
             return self.with_offsets([offset_n + kept - self.offsets_n[0] for offset_n in self.offsets_n])
         return replace(self, plant=with_value(self.plant, parameter.section, parameter.name, kept))
@@ -98,6 +128,9 @@ def reset_parameters(
     parameters: ModelParameters, before: ModelParameters, chosen: Sequence[Parameter]
 ) -> ModelParameters:
     """Return the same model with these parameters where they were before."""
-    for parameter in chosen:
+    known = dict(before.changes)
+    gone = {each for each in chosen if isinstance(each, ChangedValue) and each not in known}
+    parameters = replace(parameters, changes=tuple(each for each in parameters.changes if each[0] not in gone))
+    for parameter in (each for each in chosen if each not in gone):
         parameters = parameters.with_value(parameter, before.value(parameter))
     return parameters

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.random import default_rng
 from numpy.typing import NDArray
 
-from gateway.catalogue.all_effects import BY_NAME
 from gateway.catalogue.cylinder import AREA
 from gateway.diagnosis.noise import Whitener, white_whitener
 from gateway.diagnosis.result import Gain
@@ -95,7 +94,7 @@ def reason_for_doubt(accepted: AcceptedEffect, gain: Gain) -> str:
         return f"what it gains on unseen blocks may be nothing: {gain.ci95[0]:.2g} .. {gain.ci95[1]:.2g} N"
     if after_n**2 > (1.0 - _LEAST_SAVED) * before_n**2:
         return f"it leaves the error as large: {before_n:.3g} N before, {after_n:.3g} N after"
-    wins = sum(comparison.shares.get(each, 0.0) for each in {name, *BY_NAME[name].group})
+    wins = sum(comparison.shares.get(each, 0.0) for each in {name, *accepted.effect.group})
     return f"it wins in {100.0 * wins:.0f} % of the ways to resample the recording only" if wins < _LEAST_SURE else ""
 
 

@@ -1,9 +1,10 @@
 """A diagnosis as plain values: the JSON contract of `diagnose --json`, format 1. Programs read it: no field may change."""
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 from gateway.diagnosis.input_checks import Suspect
-from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Interval
+from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Estimate, Interval
 from gateway.reports.diagnosis.wording import all_notes
 from gateway.reports.json_numbers import finite_or_none
 
@@ -14,13 +15,14 @@ Document = dict[str, Any]
 def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
     """Return plain values. Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1; not finite: null.
 
-    suspects (columns that are not what they say) and notes stand beside the contract's fields.
+    suspects (columns that are not what they say) and notes stand beside the contract's fields; where older recordings of the
+    machine were given also machine, and what each cause's parameters were before.
     """
     return {
         "format": FORMAT,
         "verdict": str(diagnosis.verdict),
         "baseline": _baseline(diagnosis.baseline),
-        "causes": [_cause(cause) for cause in diagnosis.causes],
+        "causes": [_cause(cause) | _before(diagnosis, cause) for cause in diagnosis.causes],
         "leftover": [
             {"depends_on": rest.depends_on, "shape": rest.shape, "share": finite_or_none(rest.share)}
             for rest in diagnosis.leftover
@@ -37,7 +39,7 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
         "runtime_s": finite_or_none(runtime_s),
         "suspects": [_suspect(each) for each in diagnosis.suspects],
         "notes": all_notes(diagnosis),
-    }
+    } | ({"machine": _machine(diagnosis)} if diagnosis.machine else {})
 
 
 def _baseline(baseline: Baseline) -> Document:
@@ -69,16 +71,44 @@ def _cause(cause: Cause) -> Document:
         "name": cause.name,
         "group": list(cause.group),
         "confidence": finite_or_none(cause.confidence),
-        "parameters": {
-            name: {"value": finite_or_none(estimate.value), "unit": estimate.unit, "ci95": _interval(estimate.ci95)}
-            for name, estimate in cause.parameters.items()
-        },
+        "parameters": _parameters(cause.parameters),
         "gain": {
             "held_out_rms_before_n": finite_or_none(gain.held_out_rms_before_n),
             "held_out_rms_after_n": finite_or_none(gain.held_out_rms_after_n),
             "ci95": _interval(gain.ci95),
             "share_of_excess": finite_or_none(gain.share_of_excess),
         },
+    }
+
+
+def _parameters(parameters: Mapping[str, Estimate]) -> Document:
+    return {
+        name: {"value": finite_or_none(estimate.value), "unit": estimate.unit, "ci95": _interval(estimate.ci95)}
+        for name, estimate in parameters.items()
+    }
+
+
+def _before(diagnosis: Diagnosis, cause: Cause) -> Document:
+    """What the cause's parameters were in the older recordings, where it is a change since."""
+    if diagnosis.machine is None:
+        return {}
+    return {
+        "before": {
+            name: finite_or_none(getattr(getattr(diagnosis.base, estimate.section), name))
+            for name, estimate in cause.parameters.items()
+        }
+    }
+
+
+def _machine(diagnosis: Diagnosis) -> Document:
+    """What belongs to the machine, by its older recordings: no finding."""
+    assert diagnosis.machine is not None
+    machine = diagnosis.machine
+    return {
+        "against": list(machine.recordings),
+        "effects": [{"name": each.name, "parameters": _parameters(each.parameters)} for each in machine.effects],
+        "common_error_n": finite_or_none(machine.common_error_n),
+        "left_n": finite_or_none(machine.left_n),
     }
 
 

@@ -82,6 +82,7 @@ def _heading(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
     return (
         f"<header><p class='kicker'>Diagnosis · force-gateway {VERSION} · {escape(circumstances.made_utc)}</p>"
         f"<h1>{escape(words.title(diagnosis))}</h1><p class='verdict'>{words.sentence(diagnosis)}</p>"
+        f"<p>{escape(words.machine_sentence(diagnosis))}</p>"
         f"<p>{escape(' · '.join(fact for fact in facts if fact))}</p></header>"
     )
 

@@ -19,6 +19,18 @@ _TITLES: Final = {
     Verdict.PARTIAL: "Partial",
     Verdict.UNKNOWN: "Unknown",
 }
+_TITLES_OF_CHANGES: Final = {
+    Verdict.NOTHING_FOUND: "Nothing has changed",
+    Verdict.CONFIRMED: "Changed",
+    Verdict.PARTIAL: "Changed",
+    Verdict.UNKNOWN: "Changed, by no name",
+}
+_SENTENCES_ON_CHANGES: Final = {
+    Verdict.NOTHING_FOUND: "What this machine does is what it did before, as far as these recordings could show.",
+    Verdict.CONFIRMED: "What has changed is found, and as little is left as in the older recordings.",
+    Verdict.PARTIAL: "A change is found; more is left than in the older recordings, or it looks like others.",
+    Verdict.UNKNOWN: "More is off than in the older recordings, and no effect of the catalogue explains it.",
+}
 _PLURAL: Final = {
     "The cause is": "The causes are",
     "A cause is": "Causes are",
@@ -39,7 +51,8 @@ _PARTIAL: Final = (
 def title(diagnosis: Diagnosis) -> str:
     """Return the verdict with its causes: `Partial: creep or warm-up; mains-hum`."""
     names = "; ".join(label(cause) for cause in diagnosis.causes)
-    word = "Nothing can be told" if why_blind(diagnosis) else _TITLES[diagnosis.verdict]
+    titles = _TITLES if diagnosis.machine is None else _TITLES_OF_CHANGES
+    word = "Nothing can be told" if why_blind(diagnosis) else titles[diagnosis.verdict]
     return f"{word}: {names}" if names else word
 
 
@@ -49,8 +62,22 @@ def sentence(diagnosis: Diagnosis) -> str:
         return "The columns are not what their names say: no cause was looked for. Fix this first, then run it again."
     if why := why_blind(diagnosis):
         return f"{why}."
+    if diagnosis.machine is not None:
+        return _SENTENCES_ON_CHANGES[diagnosis.verdict]
     words = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_missing_evidence(diagnosis)]
     return _use_plural(words) if len(diagnosis.causes) > 1 else words
+
+
+def machine_sentence(diagnosis: Diagnosis) -> str:
+    """Return what belongs to the machine and was there before, where its older recordings were given; empty else."""
+    machine = diagnosis.machine
+    if machine is None:
+        return ""
+    names = join_words(each.name for each in machine.effects) if machine.effects else "no effect of the catalogue"
+    return (
+        f"belongs to the machine, by {join_words(machine.recordings)}: {names}, and {force(machine.common_error_n)} N RMS that "
+        f"its model gets wrong in the same way every time; {force(machine.left_n)} N RMS is left beside it"
+    )
 
 
 def why_blind(diagnosis: Diagnosis) -> str:

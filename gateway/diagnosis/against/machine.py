@@ -1,0 +1,115 @@
+"""The machine as its old recordings show it: base model, the effects that they ask for, and its common error.
+
+None of that is a finding of the new recordings. They join the old ones under this model, each with its own offset and start.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from gateway.diagnosis.against.machine_error import common_error_n, machine_error_columns
+from gateway.diagnosis.diagnose import Options, doubt_times, prepare_search
+from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.diagnosis.noise import Whitener, white_whitener
+from gateway.diagnosis.result import OwnEffect
+from gateway.diagnosis.search.base_fit import refit
+from gateway.diagnosis.search.bench import Bench, bench_of
+from gateway.diagnosis.search.direct_evidence import DirectEvidence
+from gateway.diagnosis.search.initial_friction import drop_unfelt_strains, fit_initial_strains, start_parameters
+from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, linearise
+from gateway.diagnosis.search.line_lengths import fit_line_lengths
+from gateway.diagnosis.search.parameters import STARTS, ModelParameters
+from gateway.diagnosis.search.search import search_effects
+from gateway.diagnosis.verdict import estimates_of
+from gateway.twin.plant import Plant
+
+_WAVES: Final = 8  # from the optimum under coloured noise to the plain one
+
+
+@dataclass(frozen=True, slots=True)
+class MachineModel:
+    """A machine by its old recordings. fitted: their model; evidence: what their readings tell by themselves."""
+
+    bench: Bench
+    fitted: FittedModel
+    evidence: tuple[DirectEvidence, ...]
+    effects: tuple[OwnEffect, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class JointModel:
+    """New recordings, which come first, and old ones under the machine's model.
+
+    bench: judges by the new ones, and counts the machine's common error as explained; error_n: that error, (rows,);
+    common_error_n, left_n: RMS of it, and of what is left beside it, in the old recordings.
+    """
+
+    bench: Bench
+    fitted: FittedModel
+    whiten: Whitener
+    error_n: Floats
+    common_error_n: float
+    left_n: float
+
+
+def describe_machine(old: Sequence[Measurement], given: Plant, options: Options) -> MachineModel:
+    """Return the machine that these recordings show, with as many effects as they ask for. given: the plant to start from."""
+    start = prepare_search(old, given, options)
+    found = search_effects(start.bench, start.base, start.effects, start.whiten, roughly=True)
+    plain = white_whitener(
+        start.bench, found.fitted.residual_n
+    )  # the whitened optimum leaves slow errors, which come again
+    fitted = refit(start.bench, found.fitted, plain, waves=_WAVES)
+    effects = tuple(
+        OwnEffect(each.effect.name, estimates_of(start.bench, fitted, each.form.parameters, plain))
+        for each in found.accepted
+    )
+    return MachineModel(start.bench, fitted, start.evidence, effects)
+
+
+def join_recordings(new: Sequence[Measurement], machine: MachineModel, given: Plant, options: Options) -> JointModel:
+    """Return the new recordings beside the old ones, under the machine's model fitted to all of them."""
+    bench, fitted, whiten = _fit_jointly(new, machine)
+    if options.late_s > 0.0 or any(each.even_s for each in bench.measurements):
+        fitted, whiten = doubt_times(bench, fitted, whiten, options.late_s)
+        bench, fitted = fit_line_lengths(bench, fitted, whiten, given.regulator.command_step_v)
+    rows = bench.judged & (np.arange(bench.rows) >= bench.rows - machine.bench.rows)
+    columns = machine_error_columns(bench, fitted, rows)
+    error_n, common_n, left_n = common_error_n(fitted, columns, rows)
+    bench = replace(bench.without_columns(columns), raw_n=bench.raw_n - error_n, witnesses=frozenset(range(len(new))))
+    fitted = refit(bench, fitted, whiten)
+    return JointModel(bench, fitted, whiten, error_n, common_n, left_n)
+
+
+def _fit_jointly(new: Sequence[Measurement], machine: MachineModel) -> tuple[Bench, FittedModel, Whitener]:
+    """All recordings under the machine's parameters as the old ones show them, with offsets and starts of their own."""
+    bench = bench_of([*new, *machine.bench.measurements], machine.bench.motion)
+    fresh = bench.rows - machine.bench.rows
+    bench = replace(bench, usable=np.concatenate([bench.usable[:fresh], machine.bench.usable]))
+    parameters = _joined_parameters(new, machine)
+    free = tuple(each for each in machine.fitted.free if each.section != STARTS)
+    strains = start_parameters(bench, parameters.plant)
+    whiten = white_whitener(bench, machine_residual(bench, parameters))
+    (fitted,) = linearise(bench, [FitProblem(parameters, (*free, *strains))], whiten)
+    return (*drop_unfelt_strains(bench, fitted, whiten), whiten)
+
+
+def machine_residual(bench: Bench, parameters: ModelParameters) -> Floats:
+    """Return measured minus simulated of one model, (rows,)."""
+    return np.asarray(bench.residuals(bench.simulate([parameters]))[0])
+
+
+def _joined_parameters(new: Sequence[Measurement], machine: MachineModel) -> ModelParameters:
+    """The machine's parameters with the offsets and starts that fit the new recordings best before those of the old."""
+    own = machine.fitted.parameters
+    fresh = fit_initial_strains(bench_of(new, machine.bench.motion), own.plant).parameters
+    olds = range(len(machine.bench.measurements))
+    starts = (*(fresh.start(k) for k in range(len(new))), *(own.start(k) for k in olds))
+    return replace(
+        own,
+        offsets_n=(*fresh.offsets_n, *own.offsets_n),
+        starts=starts if any(each is not None for each in starts) else (),
+        character_s=0.0,
+    )
