@@ -31,12 +31,12 @@ def compensation_on(rig: Rig, plant: PlantProfile) -> Compensation:
     take back of that one, too."""
     own = rig.plant_profile or rig.fallback_plant or load_plant(FALLBACK_PLANT)
     compensation = compensation_of(without_compensable(own.plant), plant.plant)
-    return _without_calibrated(rig, in_simulation(compensation) if rig.simulated else compensation)
+    return _tell_calibrated(rig, in_simulation(compensation) if rig.simulated else compensation)
 
 
-def _without_calibrated(rig: Rig, compensation: Compensation) -> Compensation:
-    """Leave to a calibration that was made on this very rig what it has measured itself: the command map, and with its
-    response the timing."""
+def _tell_calibrated(rig: Rig, compensation: Compensation) -> Compensation:
+    """Say what is left to a calibration that was made on this very rig and has measured it: the command map, and with its
+    response the timing. The parts stay, for another calibration may come into use: control leaves them out by itself."""
     measured = {By.COMMAND} if rig.calibration.rig == rig.name else set()
     measured |= {By.TIMING} if rig.response_of(rig.calibration) else set()
     known = {treatment.name for treatment in TREATMENTS if treatment.by in measured}
@@ -45,8 +45,6 @@ def _without_calibrated(rig: Rig, compensation: Compensation) -> Compensation:
     )
     return replace(
         compensation,
-        command=None if By.COMMAND in measured else compensation.command,
-        timing=None if By.TIMING in measured else compensation.timing,
         acts=tuple(name for name in compensation.acts if name not in known),
         limited=(*compensation.limited, *left),
     )

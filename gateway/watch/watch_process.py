@@ -100,29 +100,42 @@ def pause_s(every_s: float, spent_s: float) -> float:
 
 
 def watch_forever(options: dict[str, Any]) -> None:
-    """Look, tell, sleep; for ever. Begin anew where another plant has come into use."""
+    """Look, tell, sleep; for ever. Begin anew where another plant has come into use. The look at the force is cheap, so it is
+    told before the other begins, which may take long."""
     ring, state, every_s = RingReader(options["ring"]), Path(options["state"]), options["every_s"]
     time.sleep(options["window_s"])
     watch, force = make_watch(ring, options)
     known: PlantSince | None = None
     while True:
-        began_s = time.process_time()
-        watch.check_newest_window()
-        force.look(ring.newest(_ALL_ROWS), ring.columns)
-        spent_s = time.process_time() - began_s
-        rest_s = pause_s(every_s, spent_s)
-        counters = watch.counters | {"cpu_s": time.process_time(), "pause_s": rest_s}
-        counters = {name: value for name, value in counters.items() if isfinite(value)}  # JSON has no NaN
-        published = watch.published
-        said = {"cause": int(published.cause), "sentence": published.sentence, "worse": force.sentence}
-        plant = _plant_of(report_to_control(state, said | {"counters": counters}))
-        time.sleep(rest_s)
+        plant = _plant_of(report_to_control(state, {}))
         if plant is not None and plant != known:
             if known is not None:  # rows from before the change were read and commanded otherwise
                 time.sleep(max(0.0, options["window_s"] - (time.monotonic() - plant.since_s)))
                 watch, force = make_watch(ring, options)
             known = plant
             force.follow(plant)
+        began_s, said_before = time.process_time(), force.sentence
+        force.look(ring.newest(_ALL_ROWS), ring.columns)
+        if force.sentence != said_before:
+            report_to_control(state, _report(watch, force, {}))
+        watch.check_newest_window()
+        spent_s = time.process_time() - began_s
+        rest_s = pause_s(every_s, spent_s)
+        counters = {"cpu_s": time.process_time(), "pause_s": rest_s}
+        report_to_control(state, _report(watch, force, counters))
+        time.sleep(rest_s)
+
+
+def _report(watch: "Watch", force: "ForceWatch", more: dict[str, float]) -> dict[str, Any]:
+    """Return what both watches say, as control takes it. more: counters of the process."""
+    counters = {name: value for name, value in (watch.counters | more).items() if isfinite(value)}  # JSON has no NaN
+    published = watch.published
+    return {
+        "cause": int(published.cause),
+        "sentence": published.sentence,
+        "worse": force.sentence,
+        "counters": counters,
+    }
 
 
 def _plant_of(answer: dict[str, Any]) -> "PlantSince | None":

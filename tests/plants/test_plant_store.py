@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm import Bsfm
 from gateway.numbered_documents.store import StoreError
 from gateway.plants.in_use import compensation_on, in_use_facts, with_cell_terms, with_plant_in_use
 from gateway.plants.store import FoundCause, NumberedPlant, PlantStore, Provenance, SourceRecording
@@ -79,7 +80,9 @@ def test_a_calibration_of_this_very_rig_has_measured_the_command_map_itself():
     rig = load_rig("demo")
     calibrated = replace(rig, calibration=replace(load_calibration("demo"), rig="demo"))
     compensation = compensation_on(calibrated, bowed())
-    assert (compensation.acts, compensation.command) == ((), None)
+    assert compensation.acts == ()
+    used = with_plant_in_use(calibrated, numbered())
+    assert type(used.calibration_in_use(used.calibration).model) is Bsfm, "its volts are sent as they are"
     ((name, why),) = compensation.limited
     assert name == "command-nonlinearity" and "has measured it" in why
 

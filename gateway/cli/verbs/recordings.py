@@ -46,6 +46,7 @@ def _facts(entry: "RecordingEntry") -> dict[str, object]:
         "started_utc": entry.header.get("started_utc"),
         "rig": entry.header.get("rig"),
         "calibration": entry.header.get("calibration"),
+        "plant": (entry.header.get("plant_in_use") or {}).get("number"),
         "rows": entry.rows,
         "duration_s": round(entry.duration_s, 6),
         "size_bytes": entry.size_bytes,

@@ -155,3 +155,21 @@ def test_the_same_machine_unchanged_is_neither_better_nor_worse(tmp_path):
         wired_run = recorded_run(machine.record(None))
         runs.append(wired_run.blocks(None))
     assert compare_runs(*runs).verdict is GainVerdict.UNKNOWN
+
+
+@pytest.mark.long
+def test_recorded_diagnosed_used_and_run_again_it_gains(tmp_path):
+    """README, "Close the loop": the diagnosis finds the hidden effect in the gateway's own recording by itself."""
+    machine = Machine(tmp_path, {"regulator__command_bow": BOW})
+    machine.record(None, rounds=5)
+    told = CliRunner().invoke(command, ["diagnose", "1", "--save", "--state", str(tmp_path)])
+    assert told.exit_code == 0, told.output
+    used = CliRunner().invoke(command, ["plant", "use", "1", "--state", str(tmp_path), "--json"])
+    assert json.loads(used.stdout)["compensated"] == ["command-nonlinearity"], used.output
+    plant = PlantStore(tmp_path).find_selected().document
+    assert plant is not None
+    assert plant.profile.plant.regulator.command_bow == pytest.approx(BOW, rel=0.1)
+    Machine(tmp_path, {"regulator__command_bow": BOW}, seed=8).record(plant, rounds=5)
+    found = compare(tmp_path, "--before", 1, "--after", 2)
+    assert found["verdict"] == found["held"]["verdict"] == "better"
+    assert found["held"]["ratio"] < 0.3
