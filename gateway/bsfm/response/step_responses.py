@@ -96,13 +96,18 @@ class StepResponse:
         beyond_v = self.way * (arrived_v - self.end_v)
         peak_v = np.maximum.accumulate(np.maximum(beyond_v, 0.0))
         start_n, end_n = (self.path_n[0], self.path_n[-1]) if self.way > 0.0 else (self.path_n[-1], self.path_n[0])
-        last = slice(-2, None) if self.way > 0.0 else slice(0, 2)
-        slope = float(np.ptp(self.path_n[last]) / max(np.ptp(self.path_v[last]), SAME_V))
+        slope = self._slope_at_end()
         lost_n = np.interp(np.where(peak_v > 0.0, peak_v - beyond_v, 0.0), self.back_v, self.back_n)
         kept_n = slope * peak_v[-1] - float(np.interp(peak_v[-1], self.back_v, self.back_n))
         share = (np.where(peak_v > 0.0, end_n, on_way_n) - start_n) / (end_n - start_n)
         expected_n = start_n + share * (end_n - self.way * kept_n - start_n) + self.way * (slope * peak_v - lost_n)
         return np.asarray(expected_n, dtype=np.float64)
+
+    def _slope_at_end(self) -> float:
+        """N/V over the last third of the way; where the model's range ends there, not more than twice that of the whole."""
+        third = slice(-PATH_POINTS // 3, None) if self.way > 0.0 else slice(0, PATH_POINTS // 3)
+        whole = float(np.ptp(self.path_n) / np.ptp(self.path_v))
+        return min(2.0 * whole, float(np.ptp(self.path_n[third]) / max(np.ptp(self.path_v[third]), SAME_V)))
 
 
 def missing_share(since_s: Floats, lag_s: float, second_lag_s: float, damping: float = 0.0) -> Floats:
