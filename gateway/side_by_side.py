@@ -4,8 +4,9 @@ For work that lets go of Python's lock: compiled loops and numpy's own on long a
 core did what: every call stands for itself. Two, because that is what a controller's computer has to spare.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from typing import Final, TypeVar
@@ -28,12 +29,19 @@ def side_by_side(function: Callable[[_Item], _Result], items: Sequence[_Item]) -
     return [result for pair in zip(own, found, strict=False) for result in pair] + own[len(found) :]
 
 
-def _call_each(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+@contextmanager
+def one_after_another() -> Iterator[None]:
+    """Have everything in this block done by the one thread that asks for it: for whoever must not be felt."""
     token = _is_inside.set(True)
     try:
-        return [function(item) for item in items]
+        yield
     finally:
         _is_inside.reset(token)
+
+
+def _call_each(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    with one_after_another():
+        return [function(item) for item in items]
 
 
 @cache

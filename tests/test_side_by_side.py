@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from gateway.side_by_side import side_by_side
+from gateway.side_by_side import one_after_another, side_by_side
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 8])
@@ -29,3 +29,8 @@ def test_what_fails_in_either_thread_fails(bad):
 
     with pytest.raises(ZeroDivisionError):
         side_by_side(divide, [0, 1, 2])
+
+
+def test_who_must_not_be_felt_uses_one_thread():
+    with one_after_another():
+        assert set(side_by_side(lambda _: threading.get_ident(), range(6))) == {threading.get_ident()}

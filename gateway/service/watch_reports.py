@@ -13,7 +13,7 @@ from gateway.service.running_rig.control_loop import ControlLoop, Log
 from gateway.service.socket_requests import ResidualRequest, parse_request
 
 Answer = dict[str, Any]
-COUNTERS: Final = ("looks", "judged", "skipped", "cpu_s", "rms_n", "floor_n", "pause_s")
+COUNTERS: Final = ("looks", "judged", "skipped", "cpu_s", "rms_n", "floor_n", "pause_s", "memory_mb")
 """Numbers that the watch may tell about itself; others are not kept."""
 _LONGEST_SENTENCE: Final = 500
 _LARGEST_COUNT: Final = 1.0e15

@@ -59,7 +59,7 @@ def plain(plant: Plant) -> Plant:
     return Plant(**{name: plain_section(getattr(plant, name)) for name in SECTIONS})
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=512)
 def plain_section(section: Any) -> Any:
     """Return a section of Python floats. The cache makes this, which every plant of a search goes through, cheap."""
     return replace(section, **{entry.name: float(getattr(section, entry.name)) for entry in fields(section)})

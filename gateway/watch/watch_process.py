@@ -1,9 +1,10 @@
 """The residual watch as a process: `python -m gateway.watch.watch_process LINK '{"rig": ..., "ring": descriptor, ...}'`.
 
-It must never be felt. It runs in the kernel's idle class, uses one thread, a quarter of one core at most on average, is
-the first to go when memory runs out, and shares with control nothing but memory that it can only read, and a socket that
-it speaks to for a millisecond. Everything heavy is imported when there is a window to judge: a gateway that runs for
-less, as in most tests, never pays for it. It ends with the guardian: the end of its link ends it, whatever it is doing.
+It must never be felt. It runs in the kernel's idle class, of processor and disk alike, uses one thread, a fortieth of one core
+at most in the long run (`processor_budget`), gives back what memory a look leaves, is the first to go when memory runs out,
+and shares with control nothing but memory that it can only read, and a socket that it speaks to for a millisecond. Everything
+heavy is imported when there is a window to judge: a gateway that runs for less, as in most tests, never pays for it. It ends
+with the guardian: the end of its link ends it, whatever it is doing.
 """
 
 import contextlib
@@ -18,8 +19,13 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from gateway.processes import priority
+from gateway import progress
+from gateway.extras import MissingExtraError
+from gateway.processes import exit_codes, priority
 from gateway.recording.ring import RingReader
+from gateway.side_by_side import one_after_another
+from gateway.watch.memory import resident_mb, return_memory
+from gateway.watch.processor_budget import ProcessorBudget
 
 if TYPE_CHECKING:
     from gateway.diagnosis import Diagnosis, Measurement
@@ -27,18 +33,19 @@ if TYPE_CHECKING:
     from gateway.watch.force_watch import ForceWatch, PlantSince
     from gateway.watch.residual_watch import Watch
 
-SHARE: Final = 0.25
-"""Of one core, on average."""
 _ALL_ROWS: Final = 1 << 30
 _ANSWER_S: Final = 5.0
 _LONGEST_ANSWER: Final = 1 << 16
 _FIRST_AMONG_THE_KILLED: Final = "900"
+_LAST_NICE: Final = 19
 
 
 def yield_to_others() -> None:
     """Give way to everybody else in processor time and memory; use one thread for the mathematics."""
     priority.lower_priority()
-    with contextlib.suppress(OSError, AttributeError):
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, _LAST_NICE)  # where the idle class is refused
+    with contextlib.suppress(OSError, AttributeError):  # takes the idle class of the disk with it, see ioprio_set(2)
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(_FIRST_AMONG_THE_KILLED)
@@ -94,18 +101,14 @@ def diagnose_window(measurements: "Sequence[Measurement]", plant: "Plant") -> "D
     return diagnose(measurements, plant, Options(is_own=True))
 
 
-def pause_s(every_s: float, spent_s: float) -> float:
-    """Return the pause from the end of a look to the next one. spent_s: of processor time, by the look."""
-    return max(every_s, spent_s / SHARE) - min(spent_s, every_s)
-
-
 def watch_forever(options: dict[str, Any]) -> None:
     """Look, tell, sleep; for ever. Begin anew where another plant has come into use. The look at the force is cheap, so it is
     told before the other begins, which may take long."""
-    ring, state, every_s = RingReader(options["ring"]), Path(options["state"]), options["every_s"]
+    ring, state, budget = RingReader(options["ring"]), Path(options["state"]), ProcessorBudget()
     time.sleep(options["window_s"])
     watch, force = make_watch(ring, options)
     known: PlantSince | None = None
+    told_s, spent_s = time.monotonic(), 0.0
     while True:
         plant = _plant_of(report_to_control(state, {}))
         if plant is not None and plant != known:
@@ -114,14 +117,17 @@ def watch_forever(options: dict[str, Any]) -> None:
                 watch, force = make_watch(ring, options)
             known = plant
             force.follow(plant)
-        began_s, said_before = time.process_time(), force.sentence
+        said_before = force.sentence
         force.look(ring.newest(_ALL_ROWS), ring.columns)
         if force.sentence != said_before:
             report_to_control(state, _report(watch, force, {}))
-        watch.check_newest_window()
-        spent_s = time.process_time() - began_s
-        rest_s = pause_s(every_s, spent_s)
-        counters = {"cpu_s": time.process_time(), "pause_s": rest_s}
+        with progress.listen(_return_memory_between_stages), one_after_another():
+            watch.check_newest_window()
+        return_memory()
+        now_s, total_s = time.monotonic(), time.process_time()
+        rest_s = budget.pause_s(options["every_s"], now_s - told_s, total_s - spent_s)
+        told_s, spent_s = now_s, total_s
+        counters = {"cpu_s": total_s, "pause_s": rest_s, "memory_mb": resident_mb()}
         report_to_control(state, _report(watch, force, counters))
         time.sleep(rest_s)
 
@@ -145,12 +151,21 @@ def _plant_of(answer: dict[str, Any]) -> "PlantSince | None":
     return PlantSince(answer["plant"], answer["plant_since_s"]) if "plant" in answer else None
 
 
+def _return_memory_between_stages(now: progress.Progress) -> None:
+    """What one stage of a search has freed is not for the next one only."""
+    if not now.done:
+        return_memory()
+
+
 def main(arguments: list[str]) -> int:
     """Watch until the guardian ends. arguments: descriptor of the link, options as JSON."""
     yield_to_others()
     exit_with_guardian(socket.socket(fileno=int(arguments[0])))
-    watch_forever(json.loads(arguments[1]))
-    return 0
+    try:
+        watch_forever(json.loads(arguments[1]))
+    except MissingExtraError as missing:  # numba is there, or nobody had started us, and does not load
+        sys.stderr.write(f"{missing}\n")
+    return exit_codes.DEVICE
 
 
 if __name__ == "__main__":
