@@ -61,7 +61,7 @@ def test_numbers_are_the_catalogues_in_its_order():
     from gateway.diagnosis import EFFECTS
 
     assert [effect.name for effect in EFFECTS] == [cause.effect for cause in C if 0 < cause < 99]
-    assert [int(cause) for cause in C] == [*range(44), 99]
+    assert [int(cause) for cause in C] == [*range(46), 99]
 
 
 def test_an_effect_that_the_map_does_not_know_is_unknown():
