@@ -174,6 +174,8 @@ def _direct_causes(
             before_n, now_n = after_n, float(np.sqrt(max(after_n**2 - each.values[0][1] ** 2 / 12.0, 0.0)))
         else:
             now_n = after_n
+        if bench.witnesses is not None:  # what belongs to the machine is in no simulation
+            before_n, now_n = each.before_n, each.after_n
         least = 0.0 if each.name == "repeated-samples" else _LEAST_DIRECT  # few copies are no chance either
         if before_n**2 - now_n**2 > least * before_n**2:
             gain = Gain(

@@ -57,7 +57,7 @@ class JointModel:
 def describe_machine(old: Sequence[Measurement], given: Plant, options: Options) -> MachineModel:
     """Return the machine that these recordings show, with as many effects as they ask for. given: the plant to start from."""
     start = prepare_search(old, given, options)
-    found = search_effects(start.bench, start.base, start.effects, start.whiten, roughly=True)
+    found = search_effects(start.bench, start.base, start.effects, start.whiten)
     plain = white_whitener(
         start.bench, found.fitted.residual_n
     )  # the whitened optimum leaves slow errors, which come again

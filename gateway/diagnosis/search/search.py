@@ -42,7 +42,6 @@ from gateway.diagnosis.search.normal_equations import block_sums, held_out_error
 from gateway.diagnosis.search.parameters import reset_parameters
 
 MOST_EFFECTS: Final = 5  # found, usual or without a name; each costs a comparison of all others
-_MOST_ROUGHLY: Final = 3  # of the same, where only the model counts
 _DISCREPANT_CHI2_PER_ROW: Final = 3.0  # chi-square per row of the winner
 _CLEARLY_STRONGER: Final = 1.15  # a nameless dependence must explain this much more than the best effect ...
 _CLEARLY_STRONGER_ON_ITS_COLUMN: Final = 1.3  # ... or this much more, where both look at one column ...
@@ -90,18 +89,12 @@ class SearchResult:
     last: ModelComparison
 
 
-def search_effects(
-    bench: Bench, base: FittedModel, effects: Sequence[Effect], whiten: Whitener, *, roughly: bool = False
-) -> SearchResult:
-    """Return all effects that the recording shows, one after the other. `base` is the refitted base model.
-
-    roughly: the first few, none compared once more: where the model counts and their names do not.
-    """
+def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], whiten: Whitener) -> SearchResult:
+    """Return all effects that the recording shows, one after the other. `base` is the refitted base model."""
     base, whiten, comparison = _compare_under_noise(bench, base, effects, whiten)
     first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
     unnamed: list[Dependence] = []
-    most = _MOST_ROUGHLY if roughly else MOST_EFFECTS
-    while len(accepted) + len(usual) + len(unnamed) < most:
+    while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
         explained = _explained_chi2(base, fitted, accepted)
         winner, saved = None, 0.0
         if comparison.ranked and is_significant(comparison.winner, comparison.starts):
@@ -129,7 +122,7 @@ def search_effects(
         fitted, whiten, comparison = _compare_under_noise(bench, fitted, _not_accepted(effects, accepted), whiten)
         base = _refit_base(bench, base, whiten)
     found = SearchResult(bench, base, fitted, tuple(accepted), tuple(unnamed), whiten, first, comparison)
-    if len(accepted) > 1 and not roughly:
+    if len(accepted) > 1:
         return _exchange_effects(found, effects)
     return found
 

@@ -182,7 +182,7 @@ def readings(day: Day, effect: str, amount: float, noise_n: Floats) -> Floats:
     if effect == "sensor-quadratic":
         force = force + amount * force**2
     elif effect == "creep":
-        force = force - amount * (force - _follow(force, 6.0))
+        force = force + amount * _follow(force, 6.0)  # a cell under load: at once what it was, and more with time
     elif effect == "thermal-zero-drift":
         force = force + amount * (day.temperature_c - 22.0)
     reading = force + noise_n
