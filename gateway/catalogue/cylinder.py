@@ -88,7 +88,7 @@ CYLINDER: Final = (
                 parameters=(STICTION, STICTION_TIME_SHORT), probes=effect.fixed_starts(*_STICK_SLIP_STARTS)
             ),  # of a slide that sticks and slips
         ),
-        group=("coulomb-friction", "dwell-stiction"),
+        group=("coulomb-friction", "dwell-stiction", "presliding"),
     ),
     entry(
         name="viscous-friction",
@@ -114,7 +114,7 @@ CYLINDER: Final = (
         treatments=(effect.Treatment(by=effect.By.MODEL),),
         least=LEAST_PRESLIDING_M,
         forms=(effect.EffectForm(parameters=(PRESLIDING,), probes=effect.fixed_starts(*_PRESLIDING_STARTS)),),
-        group=_ONE_SPEED,
+        group=(*_ONE_SPEED, "stribeck-friction"),
     ),
     entry(
         name="load-dependent-friction",

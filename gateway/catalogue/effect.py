@@ -162,6 +162,7 @@ class Effect:
     group: tuple[str, ...] = ()
     rarity: float = 0.0  # chi-square by which it must beat a commoner cause that explains as much
     least: float = 0.0  # of the first parameter, below which it is part of every machine
+    least_rows: float = 0.0  # the same in rows of a table that a gauge drives: its channels are read one after another
     direct: bool = False  # told by the readings themselves, not by what the model leaves
     marks: tuple[Parameter, ...] = ()  # parameters that only the direct way sets
 

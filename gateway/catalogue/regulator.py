@@ -205,7 +205,7 @@ REGULATOR: Final = (
             effect.EffectForm(parameters=(LEAK,), probes=effect.fixed_starts((0.003,), (0.03,))),
             effect.EffectForm(parameters=(LEAK_FLOW,), probes=effect.fixed_starts((5.0e3,)), proportional=True),
         ),
-        group=shared.LIMITS,
+        group=(*shared.LIMITS, "warm-up"),
         rarity=2.0,
     ),
     entry(

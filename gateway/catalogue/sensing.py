@@ -101,7 +101,7 @@ SENSING: Final = (
         ),
         treatments=(effect.Treatment(why_not=_UNKNOWN_ZERO),),
         forms=(effect.EffectForm(parameters=(WARM_UP, WARM_UP_TIME), probes=_warm_up, proportional=True),),
-        group=shared.MONOTONE,
+        group=(*shared.MONOTONE, "leak"),
     ),
     entry(
         name="linear-drift",
@@ -163,6 +163,7 @@ SENSING: Final = (
         recipe=effect.Recipe(parts=(effect.PartName.STEPS, effect.PartName.RAMPS), columns=effect.PRESSURE),
         treatments=(effect.Treatment(why_not=_ONE_CLOCK),),
         least=7.0e-4,
+        least_rows=0.5,
         rarity=3.0,
         forms=(effect.EffectForm(parameters=(CLOCK_OFFSET,), probes=effect.fixed_starts((0.003,), (0.03,), (-0.02,))),),
         group=shared.SLOW_LAGS,

@@ -27,6 +27,9 @@ INDISTINGUISHABLE = (
     ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift"),
     ("sensor-quadratic", "sensor-cubic", "supply-saturation", "contact-nonlinearity"),
     ("coulomb-friction", "viscous-friction", "presliding"),
+    ("end-stop", "supply-saturation"),
+    ("stribeck-friction", "presliding"),
+    ("leak", "warm-up"),
 )
 WORDS = ("family", "what", "signature", "excitation", "experiment")
 UNITS = {

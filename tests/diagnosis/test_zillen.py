@@ -14,6 +14,7 @@ from gateway.diagnosis import Diagnosis, Measurement, Options, diagnose
 from gateway.recording import read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.mapping_file import column_mapping
+from tools.bench.cylinders import columns_of, held_out_rms_n
 
 FOLDER = Path(os.environ.get("FORCE_GATEWAY_DATA") or Path(__file__).parents[3] / "shared" / "data")
 DATA = FOLDER / "zillen-cylinder-friction"
@@ -77,6 +78,18 @@ def test_hidden_friction_of_the_o_ring_is_found() -> None:
 def test_friction_at_three_bar_is_the_strongest_cause(name: str) -> None:
     found = diagnosed((name,))
     assert_friction_found(found, 0.65 * found.baseline.rms_n)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["PK_1bar", "PK_3bar", "O-ring257_1bar", "O-ring257_3bar"])
+def test_less_is_left_than_by_least_squares_with_the_place(name: str) -> None:
+    """And no clock is blamed that nobody can tell from friction or from a pressure that comes late."""
+    measurement, found = recording(name), diagnosed((name,), None)
+    rows = measurement.usable
+    assert found.extended.held_out_rms_n <= 0.75 * held_out_rms_n(
+        columns_of(measurement)[rows], measurement.force_n[rows]
+    )
+    assert not [cause for cause in found.causes if cause.group == ("clock-offset",)], names_of(found)
 
 
 def _both(without: str | None) -> Diagnosis:

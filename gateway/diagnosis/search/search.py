@@ -112,7 +112,9 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
             fitted = refit(bench, fitted, whiten)
         elif winner is None or saved == 0.0:
             break
-        elif _saves_enough(winner, saved) and _is_noticeable(winner, fitted):
+        elif _saves_enough(winner, saved) and is_noticeable(
+            (winner.effect, winner.form), winner.fitted, fitted, comparison.hints
+        ):
             accepted.append(AcceptedEffect(winner.effect, winner.form, comparison))
             fitted = winner.fitted
         else:
@@ -222,12 +224,15 @@ def _saves_enough(refined: RefinedEffect, saved: float) -> bool:
     return saved > (_LEAST_SURE_GAIN if refined.gain > _OVERWHELMING_CHI2 else _LEAST_GAIN)
 
 
-def _is_noticeable(refined: RefinedEffect, before: FittedModel) -> bool:
-    """Is its size, or the change of a size that the plant had already, more than every machine has?"""
-    size = refined.form.parameters[0]
-    return abs(refined.fitted.parameters.value(size) - before.parameters.value(size)) >= max(
-        refined.effect.least, refined.form.least
-    )
+def is_noticeable(
+    named: tuple[Effect, EffectForm], after: FittedModel, before: FittedModel, hints: SearchHints
+) -> bool:
+    """Return whether an effect's size, or the change of a size that the plant had already, is more than every machine has."""
+    effect, form = named
+    size = form.parameters[0]
+    channels_s = 0.0 if "command_v" in hints.columns else effect.least_rows * hints.row_s
+    least = max(effect.least, form.least, channels_s)
+    return abs(after.parameters.value(size) - before.parameters.value(size)) >= least
 
 
 def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whitener) -> FittedModel:

@@ -20,7 +20,7 @@ from gateway.diagnosis.result import Gain
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.search.normal_equations import HeldOutErrors, held_out_errors
-from gateway.diagnosis.search.search import AcceptedEffect, SearchResult, refit_without
+from gateway.diagnosis.search.search import AcceptedEffect, SearchResult, is_noticeable, refit_without
 
 _BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
 _SAME_AREA: Final = 0.2  # relative; plain optima further apart are looked for from both sides
@@ -70,7 +70,10 @@ def drop_doubtful_effects(
             gain_of(held_out_errors(bench, without_it, reported.whiten), reported.held_out, 0.0)
             for without_it in reported.without
         ]
-        doubts = [reason_for_doubt(each, gain) for each, gain in zip(found.accepted, gains, strict=True)]
+        doubts = [
+            reason_for_doubt(each, gain) or _reason_in_size(each, reported.fitted)
+            for each, gain in zip(found.accepted, gains, strict=True)
+        ]
         rms_n = bench.rms_n(reported.base.residual_n)
         if not any(doubts) and reported.held_out.rms_n > _LEFT_AS_LARGE * rms_n:
             doubts = [f"with it the error is as large on unseen blocks as without: {rms_n:.3g} N"] * len(gains)
@@ -96,6 +99,14 @@ def reason_for_doubt(accepted: AcceptedEffect, gain: Gain) -> str:
         return f"it leaves the error as large: {before_n:.3g} N before, {after_n:.3g} N after"
     wins = sum(comparison.shares.get(each, 0.0) for each in {name, *accepted.effect.group})
     return f"it wins in {100.0 * wins:.0f} % of the ways to resample the recording only" if wins < _LEAST_SURE else ""
+
+
+def _reason_in_size(accepted: AcceptedEffect, reported: FittedModel) -> str:
+    """Why an effect of this size is no finding; empty where it is one. An exchange may have let a small one in."""
+    named, comparison = (accepted.effect, accepted.form), accepted.comparison
+    return (
+        "" if is_noticeable(named, reported, comparison.beside, comparison.hints) else "every machine has as much of it"
+    )
 
 
 def _refit_for_report(bench: Bench, found: SearchResult) -> ReportedModels:

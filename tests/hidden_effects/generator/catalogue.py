@@ -15,6 +15,9 @@ PAGE_GROUPS = (
     ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift"),
     ("sensor-quadratic", "sensor-cubic", "supply-saturation", "contact-nonlinearity"),
     ("coulomb-friction", "viscous-friction", "presliding"),
+    ("end-stop", "supply-saturation"),
+    ("stribeck-friction", "presliding"),
+    ("leak", "warm-up"),
 )
 # The same curve or the same loop from other causes, which the page does not list: a group that holds the truth is no lie.
 PHYSICAL_GROUPS = (
