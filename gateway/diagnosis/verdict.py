@@ -84,7 +84,7 @@ def compose_diagnosis(findings: SearchFindings, given_floor_n: float | None) -> 
     reaches = reported.held_out.rms_n <= _REACHED_RATIO * noise.floor_n
     causes = _causes(bench, found, reported, noise.floor_n)
     causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
-    causes.sort(key=lambda cause: -cause.gain.share_of_excess)
+    causes.sort(key=lambda cause: cause.gain.held_out_rms_after_n**2 - cause.gain.held_out_rms_before_n**2)
     unseen = _unseen(findings, found, causes)
     told = {*_grouped(causes), *(each.name for each in causes), *(each.name for each in unseen)}
     unexplained = noise.known_n is not None and noise.rms_n > _ABOVE_FLOOR_RATIO * noise.known_n
