@@ -19,7 +19,7 @@ from gateway.diagnosis.residual_regressors import Regressors, list_regressors
 from gateway.diagnosis.result import Leftover
 from gateway.diagnosis.search.bench import BLOCKS, Bench
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import NormalEquations
+from gateway.diagnosis.search.normal_equations import NormalEquations, model_span
 
 _RESOLUTION_N: Final = 1.0e-4
 """What the simulation itself resolves: its rigid friction gives by a nanometre, 4e-5 N on the usual pad."""
@@ -67,7 +67,7 @@ def strongest_dependence(
 
 def _strongest(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Iterator[Regressors]) -> Dependence | None:
     """Some at a time: a thousand columns would be gigabytes at once."""
-    model, white = whiten.spectra(fitted.jacobian), whiten.spectra(fitted.residual_n)
+    span, white = model_span(fitted, whiten), whiten.spectra(fitted.residual_n)
     total = max(float(white @ white), 1.0)
     least_power = _OWN_POWER if whiten.knows_times else _OWN_POWER_IN_DOUBT
     tried, best = 0, None
@@ -76,7 +76,7 @@ def _strongest(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Itera
         columns = whiten.spectra(bench.reduced(np.vstack([each.columns for each in some])))
         found = [
             each
-            for each in _dependences(NormalEquations(model, columns, white), some, total, least_power)
+            for each in _dependences(NormalEquations(span, columns), some, total, least_power)
             if each.share >= _LEAST_SHARE
         ]
         best = min([*found, *([best] if best else [])], key=lambda each: each.log_chance, default=None)

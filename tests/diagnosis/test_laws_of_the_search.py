@@ -14,7 +14,7 @@ from gateway.diagnosis.noise import coloured_whitener, timing_weights, white_whi
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
 from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.normal_equations import NormalEquations, held_out_errors
+from gateway.diagnosis.search.normal_equations import ModelSpan, NormalEquations, held_out_errors
 from gateway.diagnosis.search.parameters import ModelParameters
 from gateway.recording import Recording
 from gateway.recording.measurement import measurement_of
@@ -35,7 +35,7 @@ def test_the_gain_of_added_columns_is_that_of_least_squares() -> None:
     rng = np.random.default_rng(1)
     model, columns = rng.normal(size=(4, 300)), rng.normal(size=(6, 300)) * np.logspace(-6, 6, 6)[:, None]
     residual = rng.normal(size=300) + 0.3 * columns[2] / 1.0e-2 + model[1]
-    normal = NormalEquations(model, columns, residual)
+    normal = NormalEquations(ModelSpan.of(model, residual), columns)
     for indices in ([0], [2], [5], [1, 2], [0, 3, 5]):
         joined = np.vstack([model, columns[indices] / np.linalg.norm(columns[indices], axis=1)[:, None]])
         found = normal.add(indices)
@@ -50,7 +50,7 @@ def test_a_column_of_the_model_gains_nothing() -> None:
     rng = np.random.default_rng(2)
     model = rng.normal(size=(3, 200))
     columns = np.vstack([2.0 * model[0] - model[2], rng.normal(size=200)])
-    normal = NormalEquations(model, columns, rng.normal(size=200))
+    normal = NormalEquations(ModelSpan.of(model, rng.normal(size=200)), columns)
     assert normal.add([0]).gain == 0.0
     assert normal.add([1]).gain > 0.0
 

@@ -14,7 +14,7 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import ColumnGain, NormalEquations, beside_model
+from gateway.diagnosis.search.normal_equations import ColumnGain, NormalEquations, model_span
 from gateway.diagnosis.search.parameters import ModelParameters, apply_start
 
 _LARGEST_STRETCH: Final = 3.0  # how far beyond its start a response that is not proportional is believed
@@ -95,7 +95,7 @@ class CandidateScore:
 
 def score_candidates(found: CandidateColumns, fitted: FittedModel, whiten: Whitener) -> list[CandidateScore]:
     """Return every candidate's promise beside the present model."""
-    normal = beside_model(fitted, found.columns, whiten)
+    normal = NormalEquations(model_span(fitted, whiten), whiten.spectra(found.columns))
     return [
         _with_power(_score_candidate(candidate, normal, fitted.parameters), normal) for candidate in found.candidates
     ]

@@ -21,7 +21,7 @@ from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.search.bench import Bench, Channel
 from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves, fill_rounding_errors
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import beside_model
+from gateway.diagnosis.search.normal_equations import NormalEquations, model_span
 from gateway.diagnosis.search.parameters import ChangedValue, ModelParameters
 from gateway.side_by_side import side_by_side
 from gateway.twin.elementwise import Real, smaller
@@ -54,12 +54,12 @@ def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) ->
     rigid = replace(fitted.parameters, plant=_with_rigid_friction(fitted.parameters.plant))
     dead_band = DEAD_BAND if bench.witnesses is None else ChangedValue(DEAD_BAND, bench.witnesses)
     without = bench.simulate([rigid])
-    cost = np.zeros(bands_pa.size)
+    cost, span = np.zeros(bands_pa.size), model_span(fitted, whiten)
     for part in _column_parts(bands_pa.size, bench.rows):
         columns = bench.reduced(
             bench.simulate([rigid.with_value(dead_band, band_pa) for band_pa in bands_pa[part]]) - without
         )
-        normal = beside_model(fitted, columns, whiten)
+        normal = NormalEquations(span, whiten.spectra(columns))
         cost[part] = normal.power - 2.0 * normal.slope
     return tuple(bands_pa[np.argsort(cost)[:_MOST_ANSWERS]].tolist())
 
@@ -139,14 +139,14 @@ def _commanded_channels(bench: Bench) -> Iterator[tuple[Channel, Floats, float]]
 
 def _chi2_gains(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
     """Chi-square that each step explains of the whitened residual."""
-    found = np.zeros(tried.size)
+    found, span = np.zeros(tried.size), model_span(fitted, whiten)
     for part in _column_parts(tried.size, bench.rows):
         vectors = np.zeros((tried[part].size, bench.rows))
         for channel, command_v, row_s in _commanded_channels(bench):
             columns_v = np.empty((tried[part].size, command_v.size))
             fill_rounding_errors(command_v, tried[part], _force_chain(fitted.parameters, row_s), columns_v)
             vectors[:, channel.rows] = columns_v
-        normal = beside_model(fitted, bench.reduced(vectors), whiten)
+        normal = NormalEquations(span, whiten.spectra(bench.reduced(vectors)))
         power = np.maximum(normal.power, 1.0e-300)
         found[part] = np.where(normal.slope > _LEAST_WHOLE_STEP * power, normal.slope**2 / power, 0.0)
     return found

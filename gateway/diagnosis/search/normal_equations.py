@@ -27,19 +27,32 @@ class ColumnGain:
     sizes: Floats
 
 
+@dataclass(frozen=True, slots=True)
+class ModelSpan:
+    """What a model's columns span, as orthonormal rows, and what of the residual they leave; for many NormalEquations."""
+
+    basis: Floats
+    left: Floats
+
+    @classmethod
+    def of(cls, model: Floats, residual: Floats) -> "ModelSpan":
+        """model: (k, rows), residual: (rows,), whitened, or their spectra."""
+        scale = np.sqrt(np.maximum(np.sum(model**2, axis=1), 1.0e-300))
+        basis = orthonormal(model / scale[:, None])
+        return cls(basis, residual - (residual @ basis.T) @ basis)
+
+
 class NormalEquations:
     """Normal equations of candidate columns beside the columns of the present model (whitened, (k, rows), or their spectra).
 
     raw_power: sum of squares of each column; power: of what the model does not span of it; slope: that by the residual.
     """
 
-    def __init__(self, model: Floats, columns: Floats, residual: Floats) -> None:
-        scale = np.sqrt(np.maximum(np.sum(model**2, axis=1), 1.0e-300))
-        basis = orthonormal(model / scale[:, None])
-        self._columns, self._spanned = columns, columns @ basis.T
+    def __init__(self, span: ModelSpan, columns: Floats) -> None:
+        self._columns, self._spanned = columns, columns @ span.basis.T
         self.raw_power = np.einsum("ij,ij->i", columns, columns)
         self.power = np.maximum(self.raw_power - np.sum(self._spanned**2, axis=1), 0.0)
-        self.slope = columns @ (residual - (residual @ basis.T) @ basis)
+        self.slope = columns @ span.left
 
     @cached_property
     def normal_matrix(self) -> Floats:
@@ -56,9 +69,9 @@ class NormalEquations:
         return ColumnGain(gain, sizes / scale)
 
 
-def beside_model(fitted: FittedModel, columns: Floats, whiten: Whitener) -> NormalEquations:
-    """Return the normal equations of columns (k, rows) beside a fitted model, whitened."""
-    return NormalEquations(*(whiten.spectra(each) for each in (fitted.jacobian, columns, fitted.residual_n)))
+def model_span(fitted: FittedModel, whiten: Whitener) -> ModelSpan:
+    """Return what a fitted model spans, by spectra of the whitened columns."""
+    return ModelSpan.of(whiten.spectra(fitted.jacobian), whiten.spectra(fitted.residual_n))
 
 
 def orthonormal(rows: Floats) -> Floats:
