@@ -46,10 +46,11 @@ class Machine:
         self.now_s = 0.0
 
     def work(self, lasts_s: float) -> None:
-        """Go on for some seconds; every stretch begins at rest."""
+        """Go on for some seconds; every stretch begins and ends at rest, so that they fit together."""
         time_s = np.arange(0.0, lasts_s, ROW_S)
         levels_v = self.rng.uniform(0.5, 4.5, math.ceil(lasts_s))
-        command_v = np.where(time_s < 1.0, 0.0, levels_v[time_s.astype(int)])
+        is_at_rest = (time_s < 1.0) | (time_s > lasts_s - 2.0)
+        command_v = np.where(is_at_rest, 0.0, levels_v[time_s.astype(int)])
         force_n = Replay(Drive(time_s=time_s, command_v=command_v)).run([self.plant]).reading_n[0]
         force_n = force_n + self.rng.normal(0.0, self.plant.cell.noise_n, time_s.size)
         for at_s, volts, newtons in zip(self.now_s + time_s, command_v, force_n, strict=True):
