@@ -7,6 +7,7 @@ effect, with the rules of every search, judged by the new recordings only; what 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 from gateway import progress
 from gateway.diagnosis.against.change_effects import change_effects
@@ -17,11 +18,13 @@ from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt
 from gateway.diagnosis.input_checks import find_suspects
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.residual_tests import find_dependences
-from gateway.diagnosis.result import Diagnosis, Leftover, Machine, Trace
+from gateway.diagnosis.result import Cause, Diagnosis, Leftover, Machine, Trace, Verdict
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT
 from gateway.diagnosis.search.search import SearchResult, search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
 from gateway.twin.plant import Plant
+
+_LEAST_SHARE_OF_LEFT: Final = 0.05  # of the squared error that the old recordings keep; a quiet day showed 0.02
 
 
 def find_changes(
@@ -61,6 +64,7 @@ def compare_with_machine(
     left = _without_old(joint, found, left) if left else left
     floor_n = options.noise_floor_n or min(joint.left_n, joint.bench.rms_n(found.base.residual_n))
     result = compose_diagnosis(SearchFindings(joint.bench, found, evidence, left, effects), floor_n)
+    result = _drop_trifles(result, joint.left_n)
     return replace(
         result,
         base=with_readings_of(given, result.base),
@@ -74,6 +78,27 @@ def compare_with_machine(
             left_n=joint.left_n,
         ),
     )
+
+
+def _drop_trifles(result: Diagnosis, left_n: float) -> Diagnosis:
+    """The answer without changes that are small beside what the machine's model leaves anyway."""
+    kept = tuple(each for each in result.causes if _saved_n2(each) > _LEAST_SHARE_OF_LEFT * left_n**2)
+    if len(kept) == len(result.causes):
+        return result
+    gone = ", ".join(each.name for each in result.causes if each not in kept)
+    note = f"{gone}: no change is told, for it saves less than the machine's own model is uncertain by"
+    quiet = Verdict.UNKNOWN if result.leftover else Verdict.NOTHING_FOUND
+    return replace(
+        result,
+        causes=kept,
+        verdict=result.verdict if kept else quiet,
+        plant=result.plant if kept else result.base,
+        notes=(*result.notes, note),
+    )
+
+
+def _saved_n2(cause: Cause) -> float:
+    return cause.gain.held_out_rms_before_n**2 - cause.gain.held_out_rms_after_n**2
 
 
 def _without_old(joint: JointModel, found: SearchResult, left: Sequence[Leftover]) -> tuple[Leftover, ...]:
