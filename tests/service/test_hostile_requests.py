@@ -18,6 +18,7 @@ from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
+from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
 from gateway.service.simulated_rig import SimulatedRig
 from gateway.service.watch_reports import WatchReports
 from tests.service.hostile import garbage, mutants
@@ -74,11 +75,15 @@ class Stage:
         wired.loop.calibration_runs = self.calibration_runs
         self.upload = RigCalibrations(wired.rig, self.state).serve(wired.bank, lambda taken: None, log)
         self.upload.run_in_background = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers
+        self.plants = RigPlants(wired.rig, self.state)
+        self.plants.serve(PlantEdges(lambda: False, lambda rig: None, lambda: wired.now_s, log))
+        self.plants.run_in_background = lambda work, done: None  # type: ignore[assignment]
         asked = RunningParts(
             bank=wired.bank,
             recordings=self.recordings,
             health=wired.loop.health,
             upload=self.upload,
+            plants=self.plants,
             calibration_runs=self.calibration_runs,
             watch=WatchReports(wired.loop, lambda: wired.now_s, log),
             running={"rig": "demo", "port": 5020, "lease_s": None, "lease_action": "fault"},

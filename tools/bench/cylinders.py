@@ -47,6 +47,7 @@ class CylinderResult:
 
     @property
     def cells(self) -> tuple[str, ...]:
+        """The cells of its row in the table."""
         errors = (f"{each:.2f}" for each in (self.alone_n, self.base_n, self.peer_n, self.left_n))
         found = ", ".join(self.found) or "nothing"
         return (self.name, f"{self.bar:.1f}", f"{self.rows}", *errors, found, f"{self.seconds:.0f}")
@@ -115,6 +116,7 @@ def measurements_in(folder: Path, columns: str) -> Iterator[Measurement]:
 
 
 def main() -> None:
+    """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--columns", default=COLUMNS, help="as diagnose --columns")

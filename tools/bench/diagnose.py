@@ -71,7 +71,7 @@ class Figure:
     worst_s: float
 
     def line(self, *, busy: bool) -> str:
-        """The row of the table; of a busy machine without wall times."""
+        """Return the row of the table; of a busy machine without wall times."""
         wall, processor = ([getattr(run, name) for run in self.runs] for name in ("wall_s", "processor_s"))
         bounds = " and ".join(f"{bound:.0f} s" for bound in (self.median_s, self.worst_s) if bound)
         memory_mb = max(run.memory_mb for run in self.runs)
@@ -131,6 +131,7 @@ def measure_effects(folder: Path, wanted: Sequence[Sequence[str]]) -> list[Spent
 
 
 def tell(what: str, spent: Spent) -> None:
+    """Print what was found, and the time it took, on stderr."""
     named = ", ".join(spent.causes) or "no cause"
     print(f"  {what}: {spent.wall_s:.1f} s, {spent.processor_s:.1f} s of processor: {named}", file=sys.stderr)
 

@@ -40,7 +40,9 @@ def differences(committed: dict[str, Any], again: Calibration) -> list[str]:
 def response_differences(committed: dict[str, Any] | None, again: dict[str, Any]) -> list[str]:
     """Return the difference of two responses as a sentence; that of their source is not compared."""
     times = {name: value for name, value in again.items() if name != "source"}
-    same = committed is not None and all(abs(committed[name] - value) <= SAME_S for name, value in times.items())
+    same = committed is not None and all(
+        abs(committed.get(name, 0.0) - value) <= SAME_S for name, value in times.items()
+    )
     return [] if same else [f"response: committed {committed}, now {again}"]
 
 
