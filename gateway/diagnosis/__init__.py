@@ -1,7 +1,7 @@
 """Measured against simulated: what the model gets wrong, the named cause, the extended model, the gain on unseen data.
 
 In the order of the work: measurement (what came in), excerpt, input_checks (wrong units, swapped columns); search/: bench
-(recordings beside the twin), base_fit, initial_friction (what friction remembers at the first row), direct_evidence (what
+(recordings beside the twin), base_fit, initial_state (what is remembered at the first row), direct_evidence (what
 the readings tell by themselves), hints, candidates, model_comparison and search (naming one of the effects of
 gateway/catalogue), normal_equations and levenberg_marquardt (the mathematics of it), significance (what is a finding);
 noise, residual_tests and residual_regressors (what is left), noise_floor, experiments/ (what the recording cannot show, and

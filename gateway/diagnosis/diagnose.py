@@ -25,7 +25,7 @@ from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdi
 from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
 from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
-from gateway.diagnosis.search.initial_friction import drop_unfelt_strains
+from gateway.diagnosis.search.initial_state import drop_unfelt_starts, settle_known_rests
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.line_lengths import fit_line_lengths
 from gateway.diagnosis.search.parameters import ModelParameters
@@ -42,12 +42,14 @@ _CHANCE_SHARE: Final = 0.25  # of the time that readings may be late is chance: 
 class Options:
     """without: an effect of the base model to switch off, to see it found again. noise_floor_n: known floor, N.
 
+    calibration_noise_n: noise of the readings at rest as the rig's calibration measured it, N.
     late_s: readings may come up to so much late without being a finding (the wires of a gateway's own recording).
     quantum_n: step of the readings that is known and no finding either. is_own: the plant is that of the recording's rig.
     """
 
     without: str | None = None
     noise_floor_n: float | None = None
+    calibration_noise_n: float | None = None
     late_s: float = 0.0
     quantum_n: float = 0.0
     is_own: bool = False
@@ -95,9 +97,9 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
     start = prepare_search(measurements, given, options)
     found = search_effects(start.bench, start.base, start.effects, start.whiten)
     progress.report("testing what is left")
-    left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])
+    left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     findings = SearchFindings(start.bench, found, start.evidence, left, start.effects)
-    return compose_diagnosis(findings, options.noise_floor_n)
+    return compose_diagnosis(findings, options.noise_floor_n, options.calibration_noise_n)
 
 
 def prepare_search(measurements: Sequence[Measurement], given: Plant, options: Options) -> SearchStart:
@@ -215,7 +217,7 @@ def _fit_base_model(
     free = base_parameters(bench, hidden, late_s)
     if free != fitted.free[: len(free)] or hidden - {"coulomb-friction"} != hidden:
         fitted = fit_base(bench, start, free, whiten)
-    bench, fitted = drop_unfelt_strains(bench, fitted, whiten)
+    bench, fitted = drop_unfelt_starts(bench, settle_known_rests(bench, fitted, whiten), whiten)
     return bench, fitted, whiten
 
 

@@ -23,6 +23,7 @@ from gateway.side_by_side import side_by_side
 _LEAST_LEFT: Final = 0.15
 _BINS: Final = 64
 _AT_ONCE: Final = 8  # vectors
+_MANY_LINES: Final = 12  # of a bin, from which its median is told
 _NOWHERE: Final = 1.0e-12  # centre of a Lorentzian that falls from frequency 0
 _FIRST_DAMPING: Final = 0.1
 _FLAT: Final = 1.0e-9  # curvature of a number that changes nothing
@@ -197,15 +198,30 @@ def _fit_spectrum(part: Floats, left: Floats) -> Noise:
     return Noise(total, 1.0 / np.sqrt(model))
 
 
+def fit_to_lines(lines: Floats, power: Floats, rows: int) -> "Spectrum":
+    """Return the spectrum of noise whose power is known at some lines, in lines of so many rows. Both (k,), any order."""
+    edges = np.geomspace(float(lines.min()), float(lines.max()) * (1.0 + 1.0e-9), _BINS // 2)
+    place = np.searchsorted(edges, lines, side="right")
+    bins = [place == each for each in np.unique(place)]
+    levels = [_level(power[inside]) for inside in bins]
+    centres = [float(np.exp(np.mean(np.log(lines[inside])))) for inside in bins]
+    weights = [min(float(inside.sum()), 400.0) for inside in bins]
+    return _fit_by_likelihood(np.array(centres), np.maximum(levels, 1.0e-300), np.array(weights), rows)
+
+
+def _level(power: Floats) -> float:
+    """Level of a bin of the periodogram; one of many lines does not feel a line that stands out."""
+    return float(np.median(power) / _MEDIAN_OF_EXPONENTIAL if power.size >= _MANY_LINES else np.mean(power))
+
+
 def _bin_spectrum(lines: NDArray[np.int64], power: Floats, left: Floats) -> tuple[Floats, Floats, Floats]:
     """Centre line, level and weight of logarithmic bins."""
     edges = np.unique(np.round(np.geomspace(1, lines.size + 1, _BINS)).astype(int))
     centres, levels, weights = [], [], []
     for low, high in pairwise(edges):
         inside = power[low - 1 : high - 1]
-        level = np.median(inside) / _MEDIAN_OF_EXPONENTIAL if inside.size >= 12 else np.mean(inside)
         centres.append(np.sqrt(low * max(high - 1, low)))
-        levels.append(level)
+        levels.append(_level(inside))
         weights.append(min(float(np.sum(left[low - 1 : high - 1])), 400.0))
     return np.array(centres), np.array(levels), np.array(weights, dtype=float)
 

@@ -26,13 +26,22 @@ _MOST_PAIRED: Final = 8  # covariates whose products are asked
 
 @dataclass(frozen=True, slots=True)
 class Regressors:
-    """What the residual may depend on, in which shape; columns (k, rows); among: how many places were tried."""
+    """What the residual may depend on, in which shape; columns (k, rows); among: how many places were tried.
+
+    kind: of the experiment that would show its nature (leftovers.py). names: columns of the recording that it looks at.
+    frequency_hz: of a line; at_s: of a jump; slow: (k, rows), what each column is in time before it is multiplied.
+    """
 
     depends_on: str
     shape: str
     columns: Floats
     outside: bool
     among: int = 1
+    kind: str = "columns"
+    names: tuple[str, ...] = ()
+    frequency_hz: float | None = None
+    at_s: float | None = None
+    slow: Floats | None = None
 
 
 def list_regressors(bench: Bench, residual_n: Floats, white: Floats) -> Iterator[Regressors]:
@@ -64,13 +73,15 @@ def _column_regressors(bench: Bench, force: Floats) -> Iterator[Regressors]:
             columns[name] = column
     for name, column in columns.items():
         foreign = name not in SURROUNDINGS
-        yield Regressors(name, "in proportion", column[None], foreign)
-        yield Regressors(name, "in proportion to it times the force", (column * force)[None], foreign)
-        yield Regressors(name, "curved", np.vstack([column, column**2]), name != "position_mm")
-        yield Regressors(name, "follows it late, by seconds", _lagged_columns(bench, column), True)
+        own = (name,)
+        yield Regressors(name, "in proportion", column[None], foreign, names=own)
+        yield Regressors(name, "in proportion to it times the force", (column * force)[None], foreign, names=own)
+        yield Regressors(name, "curved", np.vstack([column, column**2]), name != "position_mm", names=own)
+        yield Regressors(name, "follows it late, by seconds", _lagged_columns(bench, column), True, names=own)
     for first, second in combinations(list(columns)[:_MOST_PAIRED], 2):
         product = standardise(columns[first] * columns[second], bench)
-        yield Regressors(f"{first} x {second}", "in proportion to their product", product[None], True)
+        shape, both = "in proportion to their product", (first, second)
+        yield Regressors(f"{first} x {second}", shape, product[None], True, kind="product", names=both)
 
 
 def _lagged_columns(bench: Bench, column: Floats) -> Floats:
@@ -98,11 +109,10 @@ def _slow_waves(bench: Bench) -> Floats:
 def _time_regressors(bench: Bench, force: Floats) -> Iterator[Regressors]:
     seconds = bench.time_s()
     time = standardise(seconds, bench)
-    yield Regressors("time", "a slow trend", np.vstack([time, time**2, time**3]), False)
-    yield Regressors(
-        "time", "the gain drifts: a trend times the force", np.vstack([time * force, time**2 * force]), True
-    )
-    yield Regressors("time", "the gain wanders", _slow_waves(bench) * force, True)
+    trend, waves = np.vstack([time, time**2, time**3]), _slow_waves(bench)
+    yield Regressors("time", "a slow wander", trend, False, kind="slow", slow=trend)
+    yield Regressors("time", "the gain drifts with the time", trend[:2] * force, True, kind="slow", slow=trend[:2])
+    yield Regressors("time", "the gain wanders", waves * force, True, kind="slow", slow=waves)
     for place in range(1, _JUMPS_TRIED):
         part = np.zeros(bench.rows)
         for channel in bench.channels:
@@ -110,8 +120,9 @@ def _time_regressors(bench: Bench, force: Floats) -> Iterator[Regressors]:
                 rows = channel.rows.stop - channel.rows.start
                 part[channel.rows] = np.arange(rows) * _JUMPS_TRIED >= place * rows
         at_s = float(np.min(seconds[part > 0.0])) if np.any(part) else 0.0
-        yield Regressors("time", f"a jump at {at_s:.0f} s", (part * bench.force_rows)[None], True)
-        yield Regressors("time", f"the gain jumps at {at_s:.0f} s", np.vstack([part * force, part]), True)
+        jump, gain = (part * bench.force_rows)[None], np.vstack([part * force, part])
+        yield Regressors("time", f"a jump at {at_s:.0f} s", jump, True, kind="jump", at_s=at_s)
+        yield Regressors("time", f"the gain jumps at {at_s:.0f} s", gain, True, kind="jump", at_s=at_s)
 
 
 def _line_regressors(bench: Bench, white: Floats) -> Iterator[Regressors]:
@@ -119,11 +130,13 @@ def _line_regressors(bench: Bench, white: Floats) -> Iterator[Regressors]:
     for line_hz in lines_hz(bench, white):
         angle = 2.0 * np.pi * line_hz * seconds
         waves = np.vstack([np.sin(angle), np.cos(angle)]) * bench.force_rows
-        yield Regressors("time", f"a line at {line_hz:.3g} Hz", waves, False, max(bench.rows // 2, 1))
+        among = max(bench.rows // 2, 1)
+        shape = f"a line at {line_hz:.3g} Hz"
+        yield Regressors("time", shape, waves, False, among, kind="line", frequency_hz=line_hz)
         for name, half in (("first", 0), ("second", 1)):
             inside = (bench.block_of_row % BLOCKS) // (BLOCKS // 2) == half
-            shape = f"a line at {line_hz:.3g} Hz in the {name} half"
-            yield Regressors("time", shape, waves * inside, True, max(bench.rows // 2, 1))
+            half_shape = f"{shape} in the {name} half"
+            yield Regressors("time", half_shape, waves * inside, True, among, kind="line", frequency_hz=line_hz)
 
 
 def _motion_regressors(bench: Bench, simulated_n: Floats, force: Floats) -> Iterator[Regressors]:
@@ -131,10 +144,13 @@ def _motion_regressors(bench: Bench, simulated_n: Floats, force: Floats) -> Iter
     moving = np.sign(slope) * bench.force_rows
     time = standardise(bench.time_s(), bench)
     command = standardise(bench.command(), bench)
-    yield Regressors("force", "curved", np.vstack([force**2, force**3, force**4]), False)
-    yield Regressors("direction", "differs between rising and falling", moving[None], False)
-    yield Regressors("direction", "differs between rising and falling, with the force", (moving * force)[None], False)
+    yield Regressors("force", "curved", np.vstack([force**2, force**3, force**4]), False, kind="force")
+    differs = "differs between rising and falling"
+    yield Regressors("direction", differs, moving[None], False, kind="direction")
+    yield Regressors("direction", f"{differs}, with the force", (moving * force)[None], False, kind="direction")
     drifting = np.vstack([time, time**2, _slow_waves(bench)]) * moving
-    yield Regressors("direction", "the difference between rising and falling changes in time", drifting, True)
-    yield Regressors("speed", "in proportion to the rate of the force", standardise(slope, bench)[None], False)
-    yield Regressors("command", "curved", np.vstack([command, command**2, command**3]), False)
+    changes = "the difference between rising and falling changes in time"
+    yield Regressors("direction", changes, drifting, True, kind="direction")
+    rate = standardise(slope, bench)[None]
+    yield Regressors("speed", "in proportion to the rate of the force", rate, False, kind="speed")
+    yield Regressors("command", "curved", np.vstack([command, command**2, command**3]), False, kind="command")

@@ -12,16 +12,18 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.light_statistics import chi2_tail, log_chi2_tail
-from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.diagnosis.leftovers import describe, is_one_thing
+from gateway.diagnosis.light_statistics import log_chi2_tail
+from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
 from gateway.diagnosis.residual_regressors import Regressors, list_regressors
 from gateway.diagnosis.result import Leftover
-from gateway.diagnosis.search.bench import BLOCKS, Bench
+from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 from gateway.diagnosis.search.normal_equations import NormalEquations, model_span
+from gateway.diagnosis.unsteadiness import find_unsteadiness
 
-_RESOLUTION_N: Final = 1.0e-4
+RESOLUTION_N: Final = 1.0e-4
 """What the simulation itself resolves: its rigid friction gives by a nanometre, 4e-5 N on the usual pad."""
 _SIGNIFICANCE: Final = 1.0e-3  # of a false answer over all questions
 _LEAST_SHARE: Final = 0.01  # of the whitened squared residual
@@ -31,32 +33,34 @@ _OWN_POWER_IN_DOUBT: Final = (
 )
 _REGRESSORS_AT_ONCE: Final = 60  # questions
 _MOST_DEPENDENCES: Final = 6
-_SURROUNDING_LINES: Final = 14  # lines to either side that a wandering line stands out of
-_LEAST_PEAK_RATIO: Final = 16.0  # times their mean
+MOST_LEFTOVERS: Final = 3  # that are told
 
 
 @dataclass(frozen=True, slots=True)
 class Dependence:
-    """A question that the residual answers. gain: chi-square beside the model; share: of the whitened squared residual."""
+    """A question that the residual answers. gain: chi-square beside the model; share: of the whitened squared residual;
+    sizes: of the regressors' columns, N."""
 
     regressors: Regressors
     gain: float
     share: float
     log_chance: float
+    sizes: Floats
 
     @property
-    def leftover(self) -> Leftover:
-        return Leftover(self.regressors.depends_on, self.regressors.shape, min(self.share, 1.0))
+    def contribution_n(self) -> Floats:
+        """What it explains, (rows,)."""
+        return np.asarray(self.sizes @ self.regressors.columns)
 
 
 def strongest_dependence(
-    bench: Bench, fitted: FittedModel, whiten: Whitener, given: Collection[Leftover], *, outside: bool
+    bench: Bench, fitted: FittedModel, whiten: Whitener, given: Collection[Dependence], *, outside: bool
 ) -> Dependence | None:
     """Return the most telling answer beyond chance that was not given yet; `outside`: only what no named effect covers."""
-    if bench.rms_n(fitted.residual_n) < _RESOLUTION_N:
+    if bench.rms_n(fitted.residual_n) < RESOLUTION_N:
         return None
     white = whiten(fitted.residual_n)
-    known = {(each.depends_on, each.shape) for each in given}
+    known = {(each.regressors.depends_on, each.regressors.shape) for each in given}
     asked = (
         each
         for each in list_regressors(bench, fitted.residual_n, white)
@@ -93,67 +97,44 @@ def _dependences(
         indices = list(range(at, at + regressors.columns.shape[0]))
         at += len(indices)
         usable = [k for k in indices if normal.power[k] > least_power * max(normal.raw_power[k], 1.0e-300)]
-        gain = normal.add(usable).gain if usable else 0.0
+        added = normal.add(usable) if usable else None
+        gain, sizes = added.gain if added else 0.0, np.zeros(len(indices))
+        sizes[[k - indices[0] for k in usable]] = added.sizes if added else 0.0
         chance = log_chi2_tail(gain, len(indices)) + float(np.log(regressors.among))
-        yield Dependence(regressors, gain, gain / total, chance)
+        yield Dependence(regressors, gain, gain / total, chance, sizes)
 
 
 def find_dependences(
-    bench: Bench, fitted: FittedModel, whiten: Whitener, given: Sequence[Leftover]
+    bench: Bench, fitted: FittedModel, whiten: Whitener, given: Sequence[Dependence]
 ) -> tuple[Leftover, ...]:
-    """Return what the search gave already, then everything that the residual still depends on, the most telling first.
+    """Return what the search gave already, then what the residual still depends on, the most telling first: one leftover for
+    each thing, and no more than a reader can follow.
 
     Each answer is taken out before the next question.
     """
-    leftovers = list(given)
-    while len(leftovers) < _MOST_DEPENDENCES:
-        dependence = strongest_dependence(bench, fitted, whiten, leftovers, outside=False)
+    found, told = list(given), list[Dependence]()
+    for each in found:
+        told += [each] if _is_new(bench, each, told) else []
+    while len(found) < _MOST_DEPENDENCES and len(told) < MOST_LEFTOVERS:
+        dependence = strongest_dependence(bench, fitted, whiten, found, outside=False)
         if dependence is None:
             break
-        leftovers.append(dependence.leftover)
+        told += [dependence] if _is_new(bench, dependence, told) else []
+        found.append(dependence)
         taken = np.vstack([fitted.jacobian, bench.reduced(dependence.regressors.columns)])
         fitted = FittedModel(fitted.parameters, fitted.free, fitted.residual_n, fitted.chi2, taken)
-    return (*leftovers, *_find_unsteadiness(bench, fitted, whiten))
+    leftovers = [describe(bench, each.regressors, each.sizes, each.share) for each in told]
+    is_uneven = any(each.regressors.kind in ("jump", "slow") for each in told)  # these are louder somewhere themselves
+    if not is_uneven and bench.rms_n(fitted.residual_n) >= RESOLUTION_N:
+        leftovers += find_unsteadiness(bench, fitted, whiten)
+    return tuple(leftovers[:MOST_LEFTOVERS])
 
 
-def _find_unsteadiness(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Iterator[Leftover]:
-    """What has no shape but a time: noise that is louder in some stretches, lines that wander."""
-    if bench.rms_n(fitted.residual_n) < _RESOLUTION_N:
-        return
-    white = whiten(fitted.residual_n)
-    times_are_sure = whiten.knows_times and all(map(_evenly_sampled, bench.measurements))
-    for channel in bench.channels:
-        if channel.is_force:
-            part = white[channel.rows]
-            counted = part[bench.usable[channel.rows]]
-            if counted.size < BLOCKS or not counted.any():
-                continue
-            levels = np.array([np.mean(block**2) for block in np.array_split(counted, BLOCKS)])
-            usual = float(np.median(levels))
-            apart = np.sum((levels / levels.mean() - 1.0) ** 2) * counted.size / BLOCKS / 2.0
-            if chi2_tail(apart, BLOCKS - 1) < _SIGNIFICANCE and times_are_sure:
-                share = float(np.sum(np.maximum(levels - usual, 0.0)) / np.sum(levels))
-                yield Leftover("time", "louder at some times than at others", share)
-            if (share := _wandering_share(part)) > _LEAST_SHARE:
-                yield Leftover("time", "a line that wanders, or comes and goes", share)
-
-
-def _evenly_sampled(measurement: Measurement) -> bool:
-    """Are rows hardly missing? Whitening takes rows for evenly spaced; where they are not, noise seems to come and go."""
-    rows_s = np.diff(measurement.time_s)
-    return float(np.mean(rows_s > 1.9 * np.median(rows_s))) < 0.02
-
-
-def _wandering_share(part: Floats) -> float:
-    """Share of the power in lines that stand out of their surroundings in single blocks."""
-    standing, total = 0.0, 0.0
-    for block in np.array_split(part, BLOCKS):
-        power = np.abs(np.fft.rfft(block * np.hanning(block.size))) ** 2
-        total += float(power.sum())
-        if power.size < 7:
-            continue
-        best = int(np.argmax(power[3:-3])) + 3
-        around = np.r_[power[max(best - _SURROUNDING_LINES, 1) : best - 2], power[best + 3 : best + _SURROUNDING_LINES]]
-        if around.size and power[best] > _LEAST_PEAK_RATIO * float(around.mean()):
-            standing += float(power[best - 2 : best + 3].sum())
-    return standing / max(total, 1.0e-300)
+def _is_new(bench: Bench, dependence: Dependence, told: Sequence[Dependence]) -> bool:
+    """Is it of another thing than all that was told?"""
+    return not any(
+        is_one_thing(
+            dependence.regressors, each.regressors, (dependence.contribution_n, each.contribution_n), bench.judged
+        )
+        for each in told
+    )

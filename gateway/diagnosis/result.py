@@ -20,14 +20,26 @@ class Verdict(StrEnum):
     UNKNOWN = "unknown"
 
 
+class FloorSource(StrEnum):
+    """How a noise floor is known."""
+
+    GIVEN = "given"
+    REPLICATES = "replicates"
+    RESTS = "rests"
+    CALIBRATION = "calibration"
+    SEARCH = "search"
+
+
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """The refitted base model against the recording. noise_floor_n: standard deviation that no model could explain."""
+    """The refitted base model against the recording. noise_floor_n: standard deviation that no model could explain;
+    noise_floor_source: how it is known, from the search's own noise model where nothing proves it."""
 
     rms_n: float
     noise_floor_n: float
     samples: int
     duration_s: float
+    noise_floor_source: FloorSource = FloorSource.SEARCH
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +78,22 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class Leftover:
-    """What no effect explains: the column or quantity it depends on, its shape in words, its share of the excess."""
+    """What no effect explains: the column or quantity it depends on, its form in words and numbers, its share of what is left.
+
+    columns: of the recording that it looks at, both for a product; frequency_hz: of a line; period_s: of a slow wander;
+    amplitude_n: of a line, else half the way that it goes; file: the recording that has nearly all of it, of several;
+    experiment: what would show its nature.
+    """
 
     depends_on: str
     shape: str
     share: float
+    columns: tuple[str, ...] = ()
+    frequency_hz: float | None = None
+    amplitude_n: float | None = None
+    period_s: float | None = None
+    file: str = ""
+    experiment: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.experiments.identifiability import find_invisible_effects
 from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.noise_floor import replicate_floor_n
+from gateway.diagnosis.noise_floor import NoiseFloor, find_floor
 from gateway.diagnosis.notes import recording_notes, too_high_a_floor
 from gateway.diagnosis.result import (
     Baseline,
@@ -22,6 +22,7 @@ from gateway.diagnosis.result import (
     Diagnosis,
     Estimate,
     Extended,
+    FloorSource,
     Gain,
     Leftover,
     NotIdentifiable,
@@ -44,6 +45,7 @@ from gateway.diagnosis.search.significance import (
 )
 from gateway.twin.plant import Plant, with_value
 
+_SURE: Final = 0.95  # confidence of a name
 _REACHED_RATIO: Final = 1.05  # residual over floor that counts as reached
 _ABOVE_FLOOR_RATIO: Final = 1.1  # residual over a known floor that asks for a cause
 _LEAST_DIRECT: Final = 0.01  # of the squared error that rows must carry to be a cause
@@ -64,34 +66,60 @@ class SearchFindings:
 
 
 @dataclass(frozen=True, slots=True)
-class _NoiseFloor:
-    """known_n: from the user or from replicates, N, None where nobody knows; floor_n: that, or what the search found.
+class _Noise:
+    """known: None where only the search has an idea; floor_n: that, or what the search found, no more than what is left.
 
     too_high_n: what the user gave, where it is more than the base model leaves; rms_n: of the base model.
     """
 
     rms_n: float
-    known_n: float | None
+    known: NoiseFloor | None
     floor_n: float
     too_high_n: float | None
 
+    @property
+    def source(self) -> FloorSource:
+        return self.known.source if self.known else FloorSource.SEARCH
 
-def compose_diagnosis(findings: SearchFindings, given_floor_n: float | None) -> Diagnosis:
-    """Return the diagnosis. given_floor_n: noise floor that the user knows, N."""
+    def is_reached(self, rms_n: float) -> bool:
+        """Is this no more than the floor, as well as it is known?"""
+        return rms_n <= (_REACHED_RATIO + (self.known.error_share if self.known else 0.0)) * self.floor_n
+
+    def confirms(self, causes: Sequence[Cause]) -> bool:
+        """Is the floor known well enough for these causes? Rests and a calibration do not see the slowest noise, so under
+        them a name that does not nearly always win may be a wander that has none."""
+        return self.is_sure or (self.known is not None and all(each.confidence >= _SURE for each in causes))
+
+    @property
+    def asks_for_a_cause(self) -> bool:
+        """Is the base model's error above a floor that is sure? Rests do not see the slowest noise, nor a calibration."""
+        return self.known is not None and self.is_sure and self.rms_n > _ABOVE_FLOOR_RATIO * self.known.value_n
+
+    @property
+    def is_sure(self) -> bool:
+        """Was it given, or proven by cycles that hold all noise?"""
+        return self.source in (FloorSource.GIVEN, FloorSource.REPLICATES)
+
+
+def compose_diagnosis(
+    findings: SearchFindings, given_floor_n: float | None, calibration_noise_n: float | None = None
+) -> Diagnosis:
+    """Return the diagnosis. given_floor_n: noise floor that the user knows, N; calibration_noise_n: see Options."""
     bench, left = findings.bench, findings.left
     found, reported, dropped = drop_doubtful_effects(bench, findings.found)
-    noise = _noise_floor(bench, found, reported, given_floor_n)
-    reaches = reported.held_out.rms_n <= _REACHED_RATIO * noise.floor_n
+    noise = _noise_floor(bench, found, reported, (given_floor_n, calibration_noise_n))
+    reaches = noise.is_reached(reported.held_out.rms_n)
     causes = _causes(bench, found, reported, noise.floor_n)
     causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
     causes.sort(key=lambda cause: cause.gain.held_out_rms_after_n**2 - cause.gain.held_out_rms_before_n**2)
     unseen = _unseen(findings, found, causes)
     told = {*_grouped(causes), *(each.name for each in causes), *(each.name for each in unseen)}
-    unexplained = noise.known_n is not None and noise.rms_n > _ABOVE_FLOOR_RATIO * noise.known_n
     duration_s = sum(each.duration_s for each in bench.measurements)
     return Diagnosis(
-        verdict=_decide_verdict(causes, left, reached=noise.known_n is not None and reaches, unexplained=unexplained),
-        baseline=Baseline(noise.rms_n, noise.floor_n, int(bench.judged.sum()), duration_s),
+        verdict=_decide_verdict(
+            causes, left, reached=reaches and noise.confirms(causes), unexplained=noise.asks_for_a_cause
+        ),
+        baseline=Baseline(noise.rms_n, noise.floor_n, int(bench.judged.sum()), duration_s, noise.source),
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
@@ -107,13 +135,18 @@ def compose_diagnosis(findings: SearchFindings, given_floor_n: float | None) -> 
 
 
 def _noise_floor(
-    bench: Bench, found: SearchResult, reported: ReportedModels, given_floor_n: float | None
-) -> _NoiseFloor:
+    bench: Bench, found: SearchResult, reported: ReportedModels, told_n: tuple[float | None, float | None]
+) -> _Noise:
+    """told_n: floors from the user and from the calibration, N."""
+    given_n, calibration_n = told_n
     rms_n = bench.rms_n(reported.base.residual_n)
-    too_high_n = given_floor_n if given_floor_n is not None and given_floor_n > rms_n else None
-    known_n = _replicate_floor_n(bench) if given_floor_n is None or too_high_n is not None else given_floor_n
-    floor_n = min(found.whiten.floor_n if known_n is None else known_n, rms_n, reported.held_out.rms_n)
-    return _NoiseFloor(rms_n, known_n, floor_n, too_high_n)
+    too_high_n = given_n if given_n is not None and given_n > rms_n else None
+    if given_n is not None and too_high_n is None:
+        known: NoiseFloor | None = NoiseFloor(given_n, FloorSource.GIVEN)
+    else:
+        known = find_floor(bench, reported.fitted.residual_n, calibration_n)
+    floor_n = min(known.value_n if known else found.whiten.floor_n, rms_n, reported.held_out.rms_n)
+    return _Noise(rms_n, known, floor_n, too_high_n)
 
 
 def _unseen(findings: SearchFindings, found: SearchResult, causes: Sequence[Cause]) -> tuple[NotIdentifiable, ...]:
@@ -123,9 +156,7 @@ def _unseen(findings: SearchFindings, found: SearchResult, causes: Sequence[Caus
     return find_invisible_effects(findings.bench, findings.effects, found.first.scores, names | fixed)
 
 
-def _notes(
-    bench: Bench, reported: ReportedModels, noise: _NoiseFloor, dropped: Sequence[DoubtfulEffect]
-) -> Iterator[str]:
+def _notes(bench: Bench, reported: ReportedModels, noise: _Noise, dropped: Sequence[DoubtfulEffect]) -> Iterator[str]:
     yield from recording_notes(bench.measurements, reported.fitted.parameters.offsets_n, noise.floor_n)
     yield from (each.note for each in dropped)
     if noise.too_high_n is not None:
@@ -141,11 +172,6 @@ def _decide_verdict(causes: Sequence[Cause], left: Sequence[Leftover], *, reache
     if not causes:
         return Verdict.UNKNOWN if left or unexplained else Verdict.NOTHING_FOUND
     return Verdict.CONFIRMED if reached and not left else Verdict.PARTIAL
-
-
-def _replicate_floor_n(bench: Bench) -> float | None:
-    floors = [floor for each in bench.measurements if (floor := replicate_floor_n(each)) is not None]
-    return max(floors) if len(floors) == len(bench.measurements) else None
 
 
 def _causes(bench: Bench, found: SearchResult, reported: ReportedModels, floor_n: float) -> list[Cause]:

@@ -18,7 +18,7 @@ import numpy as np
 from gateway.diagnosis import Diagnosis
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.search.bench import bench_of
-from gateway.diagnosis.search.initial_friction import fit_initial_strains
+from gateway.diagnosis.search.initial_state import fit_initial_states
 from gateway.diagnosis.search.recording_drive import replay_of
 from gateway.twin.plant import Plant, with_value
 from gateway.watch.window import Window
@@ -74,10 +74,10 @@ class WatchReference:
 
 def rms_of(measurement: Measurement, plant: Plant) -> float:
     """Return the RMS of measured minus replayed over the judged rows, N, without its mean and with the start that fits
-    best: a tare is no difference, and neither is what friction remembers from before the window.
+    best: a tare is no difference, and neither is what the machine remembers from before the window.
     """
     bench = bench_of([measurement])
-    return bench.rms_n(fit_initial_strains(bench, plant).residual_n)
+    return bench.rms_n(fit_initial_states(bench, plant).residual_n)
 
 
 def residuals(measurement: Measurement, plants: list[Plant]) -> Floats:

@@ -14,7 +14,7 @@ import pytest
 from gateway.cli.diagnosis.inputs import Sources, read_sources
 from gateway.diagnosis import Diagnosis, Options, Verdict, diagnose
 from gateway.diagnosis.search.bench import bench_of
-from gateway.diagnosis.search.initial_friction import fit_initial_strains
+from gateway.diagnosis.search.initial_state import fit_initial_states
 from gateway.profiles import load_rig
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.recorded_row import COLUMNS
@@ -55,7 +55,7 @@ def test_what_was_sent_and_the_start_leave_the_cell_s_noise_only(tmp_path: Path,
     sources = read(kind, 3, tmp_path, 15.0)
     plant = with_value(with_value(sources.plant.plant, "cell", "noise_n", 0.0), "cell", "clock_offset_s", 0.011)
     bench = bench_of(sources.measurements)
-    assert bench.rms_n(fit_initial_strains(bench, plant).residual_n) < 1.2 * NOISE_N
+    assert bench.rms_n(fit_initial_states(bench, plant).residual_n) < 1.2 * NOISE_N
 
 
 @pytest.mark.long

@@ -45,8 +45,9 @@ def render_diagnosis(
         yield _line("left", _remaining_error(diagnosis))
     yield from _cause_table(diagnosis)
     for rest in diagnosis.leftover:
-        share = words.percent(rest.share)
-        yield _line("leftover", f"depends on {rest.depends_on}: {rest.shape} ({share} of the excess)", "yellow")
+        yield _line("leftover", words.leftover(rest), "yellow")
+        if rest.experiment:
+            yield _line("", f"to show its nature: {rest.experiment}", "dim")
     yield from _rejected_line(diagnosis)
     for keyword, sentence in zip(("control", *[""] * len(loop)), loop, strict=False):
         yield _line(keyword, sentence)
@@ -70,7 +71,8 @@ def _initial_error(diagnosis: Diagnosis) -> str:
     model = "the base model refitted" if diagnosis.machine is None else "the machine as it was"
     return (
         f"{words.force(baseline.rms_n)} N RMS with {model}; noise floor "
-        f"{words.force(baseline.noise_floor_n)} N ({readings} readings, {baseline.duration_s:.1f} s)"
+        f"{words.force(baseline.noise_floor_n)} N, {words.floor_source(diagnosis)} "
+        f"({readings} readings, {baseline.duration_s:.1f} s)"
     )
 
 

@@ -16,6 +16,7 @@ from gateway.diagnosis.against.new_evidence import take_new_evidence
 from gateway.diagnosis.diagnose import Options, diagnosis_of_wrong_columns, with_readings_of
 from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt
 from gateway.diagnosis.input_checks import find_suspects
+from gateway.diagnosis.leftovers import is_same_form
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.residual_tests import find_dependences
 from gateway.diagnosis.result import Cause, Diagnosis, Leftover, Machine, Trace, Verdict
@@ -60,7 +61,7 @@ def compare_with_machine(
     assert joint.bench.witnesses is not None
     effects = change_effects(joint.fitted.parameters, joint.bench.witnesses, options.late_s)
     found = search_effects(joint.bench, joint.fitted, effects, joint.whiten)
-    left = find_dependences(found.bench, found.fitted, found.whiten, [each.leftover for each in found.unnamed])
+    left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     left = _without_old(joint, found, left) if left else left
     floor_n = options.noise_floor_n or min(joint.left_n, joint.bench.rms_n(found.base.residual_n))
     result = compose_diagnosis(SearchFindings(joint.bench, found, evidence, left, effects), floor_n)
@@ -106,8 +107,7 @@ def _without_old(joint: JointModel, found: SearchResult, left: Sequence[Leftover
     assert joint.bench.witnesses is not None
     olds = frozenset(range(len(joint.bench.measurements))) - joint.bench.witnesses
     before = find_dependences(replace(found.bench, witnesses=olds), found.fitted, found.whiten, ())
-    known = {(each.depends_on, each.shape) for each in before}
-    return tuple(each for each in left if (each.depends_on, each.shape) not in known)
+    return tuple(each for each in left if not any(is_same_form(each, known) for known in before))
 
 
 def _is_of(new: Sequence[Measurement], trace: Trace) -> bool:

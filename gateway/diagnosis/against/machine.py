@@ -17,7 +17,7 @@ from gateway.diagnosis.result import OwnEffect
 from gateway.diagnosis.search.base_fit import refit
 from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.direct_evidence import DirectEvidence
-from gateway.diagnosis.search.initial_friction import drop_unfelt_strains, fit_initial_strains, start_parameters
+from gateway.diagnosis.search.initial_state import drop_unfelt_starts, fit_initial_states, start_parameters
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, linearise
 from gateway.diagnosis.search.line_lengths import fit_line_lengths
 from gateway.diagnosis.search.parameters import STARTS, ModelParameters
@@ -93,7 +93,7 @@ def _fit_jointly(new: Sequence[Measurement], machine: MachineModel) -> tuple[Ben
     strains = start_parameters(bench, parameters.plant)
     whiten = white_whitener(bench, machine_residual(bench, parameters))
     (fitted,) = linearise(bench, [FitProblem(parameters, (*free, *strains))], whiten)
-    return (*drop_unfelt_strains(bench, fitted, whiten), whiten)
+    return (*drop_unfelt_starts(bench, fitted, whiten), whiten)
 
 
 def machine_residual(bench: Bench, parameters: ModelParameters) -> Floats:
@@ -104,7 +104,7 @@ def machine_residual(bench: Bench, parameters: ModelParameters) -> Floats:
 def _joined_parameters(new: Sequence[Measurement], machine: MachineModel) -> ModelParameters:
     """The machine's parameters with the offsets and starts that fit the new recordings best before those of the old."""
     own = machine.fitted.parameters
-    fresh = fit_initial_strains(bench_of(new, machine.bench.motion), own.plant).parameters
+    fresh = fit_initial_states(bench_of(new, machine.bench.motion), own.plant).parameters
     olds = range(len(machine.bench.measurements))
     starts = (*(fresh.start(k) for k in range(len(new))), *(own.start(k) for k in olds))
     return replace(

@@ -19,10 +19,10 @@ from gateway.catalogue.sensing import CLOCK_OFFSET
 from gateway.defaults import UNLIMITED
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.initial_friction import start_parameters, try_initial_strains
+from gateway.diagnosis.search.bench import Bench, unsettled_rows
+from gateway.diagnosis.search.initial_state import start_parameters, try_initial_states, without_pressures
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.parameters import ModelParameters
+from gateway.diagnosis.search.parameters import ModelParameters, StartParameter
 from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
 DEFAULT_PLANT: Final = Plant(
@@ -39,8 +39,9 @@ _BELIEVED_GAINS: Final = (
     50.0,
 )  # measured over simulated; beyond it the force does not answer, or is in another unit
 _KNOWN_SHARE: Final = 0.1  # of a gain: ten standard errors, for slow noise makes the true one several times as large
+_LEAST_OF_PRESSURES_CHI2: Final = 16.0  # that three parameters exceed by chance once in 900 recordings
 _WAVES: Final = 8  # most waves of a base fit ...
-_WAVES_WITH_START: Final = 16  # ... and of one that also fits what friction remembers
+_WAVES_WITH_START: Final = 16  # ... and of one that also fits how a recording begins
 
 
 def without_effects(plant: Plant) -> Plant:
@@ -67,14 +68,32 @@ def base_parameters(bench: Bench, hidden: frozenset[str], late_s: float = 0.0) -
 
 
 def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Whitener) -> FittedModel:
-    """Return the refitted base model; what friction remembers at the beginning of each recording is fitted besides."""
+    """Return the refitted base model; the state in which each recording begins is fitted besides.
+
+    The pressures of the beginning belong to it only where chi-square asks for them: a recording that hardly moves would take
+    its gain from the noise of their decay.
+    """
     start = ModelParameters(plant, tuple(0.0 for _ in bench.measurements))
-    coarse, strains = _grid_search(bench, start, free, whiten), start_parameters(bench, plant)
-    coarse_ones = try_initial_strains(bench, coarse, whiten) if strains else [coarse]
-    problems = [FitProblem(parameters, (*free, *strains)) for parameters in coarse_ones]
-    return min(
-        refine(bench, problems, whiten, waves=_WAVES_WITH_START if strains else _WAVES), key=lambda each: each.chi2
+    settled_bench = bench.without_rows(unsettled_rows(bench))
+    coarse = _grid_search(settled_bench, start, free, whiten)
+    if _gain_error(settled_bench, settled_bench.simulate([coarse])[0]) > _KNOWN_SHARE:
+        free = tuple(each for each in free if each is not AREA)  # the noise would choose it
+    starts = start_parameters(bench, plant)
+    if not starts:
+        return refine(bench, [FitProblem(coarse, free)], whiten, waves=_WAVES)[0]
+    tried = try_initial_states(bench, coarse, whiten)
+    strains = tuple(each for each in starts if isinstance(each, StartParameter) and each.elements)
+    settled = list(dict.fromkeys(map(without_pressures, tried)))
+    plain, whole = (
+        min(
+            refine(bench, [FitProblem(each, (*free, *more)) for each in points], whiten, waves=_WAVES_WITH_START),
+            key=lambda each: each.chi2,
+        )
+        for points, more in ((settled, strains), (tried, starts))
     )
+    usual = max(whole.chi2 / max(int(bench.usable.sum()), 1), 1.0)  # per row: no cause is found yet
+    asked = _LEAST_OF_PRESSURES_CHI2 * usual * len(bench.measurements)
+    return whole if whole.chi2 < plain.chi2 - asked else plain
 
 
 def refit(bench: Bench, fitted: FittedModel, whiten: Whitener, waves: int = 3) -> FittedModel:

@@ -177,11 +177,11 @@ class Bench:
 
 
 def bench_of(measurements: Sequence[Measurement], motion: Motion = "inferred") -> Bench:
-    """Return the bench of these recordings before anything is known of them; all rows count once they have settled."""
+    """Return the bench of these recordings before anything is known of them."""
     channels = tuple(_channels(measurements))
     raw_n = np.concatenate([_channel_n(measurements[each.recording], each) for each in channels])
     flags = np.concatenate([measurements[each.recording].usable for each in channels])
-    usable = flags & np.isfinite(raw_n) & ~_settling(measurements, channels)
+    usable = flags & np.isfinite(raw_n) & ~_unknown_rows(measurements, channels, motion)
     return Bench(
         measurements=tuple(measurements),
         motion=motion,
@@ -194,14 +194,24 @@ def bench_of(measurements: Sequence[Measurement], motion: Motion = "inferred") -
     )
 
 
-def _settling(measurements: Sequence[Measurement], channels: Sequence[Channel]) -> Flags:
-    """Rows before which nobody knows what went in: at the beginning unless a recording begins at rest, and after gaps."""
+def unsettled_rows(bench: Bench) -> Flags:
+    """Return the rows (rows,) that still feel how their recording began: none where it begins at rest."""
+    return _unsettled_rows(bench.measurements, bench.channels)
+
+
+def _unsettled_rows(measurements: Sequence[Measurement], channels: Sequence[Channel]) -> Flags:
     parts = []
     for channel in channels:
         measurement = measurements[channel.recording]
-        begins_s = 0.0 if begins_at_rest(measurement) else settled_s(measurement)
-        parts.append((measurement.time_s < begins_s) | rows_after_unseen_settings(measurement))
+        parts.append(measurement.time_s < (0.0 if begins_at_rest(measurement) else settled_s(measurement)))
     return np.concatenate(parts)
+
+
+def _unknown_rows(measurements: Sequence[Measurement], channels: Sequence[Channel], motion: Motion) -> Flags:
+    """Rows before which nobody knows what went in: after gaps; at the beginning where the motion is measured, for else the
+    start is fitted."""
+    unseen = np.concatenate([rows_after_unseen_settings(measurements[each.recording]) for each in channels])
+    return unseen if motion == "inferred" else unseen | _unsettled_rows(measurements, channels)
 
 
 def _channel_n(measurement: Measurement, channel: Channel) -> Floats:

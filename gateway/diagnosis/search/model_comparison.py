@@ -24,8 +24,10 @@ from gateway.diagnosis.search.candidates import (
     score_candidates,
     simulate_candidates,
 )
+from gateway.diagnosis.search.initial_state import with_start_of
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.search.normal_equations import block_sums
+from gateway.diagnosis.search.recording_drive import begins_at_rest
 
 MOST_REFINED: Final = 6  # effects; a wave of simulations serves all of them
 _RESAMPLES: Final = 500  # draws of blocks: a share of 95 % is then uncertain by 1 %
@@ -127,7 +129,7 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     found = simulate_candidates(bench, fitted, competitors.effects, hints)
     promised = score_candidates(found, fitted, whiten)
     best = best_scores(promised, competitors.most)
-    problems = [FitProblem(each.parameters, joined_parameters(fitted, each.candidate.form)) for each in best]
+    problems = [FitProblem(each.parameters, joined_parameters(bench, fitted, each.candidate.form)) for each in best]
     progress.report(f"refining {progress.few([each.candidate.effect.name for each in best])}")
     refined = refine(bench, problems, whiten, _WAVES)
     ranked = [
@@ -147,9 +149,10 @@ def _incumbent_bonus(bench: Bench, incumbent: RefinedEffect) -> float:
     return _INCUMBENT_SHARE * incumbent.gain * min(max((per_row - _NOISE_CHI2) / _BONUS_GROWS_OVER, 0.0), 1.0)
 
 
-def joined_parameters(fitted: FittedModel, form: EffectForm) -> tuple[Parameter, ...]:
+def joined_parameters(bench: Bench, fitted: FittedModel, form: EffectForm) -> tuple[Parameter, ...]:
     """Return what moves when a form joins a model; what is settled stands as the start has it."""
-    return (*fitted.free, *(each for each in form.parameters if each not in fitted.free and not each.settled))
+    free = (*fitted.free, *(each for each in form.parameters if each not in fitted.free and not each.settled))
+    return with_start_of(form, free, [not begins_at_rest(each) for each in bench.measurements])
 
 
 def refined_effect(

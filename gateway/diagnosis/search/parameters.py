@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Final
+from typing import Any, Final
 
 from gateway.catalogue.effect import EffectForm, Parameter, Start
 from gateway.twin.plant import Plant, with_value
-from gateway.twin.replay.drive import Strains
+from gateway.twin.replay.drive import AT_REST, StartState, Strains
 
 _ZERO: Final = "cell.zero_n"
 _UNSTRAINED: Final[Strains] = (0.0, 0.0, 0.0)
@@ -14,18 +14,66 @@ STARTS: Final = "start"
 """Section of the parameters that belong to a recording (its beginning, its lines) and to no plant."""
 
 
-@dataclass(frozen=True, slots=True, init=False)
-class InitialStrain(Parameter):
-    """Strain of some friction elements, all alike, at the beginning of one recording."""
+@dataclass(frozen=True, slots=True)
+class StartParameter(Parameter):
+    """A number of the state in which one recording begins. elements: of the strains; empty for `field` of StartState."""
 
     recording: int = 0
+    field: str = ""
     elements: tuple[int, ...] = ()
 
-    def __init__(self, recording: int, elements: tuple[int, ...]) -> None:
-        name = f"strain_{''.join(str(element) for element in elements)}_of_{recording}"
-        Parameter.__init__(self, STARTS, name, "1", 0.0, -1.0, 1.0, 0.05)
-        object.__setattr__(self, "recording", recording)
-        object.__setattr__(self, "elements", elements)
+    def read(self, start: StartState) -> float:
+        """Return its value in a state."""
+        if not self.elements:
+            return float(getattr(start, self.field))
+        strains = start.strains or _UNSTRAINED
+        return sum(strains[element] for element in self.elements) / len(self.elements)
+
+    def write(self, start: StartState, value: float) -> StartState:
+        """Return the state with another value; elements become alike."""
+        if not self.elements:
+            changed: dict[str, Any] = {self.field: value}
+            return start._replace(**changed)
+        one, two, three = (
+            value if element in self.elements else strain for element, strain in enumerate(start.strains or _UNSTRAINED)
+        )
+        return start._replace(strains=(one, two, three))
+
+
+def initial_strain(recording: int, elements: tuple[int, ...]) -> StartParameter:
+    """Return the strain of some friction elements, all alike, at the beginning of one recording."""
+    name = f"strain_{''.join(str(element) for element in elements)}_of_{recording}"
+    return StartParameter(STARTS, name, "1", 0.0, -1.0, 1.0, 0.05, recording=recording, elements=elements)
+
+
+def initial_pressure(recording: int) -> StartParameter:
+    """Return what the pressure is ahead of the first command at the beginning of one recording."""
+    return _initial(recording, "ahead_pa", "Pa", (-1.0e6, 1.0e6), 2.0e3)
+
+
+def initial_second_pressure(recording: int) -> StartParameter:
+    """Return what the pressure behind a second lag is ahead of that before it at the beginning of one recording."""
+    return _initial(recording, "second_ahead_pa", "Pa", (-1.0e6, 1.0e6), 2.0e3)
+
+
+def initial_command(recording: int) -> StartParameter:
+    """Return what is under way in the regulator's delay at the beginning of one recording, ahead of the first command."""
+    return _initial(recording, "coming_pa", "Pa", (-1.0e6, 1.0e6), 2.0e3)
+
+
+def initial_stiction(recording: int) -> StartParameter:
+    """Return the share of stiction that has grown before one recording begins."""
+    return _initial(recording, "stiction_share", "1", (0.0, 1.0), 0.1)
+
+
+def initial_creep(recording: int) -> StartParameter:
+    """Return what the pad's creep is ahead of the first force at the beginning of one recording."""
+    return _initial(recording, "creep_n", "N", (-100.0, 100.0), 0.5)
+
+
+def _initial(recording: int, field: str, unit: str, bounds: tuple[float, float], step: float) -> StartParameter:
+    name = f"{field}_of_{recording}"
+    return StartParameter(STARTS, name, unit, 0.0, *bounds, step, recording=recording, field=field)
 
 
 CHARACTER: Final = Parameter(STARTS, "character_s", "s", 0.0, 0.0, 4.2e-3, 1.0e-4)
@@ -52,14 +100,14 @@ class ChangedValue(Parameter):
 class ModelParameters:
     """Everything that a simulation needs; hashable, so that simulations can be remembered.
 
-    starts: what friction remembers at the beginning of each recording; None, or none at all: rest without pressure.
+    starts: what is remembered at the beginning of each recording; none at all: rest without pressure.
     character_s: by which settings of fewer digits are there earlier, for each digit.
     changes: numbers that are others in some recordings than in the plant.
     """
 
     plant: Plant
     offsets_n: tuple[float, ...]
-    starts: tuple[Strains | None, ...] = ()
+    starts: tuple[StartState, ...] = ()
     character_s: float = 0.0
     changes: tuple[tuple[ChangedValue, float], ...] = ()
 
@@ -71,15 +119,14 @@ class ModelParameters:
                 plant = with_value(plant, parameter.section, parameter.name, value)
         return plant
 
-    def start(self, recording: int) -> Strains | None:
-        """Return what friction remembers at the beginning of one recording; None: rest without pressure."""
-        return self.starts[recording] if self.starts else None
+    def start(self, recording: int) -> StartState:
+        """Return what is remembered at the beginning of one recording."""
+        return self.starts[recording] if self.starts else AT_REST
 
     def value(self, parameter: Parameter) -> float:
         """Return what a parameter is now; of the zero, the first recording's offset, which stands for it."""
-        if isinstance(parameter, InitialStrain):
-            strains = self.start(parameter.recording) or _UNSTRAINED
-            return sum(strains[element] for element in parameter.elements) / len(parameter.elements)
+        if isinstance(parameter, StartParameter):
+            return parameter.read(self.start(parameter.recording))
         if parameter is CHARACTER:
             return self.character_s
         if parameter.path == _ZERO:
@@ -91,8 +138,10 @@ class ModelParameters:
     def with_value(self, parameter: Parameter, value: float) -> "ModelParameters":
         """Return the same model with one parameter at `value`, kept within its bounds."""
         kept = min(max(float(value), parameter.low), parameter.high)
-        if isinstance(parameter, InitialStrain):
-            return self._with_strain(parameter, kept)
+        if isinstance(parameter, StartParameter):
+            starts = list(self.starts or (AT_REST,) * len(self.offsets_n))
+            starts[parameter.recording] = parameter.write(starts[parameter.recording], kept)
+            return replace(self, starts=tuple(starts))
         if parameter is CHARACTER:
             return replace(self, character_s=kept)
         if isinstance(parameter, ChangedValue):
@@ -100,15 +149,6 @@ class ModelParameters:
         if parameter.path == _ZERO:  # of all recordings by as much
             return self.with_offsets([offset_n + kept - self.offsets_n[0] for offset_n in self.offsets_n])
         return replace(self, plant=with_value(self.plant, parameter.section, parameter.name, kept))
-
-    def _with_strain(self, parameter: InitialStrain, value: float) -> "ModelParameters":
-        starts = list(self.starts or (None,) * len(self.offsets_n))
-        first, second, third = (
-            value if element in parameter.elements else strain
-            for element, strain in enumerate(starts[parameter.recording] or _UNSTRAINED)
-        )
-        starts[parameter.recording] = (first, second, third)
-        return replace(self, starts=tuple(starts))
 
     def with_offsets(self, offsets_n: Sequence[float]) -> "ModelParameters":
         """Return the same model with these offsets, N, one for each recording."""

@@ -1,4 +1,7 @@
-"""From a recording to what drives the twin in a replay, and when its unknown past does not matter any more."""
+"""From a recording to what drives the twin in a replay, and when its unknown past does not matter any more.
+
+The past before the first row is a parameter (initial_state.py). The coarse look that comes before any parameter is fitted is
+taken at rows that have forgotten it, and so is a fit to a measured motion."""
 
 from itertools import pairwise
 from typing import Final
@@ -12,7 +15,7 @@ from gateway.twin.replay.replay import Drive, Replay
 from gateway.twin.surroundings import COLUMNS, Surroundings
 
 MOTIONS: Final[tuple[Motion, ...]] = ("inferred", "measured", "measured-reversed")  # how the slide's may be known
-SETTLING_S: Final = 1.0  # of a recording's start are not judged, unless it begins at rest at its lowest:
+SETTLING_S: Final = 1.0  # until lags have forgotten what was asked before; 0 for a recording that begins at its lowest:
 _LOWEST_SHARE: Final = 0.02  # of the drive's range
 _FORGOTTEN_SHARE: Final = (
     0.15  # of the drive's range: a drive that went so far has wiped out what friction remembered ...
@@ -105,5 +108,4 @@ def drive_of(measurement: Measurement, motion: Motion) -> Drive:
         surroundings=Surroundings(**{name: columns[name] for name in COLUMNS if name in columns}),
         repeated=measurement.repeated,
         before_v=None,
-        settled_s=0.0 if begins_at_rest(measurement) else min(SETTLING_S, 0.1 * measurement.duration_s),
     )

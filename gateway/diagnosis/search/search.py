@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from gateway import progress
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
 from gateway.diagnosis.noise import Whitener, coloured_whitener
-from gateway.diagnosis.residual_tests import Dependence, strongest_dependence
+from gateway.diagnosis.residual_tests import RESOLUTION_N, Dependence, strongest_dependence
 from gateway.diagnosis.search.base_fit import refit
 from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.candidates import simulate_candidates, unexplained_residual
 from gateway.diagnosis.search.hints import search_hints
+from gateway.diagnosis.search.initial_state import with_start_of
 from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.search.model_comparison import (
     Competitors,
@@ -97,14 +98,15 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
     while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
         explained = _explained_chi2(base, fitted, accepted)
         winner, saved = None, 0.0
-        if comparison.ranked and is_significant(comparison.winner, comparison.starts):
+        is_seen = bench.rms_n(fitted.residual_n) >= RESOLUTION_N
+        if is_seen and comparison.ranked and is_significant(comparison.winner, comparison.starts):
             winner, saved = comparison.winner, _saved_share(bench, fitted, comparison.winner, whiten, explained)
             if _saves_enough(winner, saved):  # the name of a trifle is not worth foresight
                 winner = _pick_with_companions(bench, comparison, _not_accepted(effects, accepted), whiten)
                 saved = saved if winner is comparison.winner else _saved_share(bench, fitted, winner, whiten, explained)
             saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH_SAVED
         progress.report("looking for what no effect explains")
-        dependence = strongest_dependence(bench, fitted, whiten, [each.leftover for each in unnamed], outside=True)
+        dependence = strongest_dependence(bench, fitted, whiten, unnamed, outside=True)
         strongest = comparison.winner if saved > 0.0 else None
         if dependence is not None and _is_clearly_stronger(dependence, strongest, explained):
             unnamed.append(dependence)
@@ -238,7 +240,9 @@ def is_noticeable(
 def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whitener) -> FittedModel:
     """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
     parameters = reset_parameters(base.parameters, usual.fitted.parameters, usual.form.parameters)
-    return refine(bench, [FitProblem(parameters, joined_parameters(base, usual.form))], whiten, waves=_WAVES_WIDENED)[0]
+    return refine(
+        bench, [FitProblem(parameters, joined_parameters(bench, base, usual.form))], whiten, waves=_WAVES_WIDENED
+    )[0]
 
 
 def _saved_share(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten: Whitener, explained: float) -> float:
@@ -301,7 +305,8 @@ def refit_without(
     """Return the model without one effect, its parameters back where the base model has them, refitted."""
     fitted, base = found.fitted, found.base
     kept = {parameter.path for each in beside for parameter in each.form.parameters}
-    gone: tuple[Parameter, ...] = tuple(each for each in taken.form.parameters if each.path not in kept)
+    own = with_start_of(taken.form, taken.form.parameters, [True] * len(bench.measurements))
+    gone: tuple[Parameter, ...] = tuple(each for each in own if each.path not in kept)
     paths = {each.path for each in gone}
     free = tuple(each for each in fitted.free if each.path not in paths)
     return refine(

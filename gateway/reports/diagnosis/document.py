@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from gateway.diagnosis.input_checks import Suspect
-from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Estimate, Interval
+from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Estimate, Interval, Leftover
 from gateway.reports.diagnosis.wording import all_notes
 from gateway.reports.json_numbers import finite_or_none
 
@@ -23,10 +23,7 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
         "verdict": str(diagnosis.verdict),
         "baseline": _baseline(diagnosis.baseline),
         "causes": [_cause(cause) | _before(diagnosis, cause) for cause in diagnosis.causes],
-        "leftover": [
-            {"depends_on": rest.depends_on, "shape": rest.shape, "share": finite_or_none(rest.share)}
-            for rest in diagnosis.leftover
-        ],
+        "leftover": [_leftover(rest) for rest in diagnosis.leftover],
         "not_identifiable": [
             {"name": unseen.name, "why": unseen.why, "experiment": unseen.experiment}
             for unseen in diagnosis.not_identifiable
@@ -46,9 +43,29 @@ def _baseline(baseline: Baseline) -> Document:
     return {
         "rms_n": finite_or_none(baseline.rms_n),
         "noise_floor_n": finite_or_none(baseline.noise_floor_n),
+        "noise_floor_source": str(baseline.noise_floor_source),
         "samples": int(baseline.samples),
         "duration_s": finite_or_none(baseline.duration_s),
     }
+
+
+def _leftover(rest: Leftover) -> Document:
+    """What does not belong to its form is null."""
+    return {
+        "depends_on": rest.depends_on,
+        "shape": rest.shape,
+        "share": finite_or_none(rest.share),
+        "columns": list(rest.columns),
+        "frequency_hz": _or_none(rest.frequency_hz),
+        "amplitude_n": _or_none(rest.amplitude_n),
+        "period_s": _or_none(rest.period_s),
+        "file": rest.file or None,
+        "experiment": rest.experiment,
+    }
+
+
+def _or_none(value: float | None) -> float | None:
+    return None if value is None else finite_or_none(value)
 
 
 def _suspect(suspect: Suspect) -> Document:

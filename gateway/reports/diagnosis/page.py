@@ -12,6 +12,7 @@ from gateway.reports.diagnosis import charts, tables
 from gateway.reports.diagnosis import wording as words
 from gateway.reports.diagnosis.charts import Drawing
 from gateway.reports.diagnosis.grid import Panel, figure, grid
+from gateway.reports.diagnosis.leftover_figures import leftover_figures
 from gateway.reports.diagnosis.series import (
     ResidualRows,
     TraceResiduals,
@@ -64,7 +65,7 @@ def _summary(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str
     yield _tiles(diagnosis)
     yield _notes(words.all_notes(diagnosis, circumstances.notes))
     yield _section("What is missing in the simulation", tables.causes_table(diagnosis, circumstances.about))
-    yield _section("What no effect explains", tables.leftover_table(diagnosis))
+    yield _section("What no effect explains", tables.leftover_table(diagnosis) + leftover_figures(diagnosis))
     lines = "".join(f"<li>{escape(line)}</li>" for line in circumstances.loop)
     yield _section("What it is worth in commanded force, on the twin", f"<ul>{lines}</ul>" if lines else "")
 
@@ -105,10 +106,10 @@ def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
     if diagnosis.causes:
         reached = "at the noise floor" if extended.reaches_noise_floor else "above the noise floor"
         yield "With the causes", words.force(extended.held_out_rms_n), f"N RMS, held out, {reached}"
-        yield "Noise floor", words.force(baseline.noise_floor_n), "N, no model goes below"
+        yield "Noise floor", words.force(baseline.noise_floor_n), f"N, {words.floor_source(diagnosis)}"
         yield "Explained", words.percent(words.explained_share(diagnosis)), "of the squared error above the noise"
     else:
-        yield "Noise floor", words.force(baseline.noise_floor_n), "N, no model goes below"
+        yield "Noise floor", words.force(baseline.noise_floor_n), f"N, {words.floor_source(diagnosis)}"
         yield "Above the noise", words.force(words.excess_n(diagnosis)), "N RMS"
 
 

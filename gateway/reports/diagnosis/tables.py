@@ -61,8 +61,17 @@ def _name(cause: Cause, about: Mapping[str, str]) -> str:
 
 def leftover_table(diagnosis: Diagnosis) -> str:
     """Return the table of what no cause explains; empty where nothing is left."""
-    rows = ((escape(rest.depends_on), escape(rest.shape), words.percent(rest.share)) for rest in diagnosis.leftover)
-    return table(("depends on", "shape", "of the excess"), rows) if diagnosis.leftover else ""
+    rows = (
+        (
+            escape(rest.depends_on),
+            escape(rest.shape + (f", in {rest.file}" if rest.file else "")),
+            words.percent(rest.share),
+            escape(rest.experiment or "–"),
+        )
+        for rest in diagnosis.leftover
+    )
+    heads = ("depends on", "form", "of what is left", "what would show its nature")
+    return table(heads, rows) if diagnosis.leftover else ""
 
 
 def rejected_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:

@@ -5,7 +5,7 @@ from math import floor, isfinite, log10, sqrt
 from typing import Final
 
 from gateway.diagnosis import notes
-from gateway.diagnosis.result import Cause, Diagnosis, Estimate, Interval, Verdict
+from gateway.diagnosis.result import Cause, Diagnosis, Estimate, FloorSource, Interval, Leftover, Verdict
 from gateway.twin.plant import Plant
 
 _SENTENCES: Final = {
@@ -31,6 +31,13 @@ _SENTENCES_ON_CHANGES: Final = {
     Verdict.PARTIAL: "A change is found; more is left than in the older recordings, or it looks like others.",
     Verdict.UNKNOWN: "More is off than in the older recordings, and no effect of the catalogue explains it.",
 }
+_FLOOR_SOURCES: Final = {
+    FloorSource.GIVEN: "as given",
+    FloorSource.REPLICATES: "from repeated cycles",
+    FloorSource.RESTS: "from rests",
+    FloorSource.CALIBRATION: "from the calibration",
+    FloorSource.SEARCH: "estimated",
+}
 _PLURAL: Final = {
     "The cause is": "The causes are",
     "A cause is": "Causes are",
@@ -42,7 +49,7 @@ _NO_AREA_M2: Final = 5.0e-6
 """What is left of the model's area where no force answers; a small signal leaves it whole."""
 _PARTIAL: Final = (
     "A cause is found, but this recording cannot tell it from others that look alike.",
-    "A cause is found that explains the error; to confirm it, repeat a cycle or give the noise floor.",
+    "A cause is found that explains the error; to confirm it, record rests, repeat a cycle or give the noise floor.",
     "A cause is found, but it does not explain everything.",
 )
 """Where a group is named, where nothing is left but the noise floor is a guess, and else."""
@@ -185,6 +192,17 @@ def explained_share(diagnosis: Diagnosis) -> float:
     if excess_n2 <= 0.0:
         return strongest if diagnosis.causes else float("nan")
     return min(1.0, max(strongest, 1.0 - left_n2 / excess_n2))
+
+
+def leftover(rest: Leftover) -> str:
+    """Return what is left in a sentence: what it depends on, its form and size, whose it is, its share."""
+    of_file = f" in {rest.file}" if rest.file else ""
+    return f"depends on {rest.depends_on}{of_file}: {rest.shape} ({percent(rest.share)} of what is left)"
+
+
+def floor_source(diagnosis: Diagnosis) -> str:
+    """Return how the noise floor is known, as words behind its number."""
+    return _FLOOR_SOURCES[diagnosis.baseline.noise_floor_source]
 
 
 def excess_n(diagnosis: Diagnosis) -> float:

@@ -1,7 +1,7 @@
 """What drives a replay: the columns of a recording, checked."""
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,26 @@ Strains: TypeAlias = tuple[float, float, float]
 The first is the stiffest element's strain; each further one how an element stands beyond the one before it, as a share of
 what it may: d z = d' z' + (d - d') u. So any three numbers are a state that some history leaves, all 1 is the rising branch,
 and a reversal turns the first number first."""
+
+
+class StartState(NamedTuple):
+    """What a machine remembers when its first row comes.
+
+    strains: of friction; None: it was at rest without pressure before. ahead_pa: what the pressure behind the first lag has
+    to fall until it is that of the first command (below 0: to rise); second_ahead_pa: how far that behind a second lag is
+    above it; coming_pa: what is under way in the delay, above the first command's. stiction_share: of the full stiction, what
+    rest has grown already, 0..1. creep_n: what the pad's creep follows is so far above the first force.
+    """
+
+    strains: Strains | None = None
+    ahead_pa: float = 0.0
+    second_ahead_pa: float = 0.0
+    coming_pa: float = 0.0
+    stiction_share: float = 0.0
+    creep_n: float = 0.0
+
+
+AT_REST: Final = StartState()
 Motion: TypeAlias = Literal["inferred", "measured", "measured-reversed"]
 
 
@@ -29,7 +49,6 @@ class Drive:
     position_noise_m: standard deviation; friction elements are made so wide that it does not move them.
     repeated: rows known to repeat the reading before. outliers: spike of each row, in units of the cell's outlier_n.
     before_v: command for a long time before the first row; None: that of the first row.
-    settled_s: until then the pressure is that of this moment for the slide: what went in before the first row has gone.
     """
 
     time_s: Floats
@@ -42,7 +61,6 @@ class Drive:
     repeated: Flags | None = None
     outliers: Floats | None = None
     before_v: float | None = 0.0
-    settled_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.time_s.ndim != 1 or self.time_s.size < 2 or self.time_s[0] != 0.0:

@@ -20,15 +20,18 @@ class Forces:
     def __init__(self, grid: Grid) -> None:
         self._grid = grid
 
-    def on_grid(self, contact: Contact, slide_n: Floats) -> Floats:
-        """Contact force on the grid without the spindle, N; the slide's own array when there is nothing to add."""
+    def on_grid(self, contact: Contact, slide_n: Floats, creep_n: float = 0.0) -> Floats:
+        """Contact force on the grid without the spindle, N; the slide's own array when there is nothing to add.
+
+        creep_n: see StartState.
+        """
         force = slide_n
         if contact.backlash_n != 0.0:
             force = np.empty_like(slide_n)
             march_play(contact.backlash_n, 0.0, slide_n, force)
         if contact.creep_share != 0.0:
             late = np.empty_like(force)
-            march_lag(contact.creep_s, force, self._grid.steps_s, late)
+            march_lag(contact.creep_s, force[0] + creep_n, force, self._grid.steps_s, late)
             force = force + contact.creep_share * late
         for term in active_formulas(SLOW, contact, self._grid.conditions):
             force = term(contact, force, self._grid.conditions)

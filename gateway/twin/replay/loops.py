@@ -45,18 +45,25 @@ def hold_targets(
 
 @loop
 def march_pressure(
-    lags: Lags, jumps: bool, target_pa: Floats, arrives_s: Floats, point_s: Floats, pressure_pa: Floats
+    lags: Lags,
+    jumps: bool,
+    start_pa: tuple[float, float],
+    target_pa: Floats,
+    arrives_s: Floats,
+    point_s: Floats,
+    pressure_pa: Floats,
 ) -> None:
     """Fill in the pressure at each point. A target that arrives just then is not seen yet.
 
-    target_pa: one more than arrives_s, from before the first; it has stood for long. jumps: whether there is no lag at all.
+    start_pa: at the first point, behind the first lag and behind the second. target_pa: one more than arrives_s, from before
+    the first. jumps: whether there is no lag at all.
     """
     seen_pa = target_pa[0]
-    state = PressureState(seen_pa, seen_pa, seen_pa)
+    state = PressureState(start_pa[0], start_pa[1], start_pa[1])
     step_s = part_s = -1.0
     step = part = lag_shares(lags, 1.0)
     at_s, row = point_s[0], 0
-    pressure_pa[0] = seen_pa
+    pressure_pa[0] = start_pa[1]
     for point in range(1, point_s.size):
         begin_s, end_s, total = at_s, point_s[point], 0.0
         while row < arrives_s.size and arrives_s[row] < end_s:
@@ -110,8 +117,7 @@ def march_slide(
 
 @loop
 def march_stiction(full_n: float, rest_s: float, travels: Floats, steps_s: Floats, stiction_n: Floats) -> None:
-    """Fill in the stiction at each point, from none. travels: of each step, as multiples of the breakaway."""
-    stiction_n[0] = 0.0
+    """Fill in the stiction at each point behind the first. travels: of each step, as multiples of the breakaway."""
     for point in range(1, stiction_n.size):
         _, stiction_n[point] = age_stiction(
             stiction_n[point - 1], full_n, steps_s[point - 1] / rest_s, travels[point - 1]
@@ -127,9 +133,9 @@ def march_strain(towards: Floats, travels: Floats, strain: Floats) -> None:
 
 
 @loop
-def march_lag(lag_s: float, series: Floats, steps_s: Floats, late: Floats) -> None:
-    """Fill in a first-order lag behind a series that is straight between its points, from rest at its first value."""
-    late[0] = series[0]
+def march_lag(lag_s: float, start: float, series: Floats, steps_s: Floats, late: Floats) -> None:
+    """Fill in a first-order lag behind a series that is straight between its points, from `start`."""
+    late[0] = start
     step_s = steps_s[0]
     shares = ramp_shares(lag_s, step_s)
     for point in range(1, series.size):

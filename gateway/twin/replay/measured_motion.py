@@ -72,6 +72,7 @@ class Motions:
     def _stiction_n(self, friction: Friction) -> Floats:
         breakaway_m = max(friction.presliding_m, BREAKAWAY_M, NOISE_WIDTHS * self._noise_m)
         travels, stiction = self._quiet_travels_m() / breakaway_m, np.empty(self._grid.points)
+        stiction[0] = 0.0
         march_stiction(friction.dwell_stiction_n, friction.dwell_stiction_s, travels, self._grid.steps_s, stiction)
         return stiction
 

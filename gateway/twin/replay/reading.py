@@ -57,7 +57,7 @@ class Readings:
         filtered = contact_n
         if cell.filter_s != 0.0:
             filtered = np.empty_like(contact_n)
-            march_lag(cell.filter_s, contact_n, grid.steps_s, filtered)
+            march_lag(cell.filter_s, contact_n[0], contact_n, grid.steps_s, filtered)
         if not shifted:
             return self._vibrating(plant, grid.at_rows(filtered), grid.row_conditions)
         shown_s = shown_time_s(cell, grid.row_s)

@@ -15,7 +15,7 @@ from gateway.twin.effects.regulator import add_droop, add_hunting, apply_leak
 from gateway.twin.effects.term import is_switched_on
 from gateway.twin.regulator import lags_of, target_pa
 from gateway.twin.replay.cache import Cache
-from gateway.twin.replay.drive import Drive, Floats
+from gateway.twin.replay.drive import AT_REST, Drive, Floats, StartState
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.loops import hold_targets, march_pressure
 from gateway.twin.sections import Regulator
@@ -29,12 +29,15 @@ class Pressures:
         self._pressures = Cache()
         self._lasts_s = np.concatenate([np.diff(drive.time_s), [grid.step_s + grid.time_s[-1] - drive.time_s[-1]]])
 
-    def of(self, regulators: Sequence[Regulator]) -> tuple[list[Floats], NDArray[np.intp]]:
+    def of(
+        self, regulators: Sequence[Regulator], starts: Sequence[StartState]
+    ) -> tuple[list[Floats], NDArray[np.intp]]:
         """Return (the different pressures, which of them each regulator has)."""
         if self._drive.command_v is None:
             return [self._measured()], np.zeros(len(regulators), dtype=np.intp)
-        places: dict[Regulator, int] = {}
-        which = np.array([places.setdefault(regulator, len(places)) for regulator in regulators], dtype=np.intp)
+        places: dict[tuple[Regulator, StartState], int] = {}
+        each = ((one, _of_pressure(start)) for one, start in zip(regulators, starts, strict=True))
+        which = np.array([places.setdefault(one, len(places)) for one in each], dtype=np.intp)
         return self._pressures.get_all(list(places), self._followed), which
 
     def _measured(self) -> Floats:
@@ -45,11 +48,16 @@ class Pressures:
         column = np.array(self._drive.pressure_pa, dtype=float)
         return self._pressures.put("measured", self._grid.from_rows(column))
 
-    def _followed(self, regulator: Regulator) -> Floats:
+    def _followed(self, key: tuple[Regulator, StartState]) -> Floats:
         """What lags and delay make of the target, then ceiling, leak and hunting."""
+        regulator, start = key
         pressure, lags = np.empty(self._grid.points), lags_of(regulator)
         arrives_s = self._drive.time_s + regulator.delay_s
-        march_pressure(lags, lags.are_none, self._target(regulator), arrives_s, self._grid.time_s, pressure)
+        target = self._target(regulator)
+        first_pa = max(float(target[0]) + start.ahead_pa, 0.0)
+        start_pa = (first_pa, max(first_pa + start.second_ahead_pa, 0.0))
+        target[0] += start.coming_pa
+        march_pressure(lags, lags.are_none, start_pa, target, arrives_s, self._grid.time_s, pressure)
         if regulator.ceiling_pa < UNLIMITED:
             pressure = np.minimum(pressure, regulator.ceiling_pa)
         if regulator.leak_flow_pa != 0.0:
@@ -71,3 +79,8 @@ class Pressures:
         if supply_kpa is not None and is_switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa")):
             return np.asarray(add_droop(regulator, target, np.concatenate([supply_kpa[:1], supply_kpa])))
         return target
+
+
+def _of_pressure(start: StartState) -> StartState:
+    """The same as far as the pressure feels it."""
+    return AT_REST._replace(ahead_pa=start.ahead_pa, second_ahead_pa=start.second_ahead_pa, coming_pa=start.coming_pa)

@@ -7,7 +7,7 @@ Made for a search that tries hundreds of plants on one recording, so it differs 
     - no noise; the null value of a random effect (repeats, outliers) is told apart by rows that the caller names.
 Work is shared: plants with equal regulators share a pressure, those with equal friction besides share a slide, within a
 call and between calls. The stages stand in replay_*.py: grid, regulator, slide (with play, elastic, measured), reading.
-The state before the first row is rest under the command `before_v`; what friction remembers there may be given.
+The state before the first row is rest under the command `before_v`; what lags, friction and pad remember there may be given.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gateway.twin.plant import Plant, plain
-from gateway.twin.replay.drive import Drive, Floats, Strains
+from gateway.twin.replay.drive import AT_REST, Drive, Floats, StartState
 from gateway.twin.replay.force import Forces
 from gateway.twin.replay.grid import MOST_STEPS, Grid
 from gateway.twin.replay.reading import Readings
@@ -66,20 +66,20 @@ class Replay:
     def notes(self) -> tuple[str, ...]:
         return self.grid.notes
 
-    def run(self, plants: Sequence[Plant], starts: Sequence[Strains | None] | None = None) -> ReplayResult:
+    def run(self, plants: Sequence[Plant], starts: Sequence[StartState] | None = None) -> ReplayResult:
         """Replay the recording with each plant. ValueError when there is none.
 
-        starts: what each plant's friction remembers when the slide begins (`Drive.settled_s`); None: rest without pressure.
+        starts: what each plant remembers at the first row; None: rest without pressure.
         """
         if not plants:
             raise ValueError("a replay needs at least one plant")
-        plants = [plain(plant) for plant in plants]
-        pressures, which = self._pressures.of([plant.regulator for plant in plants])
-        slides = self._slides.of(plants, pressures, which, starts or [None] * len(plants))
+        plants, starts = [plain(plant) for plant in plants], starts or [AT_REST] * len(plants)
+        pressures, which = self._pressures.of([plant.regulator for plant in plants], starts)
+        slides = self._slides.of(plants, pressures, which, starts)
         force = np.empty((len(plants), self.grid.rows))
         reading = np.empty_like(force)
         for lane, (plant, slide_n) in enumerate(zip(plants, slides, strict=True)):
-            contact_n = self._forces.on_grid(plant.contact, slide_n)
+            contact_n = self._forces.on_grid(plant.contact, slide_n, starts[lane].creep_n)
             self._forces.at_rows(plant.contact, contact_n, force[lane])
             self._readings.fill(plant, contact_n, force[lane], reading[lane])
         return ReplayResult(reading, force, [self.grid.at_rows(pressures[place]) for place in which])

@@ -17,7 +17,7 @@ from gateway.twin.friction import (
 )
 from gateway.twin.plant import Plant
 from gateway.twin.replay.cache import Cache
-from gateway.twin.replay.drive import Drive, Floats, Strains
+from gateway.twin.replay.drive import Drive, Floats, StartState
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.loops import march_lag, march_slide
 from gateway.twin.replay.measured_motion import Motions
@@ -32,39 +32,33 @@ class Slides:
         self._motions = None if drive.motion == "inferred" else Motions(drive, grid)
         self._driven = drive.command_v is not None
         self._forces = Cache()
-        self._first = int(np.searchsorted(grid.time_s, drive.settled_s)) if drive.settled_s > 0.0 else 0
 
     def of(
         self,
         plants: Sequence[Plant],
         pressures: Sequence[Floats],
         which: NDArray[np.intp],
-        starts: Sequence[Strains | None],
+        starts: Sequence[StartState],
     ) -> list[Floats]:
         """Return one force per plant; equal ones are the same array."""
-        keys = [(self._key(plant), start) for plant, start in zip(plants, starts, strict=True)]
+        each = zip(plants, starts, strict=True)
+        keys = [(self._key(plant), start._replace(creep_n=0.0)) for plant, start in each]
         first = {key: place for place, key in reversed(list(enumerate(keys)))}
 
-        def move(key: tuple[Hashable, Strains | None]) -> Floats:
+        def move(key: tuple[Hashable, StartState]) -> Floats:
             place = first[key]
-            return self._moved(plants[place], self._settled(pressures[which[place]]), starts[place])
+            return self._moved(plants[place], pressures[which[place]], starts[place])
 
         different = list(dict.fromkeys(keys))
         forces = dict(zip(different, self._forces.get_all(different, move), strict=True))
         return [forces[key] for key in keys]
-
-    def _settled(self, pressure_pa: Floats) -> Floats:
-        """The pressure, until it is sure that of the moment from which it is."""
-        if not self._first:
-            return pressure_pa
-        return np.concatenate([np.full(self._first, pressure_pa[self._first]), pressure_pa[self._first :]])
 
     def _key(self, plant: Plant) -> Hashable:
         contact = plant.contact
         pad = (contact.pad_stiffness_n_per_m, contact.gap_m, contact.mass_kg, contact.tilt_deg)
         return (plant.regulator if self._driven else None, plant.cylinder, plant.friction, pad)
 
-    def _moved(self, plant: Plant, pressure_pa: Floats, start: Strains | None) -> Floats:
+    def _moved(self, plant: Plant, pressure_pa: Floats, start: StartState) -> Floats:
         """The force of the quasi-static slide, by its own motion or by the measured one."""
         slide = without_mass(slide_of(plant))
         thrust_n = slide.area_m2 * self._in_chamber(plant, pressure_pa)
@@ -72,7 +66,7 @@ class Slides:
         loads_n = (thrust_n, self._as_series(side_n), self._as_series(more_out_n))
         if self._motions is not None:
             return self._motions.force_n(slide, plant.friction, loads_n)
-        state = SlideState() if start is None else start_state(slide, start, [float(load[0]) for load in loads_n])
+        state = start_state(slide, start, [float(load[0]) for load in loads_n])
         force_n = np.empty_like(thrust_n)
         march_slide((slide, without_motion(slide)), state, loads_n, self._grid.steps_s, force_n)
         return force_n
@@ -82,7 +76,7 @@ class Slides:
         if plant.cylinder.chamber_lag_s == 0.0:
             return pressure_pa
         late_pa = np.empty_like(pressure_pa)
-        march_lag(plant.cylinder.chamber_lag_s, pressure_pa, self._grid.steps_s, late_pa)
+        march_lag(plant.cylinder.chamber_lag_s, pressure_pa[0], pressure_pa, self._grid.steps_s, late_pa)
         return late_pa
 
     def _as_series(self, load_n: Real) -> Floats:
@@ -99,21 +93,22 @@ class Slides:
         return side + place_limit_n(friction, conditions), place_asymmetry_n(friction, conditions)
 
 
-def start_state(slide: Slide, start: Strains, loads_n: Sequence[float]) -> SlideState:
-    """Return the state of a slide that rests with these strains; without a force where there is none to begin with.
+def start_state(slide: Slide, start: StartState, loads_n: Sequence[float]) -> SlideState:
+    """Return the state of a slide with these strains; without a force where there is none to begin with.
 
     loads_n: thrust, what surroundings add to the friction's limit, and what of it moving out has more. No element is
     strained by more than the thrust: a pad does not pull. Rigid friction has their mean.
     """
     thrust_n, side_n, more_out_n = loads_n
+    stiction_n = start.stiction_share * slide.stiction_n
     limit_n, centre_n = two_sided_limit(
-        slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n, slide.asymmetry_n + more_out_n
+        slide.coulomb_n + side_n + slide.load_dependent_n_per_n * thrust_n + stiction_n, slide.asymmetry_n + more_out_n
     )
     drive_n = thrust_n + slide.weight_n - centre_n
-    if limit_n <= 0.0:
+    if start.strains is None or limit_n <= 0.0:
         return SlideState()
     most = drive_n / limit_n
-    one, two, three = start
+    one, two, three = start.strains
     two = 0.5 * (one + two)
     three = (2.0 * two + three) / 3.0
     strains = (min(one, most), min(two, most), min(three, most))
@@ -123,4 +118,6 @@ def start_state(slide: Slide, start: Strains, loads_n: Sequence[float]) -> Slide
         return SlideState()
     is_rigid = slide.inverse_per_m[0] == slide.inverse_per_m[-1]
     position_m = slide.gap_m + force_n / slide.pad_n_per_m
-    return SlideState(position_m, strains=(mean, mean, mean) if is_rigid else strains, force_n=force_n)
+    return SlideState(
+        position_m, stiction_n=stiction_n, strains=(mean, mean, mean) if is_rigid else strains, force_n=force_n
+    )

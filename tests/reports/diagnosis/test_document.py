@@ -23,10 +23,17 @@ def several(**properties: object) -> dict[str, object]:
     return {"type": "array", "items": exactly(**properties)}
 
 
+NUMBER_OR_NULL = {"type": ["number", "null"]}
 CONTRACT = exactly(
     format={"const": 1},
     verdict={"enum": ["nothing-found", "confirmed", "partial", "unknown"]},
-    baseline=exactly(rms_n=NUMBER, noise_floor_n=NUMBER, samples={"type": "integer"}, duration_s=NUMBER),
+    baseline=exactly(
+        rms_n=NUMBER,
+        noise_floor_n=NUMBER,
+        noise_floor_source={"enum": ["given", "replicates", "rests", "calibration", "search"]},
+        samples={"type": "integer"},
+        duration_s=NUMBER,
+    ),
     causes=several(
         name=TEXT,
         group={"type": "array", "items": TEXT},
@@ -34,7 +41,17 @@ CONTRACT = exactly(
         parameters={"type": "object", "additionalProperties": exactly(value=NUMBER, unit=TEXT, ci95=INTERVAL)},
         gain=exactly(held_out_rms_before_n=NUMBER, held_out_rms_after_n=NUMBER, ci95=INTERVAL, share_of_excess=NUMBER),
     ),
-    leftover=several(depends_on=TEXT, shape=TEXT, share=NUMBER),
+    leftover=several(
+        depends_on=TEXT,
+        shape=TEXT,
+        share=NUMBER,
+        columns={"type": "array", "items": TEXT},
+        frequency_hz=NUMBER_OR_NULL,
+        amplitude_n=NUMBER_OR_NULL,
+        period_s=NUMBER_OR_NULL,
+        file={"type": ["string", "null"]},
+        experiment=TEXT,
+    ),
     not_identifiable=several(name=TEXT, why=TEXT, experiment=TEXT),
     rejected=several(name=TEXT, gain=NUMBER),
     extended=exactly(held_out_rms_n=NUMBER, reaches_noise_floor={"type": "boolean"}),

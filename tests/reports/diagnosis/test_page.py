@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from gateway.diagnosis.result import Diagnosis, Extended, NotIdentifiable, Verdict
+from gateway.diagnosis.result import Diagnosis, Extended, Leftover, NotIdentifiable, Verdict
 from gateway.reports.diagnosis import wording as words
 from gateway.reports.diagnosis.page import ReportContext, diagnosis_page
 from gateway.twin.plant import with_value
@@ -78,7 +78,7 @@ def test_no_place_of_a_grid_is_empty(columns: int, changed: bool) -> None:
     one = trace(rows=3000, **{f"column_{k}": np.linspace(0.0, 1.0, 3000) ** (k + 2) for k in range(columns)})
     html = page(diagnosis(traces=(one,), **({} if changed else {"causes": ()})))
     grids = re.findall(r"<div class='pair'>(.*?)</div>", html, re.DOTALL)
-    assert len(grids) == 4
+    assert len(grids) == 5, "with what is left over its temperature"
     for grid in grids:
         styles = re.findall(r"<figure class='(.*?)'>", grid)
         assert styles == [""] * (len(styles) // 2 * 2) + ["across"] * (len(styles) % 2)
@@ -185,7 +185,7 @@ def test_partial_says_what_it_lacks() -> None:
     ]
     assert sentences == [
         "A cause is found, but it does not explain everything.",
-        "A cause is found that explains the error; to confirm it, repeat a cycle or give the noise floor.",
+        "A cause is found that explains the error; to confirm it, record rests, repeat a cycle or give the noise floor.",
         "A cause is found, but this recording cannot tell it from others that look alike.",
         "Causes are found, but they do not explain everything.",
         "Causes are found, but this recording cannot tell them from others that look alike.",
@@ -200,3 +200,23 @@ def test_a_size_that_the_plant_had_already_is_told_beside_the_new_one() -> None:
     assert "(0.0800 before)" in page(had)
     lacked = replace(had, base=with_value(had.base, "friction", "load_dependent_n_per_n", 0.0))
     assert words.previous_value(lacked, "load_dependent_n_per_n", result) == ""
+
+
+LEFT = (
+    Leftover(
+        "time", "a line at 12.5 Hz, 0.12 N", 0.2, frequency_hz=12.5, amplitude_n=0.12, experiment="switch the pump off"
+    ),
+    Leftover("time", "a jump at 3 s, 0.3 N to either side", 0.1),
+    Leftover("column_0 x column_1", "in proportion to their product, 0.1 N", 0.1, ("column_0", "column_1")),
+)
+
+
+@pytest.mark.parametrize(
+    ("left", "drawn"), list(zip(LEFT, ("Spectrum", "Residual over time", "column_0 x column_1"), strict=True))
+)
+def test_each_leftover_is_told_and_drawn(left: Leftover, drawn: str) -> None:
+    one = trace(rows=3000, **{f"column_{k}": np.linspace(0.0, 1.0, 3000) ** (k + 2) for k in range(2)})
+    section = page(diagnosis(traces=(one,), leftover=(left,))).partition("What no effect explains")[2]
+    section = section.partition("<h2>")[0]
+    assert left.shape in section and left.experiment in section
+    assert "<svg" in section and drawn in section

@@ -1,0 +1,45 @@
+"""A quiet recording stays quiet wherever it begins; what is remembered at its first row is fitted, and no row is left out."""
+
+import numpy as np
+import pytest
+
+from gateway.diagnosis import Options, Verdict, diagnose
+from gateway.diagnosis.noise import white_whitener
+from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
+from gateway.diagnosis.search.bench import bench_of
+from tests.diagnosis.begun_anywhere import BEGINNINGS, COLOURS, NOISE_N, begun
+
+
+@pytest.mark.parametrize("beginning", BEGINNINGS)
+def test_the_base_model_leaves_the_noise_from_the_first_row_on(beginning: str) -> None:
+    """The first second is no worse than the rest, by the root mean square of 100 readings; a mass rings after steps."""
+    bench = bench_of([begun(beginning, 1, lasts_s=15.0)])
+    assert bench.judged.all()
+    whiten = white_whitener(bench, bench.measured_n)
+    fitted = fit_base(bench, DEFAULT_PLANT, base_parameters(bench, frozenset()), whiten)
+    assert np.std(fitted.residual_n) < 1.15 * NOISE_N
+    assert np.sqrt(np.mean(fitted.residual_n[:100] ** 2)) < 1.3 * NOISE_N
+
+
+def assert_quiet(beginning: str, seed: int, colour: str, floor_n: float | None) -> None:
+    found = diagnose([begun(beginning, seed, colour)], None, Options(noise_floor_n=floor_n))
+    assert found.causes == (), [(cause.name, cause.gain) for cause in found.causes]
+    assert found.leftover == (), found.leftover
+    assert found.verdict is Verdict.NOTHING_FOUND
+
+
+@pytest.mark.parametrize(("beginning", "colour"), [("in a stroke", "white"), ("after a wiggle", "lorentzian")])
+def test_a_quiet_recording_that_begins_amid_motion_is_quiet(beginning: str, colour: str) -> None:
+    assert_quiet(beginning, 3, colour, None)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("beginning", BEGINNINGS)
+def test_no_beginning_is_a_cause(beginning: str, seed: int) -> None:
+    """Sixty recordings, white and coloured, half of them with the floor given: no name is given."""
+    place = BEGINNINGS.index(beginning)
+    floor_n = NOISE_N if (seed // 2 + place) % 2 else None
+    one = begun(beginning, seed, COLOURS[(seed + place) % 2])
+    found = diagnose([one], None, Options(noise_floor_n=floor_n))
+    assert found.causes == (), [(cause.name, cause.gain) for cause in found.causes]
