@@ -119,7 +119,8 @@ def follow_target(state: PressureState, target_pa: float, shares: LagShares) -> 
     ahead_pa = state.first_pa - target_pa
     kept, across = shares.filling if ahead_pa < 0.0 else shares.emptying
     second_pa = target_pa + shares.second * (state.second_pa - target_pa) + across * ahead_pa
-    slewed_pa = min(max(second_pa, state.slewed_pa - shares.most_pa), state.slewed_pa + shares.most_pa)
+    least_pa, most_pa = state.slewed_pa - shares.most_pa, state.slewed_pa + shares.most_pa
+    slewed_pa = least_pa if second_pa < least_pa else most_pa if second_pa > most_pa else second_pa
     return PressureState(target_pa + kept * ahead_pa, second_pa, slewed_pa)
 
 
