@@ -109,6 +109,15 @@ def age_stiction(stiction_n: float, full_n: float, rest: float, travel: float) -
 
 
 @step
+def relax_strain(strain: float, towards: float, travel: float) -> float:
+    """Return the strain of an element that a motion leads towards that of sliding.
+
+    travel: of the step, as a multiple of the element's yield travel.
+    """
+    return towards + (strain - towards) * math.exp(-travel)
+
+
+@step
 def strain_elements(
     strains: tuple[float, float, float], travel_m: float, inverse_per_m: tuple[float, float, float]
 ) -> tuple[float, float, float]:
