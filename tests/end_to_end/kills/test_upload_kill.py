@@ -213,7 +213,16 @@ def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
     better = replace(demo, rising_handles_n=(low_n, 1.05 * middle_n, high_n))
     words = staged(CoefficientSet.of_calibration(better), slot=7)
     running.write(0, 1, 2000)
-    running.wait_until(lambda status: status["state"] == HOLDING)
+    stands_mv, since_s = 0, time.monotonic()
+
+    def is_steady(status: dict[str, int]) -> bool:
+        """Held, and the trim has done its work: what moves afterwards is the commit's doing."""
+        nonlocal stands_mv, since_s
+        if abs(status["output_voltage"] - stands_mv) > 10:
+            stands_mv, since_s = status["output_voltage"], time.monotonic()
+        return status["state"] == HOLDING and time.monotonic() - since_s >= 0.6
+
+    running.wait_until(is_steady, 10.0)
     own, block = running.words(414, 2), struct.pack(">200H", *running.words(1500, 100), *running.words(1600, 100))
     stage(running, block[:288] + struct.pack(">H", 7) + block[290:])
     running.write(1145, 1)

@@ -17,6 +17,7 @@ import numpy as np
 
 from gateway.twin import STEP_S, Drive, Plant
 from gateway.twin.experiment import Floats, settling_time_s
+from gateway.twin.replay.drive import AT_REST
 from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.loops import march_slide
 from gateway.twin.replay.regulator import Pressures
@@ -49,7 +50,7 @@ def responses(plant: Plant, commands_v: Floats) -> Floats:
     for lane, command_v in enumerate(commands_v.T):
         drive = Drive(time_s=time_s, command_v=np.append(command_v, command_v[-1]))
         grid = Grid(drive, STEP_S)
-        (pressure_pa,), _ = Pressures(drive, grid).of([plant.regulator])
+        (pressure_pa,), _ = Pressures(drive, grid).of([plant.regulator], [AT_REST])
         moved_n = np.empty(grid.points)
         start = (slide, without_motion(slide))
         nothing_n = np.zeros(grid.points)
