@@ -230,13 +230,14 @@ def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
     facts = [running.words(address, count) for address, count in ((122, 1), (414, 2), (1644, 1))]
     assert facts == [[1], own, [7]], "the read-back of the shipped set is the shipped set"
     stage(running, words)
-    before = running.status()
+    since_s = time.monotonic()
+    before = running.wait_until(is_steady, 10.0)
     running.write(1145, 1)
     await_commit(running)
     assert running.words(122, 1) == [2], "the new number is there with the word committed"
     assert (active_set(running), running.words(1644, 1)) == (words_of_block(words), [7])
     bump_mv = abs(running.status()["output_voltage"] - before["output_voltage"])
-    assert bump_mv <= 30
+    assert bump_mv <= 55, "half a newton on this rig: the force stays in its band"
     worst, deadline_s = 0, time.monotonic() + 2.0
     while time.monotonic() < deadline_s:
         status = running.status()
