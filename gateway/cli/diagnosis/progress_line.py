@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import IO, Final
+from typing import IO, Any, Final
 
 from gateway.progress import Progress, listen
 
@@ -85,7 +85,7 @@ class ProgressLine:
 def _interruptible() -> Iterator[Callable[[], None]]:
     """Give a function that raises KeyboardInterrupt once Ctrl-C was pressed, however long ago.
 
-    Python raises it where it happens to be, and where that is a callback of a library it is swallowed.
+    Python raises it where it happens to be, and where that is a callback of a library it is swallowed, with a traceback.
     """
     pressed = threading.Event()
 
@@ -97,9 +97,25 @@ def _interruptible() -> Iterator[Callable[[], None]]:
         pressed.set()
         raise KeyboardInterrupt
 
-    with handled_interrupt(on_interrupt):
+    with handled_interrupt(on_interrupt), _silent_when_swallowed():
         yield check
         check()
+
+
+@contextmanager
+def _silent_when_swallowed() -> Iterator[None]:
+    """Print no traceback of a KeyboardInterrupt that a callback has swallowed: what comes next raises it again."""
+    before = sys.unraisablehook
+
+    def hook(unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            before(unraisable)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 @contextmanager

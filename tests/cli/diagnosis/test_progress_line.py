@@ -1,5 +1,6 @@
 """What a long calculation says while it lasts, and that Ctrl-C ends it and leaves nothing behind, whenever it comes."""
 
+import ctypes
 import io
 import os
 import pty
@@ -104,7 +105,13 @@ def pressed_in(method: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize("press", [press_ctrl_c, swallow_ctrl_c])
+def press_ctrl_c_in_a_callback() -> None:
+    """As while loops are compiled: C swallows what its callback raises, and Python prints it."""
+    ctypes.CFUNCTYPE(None)(press_ctrl_c)()
+    progress.report("the next stage")
+
+
+@pytest.mark.parametrize("press", [press_ctrl_c, swallow_ctrl_c, press_ctrl_c_in_a_callback])
 def test_ctrl_c_while_it_calculates_writes_nothing(
     press: Callable[[], None], tmp_path: Path, call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
