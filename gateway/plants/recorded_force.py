@@ -14,7 +14,7 @@ from gateway.recording import Recording
 
 
 @dataclass(frozen=True, slots=True)
-class RecordedRun:
+class RecordedForce:
     """plant: number in use while the run was recorded, 0 the rig's own; cell: what of the readings that plant has
     straightened; voltage_v: on the output, by row."""
 
@@ -33,14 +33,14 @@ class RecordedRun:
         return error_blocks(replace(self.force, measured_n=measured_n))
 
 
-def recorded_run(recording: Recording) -> RecordedRun:
+def read_recorded_force(recording: Recording) -> RecordedForce:
     """Return the run of a recording. ValueError names the column without which nobody knows what was asked."""
     force = commanded_force(recording.columns)
     in_use = header_in_use(recording.header)
     cell = CellMap(**in_use["cell"]) if in_use.get("cell") else None
     columns = recording.columns
     voltage_v = columns.get("sent_v", columns.get("command_v", np.full(force.time_s.size, nan)))
-    return RecordedRun(recording.path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
+    return RecordedForce(recording.path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
 
 
 def header_in_use(header: dict[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Final
 
 from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import FEWEST_BLOCKS, ErrorBlock
-from gateway.plants.recorded_force import recorded_run
+from gateway.plants.recorded_force import read_recorded_force
 from gateway.processes.durable_file import make_directory
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 
@@ -45,7 +45,7 @@ def find_reference(state: Path, plant: int, cell: CellMap | None) -> ForceRefere
 
 def reference_of(recording: Recording, plant: int, cell: CellMap | None) -> ForceReference:
     """Return the reference that one recording gives. ValueError where it does not say what was asked."""
-    run = recorded_run(recording)
+    run = read_recorded_force(recording)
     return ForceReference(plant, run.name, run.plant, run.blocks(cell))
 
 

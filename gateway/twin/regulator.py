@@ -53,7 +53,7 @@ def leaked_share(leak_per_s: float, since_s: float, held_s: float) -> float:
     return math.exp(-leak_per_s * since_s) * -math.expm1(-leak_per_s * held_s) / (leak_per_s * held_s)
 
 
-class Lags(NamedTuple):
+class PressureLags(NamedTuple):
     """What delays the pressure. filling_s: the first lag while the pressure rises."""
 
     emptying_s: float
@@ -84,10 +84,10 @@ class PressureState(NamedTuple):
     slewed_pa: float = 0.0
 
 
-def lags_of(regulator: Regulator) -> Lags:
+def lags_of(regulator: Regulator) -> PressureLags:
     """Return what delays the pressure of a regulator."""
     filling_s = regulator.lag_s * (1.0 + regulator.fill_slowdown)
-    return Lags(regulator.lag_s, filling_s, regulator.second_lag_s, regulator.slew_pa_per_s)
+    return PressureLags(regulator.lag_s, filling_s, regulator.second_lag_s, regulator.slew_pa_per_s)
 
 
 @step
@@ -105,7 +105,7 @@ def couple_lags(first_s: float, second_s: float, held_s: float) -> tuple[float, 
 
 
 @step
-def lag_shares(lags: Lags, held_s: float) -> LagShares:
+def lag_shares(lags: PressureLags, held_s: float) -> LagShares:
     """Return what is kept over a time."""
     emptying = couple_lags(lags.emptying_s, lags.second_s, held_s)
     filling = emptying if lags.filling_s == lags.emptying_s else couple_lags(lags.filling_s, lags.second_s, held_s)

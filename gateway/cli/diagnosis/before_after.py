@@ -14,7 +14,7 @@ from gateway.cli.diagnosis.inputs import recording_path
 from gateway.cli.errors import CliError
 from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import ForceChange, GainVerdict, compare_runs
-from gateway.plants.recorded_force import RecordedRun, recorded_run
+from gateway.plants.recorded_force import RecordedForce, read_recorded_force
 from gateway.processes import exit_codes
 from gateway.recording import read_table
 from gateway.recording.tables.mapping_file import column_mapping
@@ -28,24 +28,24 @@ _ANOTHER_CELL: Final = (
 class BeforeAfter:
     """The comparison of two runs: of all rows, of held forces alone, and of the ways between them."""
 
-    before: RecordedRun
-    after: RecordedRun
+    before: RecordedForce
+    after: RecordedForce
     whole: ForceChange
     held: ForceChange
     moving: ForceChange
 
 
-def read_run(name: str, *, rig: str | None, columns: str | None, state: Path | None) -> RecordedRun:
+def read_run(name: str, *, rig: str | None, columns: str | None, state: Path | None) -> RecordedForce:
     """Read one run, by number or file. CliError (65) where nobody knows what was asked in it."""
     path = recording_path(name, rig, state)
     try:
-        return recorded_run(read_table(path, column_mapping(columns)))
+        return read_recorded_force(read_table(path, column_mapping(columns)))
     except ValueError as error:
         why = f"{path}: {error}; force-gateway record writes setpoint_n: the force that the master asked for"
         raise CliError(f"E403 {why}", exit_codes.DATA) from None
 
 
-def compare_before_after(before: RecordedRun, after: RecordedRun) -> BeforeAfter:
+def compare_before_after(before: RecordedForce, after: RecordedForce) -> BeforeAfter:
     """Return what the later run gained. `cannot be told` where it depends on which plant is right about the cell."""
     views = [_compare_through(before, after, cell) for cell in dict.fromkeys((after.cell, before.cell))]
     result = views[0]
@@ -54,7 +54,7 @@ def compare_before_after(before: RecordedRun, after: RecordedRun) -> BeforeAfter
     return result
 
 
-def _compare_through(before: RecordedRun, after: RecordedRun, cell: CellMap | None) -> BeforeAfter:
+def _compare_through(before: RecordedForce, after: RecordedForce, cell: CellMap | None) -> BeforeAfter:
     runs = (before.blocks(cell), after.blocks(cell))
     held, moving = ([[b for b in run if b.settled is settled] for run in runs] for settled in (True, False))
     return BeforeAfter(before, after, compare_runs(*runs), compare_runs(*held), compare_runs(*moving))
@@ -101,7 +101,7 @@ def sentences(found: BeforeAfter) -> Iterator[str]:
     yield f"{whole.verdict.value}: {sign * whole.gain_n:.2f} N {word}, 95 % interval {ends[0]:.2f} .. {ends[1]:.2f} N"
 
 
-def _run(run: RecordedRun) -> str:
+def _run(run: RecordedForce) -> str:
     return f"{run.name} ({f'plant {run.plant}' if run.plant else 'no plant in use'})"
 
 

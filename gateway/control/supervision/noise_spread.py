@@ -68,7 +68,7 @@ def spread_within_two(share: float) -> float:
     return low
 
 
-class Window:
+class SampleWindow:
     """WINDOW samples in a row: how often each level was read, and whether the force stood still."""
 
     def __init__(self) -> None:
@@ -134,7 +134,7 @@ class Pool:
         self._squares = 0
         self._deviations = self._centred = self._changes = self._expected = 0.0
 
-    def add(self, window: Window) -> None:
+    def add(self, window: SampleWindow) -> None:
         """Add a full window, unless the force moved in it."""
         if not window.is_still:
             return

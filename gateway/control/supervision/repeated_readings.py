@@ -22,7 +22,7 @@ from collections import deque
 from math import inf, nan
 from typing import Final
 
-from gateway.control.supervision.noise_spread import WINDOW, Pool, Spread, Window, quietest
+from gateway.control.supervision.noise_spread import WINDOW, Pool, SampleWindow, Spread, quietest
 from gateway.control.supervision.repeat_law import LONGEST_RUNS, Runs, careful_counts, equal_samples, stays
 
 POOL_WINDOWS: Final = 32
@@ -50,7 +50,7 @@ class RepeatedReadings:
         self._run, self._is_dead = 0, False
         self._changes = 0
         self._pool = Pool()
-        self._window = Window()
+        self._window = SampleWindow()
         self._pools: dict[bool, deque[Spread]] = {way: deque(maxlen=POOLS) for way in (True, False)}
         self._known: Spread | None = None
         self._stay = 1.0
@@ -80,7 +80,7 @@ class RepeatedReadings:
         if self._is_dead:
             return
         if step_n < 0.75 * self.count_n:  # what was judged with larger counts looks quieter than it is
-            self.count_n, self._window = step_n, Window()
+            self.count_n, self._window = step_n, SampleWindow()
         self._changes += 1
         self.runs.add(self._run)
         level, steps = round(self._value_n / self.count_n), round(step_n / self.count_n)
@@ -89,7 +89,7 @@ class RepeatedReadings:
             left -= self._window.add(level, left)
             if self._window.is_full:
                 self._pool.add(self._window)
-                self._window = Window()
+                self._window = SampleWindow()
                 self._renew(under_force)
         self._window.change(steps)
         if not self.runs.is_explained(self._run, self._stay):

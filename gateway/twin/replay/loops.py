@@ -8,7 +8,7 @@ from gateway.twin.friction import age_stiction, relax_strain
 from gateway.twin.lags import apply_play, follow_ramp, ramp_shares
 from gateway.twin.regulator import (
     HeldTarget,
-    Lags,
+    PressureLags,
     PressureState,
     follow_target,
     lag_shares,
@@ -45,7 +45,7 @@ def hold_targets(
 
 @loop
 def march_pressure(
-    lags: Lags,
+    lags: PressureLags,
     jumps: bool,
     start_pa: tuple[float, float],
     target_pa: Floats,

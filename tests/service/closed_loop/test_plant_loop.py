@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from gateway.cli.main import command
 from gateway.diagnosis.force_error import GainVerdict, compare_runs
 from gateway.plants.in_use import with_plant_in_use
-from gateway.plants.recorded_force import recorded_run
+from gateway.plants.recorded_force import read_recorded_force
 from gateway.plants.reference import keep_reference, reference_of
 from gateway.plants.store import NumberedPlant, PlantStore
 from gateway.recording import Recording
@@ -152,7 +152,7 @@ def test_the_same_machine_unchanged_is_neither_better_nor_worse(tmp_path):
     runs = []
     for seed in (7, 8):
         machine = Machine(tmp_path, {"regulator__command_bow": BOW}, seed)
-        wired_run = recorded_run(machine.record(None))
+        wired_run = read_recorded_force(machine.record(None))
         runs.append(wired_run.blocks(None))
     assert compare_runs(*runs).verdict is GainVerdict.UNKNOWN
 
