@@ -34,7 +34,7 @@ class TransportDelay:
     passes in `advance`, in steps of any size."""
 
     def __init__(self, delay_s: float) -> None:
-        self._delay_s = delay_s
+        self.delay_s = delay_s
         self.restart(0.0)
 
     def restart(self, value: float) -> None:
@@ -44,10 +44,10 @@ class TransportDelay:
 
     def advance(self, value: float, dt_s: float) -> float:
         """Advance by dt_s, take the value that holds from now on, and return the value of delay_s ago."""
-        if self._delay_s <= 0.0:
+        if self.delay_s <= 0.0:
             return value
         self._now_s += dt_s
-        past, heard_s = self._past, self._now_s - self._delay_s
+        past, heard_s = self._past, self._now_s - self.delay_s
         past.append((self._now_s, value))
         while past and past[0][0] <= heard_s:
             self._value = past.popleft()[1]
@@ -119,17 +119,19 @@ class Feedforward:
         overcome twice."""
         return max(precontact_n, 2.0 * self.model.force_range_n[0] + APPROACH_N)
 
-    def use(self, model: Bsfm, gravity_n: float) -> None:
-        """Swap the model without a bump: the voltage difference is carried over and fades. An equal one changes nothing,
-        for no share says as much as the memory that it would replace."""
+    def use(self, model: Bsfm, gravity_n: float, is_corrected: bool = False) -> None:
+        """Swap the model without a bump: the voltage difference is carried over and fades, with what a correction asks for, if
+        there is one. An equal one changes nothing, for no share says as much as the memory that it would replace."""
         if model == self.model:
             return
-        before_v, _ = self.compute_voltage(gravity_n)
-        self.model, self._memory = model, model.reversal.at(self.branch_share)
+        before_v = self._total_v(gravity_n, is_corrected)
+        slide = model.reversal.at(self.model.reversal.branch_share(self._slide))
+        self.model, self._memory, self._slide = model, model.reversal.at(self.branch_share), slide
         self._limits = narrow_limits(self._rig_limits, model.limits_n)
-        self._slide = self._memory
-        after_v, _ = self.compute_voltage(gravity_n)
-        self._carry_over_v += before_v - after_v
+        self._carry_over_v += before_v - self._total_v(gravity_n, is_corrected)
+
+    def _total_v(self, gravity_n: float, is_corrected: bool) -> float:
+        return self.compute_voltage(gravity_n)[0] + (self.correction_v(gravity_n) if is_corrected else 0.0)
 
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
         """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what does not come from

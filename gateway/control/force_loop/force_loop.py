@@ -22,7 +22,7 @@ from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, strongest
-from gateway.control.settings import ControlSettings
+from gateway.control.settings import ControlSettings, LoopTiming, Trim
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause
 from gateway.control.supervision.in_band import SettlingCheck
@@ -42,6 +42,9 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing, self._is_retimed = timing, False
+        self._arrived, self._near_s = TransportDelay(0.0), 0.0
+        self._lead: LeadCompensator | LinearizedLagInverse
+        self._trim: TrimIntegral | MeasuredTrim = TrimIntegral(settings.trim)
         self._tune(settings, model)
         self.feedforward = Feedforward(model, settings.limits, *self._course(settings))
         self.expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
@@ -64,7 +67,7 @@ class ForceLoop:
         """
         law = self.feedforward
         is_same = model == law.model and settings.timing == self._measured and settings.lead == self._lead_settings
-        law.use(model, given_n)
+        law.use(model, given_n, self._is_correcting)
         self.expected.retime(settings.supervision.response_lag_s)
         self.expected.use(model)
         if not is_same or self._is_retimed:
@@ -75,21 +78,28 @@ class ForceLoop:
         lead, trim, law = self._lead, self._trim, self.feedforward
         self._tune(settings, model)
         self._lead.go_on_from(lead.first_v, lead.second_v)
-        is_in_force = isinstance(self._trim, MeasuredTrim)
-        self._trim.resume(trim.value_v * law.slope_n_per_v(given_n) if is_in_force else trim.value_v)
+        if self._trim is not trim:
+            n_per_v = law.slope_n_per_v(given_n) if isinstance(self._trim, MeasuredTrim) else 1.0
+            self._trim.resume(trim.value_v * n_per_v)
         law.retime(*self._course(settings))
 
     def _tune(self, settings: ControlSettings, model: Bsfm) -> None:
         """LeadCompensator and trim by the measured response where there is one, else by the rig file."""
-        self._measured, self._lead_settings, self._near_s = settings.timing, settings.lead, 0.0
-        self._arrived = TransportDelay(settings.timing.dead_time_s if settings.timing else 0.0)
-        self._lead: LeadCompensator | LinearizedLagInverse
-        self._trim: TrimIntegral | MeasuredTrim
-        if self._measured:
-            self._lead = LinearizedLagInverse(self._measured.lags, settings.limits, model)
-            self._trim = MeasuredTrim(settings.trim, self._measured)
+        self._measured, self._lead_settings = settings.timing, settings.lead
+        if settings.timing:
+            self._lead = LinearizedLagInverse(settings.timing.lags, settings.limits, model)
+            self._tune_measured_trim(settings.trim, settings.timing)
         else:
             self._lead, self._trim = LeadCompensator(settings.lead, settings.limits), TrimIntegral(settings.trim)
+
+    def _tune_measured_trim(self, settings: Trim, timing: LoopTiming) -> None:
+        """One that there is goes on with its correction, and with the cell's noise: a new one would follow it for a second."""
+        if self._arrived.delay_s != timing.dead_time_s:
+            self._arrived, self._near_s = TransportDelay(timing.dead_time_s), 0.0
+        if isinstance(self._trim, MeasuredTrim):
+            self._trim.retime(settings, timing)
+        else:
+            self._trim = MeasuredTrim(settings, timing)
 
     def _course(self, settings: ControlSettings) -> tuple[float, float, float]:
         """How the force follows the target: lag, dead time before it, and how far the aim runs ahead on a ramp."""
@@ -131,6 +141,10 @@ class ForceLoop:
     def trim_v(self) -> float:
         """Voltage that the trim adds, V."""
         return self._trim.value_v
+
+    @property
+    def _is_correcting(self) -> bool:
+        return isinstance(self._trim, MeasuredTrim) and not self._trim.is_off
 
     @property
     def is_trim_at_limit(self) -> bool:
@@ -219,7 +233,7 @@ class ForceLoop:
         moved_n = law.advance(goal_n, rate_n_per_s, inputs.dt_s, given_n)
         self._learn(inputs, moved_n, given_n)
         model_v, by_model = law.compute_voltage(given_n)
-        if isinstance(self._trim, MeasuredTrim) and not self._trim.is_off:
+        if isinstance(self._trim, MeasuredTrim) and self._is_correcting:
             law.correct(self._trim.value_n, given_n)
             self._trim.take_volts(law.correction_v(given_n))
         has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE

@@ -80,6 +80,11 @@ class MeasuredTrim:
         """Go on from a correction that another trim has learned."""
         self.value_n = self._own_n = self._learned_n = value_n
 
+    def retime(self, settings: Trim, timing: LoopTiming) -> None:
+        """Go on with another rig's settings and pace: correction and noise are newtons, whatever model and lags are."""
+        self._settings, self._timing = settings, timing
+        self._same_way_n = min(SAME_WAY_N, settings.memory_n)
+
     def take_volts(self, value_v: float) -> float:
         """Return what the correction asks for, within the limit of the rig."""
         self.value_v, limited_by = trim_limited(value_v, self._settings.limit_v)

@@ -75,8 +75,8 @@ def test_without_a_response_or_by_the_rigs_word_nothing_changes():
     assert timing_of(response, rig) == rig
 
 
-def pressing(response: Response | None, **plant: float) -> Bench:
-    bench = Bench(settings(), **plant)
+def pressing(response: Response | None, seed: int = 1, **plant: float) -> Bench:
+    bench = Bench(settings(), seed=seed, **plant)
     bench.controller.use(CalibrationInUse(bsfm(), 1, response))
     bench.run(0.1)
     bench.enable(20.0)
@@ -94,6 +94,20 @@ def test_a_response_is_taken_into_use_and_out_of_it_without_a_bump():
         first = len(bench.history)
         bench.run(1.5)
         assert max(abs(record.force_n - 20.0) for record in bench.history[first:]) < 0.8
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_model_that_is_nearly_the_same_moves_nothing(seed):
+    """The correction goes on where it stood, and no noise is followed by a trim that would have to learn it anew."""
+    own = Response(dead_time_s=0.03, lag_s=0.08, second_lag_s=0.015)
+    bench = pressing(own, gain_n_per_v=6.6, noise_n=0.15, seed=seed)
+    bench.run(3.0)
+    bench.controller.use(CalibrationInUse(bsfm(1.0001), 2, own))
+    first = len(bench.history)
+    bench.run(0.5)
+    before, *after = bench.history[first - 1 :]
+    assert abs(before.output.trim_v) > 0.01, "there is a correction that could be lost"
+    assert max(abs(each.output.voltage_v - before.output.voltage_v) for each in after) < 0.001
 
 
 def test_a_trim_of_gain_nothing_stays_off():

@@ -237,7 +237,7 @@ def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
     assert running.words(122, 1) == [2], "the new number is there with the word committed"
     assert (active_set(running), running.words(1644, 1)) == (words_of_block(words), [7])
     bump_mv = abs(running.status()["output_voltage"] - before["output_voltage"])
-    assert bump_mv <= 55, "half a newton on this rig: the force stays in its band"
+    assert bump_mv <= 30
     worst, deadline_s = 0, time.monotonic() + 2.0
     while time.monotonic() < deadline_s:
         status = running.status()
