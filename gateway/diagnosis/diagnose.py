@@ -15,21 +15,21 @@ from gateway import progress
 from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.cylinder import COULOMB, DRAG_ASYMMETRY
 from gateway.catalogue.effect import Effect, Parameter
+from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.bench.parameters import ModelParameters
+from gateway.diagnosis.bench.recording_drive import MOTIONS
 from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt
 from gateway.diagnosis.input_checks import Suspect, find_suspects
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.noise import Whitener, fast_noise_n, timing_weights, white_whitener
+from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
+from gateway.diagnosis.model_fit.initial_state import drop_unfelt_starts, settle_known_rests
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
+from gateway.diagnosis.noise.whitening import Whitener, fast_noise_n, timing_weights, white_whitener
 from gateway.diagnosis.notes import implausible_area, nothing_to_switch_off, uninformative_force
-from gateway.diagnosis.residual_tests import find_dependences
+from gateway.diagnosis.residuals.dependence_tests import find_dependences
 from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdict
-from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
-from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
-from gateway.diagnosis.search.initial_state import drop_unfelt_starts, settle_known_rests
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.line_lengths import fit_line_lengths
-from gateway.diagnosis.search.parameters import ModelParameters
-from gateway.diagnosis.search.recording_drive import MOTIONS
 from gateway.diagnosis.search.search import search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
 from gateway.twin.plant import Plant, with_value

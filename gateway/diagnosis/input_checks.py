@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.bench.recording_drive import SETTLING_S, drive_of
 from gateway.diagnosis.measurement import Floats, Measurement
-from gateway.diagnosis.search.recording_drive import SETTLING_S, drive_of
 from gateway.twin.plant import Plant, with_value
 from gateway.twin.replay.replay import Replay
 from gateway.units import LINEAR

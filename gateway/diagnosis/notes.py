@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.noise import fast_noise_n
+from gateway.diagnosis.noise.whitening import fast_noise_n
 
 _MOVING_RATIO: Final = 30.0  # times the noise, from which a force moves
 _RESTING_RATIO: Final = 8.0  # times the noise, below which nearly all readings of a force lie that stands

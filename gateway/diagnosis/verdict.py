@@ -12,9 +12,13 @@ import numpy as np
 
 from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.parameters import STARTS
 from gateway.diagnosis.experiments.identifiability import find_invisible_effects
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.noise_floor import NoiseFloor, find_floor
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.normal_equations import covariance, held_out_errors
+from gateway.diagnosis.noise.noise_floor import NoiseFloor, find_floor
+from gateway.diagnosis.noise.whitening import Whitener
 from gateway.diagnosis.notes import recording_notes, too_high_a_floor
 from gateway.diagnosis.result import (
     Baseline,
@@ -30,11 +34,7 @@ from gateway.diagnosis.result import (
     Trace,
     Verdict,
 )
-from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.direct_evidence import DirectEvidence
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import covariance, held_out_errors
-from gateway.diagnosis.search.parameters import STARTS
 from gateway.diagnosis.search.search import SearchResult
 from gateway.diagnosis.search.significance import (
     DoubtfulEffect,

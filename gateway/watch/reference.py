@@ -16,10 +16,10 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis import Diagnosis
+from gateway.diagnosis.bench.bench import bench_of
+from gateway.diagnosis.bench.recording_drive import replay_of
 from gateway.diagnosis.measurement import Floats, Measurement
-from gateway.diagnosis.search.bench import bench_of
-from gateway.diagnosis.search.initial_state import fit_initial_states
-from gateway.diagnosis.search.recording_drive import replay_of
+from gateway.diagnosis.model_fit.initial_state import fit_initial_states
 from gateway.twin.plant import Plant, with_value
 from gateway.watch.window import Window
 

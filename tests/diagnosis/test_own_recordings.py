@@ -13,8 +13,8 @@ import pytest
 
 from gateway.cli.diagnosis.inputs import Sources, read_sources
 from gateway.diagnosis import Diagnosis, Options, Verdict, diagnose
-from gateway.diagnosis.search.bench import bench_of
-from gateway.diagnosis.search.initial_state import fit_initial_states
+from gateway.diagnosis.bench.bench import bench_of
+from gateway.diagnosis.model_fit.initial_state import fit_initial_states
 from gateway.profiles import load_rig
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.recorded_row import COLUMNS

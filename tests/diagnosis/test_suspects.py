@@ -7,7 +7,7 @@ import pytest
 
 from gateway.diagnosis import Measurement, Options, Verdict, diagnose
 from gateway.diagnosis.input_checks import SWAPPED, TURNED, UNIT, columns_option, find_suspects
-from gateway.diagnosis.search.base_fit import without_effects
+from gateway.diagnosis.model_fit.base_fit import without_effects
 from gateway.twin.plant import Plant, with_value
 from gateway.twin.replay.replay import Drive, Replay
 from gateway.units import LINEAR

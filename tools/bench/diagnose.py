@@ -25,7 +25,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from gateway.diagnosis.search.base_fit import DEFAULT_PLANT  # noqa: E402
+from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT  # noqa: E402
 from gateway.twin.plant import with_value  # noqa: E402
 from gateway.twin.replay.replay import Drive, Replay  # noqa: E402
 

@@ -10,7 +10,7 @@ from gateway.cli.errors import no_such_recording
 from gateway.cli.options import state_directory
 from gateway.devices import cell_host
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.search.base_fit import without_effects
+from gateway.diagnosis.model_fit.base_fit import without_effects
 from gateway.plants.recorded_force import header_in_use
 from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
 from gateway.recording import Recording, find_recording, read_table

@@ -70,7 +70,7 @@ def _simulate(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Flo
     and not of the tool along the workpiece: as in a diagnosis, the way that fits best is taken."""
     import numpy as np
 
-    from gateway.diagnosis.search.recording_drive import MOTIONS, drive_of
+    from gateway.diagnosis.bench.recording_drive import MOTIONS, drive_of
     from gateway.twin.replay.drive import Motion
     from gateway.twin.replay.replay import Replay
 

@@ -9,7 +9,7 @@ from gateway.catalogue.cylinder import AREA, DRAG_ASYMMETRY
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, Recipe, SearchHints, Start, fixed_starts
 from gateway.catalogue.regulator import LAG
 from gateway.catalogue.sensing import CLOCK_OFFSET
-from gateway.diagnosis.search.parameters import ChangedValue, ModelParameters
+from gateway.diagnosis.bench.parameters import ChangedValue, ModelParameters
 
 GAIN: Final = "gain"
 """Name of a change of the machine's area, which belongs to every model and has no entry in the catalogue."""

@@ -16,11 +16,11 @@ from gateway.diagnosis.against.new_evidence import take_new_evidence
 from gateway.diagnosis.diagnose import Options, diagnosis_of_wrong_columns, with_readings_of
 from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt
 from gateway.diagnosis.input_checks import find_suspects
-from gateway.diagnosis.leftovers import is_same_form
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.residual_tests import find_dependences
+from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT
+from gateway.diagnosis.residuals.dependence_tests import find_dependences
+from gateway.diagnosis.residuals.leftovers import is_same_form
 from gateway.diagnosis.result import Cause, Diagnosis, Leftover, Machine, Trace, Verdict
-from gateway.diagnosis.search.base_fit import DEFAULT_PLANT
 from gateway.diagnosis.search.search import SearchResult, search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
 from gateway.twin.plant import Plant

@@ -10,17 +10,17 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.against.machine_error import common_error_n, machine_error_columns
+from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.bench.parameters import STARTS, ModelParameters
 from gateway.diagnosis.diagnose import Options, doubt_times, prepare_search
 from gateway.diagnosis.measurement import Floats, Measurement
-from gateway.diagnosis.noise import Whitener, white_whitener
+from gateway.diagnosis.model_fit.base_fit import refit
+from gateway.diagnosis.model_fit.initial_state import drop_unfelt_starts, fit_initial_states, start_parameters
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, linearise
+from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
+from gateway.diagnosis.noise.whitening import Whitener, white_whitener
 from gateway.diagnosis.result import OwnEffect
-from gateway.diagnosis.search.base_fit import refit
-from gateway.diagnosis.search.bench import Bench, bench_of
 from gateway.diagnosis.search.direct_evidence import DirectEvidence
-from gateway.diagnosis.search.initial_state import drop_unfelt_starts, fit_initial_states, start_parameters
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, linearise
-from gateway.diagnosis.search.line_lengths import fit_line_lengths
-from gateway.diagnosis.search.parameters import STARTS, ModelParameters
 from gateway.diagnosis.search.search import search_effects
 from gateway.diagnosis.verdict import estimates_of
 from gateway.twin.plant import Plant

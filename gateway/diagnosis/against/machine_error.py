@@ -19,9 +19,9 @@ import numpy as np
 
 from gateway.catalogue.cylinder import AREA
 from gateway.compiled import loop
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.measurement import Flags, Floats
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.twin.replay.drive import Floats as Series
 
 _DELAYS_S: Final = (-0.04, 0.03, 0.07, 0.12, 0.18, 0.26, 0.4)  # about a regulator's lag, finer where it moves most

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.against.machine import JointModel, MachineModel
-from gateway.diagnosis.search.base_fit import refit
-from gateway.diagnosis.search.bench import Bench, bench_of
+from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.model_fit.base_fit import refit
 from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
 
 _TIMES_AS_MANY: Final = 2.0  # what the old recordings had, from which more is a change

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from gateway.catalogue.effect import Effect
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.result import NotIdentifiable
-from gateway.diagnosis.search.bench import Bench
 from gateway.diagnosis.search.candidates import CandidateScore
 
 _VISIBLE: Final = 30.0  # chi-square that an effect must reach at a noticeable size

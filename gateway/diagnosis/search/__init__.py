@@ -1,4 +1,4 @@
-"""The search for causes: candidates, model comparison, refinement, and the mathematics that they share.
+"""The search for causes: evidence, candidates, model comparison, acceptance, and what of it is a finding.
 
 Where its numbers come from: levels of significance are conventions (1 % over all that was tried, intervals of 95 %); limits of
 waves and draws bound the time, and the comment says what that costs; the other thresholds were chosen on recordings of the

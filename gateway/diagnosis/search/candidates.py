@@ -10,12 +10,12 @@ import numpy as np
 from gateway import progress
 from gateway.catalogue.effect import Effect, EffectForm, SearchHints, Start
 from gateway.defaults import UNLIMITED
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.parameters import ModelParameters, apply_start
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import ColumnGain, NormalEquations, model_span
-from gateway.diagnosis.search.parameters import ModelParameters, apply_start
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.normal_equations import ColumnGain, NormalEquations, model_span
+from gateway.diagnosis.noise.whitening import Whitener
 
 _LARGEST_STRETCH: Final = 3.0  # how far beyond its start a response that is not proportional is believed
 _HOPELESS: Final = 8.0  # chi-square: half of what 1 % over a hundred starts asks for

@@ -16,13 +16,13 @@ import numpy as np
 
 from gateway.catalogue.cylinder import AREA, COULOMB
 from gateway.catalogue.regulator import DEAD_BAND, LAG
+from gateway.diagnosis.bench.bench import Bench, Channel
+from gateway.diagnosis.bench.parameters import ChangedValue, ModelParameters
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench, Channel
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.normal_equations import NormalEquations, model_span
+from gateway.diagnosis.noise.whitening import Whitener
 from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves, fill_rounding_errors
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import NormalEquations, model_span
-from gateway.diagnosis.search.parameters import ChangedValue, ModelParameters
 from gateway.side_by_side import side_by_side
 from gateway.twin.elementwise import Real, smaller
 from gateway.twin.plant import Plant

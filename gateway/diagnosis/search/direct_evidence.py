@@ -11,9 +11,9 @@ import numpy as np
 
 from gateway.catalogue.effect import Parameter
 from gateway.catalogue.sensing import OUTLIER, OUTLIER_SHARE, QUANTUM, REPEATED
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.measurement import Flags, Floats
-from gateway.diagnosis.noise import fast_noise_n
-from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.noise.whitening import fast_noise_n
 from gateway.robust import SIGMA_PER_MAD
 
 _SPIKE: Final = 7.5  # robust standard deviations: one chance in 10^13 rows

@@ -6,11 +6,11 @@ import numpy as np
 
 from gateway.catalogue.cylinder import AREA, COULOMB
 from gateway.catalogue.effect import SearchHints
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.noise.whitening import Whitener
 from gateway.diagnosis.search.command_search import likely_dead_bands_pa, likely_steps_v
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
 
 _MAINS_HZ: Final = 0.15  # how far the mains stray
 _PEAKS: Final = 3

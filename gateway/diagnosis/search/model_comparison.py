@@ -13,10 +13,14 @@ from numpy.random import default_rng
 
 from gateway import progress
 from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.recording_drive import begins_at_rest
 from gateway.diagnosis.light_statistics import chi2_tail
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench
+from gateway.diagnosis.model_fit.initial_state import with_start_of
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.model_fit.normal_equations import block_sums
+from gateway.diagnosis.noise.whitening import Whitener
 from gateway.diagnosis.search.candidates import (
     CandidateColumns,
     CandidateScore,
@@ -24,10 +28,6 @@ from gateway.diagnosis.search.candidates import (
     score_candidates,
     simulate_candidates,
 )
-from gateway.diagnosis.search.initial_state import with_start_of
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.normal_equations import block_sums
-from gateway.diagnosis.search.recording_drive import begins_at_rest
 
 MOST_REFINED: Final = 6  # effects; a wave of simulations serves all of them
 _RESAMPLES: Final = 500  # draws of blocks: a share of 95 % is then uncertain by 1 %

@@ -1,10 +1,6 @@
 """The search: add the best effect while it pays, then compare every accepted effect with all others again.
 
-Rules of acceptance: chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did
-not see, in nearly all ways to resample them, and without the blocks that still feel how the recording began; at least
-4 % of the held-out squared error, or 2 % where chi-square overwhelms; and, for every effect after the first, a few
-percent of what the others explain, or much of the error that is left: no form is exact, and what a cause's wrong form
-leaves must not be named. What oscillates does not count there: the rest of a sine is no bent line.
+What pays is in acceptance.py. Besides:
     - Two causes together may look like a third one: where resampling does not decide, the winner's rivals are judged
       with the best companion that each finds.
     - A dependence that no effect has a name for takes its place where it explains clearly more than any effect.
@@ -17,19 +13,29 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.random import default_rng
-from numpy.typing import NDArray
 
 from gateway import progress
-from gateway.catalogue.effect import Effect, EffectForm, Parameter, SearchHints
-from gateway.diagnosis.noise import Whitener, coloured_whitener
-from gateway.diagnosis.residual_tests import RESOLUTION_N, Dependence, strongest_dependence
-from gateway.diagnosis.search.base_fit import refit
-from gateway.diagnosis.search.bench import Bench
+from gateway.catalogue.effect import Effect, Parameter, SearchHints
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.parameters import reset_parameters
+from gateway.diagnosis.model_fit.base_fit import refit
+from gateway.diagnosis.model_fit.initial_state import with_start_of
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.model_fit.normal_equations import orthonormal
+from gateway.diagnosis.noise.whitening import Whitener, coloured_whitener
+from gateway.diagnosis.residuals.dependence_tests import RESOLUTION_N, Dependence, strongest_dependence
+from gateway.diagnosis.search.acceptance import (
+    CHI2_MARGIN,
+    AcceptedEffect,
+    explained_chi2,
+    is_clearly_stronger,
+    is_more_than_a_wrong_form,
+    is_noticeable,
+    saved_share,
+    saves_enough,
+)
 from gateway.diagnosis.search.candidates import simulate_candidates, unexplained_residual
 from gateway.diagnosis.search.hints import search_hints
-from gateway.diagnosis.search.initial_state import with_start_of
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.search.model_comparison import (
     Competitors,
     ModelComparison,
@@ -39,40 +45,16 @@ from gateway.diagnosis.search.model_comparison import (
     joined_parameters,
     refined_effect,
 )
-from gateway.diagnosis.search.normal_equations import block_sums, held_out_errors, orthonormal
-from gateway.diagnosis.search.parameters import reset_parameters
 
 MOST_EFFECTS: Final = 5  # found, usual or without a name; each costs a comparison of all others
 _DISCREPANT_CHI2_PER_ROW: Final = 3.0  # chi-square per row of the winner
-_CLEARLY_STRONGER: Final = 1.15  # a nameless dependence must explain this much more than the best effect ...
-_CLEARLY_STRONGER_ON_ITS_COLUMN: Final = 1.3  # ... or this much more, where both look at one column ...
-_CHI2_MARGIN: Final = 10.0  # ... and this much more in chi-square
-_SAVING_QUANTILE: Final = 0.15  # of resampled blocks may see no gain: an effect may show in two blocks of twenty only
-_EXTREME_BLOCKS: Final = 2  # best and worst blocks without which an effect that acts everywhere ...
-_LEAST_SHARE_ELSEWHERE: Final = 0.3  # ... must save this much of what it saves with them
-_OVERWHELMING_CHI2: Final = 80.0
 _MOST_RIVALS: Final = 2  # looked at beside the winner
 _COMPANIONS: Final = 2  # looked at closely for each
 _LEAST_RIVAL_SHARE: Final = 0.05  # share from which a rival is looked at
-_SEED: Final = 21
-_RESAMPLES: Final = 400  # draws of blocks: the 15 % quantile is then uncertain by 2 %
 _WAVES_AGAIN: Final = 2  # of a model that other rows or another noise have hardly moved ...
 _WAVES_WIDENED: Final = 3  # ... that gains a parameter ...
 _WAVES_WITHOUT: Final = 4  # ... that loses one ...
 _WAVES_DISCREPANT: Final = 5  # ... and under a noise that is several times as large
-_LEAST_GAIN: Final = 0.04  # of the held-out squared error; less is a trifle ...
-_LEAST_SURE_GAIN: Final = 0.02  # ... unless chi-square overwhelms
-_LEAST_BESIDE: Final = 0.05  # of the chi-square that the effects before it explain ...
-_MUCH_SAVED: Final = 0.15  # ... unless it saves this much of the held-out squared error
-
-
-@dataclass(frozen=True, slots=True)
-class AcceptedEffect:
-    """An effect of the extended model, and the model comparison that it won."""
-
-    effect: Effect
-    form: EffectForm
-    comparison: ModelComparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,25 +78,25 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
     first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
     unnamed: list[Dependence] = []
     while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
-        explained = _explained_chi2(base, fitted, accepted)
+        explained = explained_chi2(base, fitted, accepted)
         winner, saved = None, 0.0
         is_seen = bench.rms_n(fitted.residual_n) >= RESOLUTION_N
         if is_seen and comparison.ranked and is_significant(comparison.winner, comparison.starts):
-            winner, saved = comparison.winner, _saved_share(bench, fitted, comparison.winner, whiten, explained)
-            if _saves_enough(winner, saved):  # the name of a trifle is not worth foresight
+            winner, saved = comparison.winner, saved_share(bench, fitted, comparison.winner, whiten, explained)
+            if saves_enough(winner, saved):  # the name of a trifle is not worth foresight
                 winner = _pick_with_companions(bench, comparison, _not_accepted(effects, accepted), whiten)
-                saved = saved if winner is comparison.winner else _saved_share(bench, fitted, winner, whiten, explained)
-            saved *= winner.gain > _LEAST_BESIDE * explained or saved > _MUCH_SAVED
+                saved = saved if winner is comparison.winner else saved_share(bench, fitted, winner, whiten, explained)
+            saved *= is_more_than_a_wrong_form(winner, saved, explained)
         progress.report("looking for what no effect explains")
         dependence = strongest_dependence(bench, fitted, whiten, unnamed, outside=True)
         strongest = comparison.winner if saved > 0.0 else None
-        if dependence is not None and _is_clearly_stronger(dependence, strongest, explained):
+        if dependence is not None and is_clearly_stronger(dependence, strongest, explained):
             unnamed.append(dependence)
             bench = bench.without_columns(dependence.regressors.columns)
             fitted = refit(bench, fitted, whiten)
         elif winner is None or saved == 0.0:
             break
-        elif _saves_enough(winner, saved) and is_noticeable(
+        elif saves_enough(winner, saved) and is_noticeable(
             (winner.effect, winner.form), winner.fitted, fitted, comparison.hints
         ):
             accepted.append(AcceptedEffect(winner.effect, winner.form, comparison))
@@ -163,29 +145,6 @@ def _not_accepted(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect])
     return [effect for effect in effects if effect.name not in taken]
 
 
-def _is_clearly_stronger(dependence: Dependence, strongest: RefinedEffect | None, explained: float) -> bool:
-    """Is a nameless dependence more than what the effects before it have left, and clearly more than the strongest effect?
-
-    One on the effect's own column may be no more than the effect's form, which is never exact.
-    """
-    if strongest is None:
-        return dependence.gain > _LEAST_BESIDE * explained
-    times = (
-        _CLEARLY_STRONGER_ON_ITS_COLUMN
-        if dependence.regressors.depends_on in strongest.form.needs
-        else _CLEARLY_STRONGER
-    )
-    return dependence.gain > times * strongest.gain + _CHI2_MARGIN
-
-
-def _explained_chi2(base: FittedModel, fitted: FittedModel, accepted: Sequence[AcceptedEffect]) -> float:
-    """Chi-square that the model explains by causes whose wrong form could look like another one: not by oscillations."""
-    gains = [(each.comparison.winner.gain, each.form.quadrature) for each in accepted]
-    total = sum(gain for gain, _oscillates in gains)
-    shapes = sum(gain for gain, oscillates in gains if not oscillates)
-    return max(base.chi2 - fitted.chi2, 0.0) * (shapes / total if total > 0.0 else 1.0)
-
-
 def _pick_with_companions(
     bench: Bench, comparison: ModelComparison, effects: Sequence[Effect], whiten: Whitener
 ) -> RefinedEffect:
@@ -199,7 +158,7 @@ def _pick_with_companions(
         return winner
     costs = [_cost_with_companion(bench, each, effects, comparison.hints, whiten) for each in (winner, *rivals)]
     best = int(np.argmin(costs))
-    return (winner, *rivals)[best] if costs[best] < costs[0] - _CHI2_MARGIN else winner
+    return (winner, *rivals)[best] if costs[best] < costs[0] - CHI2_MARGIN else winner
 
 
 def _is_rival(other: RefinedEffect, winner: RefinedEffect, comparison: ModelComparison) -> bool:
@@ -221,56 +180,12 @@ def _cost_with_companion(
     return first.penalty + min([first.fitted.chi2, *found])
 
 
-def _saves_enough(refined: RefinedEffect, saved: float) -> bool:
-    """Is what it saves of the held-out squared error no trifle?"""
-    return saved > (_LEAST_SURE_GAIN if refined.gain > _OVERWHELMING_CHI2 else _LEAST_GAIN)
-
-
-def is_noticeable(
-    named: tuple[Effect, EffectForm], after: FittedModel, before: FittedModel, hints: SearchHints
-) -> bool:
-    """Return whether an effect's size, or the change of a size that the plant had already, is more than every machine has."""
-    effect, form = named
-    size = form.parameters[0]
-    channels_s = 0.0 if "command_v" in hints.columns else effect.least_rows * hints.row_s
-    least = max(effect.least, form.least, channels_s)
-    return abs(after.parameters.value(size) - before.parameters.value(size)) >= least
-
-
 def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: Whitener) -> FittedModel:
     """The base model with an effect of a size that every machine has: no finding, and no work for another name."""
     parameters = reset_parameters(base.parameters, usual.fitted.parameters, usual.form.parameters)
     return refine(
         bench, [FitProblem(parameters, joined_parameters(bench, base, usual.form))], whiten, waves=_WAVES_WIDENED
     )[0]
-
-
-def _saved_share(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten: Whitener, explained: float) -> float:
-    """Share of the held-out squared error that it saves; 0 unless it saves in nearly all ways to resample the blocks.
-
-    An effect that shows in one block only (a slide that rests once, a force that is negative once) cannot be resampled;
-    an overwhelming chi-square stands for it, also beside what the effects before it have `explained`. Not so for a saw
-    tooth: it is there all the time, and among so many teeth some meet the few moments that another form got wrong.
-    """
-    old = _blocks_past_the_start(bench)
-    error_before = held_out_errors(bench, before, whiten).errors[old]
-    saved = error_before - held_out_errors(bench, winner.fitted, whiten).errors[old]
-    weights = default_rng(_SEED).multinomial(saved.size, np.full(saved.size, 1.0 / saved.size), size=_RESAMPLES)
-    if winner.form.everywhere:
-        sure = float(np.sum(np.sort(saved)[_EXTREME_BLOCKS:-_EXTREME_BLOCKS])) > _LEAST_SHARE_ELSEWHERE * float(
-            np.sum(saved)
-        )
-    else:
-        overwhelming = winner.gain > max(_OVERWHELMING_CHI2, 0.5 * explained)
-        sure = overwhelming or float(np.quantile(weights @ saved, _SAVING_QUANTILE)) > 0.0
-    return max(float(np.sum(saved)), 0.0) / float(np.sum(error_before)) if sure else 0.0
-
-
-def _blocks_past_the_start(bench: Bench) -> NDArray[np.intp]:
-    """Blocks that do not feel any more how their recording began: a cause must show without the first seconds, too."""
-    counted = block_sums(bench, bench.judged.astype(np.float64))
-    young = block_sums(bench, (bench.judged & bench.young).astype(np.float64))
-    return np.flatnonzero(young <= 0.5 * counted)
 
 
 def _exchange_effects(found: SearchResult, effects: Sequence[Effect]) -> SearchResult:

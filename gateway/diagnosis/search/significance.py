@@ -15,12 +15,13 @@ from numpy.random import default_rng
 from numpy.typing import NDArray
 
 from gateway.catalogue.cylinder import AREA
-from gateway.diagnosis.noise import Whitener, white_whitener
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.model_fit.normal_equations import HeldOutErrors, held_out_errors
+from gateway.diagnosis.noise.whitening import Whitener, white_whitener
 from gateway.diagnosis.result import Gain
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.normal_equations import HeldOutErrors, held_out_errors
-from gateway.diagnosis.search.search import AcceptedEffect, SearchResult, is_noticeable, refit_without
+from gateway.diagnosis.search.acceptance import AcceptedEffect, is_noticeable
+from gateway.diagnosis.search.search import SearchResult, refit_without
 
 _BETTER: Final = 0.995  # plain over whitened held-out RMS from which the plain fit is reported
 _SAME_AREA: Final = 0.2  # relative; plain optima further apart are looked for from both sides

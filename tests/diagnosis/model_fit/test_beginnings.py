@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Options, Verdict, diagnose
-from gateway.diagnosis.noise import white_whitener
-from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
-from gateway.diagnosis.search.bench import bench_of
+from gateway.diagnosis.bench.bench import bench_of
+from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT, base_parameters, fit_base
+from gateway.diagnosis.noise.whitening import white_whitener
 from tests.diagnosis.begun_anywhere import BEGINNINGS, COLOURS, NOISE_N, begun
 
 

@@ -12,16 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.leftovers import describe, is_one_thing
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.light_statistics import log_chi2_tail
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.residual_regressors import Regressors, list_regressors
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.normal_equations import NormalEquations, model_span
+from gateway.diagnosis.noise.whitening import Whitener
+from gateway.diagnosis.residuals.leftovers import describe, is_one_thing
+from gateway.diagnosis.residuals.regressors import Regressors, list_regressors
+from gateway.diagnosis.residuals.unsteadiness import find_unsteadiness
 from gateway.diagnosis.result import Leftover
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import NormalEquations, model_span
-from gateway.diagnosis.unsteadiness import find_unsteadiness
 
 RESOLUTION_N: Final = 1.0e-4
 """What the simulation itself resolves: its rigid friction gives by a nanometre, 4e-5 N on the usual pad."""

@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.noise.whitening import Whitener
 
 _SAME_COLUMN: Final = 1.0e-8  # share of a column that the model does not span: rounding
 _RIDGE: Final = 0.01  # of a parameter's whole weight: a block that holds all of it says nothing about itself

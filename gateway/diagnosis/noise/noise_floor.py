@@ -12,10 +12,11 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.measurement import Floats, Measurement
-from gateway.diagnosis.noise import fast_noise_n, fit_to_lines
+from gateway.diagnosis.noise.spectrum import fit_to_lines
+from gateway.diagnosis.noise.whitening import fast_noise_n
 from gateway.diagnosis.result import FloorSource
-from gateway.diagnosis.search.bench import Bench
 
 _LEAST_PERIOD_S: Final = 2.0
 _MEMORY_S: Final = 2.0  # command history that must agree before two readings count as replicates

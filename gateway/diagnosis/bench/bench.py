@@ -13,14 +13,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.diagnosis.measurement import Flags, Floats, Measurement
-from gateway.diagnosis.search.parameters import ModelParameters
-from gateway.diagnosis.search.recording_drive import (
+from gateway.diagnosis.bench.parameters import ModelParameters
+from gateway.diagnosis.bench.recording_drive import (
     begins_at_rest,
     replay_of,
     rows_after_unseen_settings,
     settled_s,
 )
+from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Replay
 from gateway.twin.surroundings import COLUMNS

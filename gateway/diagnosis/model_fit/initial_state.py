@@ -22,11 +22,8 @@ from gateway.catalogue.contact import CREEP
 from gateway.catalogue.cylinder import AREA, PRESLIDING, STICTION
 from gateway.catalogue.effect import EffectForm, Parameter
 from gateway.catalogue.regulator import DELAY, SECOND_LAG
-from gateway.diagnosis.measurement import Flags, Floats
-from gateway.diagnosis.noise import Whitener, white_whitener
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.parameters import (
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.parameters import (
     ModelParameters,
     StartParameter,
     initial_command,
@@ -36,7 +33,10 @@ from gateway.diagnosis.search.parameters import (
     initial_stiction,
     initial_strain,
 )
-from gateway.diagnosis.search.recording_drive import begins_at_rest
+from gateway.diagnosis.bench.recording_drive import begins_at_rest
+from gateway.diagnosis.measurement import Flags, Floats
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.noise.whitening import Whitener, white_whitener
 from gateway.twin.plant import Plant
 from gateway.twin.replay.drive import AT_REST, StartState, Strains
 

@@ -17,12 +17,12 @@ from gateway.catalogue.effect import Parameter
 from gateway.catalogue.regulator import LAG
 from gateway.catalogue.sensing import CLOCK_OFFSET
 from gateway.defaults import UNLIMITED
+from gateway.diagnosis.bench.bench import Bench, unsettled_rows
+from gateway.diagnosis.bench.parameters import ModelParameters, StartParameter
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench, unsettled_rows
-from gateway.diagnosis.search.initial_state import start_parameters, try_initial_states, without_pressures
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.parameters import ModelParameters, StartParameter
+from gateway.diagnosis.model_fit.initial_state import start_parameters, try_initial_states, without_pressures
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.noise.whitening import Whitener
 from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
 DEFAULT_PLANT: Final = Plant(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement
-from gateway.diagnosis.search.bench import bench_of
-from gateway.diagnosis.search.recording_drive import rows_after_unseen_settings
+from gateway.diagnosis.bench.bench import bench_of
+from gateway.diagnosis.bench.recording_drive import rows_after_unseen_settings
 
 ROW_S = 0.01
 

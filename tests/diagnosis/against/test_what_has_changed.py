@@ -10,8 +10,8 @@ import pytest
 from gateway.diagnosis import Diagnosis, Options, Verdict, find_changes
 from gateway.diagnosis.against.compare_recordings import compare_with_machine
 from gateway.diagnosis.against.machine import MachineModel, describe_machine
-from gateway.diagnosis.search.base_fit import DEFAULT_PLANT
-from tests.diagnosis.foreign.rig import EFFECTS, Day, Wish, readings, record
+from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT
+from tests.diagnosis.against.foreign_rig import EFFECTS, Day, Wish, readings, record
 
 COLUMNS = {
     "supply-droop": ("supply_kpa",),

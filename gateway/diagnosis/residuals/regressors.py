@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.bench.bench import BLOCKS, SURROUNDINGS, Bench
 from gateway.diagnosis.light_statistics import follow_exponentially
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import fast_noise_n
-from gateway.diagnosis.search.bench import BLOCKS, SURROUNDINGS, Bench
+from gateway.diagnosis.noise.whitening import fast_noise_n
 from gateway.diagnosis.search.hints import lines_hz
 
 _JUMPS_TRIED: Final = 40  # places where a jump in time is looked for

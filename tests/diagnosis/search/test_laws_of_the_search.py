@@ -10,12 +10,12 @@ import pytest
 
 from gateway.catalogue.sensing import DRIFT, ZERO_PER_K
 from gateway.diagnosis import BY_NAME, Diagnosis, Measurement, Options, diagnose
-from gateway.diagnosis.noise import coloured_whitener, timing_weights, white_whitener
-from gateway.diagnosis.search.base_fit import DEFAULT_PLANT, base_parameters, fit_base
-from gateway.diagnosis.search.bench import Bench, bench_of
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.normal_equations import ModelSpan, NormalEquations, held_out_errors
-from gateway.diagnosis.search.parameters import ModelParameters
+from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.bench.parameters import ModelParameters
+from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT, base_parameters, fit_base
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.model_fit.normal_equations import ModelSpan, NormalEquations, held_out_errors
+from gateway.diagnosis.noise.whitening import coloured_whitener, timing_weights, white_whitener
 from gateway.recording import Recording
 from gateway.recording.measurement import measurement_of
 from gateway.reports.diagnosis.document import diagnosis_document

@@ -12,10 +12,10 @@ import numpy as np
 
 from gateway import progress
 from gateway.catalogue.effect import Parameter
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.parameters import ModelParameters
+from gateway.diagnosis.noise.whitening import Whitener
 
 _DAMPINGS: Final = (0.0, 1.0, 30.0)  # tried side by side: Gauss-Newton, and two steps as careful as that goes wrong
 _SECANT_SHARE: Final = 0.02  # of a size that is there: large against the twin's steps, small against its bends

@@ -6,14 +6,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.diagnosis.leftovers import propose
+from gateway.diagnosis.bench.bench import BLOCKS, Bench, Channel
 from gateway.diagnosis.light_statistics import chi2_tail
 from gateway.diagnosis.measurement import Floats, Measurement
-from gateway.diagnosis.noise import Whitener
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.normal_equations import orthonormal
+from gateway.diagnosis.noise.whitening import Whitener
+from gateway.diagnosis.residuals.leftovers import propose
 from gateway.diagnosis.result import Leftover
-from gateway.diagnosis.search.bench import BLOCKS, Bench, Channel
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.normal_equations import orthonormal
 
 _SIGNIFICANCE: Final = 1.0e-3  # of noise that seems louder somewhere by chance
 _LOUD_RATIO: Final = 1.5  # of the usual power, that belongs to the loudest stretch

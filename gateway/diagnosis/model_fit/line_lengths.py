@@ -15,11 +15,11 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.parameters import CHARACTER
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.noise import Whitener
-from gateway.diagnosis.search.bench import Bench
-from gateway.diagnosis.search.levenberg_marquardt import FitProblem, FittedModel, refine
-from gateway.diagnosis.search.parameters import CHARACTER
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.noise.whitening import Whitener
 
 _TRIED_S: Final = 1.0e-3  # of a character, for the secant: 9600 baud
 _POWERS_OF_TEN: Final = 10.0 ** np.arange(1, 10)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gateway.diagnosis.noise_floor import find_floor, find_rests, replicate_floor_n, rest_floor
+from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.noise.noise_floor import find_floor, find_rests, replicate_floor_n, rest_floor
 from gateway.diagnosis.result import FloorSource
-from gateway.diagnosis.search.bench import Bench, bench_of
 from tests.diagnosis.begun_anywhere import coloured
 from tests.diagnosis.machine import Floats, measurement
 

@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 
+from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.residual_regressors import Regressors
+from gateway.diagnosis.residuals.regressors import Regressors
 from gateway.diagnosis.result import Leftover
-from gateway.diagnosis.search.bench import Bench
 
 _NUMBER: Final = re.compile(r"[-+.e0-9]+")
 _TAILS: Final = (0.02, 0.98)  # of a contribution, between which its amplitude is half the way

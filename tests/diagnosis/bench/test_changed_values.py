@@ -1,7 +1,7 @@
 """A number that is another one in some recordings: it moves alone, and follows the plant where it was never moved."""
 
 from gateway.catalogue.cylinder import COULOMB
-from gateway.diagnosis.search.parameters import ChangedValue, ModelParameters, reset_parameters
+from gateway.diagnosis.bench.parameters import ChangedValue, ModelParameters, reset_parameters
 from gateway.twin.plant import Plant, with_value
 
 PLANT = with_value(Plant(), "friction", "coulomb_n", 1.0)

@@ -10,11 +10,11 @@ import pytest
 
 from gateway.cli.diagnosis.inputs import read_sources
 from gateway.diagnosis import Measurement
-from gateway.diagnosis.noise import Whitener, white_whitener
-from gateway.diagnosis.search.base_fit import base_parameters, fit_base
-from gateway.diagnosis.search.bench import Bench, bench_of
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.line_lengths import fit_line_lengths
+from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.model_fit.base_fit import base_parameters, fit_base
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
+from gateway.diagnosis.noise.whitening import Whitener, white_whitener
 from gateway.twin.plant import Plant, with_value
 from tests.watch.clean_runs import recorded
 

@@ -8,10 +8,10 @@ import pytest
 
 from gateway.catalogue.all_effects import BY_NAME
 from gateway.diagnosis import Options, Verdict, diagnose
+from gateway.diagnosis.model_fit.normal_equations import HeldOutErrors
 from gateway.diagnosis.result import Gain
+from gateway.diagnosis.search.acceptance import AcceptedEffect
 from gateway.diagnosis.search.model_comparison import ModelComparison, RefinedEffect
-from gateway.diagnosis.search.normal_equations import HeldOutErrors
-from gateway.diagnosis.search.search import AcceptedEffect
 from gateway.diagnosis.search.significance import gain_of, reason_for_doubt
 from gateway.reports.diagnosis import wording as words
 from tests.diagnosis.machine import MACHINE, recorded, times_s

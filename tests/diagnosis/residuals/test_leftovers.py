@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.measurement import Measurement
-from gateway.diagnosis.noise import Whitener, white_whitener
-from gateway.diagnosis.residual_tests import MOST_LEFTOVERS, find_dependences
+from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
+from gateway.diagnosis.noise.whitening import Whitener, white_whitener
+from gateway.diagnosis.residuals.dependence_tests import MOST_LEFTOVERS, find_dependences
 from gateway.diagnosis.result import Leftover
-from gateway.diagnosis.search.bench import Bench, bench_of
-from gateway.diagnosis.search.levenberg_marquardt import FittedModel
-from gateway.diagnosis.search.parameters import ModelParameters
 from tests.diagnosis.machine import MACHINE, Floats, command_v, measurement, readings_n, times_s
 
 TIME_S = times_s(40.0, 100.0)
