@@ -9,7 +9,7 @@ import pytest
 from generator.catalogue import EFFECTS, NAMES, OUTSIDE, effect, page_group, physical_group
 from generator.covariates import COLUMNS, covariates
 from generator.excitation import TOP_V, excitation
-from generator.friction import Friction, contact_force
+from generator.friction import Extra, Friction, contact_force
 from generator.noise import COLOURS, noise
 from generator.plant import PA_PER_V, Floats
 from generator.recording import Recording, Wish, lines, make, write_csv
@@ -62,7 +62,7 @@ def refitted_rms(recording: Recording) -> float:
 
 
 def test_the_catalogue_has_the_names_of_the_contract() -> None:
-    assert len(NAMES) == len(set(NAMES)) == 43
+    assert len(NAMES) == len(set(NAMES)) == 45
     assert not set(NAMES) & set(OUTSIDE)
     assert all(name in page_group(name) <= physical_group(name) <= set(NAMES) for name in NAMES)
 
@@ -85,6 +85,25 @@ def test_every_effect_reaches_its_size(budget: int) -> None:
         else:
             assert np.isfinite(made.force_n).all() and made.amounts[name] > 0.0
     assert len(failed) <= len(names) // 10, failed
+
+
+@pytest.mark.parametrize("family", ["bristle", "smooth"])
+def test_what_a_place_adds_to_friction_acts_by_direction(family: str) -> None:
+    drive = np.concatenate([np.linspace(0.0, 30.0, 40000), np.linspace(30.0, 0.0, 40000)])
+    more = Extra(rising_n=np.linspace(0.0, 2.0, 80000), falling_n=np.full(80000, 0.5))
+    force = contact_force(drive, 2.5e-4, Friction(family, 4.0e4, 1.5, 1.5, 4.0e6), more)
+    assert drive[20000] - force[20000] == pytest.approx(2.0, abs=0.02)
+    assert drive[60000] - force[60000] == pytest.approx(-2.0, abs=0.02)
+
+
+def test_a_gauge_does_not_show_the_lag_behind_it() -> None:
+    """The chamber's lag is in the force: beside the gauge's pressure it comes later by that time."""
+    made = of("pressure-lag", 20.0)
+    gauge_n, lag_s = made.covariates["pressure_kpa"] * 1.0e3 * made.rig.area_m2, made.amounts["pressure-lag"]
+    shifts = np.arange(0, 20)
+    loop_n = [np.std(made.force_n[20:] - gauge_n[20 - shift : gauge_n.size - shift]) for shift in shifts]
+    assert lag_s > 0.02
+    assert shifts[np.argmin(loop_n)] * 0.005 == pytest.approx(lag_s, abs=0.01)
 
 
 @pytest.mark.parametrize("family", ["dahl", "bristle", "lugre", "smooth"])

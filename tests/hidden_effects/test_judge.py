@@ -1,5 +1,8 @@
 """The judge before it judges: what is right, what is honest, and what is a lie."""
 
+import json
+from dataclasses import replace
+
 import pytest
 from generator.catalogue import NAMES, page_group, physical_group
 from generator.recording import Wish, make
@@ -104,6 +107,30 @@ def test_cases_come_from_the_seed_alone() -> None:
     assert all(sum(case.wish.effects == (name,) for case in asked) == 20 for name in NAMES)
 
 
+def test_each_colour_of_noise_is_asked_for_of_the_same_recording() -> None:
+    white, slow = cases(Plan(("creep",), sizes=(1.0,), colours=("white", "lorentzian")))
+    assert (white.wish.colour, slow.wish.colour) == ("white", "lorentzian")
+    assert replace(white.wish, colour=None) == replace(slow.wish, colour=None)
+
+
+def test_silence_and_a_companion_are_counted() -> None:
+    case = next(cases(Plan(("creep",), sizes=(1.0,))))
+    answers = (
+        answer(verdict="nothing-found"),
+        answer(verdict="unknown"),
+        answer(sure_of("creep"), sure_of("leak", confidence=0.5), verdict="confirmed"),
+    )
+    rows = [
+        told(case, NULL, each) | {"kind": "alone", "truth": ["creep"], "size": 1.0, "colour": "white"}
+        for each in answers
+    ]
+    printed = table([json.loads(json.dumps(row)) for row in rows])
+    assert "no word that something is left |  | 1/3" in printed
+    assert "beside the true one |  | 1/3" in printed
+    assert "with a wrong name |  | 1/3" in printed
+    assert "under white noise |  | 1/3" in printed and "under coloured noise |  | - |" in printed
+
+
 def test_the_page_s_groups_are_inside_the_physical_ones() -> None:
     assert page_group("creep") == {"linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift"}
     assert page_group("outliers") == physical_group("outliers") == {"outliers"}
@@ -113,7 +140,7 @@ def test_the_harness_works_without_an_engine() -> None:
     """Silence: every effect is missed, no lie, no alarm; the table has every bar."""
     rows = [run_one(case, "silent") for case in cases(Plan(("linear-drift", "null", "offset-step"), sizes=(1.0,)))]
     assert [judged(row) for row in rows] == ["missed", "quiet", "silent"]
-    assert "linear-drift" in line(rows[0]) and "| false alarms | <= 1 % | 0/1" in table(rows)
+    assert "linear-drift" in line(rows[0]) and "| false alarms | <= 0.5 % | 0/1" in table(rows)
     assert "| linear-drift | 0/1" in by_effect(rows)
 
 
@@ -124,4 +151,4 @@ def test_a_crash_of_the_engine_is_a_row_too(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setitem(run_one.__globals__["ENGINES"], "silent", broken)
     row = run_one(next(cases(Plan(("null",)))), "silent")
     assert "FAILED: ZeroDivisionError: on purpose" in line(row)
-    assert "1 without an answer" in table([row]) and "| false alarms | <= 1 % | - |" in table([row])
+    assert "1 without an answer" in table([row]) and "| false alarms | <= 0.5 % | - |" in table([row])

@@ -1,4 +1,4 @@
-"""The 43 names of the contract, what the page says cannot be told apart, and what physics adds to that."""
+"""The 45 names of the contract, what the page says cannot be told apart, and what physics adds to that."""
 
 from generator import effects_contact, effects_cylinder, effects_regulator, effects_sensing, outside
 from generator.plant import Effect
@@ -11,7 +11,7 @@ OUTSIDE = tuple(effect.name for effect in outside.EFFECTS)
 # Indistinguishable unless an extra channel or excitation exists, and then reported as a group.
 PAGE_GROUPS = (
     ("regulator-hysteresis", "coulomb-friction"),
-    ("transport-delay", "clock-offset", "extra-lag", "viscous-friction"),
+    ("transport-delay", "clock-offset", "extra-lag", "viscous-friction", "pressure-lag"),
     ("linear-drift", "pad-wear", "warm-up", "creep", "thermal-zero-drift"),
     ("sensor-quadratic", "sensor-cubic", "supply-saturation", "contact-nonlinearity"),
     ("coulomb-friction", "viscous-friction", "presliding"),
@@ -24,10 +24,11 @@ PHYSICAL_GROUPS = (
     ("sensor-quadratic", "sensor-cubic", "supply-saturation", "contact-nonlinearity", "end-stop", "leak",
      "command-nonlinearity", "backlash", "sign-loss"),
     ("transport-delay", "clock-offset", "extra-lag", "viscous-friction", "asymmetric-friction", "slew-limit",
-     "valve-crosstalk"),
+     "valve-crosstalk", "pressure-lag"),
     ("regulator-hysteresis", "coulomb-friction", "load-dependent-friction", "side-load", "presliding", "stribeck-friction",
      "dwell-stiction", "dead-band"),
     ("feed-drag", "position-dependence"),
+    ("position-dependent-friction", "position-dependence", "side-load", "load-dependent-friction"),
 )  # fmt: skip
 
 

@@ -11,6 +11,8 @@ RNG = np.random.Generator
 KNOWN = ("temperature_c", "supply_kpa", "spindle_rpm", "feed_mm_s", "tilt_deg", "position_mm", "distance_m")
 DECOYS = ("humidity_pct", "air_flow_l_min", "current_a", "aux_1", "aux_2")
 COLUMNS = KNOWN + DECOYS
+GAUGE = "pressure_kpa"
+"""Where an effect needs it only: with a gauge most causes are told apart by it."""
 MOVES = ("feed_mm_s", "position_mm", "distance_m")
 
 

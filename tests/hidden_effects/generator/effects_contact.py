@@ -1,6 +1,8 @@
 """Eleven causes between the piston and the workpiece. A pneumatic piston gives force whatever the pad does, so a pad shows
 itself only where it takes or keeps part of that force: a parallel guide, an end stop, lost motion, a slow share."""
 
+from dataclasses import replace
+
 import numpy as np
 from generator.friction import Extra, Friction
 from generator.plant import Effect, World
@@ -35,7 +37,7 @@ def side_load(both: tuple[Friction, Extra], share: float, world: World) -> tuple
     """While the tool is dragged along, the surface's grip presses the piston against its guide."""
     friction, extra = both
     load = share * np.tanh(np.abs(world.fine("feed_mm_s")) / 2.0)
-    return friction, Extra(extra.factor, load if extra.load is None else extra.load + load)
+    return friction, replace(extra, load=load if extra.load is None else extra.load + load)
 
 
 def weighed(force: Floats, weight_n: float, world: World) -> Floats:

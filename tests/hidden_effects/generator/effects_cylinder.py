@@ -1,12 +1,16 @@
-"""Seven causes in the piston's friction. Only `asymmetric-friction` needed a thought: a level that differs by direction is
-an offset, one that differs in proportion to the load is a gain plus a load-dependent friction, so the part that can be
-seen at all is the one that grows with speed: a lip that drags while the piston extends."""
+"""Nine causes in the cylinder: eight in its friction, one between gauge and chamber. Only `asymmetric-friction` needed a
+thought: a level that differs by direction is an offset, one that differs in proportion to the load is a gain plus a
+load-dependent friction, so the part that can be seen at all is the one that grows with speed: a lip that drags while the
+piston extends."""
 
 from dataclasses import replace
 
+import numpy as np
 from generator.friction import Extra, Friction
 from generator.plant import Effect, World
+from numpy.typing import NDArray
 
+Floats = NDArray[np.float64]
 Both = tuple[Friction, Extra]
 
 
@@ -43,6 +47,22 @@ def dwell_stiction(both: Both, growth_n: float, world: World) -> Both:
     return replace(both[0], growth_n=growth_n, forget_m=forget_m), both[1]
 
 
+def worn_place(both: Both, most_n: float, world: World) -> Both:
+    """A tube that is scored at one end or in the middle of its stroke, or bent: there the seals rub more, in both directions
+    or in one of them only."""
+    place, rng = world.fine("position_mm"), world.rng("position-dependent-friction")
+    share = (place - place.min()) / max(float(np.ptp(place)), 1e-9)
+    far = float(rng.uniform(1.0, 2.0))
+    where = (share**far, (1.0 - share) ** far, 4.0 * share * (1.0 - share))[int(rng.integers(3))]
+    up, down = ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0))[int(rng.choice(3, p=(0.5, 0.25, 0.25)))]
+    return both[0], replace(both[1], rising_n=up * most_n * where, falling_n=down * most_n * where)
+
+
+def throttled(pressure: Floats, lag_s: float, world: World) -> Floats:
+    """A hose between the gauge and the chamber: one lag more, which the gauge does not show."""
+    return world.lagged(pressure, lag_s)
+
+
 EFFECTS = (
     Effect("coulomb-friction", "friction", coulomb, 0.5, "N", most=8.0),
     Effect("stribeck-friction", "friction", stribeck, 0.5, "N", most=20.0),
@@ -51,4 +71,6 @@ EFFECTS = (
     Effect("load-dependent-friction", "friction", load_dependent, 0.02, "N/N", most=0.3),
     Effect("asymmetric-friction", "friction", asymmetric, 300.0, "N s/m"),
     Effect("dwell-stiction", "friction", dwell_stiction, 1.0, "N", most=30.0),
+    Effect("position-dependent-friction", "friction", worn_place, 0.5, "N", needs=("position_mm",), most=20.0),
+    Effect("pressure-lag", "chamber", throttled, 0.01, "s", needs=("pressure_kpa",)),
 )

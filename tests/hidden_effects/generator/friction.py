@@ -53,15 +53,18 @@ def contact_force(drive_n: Floats, dt_s: float, friction: Friction, extra: "Extr
 
 @dataclass(frozen=True, slots=True)
 class Extra:
-    """What changes the friction from step to step: factor on the Coulomb level, and friction per newton of contact."""
+    """What changes the friction from step to step: factor on the Coulomb level, friction per newton of contact, and
+    newtons that are added while the force rises and while it falls."""
 
     factor: Floats | None = None
     load: Floats | None = None
+    rising_n: Floats | None = None
+    falling_n: Floats | None = None
 
-    def pairs(self) -> Iterable[tuple[float, float]]:
-        factor = repeat(1.0) if self.factor is None else self.factor.tolist()
-        load = repeat(0.0) if self.load is None else self.load.tolist()
-        return zip(factor, load, strict=False)
+    def rows(self) -> Iterable[tuple[float, float, float, float]]:
+        """Of each step; endless where nothing changes."""
+        usual = ((self.factor, 1.0), (self.load, 0.0), (self.rising_n, 0.0), (self.falling_n, 0.0))
+        return zip(*(repeat(alone) if values is None else values.tolist() for values, alone in usual), strict=False)
 
 
 def more_at_rest(friction: Friction, speed_m_per_s: float, rest_s: float) -> float:
@@ -84,11 +87,13 @@ def bristle_steps(drive: list[float], dt: float, own: Friction, extra: Extra) ->
     up_c, down_c = own.viscous_n_s_per_m + own.rising_viscous_n_s_per_m, own.viscous_n_s_per_m
     remembers, slow = bool(own.growth_n), bool(own.growth_n or own.stribeck_n)
     pad = grip = v = rest = 0.0
-    for d, (factor, load) in zip(drive, extra.pairs(), strict=False):
+    for d, (factor, load, more_up, more_down) in zip(drive, extra.rows(), strict=False):
         yield pad
         push = d - pad - grip
         rising = push > 0.0
-        limit = (up_n if rising else down_n) * factor + (base_load + load) * abs(pad) + 1e-9
+        limit = (
+            (up_n * factor + more_up if rising else down_n * factor + more_down) + (base_load + load) * abs(pad) + 1e-9
+        )
         if slow:
             limit += more_at_rest(own, v, rest)
         free = 1.0 - (grip if rising else -grip) / limit
@@ -107,11 +112,11 @@ def smooth_steps(drive: list[float], dt: float, own: Friction, extra: Extra) -> 
     down_a = k * dt + own.viscous_n_s_per_m
     remembers, slow = bool(own.growth_n), bool(own.growth_n or own.stribeck_n)
     pad = v = rest = 0.0
-    for d, (factor, load) in zip(drive, extra.pairs(), strict=False):
+    for d, (factor, load, more_up, more_down) in zip(drive, extra.rows(), strict=False):
         yield pad
         push = d - pad
         rising = push > 0.0
-        limit = (up_n if rising else down_n) * factor + (base_load + load) * abs(pad)
+        limit = (up_n * factor + more_up if rising else down_n * factor + more_down) + (base_load + load) * abs(pad)
         if slow:
             limit += more_at_rest(own, v, rest)
         a, size = (up_a, push) if rising else (down_a, -push)

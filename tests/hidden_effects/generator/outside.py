@@ -1,5 +1,7 @@
 """Causes that are not in the catalogue: a diagnosis must describe them and not give them a wrong name."""
 
+from dataclasses import replace
+
 import numpy as np
 from generator.effects_sensing import warmth
 from generator.friction import Extra, Friction
@@ -64,7 +66,7 @@ def clockwork_friction(both: tuple[Friction, Extra], share: float, world: World)
     """Friction that swells and shrinks with the time of day (here: in tens of seconds)."""
     rng = world.rng("friction-by-time")
     wave = np.sin(2.0 * np.pi * (world.fine_s / rng.uniform(20.0, 45.0) + rng.random()))
-    return both[0], Extra(np.maximum(1.0 + share * wave, 0.0), both[1].load)
+    return both[0], replace(both[1], factor=np.maximum(1.0 + share * wave, 0.0))
 
 
 def knocked(force: Floats, size_n: float, world: World) -> Floats:

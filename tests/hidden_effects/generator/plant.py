@@ -17,14 +17,16 @@ from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
 PA_PER_V = 0.9e6 / 10.0
-STAGES = ("command", "setpoint", "pressure", "friction", "contact", "clock", "cell", "reading")
+STAGES = ("command", "setpoint", "pressure", "chamber", "friction", "contact", "clock", "cell", "reading")
+BEFORE_CONTACT = STAGES[: STAGES.index("contact")]
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
     """One cause. act(value, amount, world) -> value, where value is what its stage handles:
 
-    command: V per row; setpoint and pressure: Pa per fine step; friction: (Friction, Extra); contact: N per fine step;
+    command: V per row; setpoint, pressure (what a gauge shows) and chamber: Pa per fine step;
+    friction: (Friction, Extra); contact: N per fine step;
     clock: the times at which the force of each row is truly read, s; cell: N per row without noise; reading: with noise.
     start: an amount that is not absurd, in the effect's unit. needs: columns without which nobody could see it.
     """
@@ -99,17 +101,21 @@ def acted(value: Any, stage: str, parts: Parts, world: World) -> Any:
     return value
 
 
-def drive_force(world: World, parts: Parts) -> Floats:
-    """Pressure times area at each fine step, N."""
+def gauge_pressure(world: World, parts: Parts) -> Floats:
+    """Pressure behind the regulator at each fine step, Pa: what a gauge shows."""
     volts = acted(world.command_v, "command", parts, world)
     setpoint = acted(world.held(volts) * PA_PER_V, "setpoint", parts, world)
-    pressure = acted(world.lagged(setpoint, world.rig.lag_s), "pressure", parts, world)
-    return np.asarray(world.rig.area_m2 * pressure)
+    return np.asarray(acted(world.lagged(setpoint, world.rig.lag_s), "pressure", parts, world))
+
+
+def drive_force(world: World, parts: Parts) -> Floats:
+    """The chamber's pressure times area at each fine step, N."""
+    return np.asarray(world.rig.area_m2 * acted(gauge_pressure(world, parts), "chamber", parts, world))
 
 
 def pad_force(world: World, parts: Parts) -> Floats:
     """Contact force at each fine step; kept, where no effect acts before the contact."""
-    upstream = [part for part in parts if part[0].stage in STAGES[:4]]
+    upstream = [part for part in parts if part[0].stage in BEFORE_CONTACT]
     if not upstream and "pad" in world.kept:
         return world.kept["pad"]
     friction, extra = acted((world.rig.friction, Extra()), "friction", upstream, world)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 from generator.catalogue import effect
-from generator.covariates import COLUMNS, covariates
+from generator.covariates import COLUMNS, GAUGE, covariates
 from generator.excitation import excitation
 from generator.friction import Friction
 from generator.noise import noise
-from generator.plant import Effect, Rig, World, readings
-from generator.sizing import UnreachableError, amount_for, sensitivities
+from generator.plant import Effect, Parts, Rig, World, gauge_pressure, readings
+from generator.sizing import LAG, UnreachableError, amount_for, sensitivities
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -80,23 +80,31 @@ def make(wish: Wish) -> Recording:
         rig=rig,
         step=step,
         command_v=excitation(wish.excitation, rng, time_s),
-        columns=covariates(rng, time_s, columns_wanted),
+        columns=covariates(rng, time_s, tuple(name for name in columns_wanted if name != GAUGE)),
         noise_n=level_n * noise(rng, time_s.size, 1.0 / ROW_S, colour),
     )
     without = tuple(name for name in wish.effects if name == "coulomb-friction")
-    world, parts = sized(world, effects, wish.size * level_n, frozenset(without))
+    hidden = {*without, *(LAG for name in columns_wanted if name == GAUGE)}
+    world, parts = sized(world, effects, wish.size * level_n, frozenset(hidden))
+    gauges = {GAUGE: gauge_kpa(world, parts)} if GAUGE in columns_wanted else {}
     return Recording(
         wish=wish,
         time_s=time_s,
         force_n=np.round(readings(world, parts), 5),
         command_v=world.command_v,
-        covariates=world.columns,
+        covariates=world.columns | gauges,
         amounts={one.name: amount for one, amount in parts},
         noise_n=level_n,
         colour=colour,
         rig=rig,
         without=without,
     )
+
+
+def gauge_kpa(world: World, parts: Parts) -> Floats:
+    """A transducer's readings, noise 0.3 kPa and steps of 0.1 kPa; each when the force is read."""
+    noise_kpa = 0.3 * world.rng(GAUGE).standard_normal(world.step.size)
+    return np.round(gauge_pressure(world, parts)[world.step] / 1.0e3 + noise_kpa, 1)
 
 
 def sized(
@@ -119,7 +127,8 @@ def wanted_columns(rng: np.random.Generator, wish: Wish, effects: Sequence[Effec
     needed = {name for one in effects for name in one.needs}
     if wish.columns is None:
         tossed = rng.random(len(COLUMNS)) < 0.45
-        return tuple(name for name, heads in zip(COLUMNS, tossed, strict=True) if heads or name in needed)
+        known = tuple(name for name, heads in zip(COLUMNS, tossed, strict=True) if heads or name in needed)
+        return (*known, *(needed & {GAUGE}))
     if missing := needed - set(wish.columns):
         raise ValueError(f"{', '.join(wish.effects)} needs the column {', '.join(sorted(missing))}")
     return wish.columns

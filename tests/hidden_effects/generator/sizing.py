@@ -11,6 +11,7 @@ from generator.plant import Effect, Parts, World, clean_force, readings
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+LAG = "lag"  # hidden where a gauge shows it, so that the force alone cannot have it
 CLOSE = 0.04  # of the wanted size
 JUMPS = 0.2  # what is good enough of an effect whose size jumps with its amount (a dead band swallows a step or not)
 
@@ -20,11 +21,12 @@ class UnreachableError(ValueError):
 
 
 def sensitivities(world: World, hidden: frozenset[str] = frozenset()) -> Floats:
-    """Orthonormal columns, shape (rows, 3 or 4): offset, gain, lag and (unless it is hidden) Coulomb friction."""
+    """Orthonormal columns, shape (rows, 2 to 4): offset, gain, lag and Coulomb friction, unless hidden."""
     rig, force = world.rig, clean_force(world, ())
     columns = [np.ones_like(force), force]
-    slower = replace(rig, lag_s=rig.lag_s * 1.03)
-    columns.append(clean_force(replace(world, rig=slower, kept={}), ()) - force)
+    if LAG not in hidden:
+        slower = replace(rig, lag_s=rig.lag_s * 1.03)
+        columns.append(clean_force(replace(world, rig=slower, kept={}), ()) - force)
     if "coulomb-friction" not in hidden:
         friction = rig.friction
         rougher = replace(friction, rising_n=friction.rising_n * 1.1, falling_n=friction.falling_n * 1.1)

@@ -2,7 +2,7 @@
 Drawn from a seed; the same seed gives the same cases."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from generator.catalogue import NAMES, OUTSIDE, physical_group
@@ -20,13 +20,15 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """seeds per effect (or per kind); sizes: empty draws one of 0.3 .. 2 for each recording."""
+    """seeds per effect (or per kind); sizes: empty draws one of 0.3 .. 2 for each recording; colours: of the noise, empty
+    draws one."""
 
     names: tuple[str, ...] = NAMES
     seeds: int = 1
     first_seed: int = 1
     sizes: tuple[float, ...] = ()
     excitation: str = "rich"
+    colours: tuple[str, ...] = ()
 
 
 def cases(plan: Plan) -> Iterator[Case]:
@@ -34,7 +36,8 @@ def cases(plan: Plan) -> Iterator[Case]:
     that is cut short has seen every name."""
     for seed in range(plan.first_seed, plan.first_seed + plan.seeds):
         for name in plan.names:
-            yield from of_name(name, seed, plan)
+            for case in of_name(name, seed, plan):
+                yield from (Case(case.kind, replace(case.wish, colour=one)) for one in plan.colours or (None,))
 
 
 def of_name(name: str, seed: int, plan: Plan) -> Iterator[Case]:

@@ -49,7 +49,7 @@ def measurement_of(recording: Recording) -> Any:
     from gateway.diagnosis.measurement import Measurement
 
     force, columns = recording.force_n, dict(recording.covariates)
-    position_mm = columns.pop("position_mm", None)
+    position_mm, pressure_kpa = columns.pop("position_mm", None), columns.pop("pressure_kpa", None)
     coarse = np.unique(force).size < 0.2 * force.size
     same = np.zeros(force.size, dtype=bool) if coarse else np.diff(force, prepend=np.nan) == 0.0
     return Measurement(
@@ -59,6 +59,7 @@ def measurement_of(recording: Recording) -> Any:
         usable=np.ones(force.size, dtype=bool),
         repeated=same,
         command_v=recording.command_v,
+        pressure_pa=None if pressure_kpa is None else pressure_kpa * 1000.0,
         position_m=None if position_mm is None else position_mm / 1000.0,
         covariates=columns,
     )

@@ -1,6 +1,6 @@
 """Rates with Wilson 95 % intervals, and the rates that must hold beside them, as Markdown that README can quote."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import sqrt
 from typing import Any
 
@@ -39,6 +39,16 @@ def lied(row: Row) -> bool:
     return row["verdict"] == "confirmed" and bool(row["causes"])
 
 
+def is_silent(row: Row) -> bool:
+    """Neither a cause nor a word that something is left."""
+    return not row["causes"] and not row["described"]
+
+
+def names_another(row: Row) -> bool:
+    """Is a cause among those named, alone or beside the true one, whose group does not hold what is hidden?"""
+    return any(not {cause["name"], *cause["group"]} & set(row["truth"]) for cause in row["causes"])
+
+
 def table(rows: Sequence[Row]) -> str:
     """Rows that were skipped are left out. One that failed is neither right nor described, and no proof of honesty: the
     rates of lies and alarms leave it out."""
@@ -47,17 +57,21 @@ def table(rows: Sequence[Row]) -> str:
     alone, several = of_kind(judged, "alone"), of_kind(judged, "two", "three")
     outside = of_kind(judged, "outside")
     seconds, processor = (sorted(row.get(key, 0.0) for row in alone) or [0.0] for key in ("seconds", "processor_s"))
+    hidden = of_kind(answered, *HIDDEN)
     made = [
-        ("right name or group, 0.3-0.75x", ">= 90 % at 0.5x", rate(sized(alone, 0.0, 0.75), lambda row: row["right"])),
-        ("right name or group, 0.75-2x", ">= 95 % at 1x", rate(sized(alone, 0.75, 9.0), lambda row: row["right"])),
+        *by_size(alone, 0.75, 9.0, ("0.75-2x", ">= 95 % at 1x")),
+        *by_size(alone, 0.0, 0.75, ("0.3-0.75x", ">= 92 % at 0.5x")),
         ("... any group that holds it counts", "", rate(alone, lambda row: row["honest"])),
         ("... the very name first", "", rate(alone, lambda row: row["named"])),
-        ("confidently wrong", "<= 2 %", rate(of_kind(answered, *HIDDEN), lambda row: row["wrong"])),
+        ("silent: no cause, and no word that something is left", "", rate(alone, is_silent)),
+        ("another name, alone or beside the true one", "", rate(alone, names_another)),
+        ("confidently wrong", "<= 1 %", rate(hidden, lambda row: row["wrong"])),
+        ("... `confirmed` with a wrong name", "", rate(hidden, lambda row: lied(row) and names_another(row))),
         ("two or three, exact set", ">= 90 %", rate(several, lambda row: row["right"])),
         ("... any groups that hold it count", "", rate(several, lambda row: row["honest"])),
-        ("false alarms", "<= 1 %", rate(of_kind(answered, "null"), lambda row: row["alarm"])),
+        ("false alarms", "<= 0.5 %", rate(of_kind(answered, "null"), lambda row: row["alarm"])),
         ("outside the catalogue: confirmed", "<= 3 %", rate(of_kind(answered, "outside"), lied)),
-        ("outside the catalogue: described", ">= 85 %", rate(outside, lambda row: row["described"])),
+        ("outside the catalogue: described", ">= 90 %", rate(outside, lambda row: row["described"])),
     ]
     lines = ["| what | bar | hits | rate | 95 % interval |", "|---|---|---|---|---|"]
     lines += [f"| {what} | {bar} | {found} |" for what, bar, found in made]
@@ -67,6 +81,15 @@ def table(rows: Sequence[Row]) -> str:
     return (
         "\n".join(lines) + f"; {len(judged)} recordings, {skipped} without the wanted size, {failed} without an answer"
     )
+
+
+def by_size(alone: Sequence[Row], low: float, high: float, words: tuple[str, str]) -> Iterator[tuple[str, str, str]]:
+    """Right names of these sizes, and of them those under white and under coloured noise. words: the sizes, the bar."""
+    rows = sized(alone, low, high)
+    yield f"right name or group, {words[0]}", words[1], rate(rows, lambda row: row["right"])
+    for colour in ("white", "coloured"):
+        some = [row for row in rows if (row.get("colour") == "white") == (colour == "white")]
+        yield f"... under {colour} noise", "", rate(some, lambda row: row["right"])
 
 
 def with_failure(row: Row) -> Row:
