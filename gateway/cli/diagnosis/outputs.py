@@ -5,10 +5,13 @@ import os
 import threading
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Final
 
 import click
 
 from gateway.cli.diagnosis.progress_line import handled_interrupt
+
+STDOUT: Final = Path("-")  # as the name of a file
 
 
 def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
