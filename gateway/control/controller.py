@@ -17,6 +17,7 @@ from gateway.control.edge_checks import EdgeCheck, Readiness, Situation
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.inputs import CalibrationInUse, LineStatus, LoopInputs, Output
+from gateway.control.messages import master_lost_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time
@@ -212,8 +213,6 @@ class Controller:
         self._faults.shift_zero(self._conditioner.take_zero(self._commands.gravity_n))
         self._machine.tell(f"tare: zero at {self.zero_n:.2f} N")
 
-    # -- supervision
-
     def _supervise(self, now_s: float, line: LineStatus) -> None:
         name = self._commands.not_finite
         cause = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
@@ -223,21 +222,13 @@ class Controller:
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
             self._machine.is_master_lost = self._machine.is_master_lost and self._machine.is_ramping_down
         elif not self._machine.is_master_lost:
-            self._lose_master(now_s, line.owner_connected)
+            lost = master_lost_sentence(line.owner_connected, self._commands.lease_age_s(now_s))
+            self._machine.lose_master(now_s, lost, self._settings.supervision.lease_action)
 
     @property
     def _goes_on_alone(self) -> bool:
         """No master is needed: a run of this machine, or the way to 0 after any run."""
         return self.active_run.is_local or (self.state is State.CALIBRATING and not self.active_run.running)
-
-    def _lose_master(self, now_s: float, connected: bool) -> None:
-        age_ms = self._commands.lease_age_s(now_s) * 1e3
-        observation = (
-            f"master lost: {'' if connected else 'connection closed, '}heartbeat unchanged for {age_ms:.0f} ms"
-        )
-        self._machine.lose_master(now_s, observation, self._settings.supervision.lease_action)
-
-    # -- movement
 
     def _target(self) -> Demand:
         """What to go for now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""

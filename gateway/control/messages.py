@@ -57,3 +57,9 @@ def stuck_sentence(measured_n: float, limit_n: float) -> str:
         f"W304 {measured_n:.1f} N measured at the safe voltage, allowed {limit_n:.1f} N: stuck in contact, valve open or zero "
         "moved; free the tool or tare"
     )
+
+
+def master_lost_sentence(connected: bool, lease_age_s: float) -> str:
+    """Return how the loss of the master was seen. lease_age_s: since its heartbeat last changed."""
+    closed = "" if connected else "connection closed, "
+    return f"master lost: {closed}heartbeat unchanged for {lease_age_s * 1e3:.0f} ms"

@@ -162,13 +162,17 @@ def advance_slide(
         free_m = travel_against_friction(drive_n, (own, more_out), share_n, state.strains, slide.inverse_per_m)
         travel_m = min(max(min(travel_m, free_m), -state.position_m), slide.stroke_m - state.position_m)
         force_n = max(pad_n + pad_n_per_m * travel_m, 0.0)
-
-    z1, z2, z3 = strain_elements(state.strains, travel_m, slide.inverse_per_m)
-    friction_n, stiction_n = centre_n + share_n * (z1 + z2 + z3), state.stiction_n
+    strains, stiction_n = strain_elements(state.strains, travel_m, slide.inverse_per_m), state.stiction_n
+    friction_n = centre_n + share_n * (strains[0] + strains[1] + strains[2])
     if slide.stiction_n != 0.0:
-        grown_n, stiction_n = age_stiction(
-            stiction_n, slide.stiction_n, step_s / slide.stiction_s, travel_m / slide.breakaway_m
-        )
-        held = max(limit_n, _LEAST_N) / max(limit_n + grown_n, _LEAST_N)
-        z1, z2, z3 = z1 * held, z2 * held, z3 * held  # what a rising limit holds it does not push: the strains give
-    return SlideState(state.position_m + travel_m, travel_m, stiction_n, (z1, z2, z3), force_n, friction_n)
+        rest, travel = step_s / slide.stiction_s, travel_m / slide.breakaway_m
+        grown_n, stiction_n = age_stiction(stiction_n, slide.stiction_n, rest, travel)
+        strains = relieve_strains(strains, limit_n, grown_n)
+    return SlideState(state.position_m + travel_m, travel_m, stiction_n, strains, force_n, friction_n)
+
+
+@step
+def relieve_strains(strains: tuple[float, float, float], limit_n: float, grown_n: float) -> tuple[float, float, float]:
+    """Return the strains under a limit that has grown: what a rising limit holds it does not push, so the strains give."""
+    held = max(limit_n, _LEAST_N) / max(limit_n + grown_n, _LEAST_N)
+    return strains[0] * held, strains[1] * held, strains[2] * held

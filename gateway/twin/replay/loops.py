@@ -48,16 +48,15 @@ def march_pressure(
     lags: PressureLags,
     jumps: bool,
     start_pa: tuple[float, float],
-    target_pa: Floats,
-    arrives_s: Floats,
-    point_s: Floats,
+    series: tuple[Floats, Floats, Floats],
     pressure_pa: Floats,
 ) -> None:
     """Fill in the pressure at each point. A target that arrives just then is not seen yet.
 
-    start_pa: at the first point, behind the first lag and behind the second. target_pa: one more than arrives_s, from before
-    the first. jumps: whether there is no lag at all.
+    start_pa: at the first point, behind the first lag and behind the second. series: targets, Pa, one more than the times at
+    which they arrive, s, from before the first; those times; the points, s. jumps: whether there is no lag at all.
     """
+    target_pa, arrives_s, point_s = series
     seen_pa = target_pa[0]
     state = PressureState(start_pa[0], start_pa[1], start_pa[1])
     step_s = part_s = -1.0

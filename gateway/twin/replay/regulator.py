@@ -57,7 +57,7 @@ class Pressures:
         first_pa = max(float(target[0]) + start.ahead_pa, 0.0)
         start_pa = (first_pa, max(first_pa + start.second_ahead_pa, 0.0))
         target[0] += start.coming_pa
-        march_pressure(lags, lags.are_none, start_pa, target, arrives_s, self._grid.time_s, pressure)
+        march_pressure(lags, lags.are_none, start_pa, (target, arrives_s, self._grid.time_s), pressure)
         if regulator.ceiling_pa < UNLIMITED:
             pressure = np.minimum(pressure, regulator.ceiling_pa)
         if regulator.leak_flow_pa != 0.0:
