@@ -83,6 +83,17 @@ class Whitener:
         side_by_side(fill, _some_at_once(flat.shape[0]))
         return found.reshape(*vectors.shape[:-1], -1)
 
+    def transposed(self, spectrum: Floats) -> Floats:
+        """Return the vector (rows,) whose product with any vector is that of `spectrum`, (coordinates,), with the spectra of
+        this vector: products with many vectors then need no spectra of them."""
+        found, at = np.empty(self.weights.size), 0
+        for channel, noise in zip(self.channels, self.noises, strict=True):
+            lines = spectrum[at : at + noise.length + 2].view(np.complex128) * (noise.weights / noise.scale)
+            rows = channel.rows.stop - channel.rows.start
+            found[channel.rows] = np.fft.irfft(lines, noise.length)[:rows] * self.weights[channel.rows]
+            at += noise.length + 2
+        return found
+
     def _lines(self, part: Floats, channel: Channel, noise: Noise) -> NDArray[np.complex128]:
         """Weighted lines of some vectors of one segment."""
         lines: NDArray[np.complex128] = np.fft.rfft(part * self.weights[channel.rows], noise.length)

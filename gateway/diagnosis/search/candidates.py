@@ -18,7 +18,6 @@ from gateway.diagnosis.model_fit.normal_equations import ColumnGain, NormalEquat
 from gateway.diagnosis.noise.whitening import Whitener
 
 _LARGEST_STRETCH: Final = 3.0  # how far beyond its start a response that is not proportional is believed
-_HOPELESS: Final = 8.0  # chi-square: half of what 1 % over a hundred starts asks for
 _FAR_BEHIND: Final = 0.25  # of the best gain: what is further behind is not refined
 _LEAST_FIRST_STEP: Final = 0.2  # of a start: a refinement that begins at nothing stays there
 _INDEPENDENT: Final = 1.0e-5  # eigenvalue of normalised columns below which they are the same column
@@ -162,12 +161,9 @@ def _apply_sizes(candidate: Candidate, parameters: ModelParameters, size: float)
 def best_scores(found: Sequence[CandidateScore], most: int) -> list[CandidateScore]:
     """Return the best starts, at most one per form, the strongest `most` effects (each with up to two forms).
 
-    None at all where the best could not be significant even if its refinement doubled its gain, and none that is far
-    behind the best.
+    None that is far behind the best.
     """
     best = max((each.gain for each in found), default=0.0)
-    if best < _HOPELESS:
-        return []
     found = [each for each in found if each.gain > _FAR_BEHIND * best]
     chosen: dict[tuple[str, int], CandidateScore] = {}
     for score in sorted(found, key=lambda each: -each.gain):

@@ -3,12 +3,12 @@
 Both change the command itself, in jumps: a saw tooth of n teeth is met only by a step within 1/(20n) of the true one, and
 a dead band decides at each command anew. So sizes are tried densely; steps first by the waves that their teeth begin
 with, which forgive ten times more, then by the teeth themselves. Friction cannot be left out: it swallows just the
-small changes that they make. Dead bands are tried in the twin, with rigid friction; steps need so many that they go
-through a lag and a play of the force only. The whole twin refines the best few.
+small changes that they make. So many go through a lag and a play of the force only; of dead bands the best few are then
+tried in the twin, with rigid friction. The whole twin refines the best.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -22,7 +22,13 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.normal_equations import NormalEquations, model_span
 from gateway.diagnosis.noise.whitening import Whitener
-from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves, fill_rounding_errors
+from gateway.diagnosis.search.command_loops import (
+    ForceChain,
+    fill_first_waves,
+    fill_rounding_errors,
+    liken_dead_bands,
+    liken_roundings,
+)
 from gateway.side_by_side import side_by_side
 from gateway.twin.elementwise import Real, smaller
 from gateway.twin.plant import Plant
@@ -33,6 +39,7 @@ _LARGEST_SPAN_V: Final = 20.0  # a command beyond it is no voltage
 _BANDS_V: Final = np.geomspace(0.004, 0.8, 160)
 _FINER_OFFSETS: Final = np.linspace(-1.0, 1.0, 41)  # between the neighbours of a step that was found
 _MOST_STEPS_REFINED: Final = 12
+_MOST_BANDS_IN_TWIN: Final = 20
 _MOST_ANSWERS: Final = 3
 _LEAST_WHOLE_STEP: Final = 0.35  # a step that explains best when shrunk below this share of itself is not the step
 _FINE_POINTS: Final = ("presliding_m", "stribeck_n", "dwell_stiction_n", "viscous_n_s_per_m", "asymmetry_n_s_per_m")
@@ -49,19 +56,15 @@ def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) ->
     """Dead bands of the target with which the twin explains most of the residual, the best first."""
     if _span_v(bench) == 0.0:
         return ()
-    regulator = fitted.parameters.plant.regulator
-    bands_pa = _BANDS_V * regulator.full_scale_pa / regulator.full_scale_v
+    regulator, span = fitted.parameters.plant.regulator, model_span(fitted, whiten)
+    told = whiten.transposed(span.left) * bench.usable
+    likely_v = _BANDS_V[np.argsort(-_liken(liken_dead_bands, bench, fitted.parameters, told, _BANDS_V))]
+    bands_pa = likely_v[:_MOST_BANDS_IN_TWIN] * (regulator.full_scale_pa / regulator.full_scale_v)
     rigid = replace(fitted.parameters, plant=_with_rigid_friction(fitted.parameters.plant))
     dead_band = DEAD_BAND if bench.witnesses is None else ChangedValue(DEAD_BAND, bench.witnesses)
-    without = bench.simulate([rigid])
-    cost, span = np.zeros(bands_pa.size), model_span(fitted, whiten)
-    for part in _column_parts(bands_pa.size, bench.rows):
-        columns = bench.reduced(
-            bench.simulate([rigid.with_value(dead_band, band_pa) for band_pa in bands_pa[part]]) - without
-        )
-        normal = NormalEquations(span, whiten.spectra(columns))
-        cost[part] = normal.power - 2.0 * normal.slope
-    return tuple(bands_pa[np.argsort(cost)[:_MOST_ANSWERS]].tolist())
+    simulated = bench.simulate([rigid, *(rigid.with_value(dead_band, band_pa) for band_pa in bands_pa)])
+    normal = NormalEquations(span, whiten.spectra(bench.reduced(simulated[1:] - simulated[0])))
+    return tuple(bands_pa[np.argsort(normal.power - 2.0 * normal.slope)[:_MOST_ANSWERS]].tolist())
 
 
 def _with_rigid_friction(plant: Plant) -> Plant:
@@ -89,37 +92,43 @@ def _spacing(step_v: Real, span_v: float) -> Real:
 
 def _most_likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> tuple[float, ...]:
     span_v, best = _span_v(bench), list[float]()
-    for size in tried[np.argsort(-_first_wave_scores(bench, fitted, whiten, tried))]:
+    told = whiten.transposed(model_span(fitted, whiten).left) * bench.usable
+    for size in tried[np.argsort(-_liken(fill_first_waves, bench, fitted.parameters, told, tried, bunched=True))]:
         if all(abs(size / other - 1.0) > 1.5 * _spacing(size, span_v) for other in best):
             best.append(float(size))
         if len(best) == _MOST_STEPS_REFINED:
             break
     finer = np.array([size * (1.0 + _spacing(size, span_v) * _FINER_OFFSETS) for size in best])
-    gains = _chi2_gains(bench, fitted, whiten, finer.ravel()).reshape(finer.shape)
-    sharpest = finer[np.arange(len(best)), np.argmax(gains, axis=1)]
-    return tuple(sharpest[np.argsort(-np.max(gains, axis=1))[:_MOST_ANSWERS]].tolist())
+    alike = _liken(liken_roundings, bench, fitted.parameters, told, finer.ravel()).reshape(finer.shape)
+    sharpest = finer[np.arange(len(best)), np.argmax(alike, axis=1)]
+    gains = _chi2_gains(bench, fitted, whiten, sharpest)
+    return tuple(sharpest[np.argsort(-gains)[:_MOST_ANSWERS]].tolist())
 
 
-def _first_wave_scores(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> Floats:
-    """How much the first wave of each step's teeth is like the residual, in no unit; rows in bunches: a lag is slow."""
-    told = whiten(whiten(fitted.residual_n)) * bench.usable
-    halves = side_by_side(lambda some: _likeness(bench, fitted.parameters, told, some), np.array_split(tried, 2))
-    return np.concatenate(halves)
+def _liken(
+    fill: Callable[[Floats, Floats, Floats, ForceChain, tuple[Floats, Floats]], None],
+    bench: Bench,
+    parameters: ModelParameters,
+    told: Floats,
+    tried: Floats,
+    *,
+    bunched: bool = False,
+) -> Floats:
+    """How much what each size makes of the force is like `told` (rows,), in no unit. bunched: a lag is slow."""
 
+    def look(some: Floats) -> Floats:
+        slope, power = np.zeros(some.size), np.full(some.size, 1.0e-300)
+        for channel, command_v, row_s in _commanded_channels(bench):
+            bunch = max(int(_BUNCH_SHARE_OF_LAG * parameters.value(LAG) / row_s), 1) if bunched else 1
+            rows = np.arange(0, command_v.size, bunch)
+            sums = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0))
+            alike, squares = np.empty(some.size), np.empty(some.size)
+            fill(command_v[rows], sums, some, _force_chain(parameters, bunch * row_s), (alike, squares))
+            slope += alike
+            power += bunch * squares
+        return np.asarray(np.maximum(slope, 0.0) ** 2 / power)
 
-def _likeness(bench: Bench, parameters: ModelParameters, told: Floats, tried: Floats) -> Floats:
-    """How much the first waves of some steps are like `told` (rows,)."""
-    slope, power = np.zeros(tried.size), np.full(tried.size, 1.0e-300)
-    for channel, command_v, row_s in _commanded_channels(bench):
-        bunch = max(int(_BUNCH_SHARE_OF_LAG * parameters.value(LAG) / row_s), 1)
-        rows = np.arange(0, command_v.size, bunch)
-        sums = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0))
-        alike, squares = np.empty(tried.size), np.empty(tried.size)
-        chain = _force_chain(parameters, bunch * row_s)
-        fill_first_waves(command_v[rows], sums, tried, chain, (alike, squares))
-        slope += alike
-        power += bunch * squares
-    return np.asarray(np.maximum(slope, 0.0) ** 2 / power)
+    return np.concatenate(side_by_side(look, np.array_split(tried, 2)))
 
 
 def _column_parts(columns: int, rows: int) -> Iterator[slice]:

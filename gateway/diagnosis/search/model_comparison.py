@@ -36,6 +36,8 @@ _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
 _SIMILAR_GAIN_SHARE: Final = 0.75  # share of the gain that a relative must explain to stay in the group
 _WAVES: Final = 6  # most waves of a refinement; it ends before where nothing is gained
 _FALSE_ALARMS: Final = 0.01  # over all starts that were tried (Bonferroni)
+_MAY_GAIN: Final = 2.0  # times what its start promises, by a refinement ...
+_LINE_MAY_GAIN: Final = 1.5  # ... of a line, whose frequency is known already
 _PENALTY_PER_PARAMETER: Final = 2.0  # chi-square (Akaike's criterion)
 _INCUMBENT_SHARE: Final = 0.04  # of its own gain, at most: what leaves as many rows unexplained proves no better form
 _NOISE_CHI2: Final = 1.1  # chi-square per row of a model at the noise: no bonus ...
@@ -110,27 +112,38 @@ def is_significant(refined: RefinedEffect, starts: int) -> bool:
     return chi2_tail(refined.gain, max(refined.dof, 1)) < _FALSE_ALARMS / max(starts, 1)
 
 
+def _is_hopeful(score: CandidateScore, starts: int) -> bool:
+    """Could a start be significant if its refinement gained as much as it may? Where none could, none is refined."""
+    form = score.candidate.form
+    gain = score.gain * (_LINE_MAY_GAIN if form.quadrature else _MAY_GAIN)
+    return chi2_tail(gain, len(form.parameters)) < _FALSE_ALARMS / max(starts, 1)
+
+
 @dataclass(frozen=True, slots=True)
 class Competitors:
     """Effects to compare, and hints where their search begins.
 
-    incumbent: an effect of the model before, refined already; most: effects that are refined.
+    incumbent: an effect of the model before, refined already; most: effects that are refined. columns: what all starts change,
+    where it is known for a model that is next to this one.
     """
 
     effects: Sequence[Effect]
     hints: SearchHints
     incumbent: RefinedEffect | None = None
     most: int = MOST_REFINED
+    columns: CandidateColumns | None = None
 
 
 def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors, whiten: Whitener) -> ModelComparison:
     """Return how well each of these effects explains what the model `fitted` leaves, which stands at its own optimum."""
     hints, incumbent = competitors.hints, competitors.incumbent
-    found = simulate_candidates(bench, fitted, competitors.effects, hints)
+    found = competitors.columns or simulate_candidates(bench, fitted, competitors.effects, hints)
     promised = score_candidates(found, fitted, whiten)
-    best = best_scores(promised, competitors.most)
+    starts = _count_starts(found, hints)
+    best = best_scores(promised, competitors.most) if any(_is_hopeful(each, starts) for each in promised) else []
     problems = [FitProblem(each.parameters, joined_parameters(bench, fitted, each.candidate.form)) for each in best]
-    progress.report(f"refining {progress.few([each.candidate.effect.name for each in best])}")
+    if best:
+        progress.report(f"refining {progress.few([each.candidate.effect.name for each in best])}")
     refined = refine(bench, problems, whiten, _WAVES)
     ranked = [
         refined_effect(bench, (score.candidate.effect, score.candidate.form), each, fitted, whiten)
@@ -138,9 +151,7 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     ]
     ranked += [replace(incumbent, incumbent_bonus=_incumbent_bonus(bench, incumbent))] if incumbent else []
     ranked.sort(key=lambda each: -each.penalised_gain)
-    return ModelComparison(
-        fitted, tuple(ranked), _winning_shares(ranked), hints, _count_starts(found, hints), tuple(promised)
-    )
+    return ModelComparison(fitted, tuple(ranked), _winning_shares(ranked), hints, starts, tuple(promised))
 
 
 def _incumbent_bonus(bench: Bench, incumbent: RefinedEffect) -> float:

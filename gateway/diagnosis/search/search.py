@@ -51,6 +51,7 @@ _DISCREPANT_CHI2_PER_ROW: Final = 3.0  # chi-square per row of the winner
 _MOST_RIVALS: Final = 2  # looked at beside the winner
 _COMPANIONS: Final = 2  # looked at closely for each
 _LEAST_RIVAL_SHARE: Final = 0.05  # share from which a rival is looked at
+_NEXT_TO: Final = 0.01  # of the force's standard deviation
 _WAVES_AGAIN: Final = 2  # of a model that other rows or another noise have hardly moved ...
 _WAVES_WIDENED: Final = 3  # ... that gains a parameter ...
 _WAVES_WITHOUT: Final = 4  # ... that loses one ...
@@ -125,14 +126,21 @@ def _compare_under_noise(
     hints = search_hints(bench, fitted, whiten)
     found = simulate_candidates(bench, fitted, effects, hints)
     whiten = coloured_whitener(bench, *unexplained_residual(found, fitted), whiten.weights)
-    fitted = refit(bench, fitted, whiten)
-    comparison = compare_effects(bench, fitted, Competitors(effects, hints), whiten)
+    before, fitted = fitted, refit(bench, fitted, whiten)
+    columns = found if _is_next_to(bench, before, fitted) else None
+    comparison = compare_effects(bench, fitted, Competitors(effects, hints, columns=columns), whiten)
     if comparison.ranked and comparison.winner.fitted.chi2 > _DISCREPANT_CHI2_PER_ROW * int(bench.usable.sum()):
         best = min((each.fitted for each in comparison.ranked), key=lambda each: bench.rms_n(each.residual_n))
         whiten = coloured_whitener(bench, best.residual_n, orthonormal(best.jacobian), whiten.weights)
         fitted = refit(bench, fitted, whiten, waves=_WAVES_DISCREPANT)
         comparison = compare_effects(bench, fitted, Competitors(effects, hints), whiten)
     return fitted, whiten, comparison
+
+
+def _is_next_to(bench: Bench, before: FittedModel, after: FittedModel) -> bool:
+    """Are two fits so much alike that an effect changes the same in both? What is refined begins there only."""
+    simulated_n, moved_n = (bench.measured_n - before.residual_n)[bench.judged], after.residual_n - before.residual_n
+    return bench.rms_n(moved_n) < _NEXT_TO * float(np.std(simulated_n))
 
 
 def _refit_base(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedModel:

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from gateway.diagnosis.search.command_loops import ForceChain, fill_first_waves, fill_rounding_errors, sine_of_turns
+from gateway.diagnosis.search.command_loops import (
+    ForceChain,
+    fill_first_waves,
+    fill_rounding_errors,
+    liken_dead_bands,
+    liken_roundings,
+    sine_of_turns,
+)
 
 CHAIN = ForceChain(share=0.2, play_v=0.15)
 COMMAND_V = 3.0 + 0.2 * np.cumsum(np.random.default_rng(1).normal(size=300))
@@ -33,12 +40,32 @@ def test_a_step_makes_of_the_force_what_its_rounding_makes():
         np.testing.assert_allclose(column_v, expected, atol=1e-12)
 
 
-def test_a_first_wave_is_likened_about_its_mean():
+def first_wave(size_v):
+    return COMMAND_V - size_v / np.pi * np.sin(2.0 * np.pi * COMMAND_V / size_v)
+
+
+def rounded(size_v):
+    return np.round(COMMAND_V / size_v) * size_v
+
+
+def noticed(size_v):
+    found = [0.0]
+    for value in COMMAND_V:
+        found.append(value if abs(value - found[-1]) > size_v else found[-1])
+    return np.array(found[1:])
+
+
+@pytest.mark.parametrize(
+    ("fill", "given_v"),
+    [(fill_first_waves, first_wave), (liken_roundings, rounded), (liken_dead_bands, noticed)],
+    ids=["first wave", "rounding", "dead band"],
+)
+def test_what_a_size_makes_of_the_force_is_likened_about_its_mean(fill, given_v):
     told = np.random.default_rng(2).normal(size=COMMAND_V.size)
     alike, squares = np.empty(STEPS_V.size), np.empty(STEPS_V.size)
-    fill_first_waves(COMMAND_V, told, STEPS_V, CHAIN, (alike, squares))
-    for k, step_v in enumerate(STEPS_V):
-        wave = force_v(COMMAND_V - step_v / np.pi * np.sin(2.0 * np.pi * COMMAND_V / step_v)) - force_v(COMMAND_V)
-        wave -= wave.mean()
-        assert alike[k] == pytest.approx(told @ wave, abs=1e-6)
-        assert squares[k] == pytest.approx(wave @ wave, rel=1e-6)
+    fill(COMMAND_V, told, STEPS_V, CHAIN, (alike, squares))
+    for k, size_v in enumerate(STEPS_V):
+        column = force_v(given_v(size_v)) - force_v(COMMAND_V)
+        column -= column.mean()
+        assert alike[k] == pytest.approx(told @ column, abs=1e-6)
+        assert squares[k] == pytest.approx(column @ column, rel=1e-6)
