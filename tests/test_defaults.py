@@ -42,7 +42,7 @@ ELSEWHERE = {
     "HOST": {"profiles/rigs/rig_file.py", "codes/errors.py"},  # what `localhost` means; advice to take any free port
     "CELL_BAUD": {
         "codes/errors.py",
-        "service/running_rig/baud_probe.py",
+        "service/running_rig/lines/baud_probe.py",
         "devices/line_settings.py",
     },  # lists of all speeds
 }

@@ -29,8 +29,8 @@ from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.control.transitions import ControllerParts, Transitions
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
+from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _CALIBRATE = int(ControlBit.START_CALIBRATION)

@@ -19,8 +19,8 @@ from gateway.control.sample_conditioning import Reading, SampleConditioner
 from gateway.control.state_table import ENABLED_STATES
 from gateway.control.transitions import ControllerParts, Transitions
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
+from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _CALIBRATE, _TAKE = int(ControlBit.START_CALIBRATION), int(ControlBit.TAKE_OWNERSHIP)

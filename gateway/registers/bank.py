@@ -24,21 +24,27 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, RequestError, ServerId
 from gateway.modbus.bits import pack_bits
 from gateway.modbus.peer import NOBODY
-from gateway.registers.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, AdmittedWrite, Write
-from gateway.registers.byte_order_echo import ByteOrderEcho
 from gateway.registers.command import Command, Status
-from gateway.registers.command_block import CONTROL_WORD, FORCE_SETPOINT, VOLTAGE_SETPOINT, CommandBlock, check_zeros
-from gateway.registers.edge_questions import Decide
 from gateway.registers.identity import SERVER_ID, build_identity
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.addresses import no_such_address
 from gateway.registers.map.register_map import Block, RegisterMap
-from gateway.registers.ownership import Ownership, ip_number
 from gateway.registers.refusal import Refusal, request_refusal
 from gateway.registers.rig_rules import BankRules
 from gateway.registers.status_block import StatusBlock
 from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, State, StatusBit
+from gateway.registers.writes.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, AdmittedWrite, Write
+from gateway.registers.writes.byte_order_echo import ByteOrderEcho
+from gateway.registers.writes.command_block import (
+    CONTROL_WORD,
+    FORCE_SETPOINT,
+    VOLTAGE_SETPOINT,
+    CommandBlock,
+    check_zeros,
+)
+from gateway.registers.writes.edge_questions import Decide
+from gateway.registers.writes.ownership import Ownership, ip_number
 
 BITS: Final = 16
 

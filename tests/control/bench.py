@@ -16,8 +16,8 @@ from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller, ControlSettings, Limits, LineStatus, Output, Supervision, Trim
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, Mode
+from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
 STEP_S = 0.001
 MOMENTARY = ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP

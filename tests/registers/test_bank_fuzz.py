@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import ModbusError, Peer
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
-from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.words import ControlBit, State
+from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
 PEERS = [Peer("10.0.0.1", 1), Peer("10.0.0.2", 2), Peer("fe80::1", 3)]
 ADDRESSES = st.one_of(

@@ -3,8 +3,8 @@
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.registers.ownership import NOT_IPV4, ip_number
 from gateway.registers.words import ControlBit
+from gateway.registers.writes.ownership import NOT_IPV4, ip_number
 
 TAKE = int(ControlBit.TAKE_OWNERSHIP)
 

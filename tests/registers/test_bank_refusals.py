@@ -5,8 +5,8 @@ import math
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.registers.edge_questions import EdgeRefusal
 from gateway.registers.words import ControlBit
+from gateway.registers.writes.edge_questions import EdgeRefusal
 
 R = RefusalReason
 NAN = math.nan

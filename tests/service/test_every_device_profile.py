@@ -11,7 +11,7 @@ from gateway.devices.messages import Accepted, ForceSample, Garbage, Pressure, R
 from gateway.ports import Pty
 from gateway.profiles import list_shipped, load_rig
 from gateway.registers.words import State
-from gateway.service.running_rig.output_line import OutputExchange
+from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.profile_files import load_device
 from tests.service.wired import Wired
 

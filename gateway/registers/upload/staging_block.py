@@ -12,7 +12,6 @@ from typing import Final
 from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
-from gateway.registers.command_block import check_zeros
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.refusal import Refusal
@@ -26,6 +25,7 @@ from gateway.registers.upload.coefficients import (
     model_hash,
 )
 from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus
+from gateway.registers.writes.command_block import check_zeros
 
 NO_SLOT: Final = 0xFFFF
 

@@ -23,7 +23,7 @@ from gateway.profiles.kinds.plans import plan_document, plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
-from gateway.service.running_rig.output_line import LineState
+from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
 from gateway.service.socket_requests import CalibrateRequest, parse_request
 

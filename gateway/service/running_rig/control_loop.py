@@ -24,12 +24,12 @@ from gateway.processes.scheduler_counters import ProcessorTime, time_between
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command
-from gateway.registers.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.registers.residual_cause import ResidualCause
+from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.lateness import Lateness
-from gateway.service.running_rig.load_cell_line import CellExchange
-from gateway.service.running_rig.output_line import OutputExchange
+from gateway.service.running_rig.lines.load_cell_line import CellExchange
+from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
 from gateway.service.running_rig.recorded_row import row_of

@@ -9,7 +9,7 @@ from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import Recorder
 from gateway.recording.tables.columns import DERIVED, SENT
-from gateway.service.running_rig.output_line import LineState
+from gateway.service.running_rig.lines.output_line import LineState
 from gateway.units import kilopascal_from_pascal
 
 COLUMNS = ("time_s", "command_v", "force_n", "pressure_kpa", "quality", *DERIVED, *SENT)

@@ -9,7 +9,7 @@ from gateway.plants.in_use import in_use_facts
 from gateway.processes.event_log import EventLog
 from gateway.profiles import Rig
 from gateway.recording import Recorder
-from gateway.service.running_rig.output_line import LineState
+from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
 
 

@@ -28,16 +28,16 @@ from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.bank_rules import bank_rules, server_settings
-from gateway.service.running_rig.baud_probe import explain_silent_device
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.lateness import Lateness
-from gateway.service.running_rig.load_cell_line import CellExchange
-from gateway.service.running_rig.output_line import OutputExchange
+from gateway.service.running_rig.lines.baud_probe import explain_silent_device
+from gateway.service.running_rig.lines.load_cell_line import CellExchange
+from gateway.service.running_rig.lines.output_line import OutputExchange
+from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
-from gateway.service.running_rig.rig_ports import RigPorts
 from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, listen, warning_notes
 from gateway.service.watch_reports import WatchReports
 

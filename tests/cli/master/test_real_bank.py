@@ -10,8 +10,8 @@ from gateway.codes.refusals import RefusalReason
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
-from gateway.registers.edge_questions import EdgeRefusal
 from gateway.registers.words import ControlBit, State
+from gateway.registers.writes.edge_questions import EdgeRefusal
 
 
 @pytest.fixture

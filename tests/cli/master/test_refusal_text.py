@@ -8,8 +8,8 @@ from gateway.cli.errors import CliError
 from gateway.cli.master import local_gateways
 from gateway.codes.refusals import RefusalReason
 from gateway.registers import BankRules, RegisterBank, RegisterMap
-from gateway.registers.edge_questions import EdgeRefusal
 from gateway.registers.words import ControlBit
+from gateway.registers.writes.edge_questions import EdgeRefusal
 
 OWN = "tare refused: 1.56 V are out: disable the output or set the force to 0 first"
 

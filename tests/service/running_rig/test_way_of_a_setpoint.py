@@ -31,7 +31,7 @@ _STATIONS: Final = {
     "ports/serial_port.py": "write",  # the characters go to the wire
 }
 """File and function (None: any) at which the stack of calls is noted."""
-_WIRING: Final = "service/running_rig/rig_ports.py"
+_WIRING: Final = "service/running_rig/lines/rig_ports.py"
 """On the way of a real rig, too: its `write_output` stands between the output's exchange and the port."""
 
 

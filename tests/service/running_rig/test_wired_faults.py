@@ -12,7 +12,7 @@ from gateway.devices.messages import ForceSample, Garbage
 from gateway.profiles import Rig
 from gateway.registers import Refusal
 from gateway.registers.words import LimitedBy, State
-from gateway.service.running_rig.load_cell_line import CellExchange
+from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from tests.service.rigs import demo, strict, with_supervision
 from tests.service.wired import ENABLE, RESET, STEP_S, Wired
 

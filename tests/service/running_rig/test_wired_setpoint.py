@@ -12,7 +12,7 @@ from gateway.devices.messages import ForceSample
 from gateway.recording import Recorder, read_recording
 from gateway.registers import Refusal
 from gateway.registers.words import State
-from gateway.service.running_rig.output_line import LineState
+from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
 from tests.service.rigs import demo, without_trim
 from tests.service.wired import ENABLE, Wired

@@ -11,7 +11,7 @@ from gateway.devices import DeviceProfile, cell_device, output_device
 from gateway.devices.messages import Accepted, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
-from gateway.service.running_rig.baud_probe import explain_silent_device, listen_at
+from gateway.service.running_rig.lines.baud_probe import explain_silent_device, listen_at
 from tests.service.rigs import demo
 
 FRAME_PERIOD_S = 0.01

@@ -7,7 +7,7 @@ import pytest
 from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.exchange import ForceReading
 from gateway.devices.messages import ForceSample
-from gateway.service.running_rig.load_cell_line import CellExchange
+from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from tests.profile_files import load_device
 
 TIMEOUT_S, ROUND_TRIP_S = 0.1, 0.02

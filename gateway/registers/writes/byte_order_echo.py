@@ -8,11 +8,11 @@ are refused (03).
 from typing import Final
 
 from gateway.codes.refusals import RefusalReason
-from gateway.registers.command_block import check_zeros
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import Register
 from gateway.registers.refusal import Refusal
 from gateway.registers.values import WordOrder, pack_number, unpack_number
+from gateway.registers.writes.command_block import check_zeros
 
 _PROOF: Final = 1234.5
 _ORDERS: Final = {pack_number("float32", order, _PROOF): order for order in WordOrder}

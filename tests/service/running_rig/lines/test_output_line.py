@@ -8,7 +8,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.devices import output_host
 from gateway.devices.exchange import VoltageExchange, VoltageRange
-from gateway.service.running_rig.output_line import OutputExchange
+from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.service.rigs import demo
 
 REPLY_TIMEOUT_S = 0.06

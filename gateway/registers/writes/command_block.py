@@ -13,13 +13,13 @@ from typing import Final
 
 from gateway.codes.refusals import RefusalReason
 from gateway.registers.command import Command
-from gateway.registers.command_field import CommandField, command_field
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
 from gateway.registers.values import WordOrder, swap_words, words_swapped_from_little_endian
 from gateway.registers.words import ControlBit, Mode
+from gateway.registers.writes.command_field import CommandField, command_field
 
 NAMES: Final = (
     "control_word", "force_setpoint", "force_ramp", "mode", "heartbeat", "voltage_setpoint", "tilt_angle",

@@ -12,9 +12,13 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
-from gateway.registers.byte_order_echo import ByteOrderEcho
 from gateway.registers.command import Command
-from gateway.registers.command_block import (
+from gateway.registers.map.register_map import Block
+from gateway.registers.refusal import Refusal
+from gateway.registers.rig_rules import BankRules
+from gateway.registers.words import ControlBit
+from gateway.registers.writes.byte_order_echo import ByteOrderEcho
+from gateway.registers.writes.command_block import (
     CONTROL_WORD,
     FORCE_SETPOINT,
     HEARTBEAT,
@@ -24,12 +28,8 @@ from gateway.registers.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.edge_questions import Decide, ProposedWrite, decide_nothing
-from gateway.registers.map.register_map import Block
-from gateway.registers.ownership import Ownership
-from gateway.registers.refusal import Refusal
-from gateway.registers.rig_rules import BankRules
-from gateway.registers.words import ControlBit
+from gateway.registers.writes.edge_questions import Decide, ProposedWrite, decide_nothing
+from gateway.registers.writes.ownership import Ownership
 
 ENABLE: Final = int(ControlBit.ENABLE)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
