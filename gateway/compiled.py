@@ -123,7 +123,15 @@ def _fingerprint() -> str:
     digest = hashlib.sha256()
     for function in sorted(_steps, key=lambda one: (one.__module__, one.__qualname__)):
         digest.update(repr((_content(function.__code__), _constants(function))).encode())
+    for module in sorted({function.__module__ for function in (*_steps, *_loops)}):
+        digest.update(repr((module, _named_tuples(module))).encode())
     return digest.hexdigest()[:16]
+
+
+def _named_tuples(module: str) -> list[tuple[str, Any]]:
+    """Return the named tuples that a module knows: what was compiled for one that has another name by now cannot be read."""
+    known = vars(sys.modules[module]).items()
+    return sorted((name, one._fields) for name, one in known if isinstance(one, type) and hasattr(one, "_fields"))
 
 
 def _content(code: CodeType) -> tuple[Any, ...]:

@@ -25,7 +25,7 @@ from gateway.diagnosis.search.search import SearchResult, search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
 from gateway.twin.plant import Plant
 
-_LEAST_SHARE_OF_LEFT: Final = 0.05  # of the squared error that the old recordings keep; a quiet day showed 0.02
+_LEAST_SHARE_OF_LEFT: Final = 0.05  # of the squared error that is left anyway; a quiet day showed 0.02
 
 
 def find_changes(
@@ -83,7 +83,8 @@ def compare_with_machine(
 
 def _drop_trifles(result: Diagnosis, left_n: float) -> Diagnosis:
     """The answer without changes that are small beside what the machine's model leaves anyway."""
-    kept = tuple(each for each in result.causes if _saved_n2(each) > _LEAST_SHARE_OF_LEFT * left_n**2)
+    usual_n2 = max(left_n, result.extended.held_out_rms_n) ** 2  # coarser readings leave more, and more by chance
+    kept = tuple(each for each in result.causes if _saved_n2(each) > _LEAST_SHARE_OF_LEFT * usual_n2)
     if len(kept) == len(result.causes):
         return result
     gone = ", ".join(each.name for each in result.causes if each not in kept)

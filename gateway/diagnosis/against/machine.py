@@ -9,23 +9,30 @@ from typing import Final
 
 import numpy as np
 
+from gateway.catalogue.effect import Effect, EffectForm
 from gateway.diagnosis.against.machine_error import common_error_n, machine_error_columns
 from gateway.diagnosis.bench.bench import Bench, bench_of
 from gateway.diagnosis.bench.parameters import STARTS, ModelParameters
-from gateway.diagnosis.diagnose import Options, doubt_times, prepare_search
+from gateway.diagnosis.diagnose import Options, SearchStart, doubt_times, prepare_search
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.model_fit.base_fit import refit
 from gateway.diagnosis.model_fit.initial_state import drop_unfelt_starts, fit_initial_states, start_parameters
 from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, linearise
 from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
+from gateway.diagnosis.model_fit.normal_equations import held_out_errors
 from gateway.diagnosis.noise.whitening import Whitener, white_whitener
 from gateway.diagnosis.result import OwnEffect
 from gateway.diagnosis.search.direct_evidence import DirectEvidence
-from gateway.diagnosis.search.search import search_effects
+from gateway.diagnosis.search.model_comparison import is_significant
+from gateway.diagnosis.search.search import SearchResult, compare_under_noise, search_effects
 from gateway.diagnosis.verdict import estimates_of
 from gateway.twin.plant import Plant
 
+_MOST_EFFECTS: Final = 8  # of a machine; a foreign rig asked for four to six
+_PREDICTS: Final = 0.995  # of the held-out error: from here on an effect predicts better
 _WAVES: Final = 8  # from the optimum under coloured noise to the plain one
+
+NamedForm = tuple[Effect, EffectForm]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,15 +65,33 @@ def describe_machine(old: Sequence[Measurement], given: Plant, options: Options)
     """Return the machine that these recordings show, with as many effects as they ask for. given: the plant to start from."""
     start = prepare_search(old, given, options)
     found = search_effects(start.bench, start.base, start.effects, start.whiten)
-    plain = white_whitener(
-        start.bench, found.fitted.residual_n
-    )  # the whitened optimum leaves slow errors, which come again
-    fitted = refit(start.bench, found.fitted, plain, waves=_WAVES)
+    fitted, named = _add_what_predicts(start, found)
+    plain = white_whitener(start.bench, fitted.residual_n)  # the whitened optimum leaves slow errors, which come again
+    fitted = refit(start.bench, fitted, plain, waves=_WAVES)
     effects = tuple(
-        OwnEffect(each.effect.name, estimates_of(start.bench, fitted, each.form.parameters, plain))
-        for each in found.accepted
+        OwnEffect(effect.name, estimates_of(start.bench, fitted, form.parameters, plain)) for effect, form in named
     )
     return MachineModel(start.bench, fitted, start.evidence, effects)
+
+
+def _add_what_predicts(start: SearchStart, found: SearchResult) -> tuple[FittedModel, list[NamedForm]]:
+    """The model of the search with every further effect that predicts better, however small, and all its effects: the machine
+    is to be described, not to be explained."""
+    bench, fitted, whiten = start.bench, found.fitted, found.whiten
+    named = [(each.effect, each.form) for each in found.accepted]
+    while len(named) < _MOST_EFFECTS:
+        taken = {effect.name for effect, _ in named}
+        effects = [effect for effect in start.effects if effect.name not in taken]
+        fitted, whiten, comparison = compare_under_noise(bench, fitted, effects, whiten)
+        if not comparison.ranked or not is_significant(comparison.winner, comparison.starts):
+            break
+        winner = comparison.winner
+        before_n, after_n = (held_out_errors(bench, each, whiten).rms_n for each in (fitted, winner.fitted))
+        if after_n > _PREDICTS * before_n:
+            break
+        fitted = winner.fitted
+        named.append((winner.effect, winner.form))
+    return fitted, named
 
 
 def join_recordings(new: Sequence[Measurement], machine: MachineModel, given: Plant, options: Options) -> JointModel:

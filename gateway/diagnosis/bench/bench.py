@@ -25,6 +25,7 @@ from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Replay
 from gateway.twin.surroundings import COLUMNS
 
+_AT_ONCE: Final = 64  # plants of a replay: a search tries hundreds, and what is between them and the readings is large
 BLOCKS: Final = 20  # per recording, for held-out errors and resampling
 SURROUNDINGS: Final = COLUMNS  # what a drive takes of a recording's covariates, and of its position
 NOMINAL_AREA_M2: Final = 1.0e-4  # turns a measured pressure into newtons
@@ -93,14 +94,16 @@ class Bench:
         """Return readings, N; shape (points, rows), all rows."""
         result = np.empty((len(parameter_sets), self.rows))
         for recording, replay in enumerate(self.replays):
-            plants = [parameters.plant_of(recording) for parameters in parameter_sets]
-            response = replay.run(plants, [parameters.start(recording) for parameters in parameter_sets])
-            for channel in self.channels:
-                if channel.recording == recording and channel.is_force:
-                    result[:, channel.rows] = response.reading_n
-                elif channel.recording == recording:
-                    result[:, channel.rows] = response.pressure_pa
-                    result[:, channel.rows] *= NOMINAL_AREA_M2
+            for first in range(0, len(parameter_sets), _AT_ONCE):
+                some = slice(first, first + _AT_ONCE)
+                plants = [parameters.plant_of(recording) for parameters in parameter_sets[some]]
+                response = replay.run(plants, [parameters.start(recording) for parameters in parameter_sets[some]])
+                for channel in self.channels:
+                    if channel.recording == recording and channel.is_force:
+                        result[some, channel.rows] = response.reading_n
+                    elif channel.recording == recording:
+                        result[some, channel.rows] = response.pressure_pa
+                        result[some, channel.rows] *= NOMINAL_AREA_M2
         if self.character_n_per_s is not None:
             result += np.outer([parameters.character_s for parameters in parameter_sets], self.character_n_per_s)
         return result

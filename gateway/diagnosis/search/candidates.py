@@ -21,6 +21,7 @@ _LARGEST_STRETCH: Final = 3.0  # how far beyond its start a response that is not
 _FAR_BEHIND: Final = 0.25  # of the best gain: what is further behind is not refined
 _LEAST_FIRST_STEP: Final = 0.2  # of a start: a refinement that begins at nothing stays there
 _INDEPENDENT: Final = 1.0e-5  # eigenvalue of normalised columns below which they are the same column
+_AT_ONCE: Final = 32  # columns: there are hundreds, as long as the recordings
 _QUARTER: Final = {"rad": 0.5 * math.pi, "deg": 90.0}
 
 
@@ -61,8 +62,17 @@ def simulate_candidates(
         return CandidateColumns((), np.empty((0, bench.rows)))
     names = [each.effect.name for each in candidates]
     progress.report(f"trying {len(candidates)} forms and sizes of {len(set(names))} effects")
-    centre = bench.measured_n - fitted.residual_n
-    return CandidateColumns(tuple(candidates), bench.reduced(bench.simulate(parameter_sets) - centre * bench.usable))
+    return CandidateColumns(tuple(candidates), _changes_n(bench, fitted, parameter_sets))
+
+
+def _changes_n(bench: Bench, fitted: FittedModel, parameter_sets: Sequence[ModelParameters]) -> Floats:
+    """What each of these models has in other readings than the fitted one, (models, rows); a few at a time."""
+    found = bench.simulate(parameter_sets)
+    centre = (bench.measured_n - fitted.residual_n) * bench.usable
+    for first in range(0, found.shape[0], _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        found[some] = bench.reduced(found[some] - centre)
+    return found
 
 
 def _starts(form: EffectForm, parameters: ModelParameters, hints: SearchHints) -> tuple[Start, ...]:
@@ -183,8 +193,8 @@ def best_scores(found: Sequence[CandidateScore], most: int) -> list[CandidateSco
 def unexplained_residual(found: CandidateColumns, fitted: FittedModel) -> tuple[Floats, Floats]:
     """Return what is left of the residual when every column may take its share, and the orthonormal columns (k, rows)."""
     rows = np.vstack([fitted.jacobian, found.columns])
-    norms = np.sqrt(np.sum(rows**2, axis=1))
-    rows = rows[norms > 0.0] / norms[norms > 0.0, None]
+    norms = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    rows /= np.where(norms > 0.0, norms, 1.0)[:, None]
     normal_matrix = rows @ rows.T
     sizes, vectors = np.linalg.eigh(normal_matrix)
     kept = sizes > _INDEPENDENT

@@ -75,7 +75,7 @@ class SearchResult:
 
 def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], whiten: Whitener) -> SearchResult:
     """Return all effects that the recording shows, one after the other. `base` is the refitted base model."""
-    base, whiten, comparison = _compare_under_noise(bench, base, effects, whiten)
+    base, whiten, comparison = compare_under_noise(bench, base, effects, whiten)
     first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
     unnamed: list[Dependence] = []
     while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
@@ -85,7 +85,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
         if is_seen and comparison.ranked and is_significant(comparison.winner, comparison.starts):
             winner, saved = comparison.winner, saved_share(bench, fitted, comparison.winner, whiten, explained)
             if saves_enough(winner, saved):  # the name of a trifle is not worth foresight
-                winner = _pick_with_companions(bench, comparison, _not_accepted(effects, accepted), whiten)
+                winner = _pick_with_companions(bench, comparison, not_accepted(effects, accepted), whiten)
                 saved = saved if winner is comparison.winner else saved_share(bench, fitted, winner, whiten, explained)
             saved *= is_more_than_a_wrong_form(winner, saved, explained)
         progress.report("looking for what no effect explains")
@@ -106,7 +106,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
             usual.append(winner.effect)
             base, fitted = _widen_base(bench, base, winner, whiten), winner.fitted
         effects = [effect for effect in effects if effect not in usual]
-        fitted, whiten, comparison = _compare_under_noise(bench, fitted, _not_accepted(effects, accepted), whiten)
+        fitted, whiten, comparison = compare_under_noise(bench, fitted, not_accepted(effects, accepted), whiten)
         base = _refit_base(bench, base, whiten)
     found = SearchResult(bench, base, fitted, tuple(accepted), tuple(unnamed), whiten, first, comparison)
     if len(accepted) > 1:
@@ -114,7 +114,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
     return found
 
 
-def _compare_under_noise(
+def compare_under_noise(
     bench: Bench, fitted: FittedModel, effects: Sequence[Effect], whiten: Whitener
 ) -> tuple[FittedModel, Whitener, ModelComparison]:
     """Noise as the remainder shows it, the model at its optimum under that noise, and the effects compared beside it.
@@ -148,7 +148,7 @@ def _refit_base(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedMo
     return refit(bench, fitted, whiten, waves=_WAVES_AGAIN)
 
 
-def _not_accepted(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect]) -> list[Effect]:
+def not_accepted(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect]) -> list[Effect]:
     taken = {each.effect.name for each in accepted}
     return [effect for effect in effects if effect.name not in taken]
 
@@ -211,7 +211,7 @@ def _exchange_effects(found: SearchResult, effects: Sequence[Effect]) -> SearchR
         lone = refit_without(bench, found, incumbent, (*before, *after))
         hints = search_hints(bench, lone, whiten)
         held = refined_effect(bench, (incumbent.effect, incumbent.form), found.fitted, lone, whiten)
-        competitors = Competitors(_not_accepted(effects, (*before, *after)), hints, incumbent=held)
+        competitors = Competitors(not_accepted(effects, (*before, *after)), hints, incumbent=held)
         comparison = compare_effects(bench, lone, competitors, whiten)
         winner = comparison.winner
         if is_significant(winner, comparison.starts):
