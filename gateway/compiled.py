@@ -5,17 +5,18 @@ same function. A `loop` walks over arrays. numba belongs to the extra `analysis`
 so that a process which never searches does not load it.
 
 numba keeps compiled loops by the file they stand in, and does not see that a step in another file has changed. So they
-are kept in a folder of their own per state of all steps, in the folder of `compiled_folder`. Where files are not taken (any
-more), loops are compiled anew in each process.
+are kept in a folder of their own per state of all steps and loops, in the folder of `compiled_folder`. Where files are not
+taken (any more), loops are compiled anew in each process.
 """
 
 import hashlib
 import importlib
+import inspect
 import sys
 from collections.abc import Callable
 from functools import cache, wraps
 from pathlib import Path
-from types import CodeType
+from threading import Lock
 from typing import Any, Final, ParamSpec, TypeVar
 
 from gateway import progress
@@ -27,6 +28,7 @@ _Result = TypeVar("_Result")
 _steps: Final[list[Callable[..., Any]]] = []
 _loops: Final[list[Callable[..., Any]]] = []
 _unkept: Final[set[Callable[..., Any]]] = set()
+_one_at_a_time: Final = Lock()
 _LINEAR_ALGEBRA: Final = ("scipy.linalg", "scipy.linalg.cython_blas")
 PREPARING: Final = "preparing the simulation for this machine, once"
 """What is reported while loops are compiled, as which of all loops that there are."""
@@ -59,9 +61,15 @@ def loop(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Res
     return run
 
 
-@cache
 def _compiled(function: Callable[_Parameters, _Result], is_kept: bool) -> Callable[_Parameters, _Result]:
-    """Return the function with a compiler before it: what it compiles for the types of its arguments is kept on disk."""
+    """Return the function with a compiler before it, the same one to all threads: it has compiled for some types already."""
+    with _one_at_a_time:
+        return _compiler_of(function, is_kept)
+
+
+@cache
+def _compiler_of(function: Callable[_Parameters, _Result], is_kept: bool) -> Callable[_Parameters, _Result]:
+    """Make it: what it compiles for the types of its arguments is kept on disk."""
     numba, has_folder = _numba()
     compiler = numba.njit(cache=is_kept and has_folder, nogil=True, error_model="numpy")
     compiled: Callable[_Parameters, _Result] = compiler(function)
@@ -119,24 +127,14 @@ def _report_compilations(event: Any) -> None:
 
 
 def _fingerprint() -> str:
-    """Name the state of all steps."""
+    """Name the state of all steps and loops: the modules that they stand in, where a type that is renamed stands too, for what
+    is kept of it cannot be read under another name; and the numbers that steps have from elsewhere."""
     digest = hashlib.sha256()
+    for name in sorted({function.__module__ for function in [*_steps, *_loops]}):
+        digest.update(inspect.getsource(sys.modules[name]).encode())
     for function in sorted(_steps, key=lambda one: (one.__module__, one.__qualname__)):
-        digest.update(repr((_content(function.__code__), _constants(function))).encode())
-    for module in sorted({function.__module__ for function in (*_steps, *_loops)}):
-        digest.update(repr((module, _named_tuples(module))).encode())
+        digest.update(repr(_constants(function)).encode())
     return digest.hexdigest()[:16]
-
-
-def _named_tuples(module: str) -> list[tuple[str, Any]]:
-    """Return the named tuples that a module knows: what was compiled for one that has another name by now cannot be read."""
-    known = vars(sys.modules[module]).items()
-    return sorted((name, one._fields) for name, one in known if isinstance(one, type) and hasattr(one, "_fields"))
-
-
-def _content(code: CodeType) -> tuple[Any, ...]:
-    constants = [_content(one) if isinstance(one, CodeType) else one for one in code.co_consts]
-    return (code.co_name, code.co_code, constants, code.co_names)
 
 
 def _constants(function: Callable[..., Any]) -> list[Any]:

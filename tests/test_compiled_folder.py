@@ -72,12 +72,43 @@ def run_with(package: Path, home: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def test_an_installed_package_is_compiled_once_and_without_a_home_each_time(tmp_path: Path) -> None:
-    ours, room = Path(gateway.__file__).parent, tmp_path / "gateway"
+RENAMED = """
+from typing import NamedTuple
+from gateway.compiled import loop, step
+from gateway import progress
+class Number(NamedTuple):
+    value: float
+@step
+def twice(number: Number):
+    return 2.0 * number.value
+@loop
+def double_number(number):
+    return twice(number)
+def double(value):
+    return double_number(Number(value))
+"""
+
+
+def test_what_another_version_has_compiled_is_left_alone(tmp_path: Path) -> None:
+    """Its types may have other names now, and what was kept of them can then not be read."""
+    room = copy_of_the_compiler(tmp_path)
+    (room / "__pycache__").mkdir()
+    for name in ("Number", "Figure"):
+        (tmp_path / "compiled_here.py").write_text(RENAMED.replace("Number", name))
+        assert run_with(tmp_path, str(tmp_path))[-1] == "42.0"
+
+
+def copy_of_the_compiler(folder: Path) -> Path:
+    ours, room = Path(gateway.__file__).parent, folder / "gateway"
     room.mkdir()
     for name in ("compiled", "compiled_folder", "extras", "progress"):
         (room / f"{name}.py").write_text((ours / f"{name}.py").read_text(encoding="utf-8"), encoding="utf-8")
     (room / "__init__.py").write_text("")
+    return room
+
+
+def test_an_installed_package_is_compiled_once_and_without_a_home_each_time(tmp_path: Path) -> None:
+    room = copy_of_the_compiler(tmp_path)
     (tmp_path / "compiled_here.py").write_text(LOOP)
     unwritable(room / "__pycache__")
     compiling = "preparing the simulation for this machine, once: 1 of 1"
