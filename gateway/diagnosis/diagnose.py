@@ -150,7 +150,7 @@ def _chance_s(measurements: Sequence[Measurement], late_s: float) -> float:
 def diagnosis_of_wrong_columns(
     measurements: Sequence[Measurement], given: Plant, suspected: tuple[Suspect, ...]
 ) -> Diagnosis:
-    """The answer where columns are wrong: what stands in them, and no cause."""
+    """Return the answer where columns are wrong: what stands in them, and no cause."""
     bench = bench_of(measurements)
     simulated_n = bench.simulate(
         [ModelParameters(without_hidden(given, frozenset()), tuple(0.0 for _ in measurements))]
@@ -178,7 +178,7 @@ def diagnosis_of_wrong_columns(
 
 
 def without_hidden(plant: Plant, hidden: frozenset[str]) -> Plant:
-    """The plant without noise and rounding, and without the effects that are to be found again."""
+    """Return the plant without noise and rounding, and without the effects that are to be found again."""
     plant = with_value(with_value(plant, "cell", "noise_n", 0.0), "cell", "quantum_n", 0.0)
     for name in hidden:
         for parameter in BY_NAME[name].parameters:
@@ -196,7 +196,7 @@ def _has_effect(plant: Plant, name: str) -> bool:
 
 
 def with_readings_of(given: Plant, plant: Plant) -> Plant:
-    """The plant with the noise and the rounding that were known before, unless a coarser rounding was found."""
+    """Return the plant with the noise and the rounding that were known before, unless a coarser rounding was found."""
     quantum_n = max(given.cell.quantum_n, plant.cell.quantum_n)
     return with_value(with_value(plant, "cell", "noise_n", given.cell.noise_n), "cell", "quantum_n", quantum_n)
 
@@ -240,7 +240,7 @@ def _take_direct_evidence(
 
 
 def effects_to_search(free: Sequence[Parameter], hidden: frozenset[str], late_s: float) -> tuple[Effect, ...]:
-    """Effects that may be found: all that the base model does not fit anyway.
+    """Return the effects that may be found: all that the base model does not fit anyway.
 
     Where wires may be late by themselves, a drag that differs by direction is not looked for: on the pad it comes late
     like a wire, only by milliseconds more in one direction than in the other.

@@ -55,14 +55,14 @@ class Suspect:
 
     @property
     def mapping(self) -> dict[str, str]:
-        """What --columns has to say, by name: SOURCE[:UNIT] with headers as they are."""
+        """Columns as --columns has to name them: SOURCE[:UNIT] by name, with headers as they are."""
         if self.other:
             return {self.column: self.other, self.other: self.column}
         return {self.column: f"{self.column}:{self.unit}"}
 
     @property
     def sentence(self) -> str:
-        """What was seen, what it probably is, and what corrects it."""
+        """Sentence that says what was seen, what it probably is, and what corrects it."""
         return f"{self._seen}; {self.option} corrects it" if self.option else self._seen
 
     @property

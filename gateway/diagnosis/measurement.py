@@ -41,8 +41,10 @@ class Measurement:
 
     @property
     def rows(self) -> int:
+        """Number of rows."""
         return int(self.time_s.size)
 
     @property
     def duration_s(self) -> float:
+        """Time from the first row to the last."""
         return float(self.time_s[-1]) if self.rows else 0.0

@@ -225,6 +225,7 @@ def _interval(value: float, error: float) -> tuple[float, float]:
 def estimates_of(
     bench: Bench, fitted: FittedModel, parameters: Sequence[Parameter], whiten: Whitener
 ) -> dict[str, Estimate]:
+    """Return the parameters of a fit by name, each with its interval of 95 %, within the bounds of the catalogue."""
     own = np.sqrt(np.maximum(np.diag(covariance(fitted, whiten)), 0.0))
     errors = np.maximum(own, held_out_errors(bench, fitted, whiten).jackknife)[len(fitted.parameters.offsets_n) :]
     settled = [(each, 0.0) for each in parameters if each.settled]

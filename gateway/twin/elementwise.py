@@ -21,18 +21,21 @@ def positive_part(value: Real) -> Real:
 
 
 def larger(left: Real, right: Real) -> Real:
+    """Return the larger of two values, element by element."""
     if type(left) is float and type(right) is float:
         return left if left > right else right
     return np.maximum(left, right)
 
 
 def smaller(left: Real, right: Real) -> Real:
+    """Return the smaller of two values, element by element."""
     if type(left) is float and type(right) is float:
         return left if left < right else right
     return np.minimum(left, right)
 
 
 def clip(value: Real, low: float, high: float) -> Real:
+    """Return a value within low .. high."""
     return smaller(larger(value, low), high)
 
 

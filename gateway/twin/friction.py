@@ -32,7 +32,7 @@ PLACE_FIELDS: Final = ("place_n_per_mm", "place_n_per_mm2", "place_asymmetry_n_p
 
 
 def side_load_n(friction: Friction, conditions: TwinConditions) -> Real:
-    """side-load: what the surroundings add to the limit, N; a column that is not known adds nothing."""
+    """Return what a side-load adds to the friction's limit by feed, tilt and place, N; an unknown column adds nothing."""
     load: Real = 0.0
     if conditions.feed_mm_s is not None:
         load = load + friction.side_load_n_s_per_mm * abs(conditions.feed_mm_s)
@@ -49,14 +49,14 @@ def has_place(friction: Friction) -> bool:
 
 
 def place_limit_n(friction: Friction, conditions: TwinConditions) -> Real:
-    """position-dependent-friction: what the place in the stroke adds to the limit in both directions, N."""
+    """Return what the place in the stroke adds to the limit in both directions, N (position-dependent-friction)."""
     if conditions.aside_mm is None:
         return 0.0
     return (friction.place_n_per_mm + friction.place_n_per_mm2 * conditions.aside_mm) * conditions.aside_mm
 
 
 def place_asymmetry_n(friction: Friction, conditions: TwinConditions) -> Real:
-    """position-dependent-friction by direction: what the place adds to the limit moving out and takes moving in, N."""
+    """Return what the place adds to the limit moving out and takes moving in, N (position-dependent-friction by direction)."""
     if conditions.aside_mm is None:
         return 0.0
     slope, curvature = friction.place_asymmetry_n_per_mm, friction.place_asymmetry_n_per_mm2
@@ -64,7 +64,7 @@ def place_asymmetry_n(friction: Friction, conditions: TwinConditions) -> Real:
 
 
 def side_share(friction: Friction, conditions: TwinConditions) -> Real:
-    """side-load: the surface's grip grows with the thrust as soon as the tool is dragged, N/N."""
+    """Return the friction that the surface's grip adds per thrust as soon as the tool is dragged, N/N (side-load)."""
     if conditions.feed_mm_s is None:
         return 0.0
     return friction.side_load_n_per_n * (1.0 - exponential(-abs(conditions.feed_mm_s) / _DRAGGED_MM_PER_S))
@@ -77,14 +77,14 @@ def yield_travels_m(presliding_m: float) -> tuple[float, float, float]:
 
 
 def directional_drags(friction: Friction) -> tuple[float, float]:
-    """asymmetric-friction by speed: viscous drag (moving out, moving in), N s/m, neither below 0."""
+    """Return the viscous drag (moving out, moving in), N s/m, neither below 0 (asymmetric-friction by speed)."""
     viscous, more_out = friction.viscous_n_s_per_m, friction.asymmetry_n_s_per_m
     return max(viscous + more_out, 0.0), max(viscous - more_out, 0.0)
 
 
 @step
 def two_sided_limit(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
-    """asymmetric-friction: (limit, centre) of a friction that is larger moving out than moving in, neither below 0.
+    """Return (limit, centre) of a friction that is larger moving out than moving in, N, neither below 0 (asymmetric-friction).
 
     Friction is then centre + limit x strain. Rejected: a limit that jumps with the direction, which chatters at rest.
     """
@@ -94,13 +94,15 @@ def two_sided_limit(limit: Real, asymmetry_n: Real) -> tuple[Real, Real]:
 
 @step
 def stribeck_limit_n(stribeck_n: Real, speed_ratio: Real) -> Real:
-    """Return stribeck-friction: what standing adds to sliding, at a speed given as a multiple of its scale."""
+    """Return what standing adds to sliding, at a speed given as a multiple of its scale (stribeck-friction)."""
     return stribeck_n / (1.0 + speed_ratio * speed_ratio)
 
 
 @step
 def age_stiction(stiction_n: float, full_n: float, rest: float, travel: float) -> tuple[float, float]:
-    """dwell-stiction: a rest brings it towards `full_n`, motion takes it away; return (what rest adds, stiction after both).
+    """Return (what rest adds to a stiction, the stiction after rest and motion), N: dwell-stiction.
+
+    A rest brings it towards `full_n`, motion takes it away.
 
     rest: length of the step as a multiple of its time constant. travel: of the step, as a multiple of the breakaway.
     """

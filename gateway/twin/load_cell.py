@@ -32,6 +32,7 @@ class History:
         self._step_s, self._first = step_s, 0
 
     def put(self, value: float) -> None:
+        """Append the force of one more step, N."""
         self._values.append(value)
 
     def at(self, time_s: float) -> float:

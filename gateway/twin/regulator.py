@@ -63,7 +63,7 @@ class PressureLags(NamedTuple):
 
     @property
     def are_none(self) -> bool:
-        """Whether the pressure takes no time at all: it jumps with the target."""
+        """Tell whether the pressure takes no time at all: it jumps with the target."""
         return self.emptying_s == 0.0 and self.second_s == 0.0 and self.slew_pa_per_s >= UNLIMITED
 
 

@@ -31,7 +31,7 @@ class Twin:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start: state, time, faults and noise."""
+        """Go back to the start: state, time, faults and noise."""
         self._conditions = TwinConditions(command_v=0.0)
         self._regulator = RegulatorState(self.plant.regulator, STEP_S)
         self._slide = MovingSlide(self.plant, STEP_S)
@@ -90,6 +90,7 @@ class Twin:
 
     @property
     def time_s(self) -> float:
+        """Time since the start."""
         return (self._steps + self._owed_steps) * STEP_S
 
     @property
@@ -114,10 +115,11 @@ class Twin:
 
     @property
     def speed_m_per_s(self) -> float:
+        """Speed of the slide, positive outward."""
         return self._slide.speed_m_per_s
 
     def set_surface(self, height_m: float) -> None:
-        """Input: the workpiece under the pad, m towards the tool; 0 is null.
+        """Set the height of the workpiece under the pad, m towards the tool; 0 is null.
 
         Feed under the tool is a series of heights. ValueError when not finite.
         """
@@ -126,7 +128,7 @@ class Twin:
         self._slide.set_surface(height_m)
 
     def set_surroundings(self, around: Surroundings) -> None:
-        """Input: temperature, supply, spindle, feed, tilt, place; they hold until the next ones. None: not known.
+        """Set temperature, supply, spindle, feed, tilt and place, which hold until the next ones. None: not known.
 
         The position is taken from where its effects are nothing. ValueError when a value is not finite.
         """
@@ -140,7 +142,7 @@ class Twin:
         self._cell.select_active_effects(self._conditions)
 
     def set_disturbance(self, force_n: float) -> None:
-        """Input: an outside force on the slide, N towards the workpiece (a spindle's vibration); 0 is null.
+        """Set an outside force on the slide, N towards the workpiece (a spindle's vibration); 0 is null.
 
         It holds until the next one. ValueError when not finite.
         """
@@ -149,15 +151,15 @@ class Twin:
         self._slide.set_disturbance(force_n)
 
     def set_air(self, on: bool) -> None:
-        """Fault: shut the air supply off; the pressure falls with the regulator's lag."""
+        """Switch the air supply on or off, which is a fault: the pressure falls with the regulator's lag."""
         self._regulator.air = on
 
     def set_contact(self, on: bool) -> None:
-        """Fault: take the workpiece away, or bring it back."""
+        """Take the workpiece away, or bring it back: a fault."""
         self._slide.set_contact(on)
 
     def set_sign(self, sign: int) -> None:
-        """Fault: wires of the load cell swapped (-1) or right (+1)."""
+        """Set the wires of the load cell swapped (-1), a fault, or right (+1). ValueError for another sign."""
         if sign not in (-1, 1):
             raise ValueError(f"sign is -1 or +1, not {sign}")
         self._cell.sign = float(sign)

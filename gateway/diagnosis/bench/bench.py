@@ -65,7 +65,7 @@ class Bench:
 
     @cached_property
     def measured_n(self) -> Floats:
-        """What was measured, zero where a row does not count."""
+        """Measured readings, (rows,), N, zero where a row does not count."""
         return np.where(self.usable, self.raw_n, 0.0)
 
     @cached_property
@@ -80,6 +80,7 @@ class Bench:
 
     @property
     def rows(self) -> int:
+        """Number of rows of all segments."""
         return int(self.raw_n.size)
 
     @cached_property
@@ -160,7 +161,7 @@ class Bench:
         return np.concatenate([self.measurements[channel.recording].time_s for channel in self.channels])
 
     def command(self) -> Floats:
-        """Command, V, or pressure, Pa, whatever drives each recording."""
+        """Return the command, V, or the pressure, Pa, whatever drives each recording, (rows,)."""
         parts = []
         for channel in self.channels:
             measurement = self.measurements[channel.recording]

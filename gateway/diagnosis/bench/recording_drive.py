@@ -70,8 +70,8 @@ def _forgetting_row(drive: Floats, first: int) -> int:
 
 
 def begins_at_rest(measurement: Measurement) -> bool:
-    """Do command and force stand still at first, and the command at its lowest, so that the state before the first row is
-    known? Rest further up may have been reached from either side."""
+    """Return whether command and force stand still at first, the command at its lowest: then the state before the first row is
+    known. Rest further up may have been reached from either side."""
     rows = measurement.time_s < REST_S
     if measurement.command_v is None or rows.sum() < 8 or np.ptp(measurement.command_v[rows]) > 0.0:
         return False

@@ -34,6 +34,7 @@ class Experiment:
 
     @property
     def duration_s(self) -> float:
+        """Duration of its parts together."""
         return sum(part.duration_s for part in self.parts)
 
     @property
@@ -52,6 +53,7 @@ class Plan:
 
     @property
     def total_s(self) -> float:
+        """Duration of the whole plan."""
         return self.experiment.duration_s
 
 

@@ -38,11 +38,14 @@ class FittedModel:
 
     @property
     def size(self) -> int:
+        """Number of what is fitted: offsets and free parameters."""
         return len(self.parameters.offsets_n) + len(self.free)
 
 
 @dataclass(frozen=True, slots=True)
 class FitProblem:
+    """Where a fit begins, and which parameters it moves beside the offsets."""
+
     parameters: ModelParameters
     free: tuple[Parameter, ...]
 

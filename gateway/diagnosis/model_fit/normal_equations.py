@@ -36,7 +36,7 @@ class ModelSpan:
 
     @classmethod
     def of(cls, model: Floats, residual: Floats) -> "ModelSpan":
-        """model: (k, rows), residual: (rows,), whitened, or their spectra."""
+        """Return the span of a model's columns (k, rows), and what it leaves of a residual (rows,); whitened, or spectra."""
         scale = np.sqrt(np.maximum(np.sum(model**2, axis=1), 1.0e-300))
         basis = orthonormal(model / scale[:, None])
         return cls(basis, residual - (residual @ basis.T) @ basis)
@@ -56,6 +56,7 @@ class NormalEquations:
 
     @cached_property
     def normal_matrix(self) -> Floats:
+        """Products of the columns with each other beside the model, (columns, columns)."""
         return np.asarray(self._columns @ self._columns.T - self._spanned @ self._spanned.T)
 
     def add(self, indices: list[int]) -> ColumnGain:
@@ -105,6 +106,7 @@ class HeldOutErrors:
 
     @property
     def rms_n(self) -> float:
+        """Root mean square of the held-out errors."""
         return float(np.sqrt(np.sum(self.errors) / np.sum(self.counts)))
 
     @property

@@ -30,12 +30,12 @@ class Noise:
 
     @property
     def length(self) -> int:
-        """Of the FFT: even."""
+        """Length of the FFT: even."""
         return 2 * (self.weights.size - 1)
 
     @property
     def scale(self) -> Floats:
-        """What turns lines into coordinates with the same sums of products: all but the first and the last stand for two."""
+        """Factors that turn lines into coordinates with the same products: all but the first and the last stand for two."""
         scale = np.full(self.weights.size, np.sqrt(2.0 / self.length))
         scale[[0, -1]] = np.sqrt(1.0 / self.length)
         return scale

@@ -49,7 +49,7 @@ class Dependence:
 
     @property
     def contribution_n(self) -> Floats:
-        """What it explains, (rows,)."""
+        """Force that it explains, (rows,)."""
         return np.asarray(self.sizes @ self.regressors.columns)
 
 

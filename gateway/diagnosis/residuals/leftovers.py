@@ -80,7 +80,7 @@ def find_file(bench: Bench, power: Floats) -> str:
 
 
 def is_one_thing(one: Regressors, other: Regressors, contributions_n: tuple[Floats, Floats], rows: np.ndarray) -> bool:
-    """Do both tell of the same thing: the same columns, the same line, slow changes of the same recording, or one form?
+    """Return whether both tell of one thing: the same columns, the same line, slow changes of one recording, or one form.
 
     rows: that count.
     """
@@ -94,7 +94,7 @@ def is_one_thing(one: Regressors, other: Regressors, contributions_n: tuple[Floa
 
 
 def is_same_form(one: Leftover, other: Leftover) -> bool:
-    """Are both of one form, whatever their size: the same line, or the same words about the same column?"""
+    """Return whether both are of one form, whatever their size: the same line, or the same words about the same column."""
     if one.frequency_hz and other.frequency_hz:
         return abs(one.frequency_hz / other.frequency_hz - 1.0) < _SAME_LINE
     words = [_NUMBER.sub("", each.shape) for each in (one, other)]

@@ -53,7 +53,7 @@ def likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple
 
 
 def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:
-    """Dead bands of the target with which the twin explains most of the residual, the best first."""
+    """Return the dead bands of the target with which the twin explains most of the residual, the best first."""
     if _span_v(bench) == 0.0:
         return ()
     regulator, span = fitted.parameters.plant.regulator, model_span(fitted, whiten)

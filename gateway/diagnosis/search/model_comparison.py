@@ -62,11 +62,12 @@ class RefinedEffect:
 
     @property
     def penalised_gain(self) -> float:
+        """Gain less the penalty, by which effects are ranked."""
         return self.gain - self.penalty
 
     @property
     def penalty(self) -> float:
-        """What its parameters and its rarity cost, less its bonus, in chi-square."""
+        """Cost of its parameters and its rarity, less its bonus, in chi-square."""
         return _PENALTY_PER_PARAMETER * self.dof + self.effect.rarity - self.incumbent_bonus
 
 
@@ -86,6 +87,7 @@ class ModelComparison:
 
     @property
     def winner(self) -> RefinedEffect:
+        """The strongest effect. IndexError where none was refined."""
         return self.ranked[0]
 
     def group(self, name: str) -> tuple[str, ...]:
@@ -108,7 +110,7 @@ class ModelComparison:
 
 
 def is_significant(refined: RefinedEffect, starts: int) -> bool:
-    """Chi-square at 1 % over the number of starts."""
+    """Return whether an effect gains more than chance: chi-square at 1 % over the number of starts."""
     return chi2_tail(refined.gain, max(refined.dof, 1)) < _FALSE_ALARMS / max(starts, 1)
 
 

@@ -57,6 +57,7 @@ class DoubtfulEffect:
 
     @property
     def note(self) -> str:
+        """Sentence for the notes of an answer."""
         return f"{self.name} is no finding: {self.why}"
 
 

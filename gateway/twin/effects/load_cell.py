@@ -14,42 +14,42 @@ from gateway.twin.surroundings import TwinConditions
 
 
 def bend_line(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
-    """sensor-quadratic and sensor-cubic: F + q F^2 + c F^3."""
+    """Bend the cell's line by sensor-quadratic and sensor-cubic: return F + q F^2 + c F^3, N."""
     return force_n + (cell.quadratic_per_n + cell.cubic_per_n2 * force_n) * (force_n * force_n)
 
 
 def drift_span(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
-    """thermal-span-drift."""
+    """Apply thermal-span-drift: return the force, N, times 1 + span x (temperature - reference)."""
     return force_n * (1.0 + cell.span_per_k * (conditions.temperature_c - cell.reference_c))
 
 
 def drift_zero(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
-    """thermal-zero-drift."""
+    """Add thermal-zero-drift: return the force, N, plus zero x (temperature - reference)."""
     return force_n + cell.zero_n_per_k * (conditions.temperature_c - cell.reference_c)
 
 
 def add_warm_up(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
-    """warm-up: an error that dies away after switching on."""
+    """Add warm-up: return the force, N, with an error that dies away after switching on."""
     return force_n + cell.warm_up_n * exponential(-conditions.time_s / cell.warm_up_s)
 
 
 def add_drift(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
-    """linear-drift."""
+    """Add linear-drift: return the force, N, plus drift x time."""
     return force_n + cell.drift_n_per_s * conditions.time_s
 
 
 def add_hum(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
-    """mains-hum."""
+    """Add mains-hum: return the force, N, with a sine of the mains' frequency."""
     return force_n + cell.hum_n * sine((2.0 * math.pi) * cell.hum_hz * conditions.time_s + cell.hum_phase_rad)
 
 
 def add_crosstalk(cell: LoadCell, force_n: Real, conditions: TwinConditions) -> Real:
-    """valve-crosstalk: the command voltage of this moment, before a new one acts."""
+    """Add valve-crosstalk: return the force, N, plus a share of the command voltage of this moment, before a new one acts."""
     return force_n + cell.crosstalk_n_per_v * conditions.command_v
 
 
 def lose_sign(cell: LoadCell, reading_n: Real) -> Real:
-    """sign-loss: the share of a reading that has lost its sign."""
+    """Apply sign-loss: return the reading, N, a share of which has lost its sign."""
     return (1.0 - cell.sign_lost) * reading_n + cell.sign_lost * abs(reading_n)
 
 

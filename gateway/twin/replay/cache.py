@@ -21,6 +21,7 @@ class Cache:
         self._room_bytes, self._bytes = room_bytes, 0
 
     def get(self, key: Hashable) -> Floats | None:
+        """Return the series of a key; None where it is not kept (any more)."""
         found = self._kept.get(key)
         if found is not None:
             with suppress(KeyError):  # another thread has made room since

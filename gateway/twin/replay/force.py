@@ -21,7 +21,7 @@ class Forces:
         self._grid = grid
 
     def on_grid(self, contact: Contact, slide_n: Floats, creep_n: float = 0.0) -> Floats:
-        """Contact force on the grid without the spindle, N; the slide's own array when there is nothing to add.
+        """Return the contact force on the grid without the spindle, N; the slide's own array when there is nothing to add.
 
         creep_n: see StartState.
         """
@@ -38,7 +38,7 @@ class Forces:
         return force
 
     def at_rows(self, contact: Contact, contact_n: Floats, found: Floats) -> None:
-        """Contact force at the rows, spindle included, N."""
+        """Fill in the contact force at the rows, (rows,), spindle included, N."""
         found[:] = self._grid.at_rows(contact_n)
         conditions = self._grid.row_conditions
         for term in active_formulas((SPINDLE,), contact, conditions):

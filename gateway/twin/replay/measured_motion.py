@@ -49,7 +49,7 @@ class Motions:
         self._strains = Cache()
 
     def force_n(self, slide: Slide, friction: Friction, loads_n: tuple[Floats, Floats, Floats]) -> Floats:
-        """Force on the grid, N: thrust - friction outward, seen from the position's own direction.
+        """Return the force on the grid, N: thrust - friction outward, seen from the position's own direction.
 
         loads_n: thrust, what surroundings add to the friction's limit, and what of it moving out has more.
         """

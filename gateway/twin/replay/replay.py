@@ -64,6 +64,7 @@ class Replay:
 
     @property
     def notes(self) -> tuple[str, ...]:
+        """Sentences on what was done to the recording."""
         return self.grid.notes
 
     def run(self, plants: Sequence[Plant], starts: Sequence[StartState] | None = None) -> ReplayResult:
