@@ -122,8 +122,9 @@ class Calibration:
 
     slip_radii_v, slip_shares: empty for the linear blend over blend_span_n. force_limits_n: lowest and highest force that
     the set may be used for, as uploaded; empty where nothing but the branches' reach and the rig bounds it. response: None
-    where it was not measured. rms_n, max_n: on all measured points, partial reversals included. rejected: why it is not offered
-    for use, empty where it is.
+    where it was not measured. rms_n, max_n: on all measured points, partial reversals included. noise_n: standard deviation
+    of one reading while the command rests, 0 where it was not measured. rejected: why it is not offered for use, empty where
+    it is.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic in gateway.profiles
@@ -148,6 +149,7 @@ class Calibration:
     force_limits_n: tuple[float, ...] = ()
     response: Response | None = None
     rejected: str = ""
+    noise_n: float = 0.0
 
     @property
     def reversal(self) -> Reversal:

@@ -13,7 +13,7 @@ from typing import Final
 from gateway.bsfm.model import Calibration, Response
 from gateway.numbered_documents.store import NumberedStore, StoreError, file_name
 from gateway.processes.durable_file import add_checksum, verify_checksum
-from gateway.profiles import ProfileError
+from gateway.profiles import ProfileError, Rig
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.strict_yaml.text import parse
 
@@ -64,6 +64,11 @@ class CalibrationStore(NumberedStore[Calibration]):
     def find_data(self, data_sha256: str) -> int | None:
         """Return the number of the calibration that was made of these very data, None where there is none."""
         return next((e.number for e in self.list() if e.document and e.document.data_sha256 == data_sha256), None)
+
+
+def calibration_in_use(rig: Rig, state: Path) -> Calibration:
+    """Return the calibration in use in a state directory, else the rig's built-in one."""
+    return CalibrationStore(state, rig.calibration).find_selected().document or rig.calibration
 
 
 def as_text(calibration: Calibration) -> str:

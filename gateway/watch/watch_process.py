@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -79,6 +80,7 @@ def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:
 def make_watch(ring: RingReader, options: dict[str, Any]) -> tuple["Watch", "ForceWatch"]:
     """Return the watch over the rig's plant, the one in use where there is one, and that over the force. Everything heavy is
     imported here."""
+    from gateway.calibrations.store import calibration_in_use
     from gateway.plants.in_use import with_selected_plant
     from gateway.profiles import load_rig
     from gateway.watch.force_watch import ForceWatch
@@ -90,15 +92,19 @@ def make_watch(ring: RingReader, options: dict[str, Any]) -> tuple["Watch", "For
     assert rig.reference_plant is not None  # or nobody had started us
     tolerance_n = rig.control.defaults.in_band_tolerance_n
     setup = WatchSettings(options["window_s"], options["every_s"], tolerance_n)
-    watch = Watch(ring, WatchReference(rig.reference_plant), setup, diagnose_window, time.monotonic)
+    noise_n = calibration_in_use(rig, state).noise_n or None
+    diagnose = partial(diagnose_window, calibration_noise_n=noise_n)
+    watch = Watch(ring, WatchReference(rig.reference_plant), setup, diagnose, time.monotonic)
     return watch, ForceWatch(state, tolerance_n)
 
 
-def diagnose_window(measurements: "Sequence[Measurement]", plant: "Plant") -> "Diagnosis":
-    """Return the diagnosis of a window. Imports the search when it is called."""
+def diagnose_window(
+    measurements: "Sequence[Measurement]", plant: "Plant", calibration_noise_n: float | None = None
+) -> "Diagnosis":
+    """Return the diagnosis of a window. Imports the search when it is called. calibration_noise_n: see its Options."""
     from gateway.diagnosis import Options, diagnose
 
-    return diagnose(measurements, plant, Options(is_own=True))
+    return diagnose(measurements, plant, Options(is_own=True, calibration_noise_n=calibration_noise_n))
 
 
 def watch_forever(options: dict[str, Any]) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
+from gateway.bsfm.ladder.settled_points import find_settled_points
 from gateway.bsfm.model import Bsfm, Response
 from gateway.bsfm.response.identification import measure_response
 from gateway.bsfm.response.step_responses import RecordedRun
@@ -17,7 +18,7 @@ from gateway.twin import Plant, Twin
 from gateway.twin.experiment import Dwell, staircase
 
 RIG = "demo"
-STEP_HELD_S, SAMPLE_S = 1.5, 0.01
+STEP_HELD_S, SAMPLE_S, REST_STAIRS = 1.5, 0.01, 21
 TOP_V, STEP_V, GROUPS = 8.0, 0.1, 5
 READ_ONCE, READ_WELL = Dwell(readings=1), Dwell(readings=5)
 TURNS_V = (0.0, 7.0, 2.0, 5.0, 3.0, 4.5, 1.0, 6.0, 3.5, 5.5, 0.5, 2.5, 1.5, 3.0)  # partial reversals of all sizes
@@ -54,6 +55,18 @@ def run_minor_loops(plant: Plant, seed: int, turns_v: Iterable[float]) -> Walk:
     """Walk through partial reversals."""
     voltages_v = stairs_between(turns_v)
     return Walk(np.array(voltages_v), staircase(conditioned_twin(plant, seed), voltages_v, READ_WELL))
+
+
+def measure_noise_n(plant: Plant, seed: int) -> float:
+    """Return the standard deviation of a reading while the command rests, N, as the stairs of a ladder run show it: read
+    every 10 ms, from the share of a dwell that has settled."""
+    twin, rows = conditioned_twin(plant, seed), []
+    for share in np.linspace(0.0, 1.0, REST_STAIRS).tolist():
+        twin.command(share * TOP_V)
+        for _ in range(round(STEP_HELD_S / SAMPLE_S)):
+            rows.append((SAMPLE_S * len(rows), share * TOP_V, float(twin.read())))
+            twin.advance(SAMPLE_S)
+    return find_settled_points(*(np.array(column) for column in zip(*rows, strict=True))).noise_n
 
 
 def run_steps(plant: Plant, seed: int, model: Bsfm) -> Response:

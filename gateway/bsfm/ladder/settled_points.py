@@ -6,6 +6,7 @@ which is as settled as the dwell let it become. A table with one row per stair h
 forces belong to their own row or to the row before is decided at the turning points, where the two differ.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,13 +21,17 @@ SAME_V: Final = 2.0e-3  # commands closer than this are one: a read-back jitters
 TAIL_SHARE: Final = 0.25
 FEWEST_TAIL_ROWS: Final = 5
 SHORTEST_DWELL_S: Final = 0.1  # shorter stretches are the slew between two stairs
+LINE_NUMBERS: Final = 2  # of a straight line
+FEWEST_READINGS: Final = 20  # beyond the lines' own numbers: the noise is known to a sixth then
+KNOCKED: Final = 25.0  # times the usual variance, median: noise alone makes so much of a single difference once in 1000
 FEWEST_DWELL_ROWS: Final = 2  # the same where readings are as far apart: one on the way is not settled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """One settled reading per stair, in order. row: where its dwell begins; noise_n: of single readings, nan if unknown;
-    drift_n: how much the force still moved within the averaged part; notes: what was decided about the table."""
+    """One settled reading per stair, in order. row: where its dwell begins; noise_n: standard deviation of a single
+    reading, nan if unknown (`_noise_n`); drift_n: how much the force still moved within the averaged part; notes: what was
+    decided about the table."""
 
     voltage_v: Floats
     force_n: Floats
@@ -69,7 +74,7 @@ def _starts_of_stairs(command_v: Floats, stair: Integers) -> Integers:
 
 def _dwells(time_s: Floats, command_v: Floats, force_n: Floats, starts: Integers) -> Points:
     ends = np.append(starts[1:], len(time_s) - 1)  # the row of the next command still reads this one's force
-    dwells, squares, readings = [], 0.0, 0
+    dwells, tails = [], []
     for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
         if time_s[end] - time_s[start] < SHORTEST_DWELL_S or end - start < FEWEST_DWELL_ROWS:
             continue
@@ -77,12 +82,32 @@ def _dwells(time_s: Floats, command_v: Floats, force_n: Floats, starts: Integers
         half = len(tail) // 2
         drift_n = float(tail[half:].mean() - tail[:half].mean()) if half else 0.0
         dwells.append((command_v[start], tail.mean(), start, drift_n))
-        squares, readings = squares + float(np.sum((tail - tail.mean()) ** 2)), readings + max(0, len(tail) - 1)
+        tails.append(tail)
     if not dwells:
         raise ValueError(f"no command is held for {SHORTEST_DWELL_S:g} s: this is a ramp, not a ladder of stairs")
     voltage_v, mean_n, row, drift = (np.array(column) for column in zip(*dwells, strict=True))
-    noise_n = float(np.sqrt(squares / readings)) if readings >= 20 else float("nan")
-    return Points(voltage_v, mean_n, row.astype(np.int64), drift, noise_n)
+    return Points(voltage_v, mean_n, row.astype(np.int64), drift, _noise_n(tails))
+
+
+def _noise_n(tails: Sequence[Floats]) -> float:
+    """Standard deviation of a reading about the straight line through its dwell's tail: what still creeps is no noise, nor
+    is the dwell in which somebody knocked. nan for too few readings. Noise that is slower than a tail is not seen."""
+    usable = [tail for tail in tails if len(tail) > 1]
+    free = np.array([max(len(tail) - LINE_NUMBERS, 1) for tail in usable])
+    if free.sum() < FEWEST_READINGS:
+        return float("nan")
+    squares = np.array([_squares_about_line(tail) for tail in usable])
+    usual = squares <= KNOCKED * np.median(squares / free) * free
+    return float(np.sqrt(squares[usual].sum() / free[usual].sum()))
+
+
+def _squares_about_line(values: Floats) -> float:
+    """Of two values about their mean: a line would leave nothing."""
+    away = values - values.mean()
+    if len(values) <= LINE_NUMBERS:
+        return float(away @ away)
+    place = np.arange(len(values)) - 0.5 * (len(values) - 1)
+    return float(away @ away - (place @ away) ** 2 / (place @ place))
 
 
 def _tail(force_n: Floats) -> Floats:

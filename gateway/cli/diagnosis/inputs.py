@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway import defaults
+from gateway.calibrations.store import calibration_in_use
 from gateway.cli.errors import no_such_recording
 from gateway.cli.options import state_directory
 from gateway.devices import cell_host
@@ -16,7 +17,7 @@ from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.mapping_file import column_mapping
-from gateway.service.fitting.recorded_rig import plant_of, rig_of, rig_texts
+from gateway.service.fitting.recorded_rig import plant_of, recorded_noise_n, rig_of, rig_texts
 from gateway.twin.plant import values
 
 _WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
@@ -29,8 +30,9 @@ class Sources:
     """Everything that the diagnosis takes.
 
     paths: of the recordings, as given; rig: its name, empty for none; known_rig: where it is known here; notes: what was
-    decided; late_s: how late the wires may have made the readings; quantum_n: their known step; is_own: the plant is that
-    of the rig that the recordings were made on; straightened: what a plant in use has taken back of the first recording's
+    decided; late_s: how late the wires may have made the readings; quantum_n: their known step; calibration_noise_n: their
+    noise at rest by the calibration that they were made under, N, None where it is not known; is_own: the plant is that of
+    the rig that the recordings were made on; straightened: what a plant in use has taken back of the first recording's
     readings, by the cell's numbers.
     """
 
@@ -42,6 +44,7 @@ class Sources:
     notes: tuple[str, ...]
     late_s: float = 0.0
     quantum_n: float = 0.0
+    calibration_noise_n: float | None = None
     is_own: bool = False
     straightened: dict[str, Any] | None = None
 
@@ -52,8 +55,18 @@ class Sources:
         return first if count == 1 else f"{first} and {count - 1} more"
 
 
-def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, state: Path | None) -> Sources:
-    """Read everything that the diagnosis takes. RecordingError and CliError (65) for data, ProfileError for a rig."""
+def read_sources(
+    names: Sequence[str],
+    *,
+    rig: str | None,
+    columns: str | None,
+    state: Path | None,
+    calibration: str | None = None,
+) -> Sources:
+    """Read everything that the diagnosis takes. RecordingError and CliError (65) for data, ProfileError for a rig.
+
+    calibration: number, name or file of the one that the recordings were made under, None for what they say themselves.
+    """
     paths = tuple(recording_path(name, rig, state) for name in names)
     known = load_rig(rig) if rig else None
     mapping = column_mapping(columns)
@@ -65,18 +78,45 @@ def read_sources(names: Sequence[str], *, rig: str | None, columns: str | None, 
     plant_of_first = None if known else plant_of(recordings[0])
     rig_name, plant, notes = _of_rig(known) if known else _recorded(recordings, plant_of_first)
     here = known or rig_of(recordings[0])
+    noise_n, unknown = _calibration_noise(recordings, calibration, known, state)
     return Sources(
         paths=paths,
         measurements=measurements,
         plant=plant,
         rig=rig_name,
         known_rig=here,
-        notes=notes,
+        notes=(*notes, *unknown),
+        calibration_noise_n=noise_n,
         late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
         quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
         straightened=header_in_use(recordings[0].header).get("cell"),
         is_own=plant is (known.plant_profile if known else plant_of_first),
     )
+
+
+def _calibration_noise(
+    recordings: Sequence[Recording], given: str | None, rig: Rig | None, state: Path | None
+) -> tuple[float | None, tuple[str, ...]]:
+    """Noise of the readings at rest, N, None where no calibration tells it, and what to say of that.
+
+    By the calibration that is given, else by what each recording carries, else by what is in use on the rig that is given.
+    """
+    if given:
+        from gateway.cli.calibration.store_access import find_calibration, open_store
+
+        name = rig.name if rig else str(recordings[0].header.get("rig") or _ANY_STATE)
+        found = find_calibration(open_store(state_directory(state, name), name), given)
+        if found.noise_n > 0.0:
+            return found.noise_n, ()
+        return None, (f"calibration {found.name} carries no noise of the cell: one made anew does, see calibrate",)
+    carried = [recorded_noise_n(each) for each in recordings]
+    known = [each for each in carried if each is not None]
+    if len(known) == len(recordings):
+        return max(known), ()
+    if rig is None:
+        return None, ()
+    noise_n = calibration_in_use(rig, state_directory(state, rig.name)).noise_n
+    return (noise_n if noise_n > 0.0 else None), ()
 
 
 def _quantum_n(rig: Rig | None) -> float:

@@ -26,6 +26,7 @@ _OF_A_DIAGNOSIS: Final = (
     "recordings",
     "against",
     "without",
+    "calibration",
     "noise_floor_n",
     "report",
     "extend",
@@ -48,6 +49,11 @@ class _Finite(click.FloatRange):
 @click.command()
 @click.argument("recordings", metavar="RECORDING...", nargs=-1)
 @click.option("--rig", metavar="R.yaml", help="The rig whose plant is the start; default the recording's own.")
+@click.option(
+    "--calibration",
+    metavar="N",
+    help="The calibration that tells the cell's noise: number, name or file; default the recording's own.",
+)
 @click.option("--without", metavar="EFFECT", help="Switch one effect of the base model off, to see it found again.")
 @click.option(
     "--noise-floor-n",
@@ -127,7 +133,11 @@ def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
 
     with shown_progress("reading"):
         sources = read_sources(
-            options["recordings"], rig=options["rig"], columns=options["columns"], state=options["state"]
+            options["recordings"],
+            rig=options["rig"],
+            columns=options["columns"],
+            state=options["state"],
+            calibration=options["calibration"],
         )
         old = _read_old(options)
     check_targets(files.on_disk, (*sources.paths, *(old.paths if old else ())))
@@ -186,6 +196,7 @@ def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str,
     engine_options = Options(
         without=options["without"],
         noise_floor_n=options["noise_floor_n"],
+        calibration_noise_n=sources.calibration_noise_n,
         late_s=min(sources.late_s, old.late_s) if old else sources.late_s,
         quantum_n=sources.quantum_n,
         is_own=sources.is_own,

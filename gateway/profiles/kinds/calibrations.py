@@ -50,7 +50,11 @@ def _length_faults(calibration: Calibration, document: Document) -> list[Profile
 
 
 def _model_faults(calibration: Calibration, document: Document) -> list[ProfileFault]:
-    """Return what only the whole model shows: force limits that are none."""
+    """Return what only the whole model shows: force limits that are none; and a noise that is none."""
+    if not 0.0 <= calibration.noise_n < defaults.LARGEST_CELL_N:
+        return [
+            document.fault(("noise_n",), f"{calibration.noise_n:g} N: a standard deviation, 0 where it is not known")
+        ]
     try:
         calibration.model()
     except ValueError as error:

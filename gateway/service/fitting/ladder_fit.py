@@ -83,6 +83,7 @@ def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
         slip_shares=_plain(model["slip_shares"]),
         response=fit.measured.response,
         rejected=fit.verdict.rejected,
+        noise_n=fit.document["ladder"]["noise_n"] or 0.0,
     )
 
 

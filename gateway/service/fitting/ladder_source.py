@@ -7,7 +7,7 @@ from typing import Final
 from gateway import defaults
 from gateway.bsfm import Calibration
 from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, join_ladders
-from gateway.calibrations.store import CalibrationStore
+from gateway.calibrations.store import calibration_in_use
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
 from gateway.recording.layout import SUFFIX
@@ -129,7 +129,4 @@ def _from_file(file: str) -> Rig | None:
 
 def _reference(rig: Rig | None, state: Path | None) -> Calibration | None:
     """Return the calibration in use, else the rig's built-in one."""
-    if rig is None:
-        return None
-    selected = CalibrationStore(state, rig.calibration).find_selected() if state else None
-    return (selected.document if selected else None) or rig.calibration
+    return None if rig is None else calibration_in_use(rig, state) if state else rig.calibration

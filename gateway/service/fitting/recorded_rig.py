@@ -6,6 +6,7 @@ files have changed. A table without them is taken by its rig's name, if that is 
 
 import json
 from collections.abc import Mapping
+from math import inf
 from pathlib import PurePath
 
 from gateway.profiles import PlantProfile, ProfileError, Rig
@@ -30,6 +31,16 @@ def plant_of(recording: Recording) -> PlantProfile | None:
         return _read_recorded_plant(texts)
     rig = rig_of(recording)
     return rig.plant_profile if rig else None
+
+
+def recorded_noise_n(recording: Recording) -> float | None:
+    """Return the noise of the readings at rest as the calibration has it under which the recording was made, N; None where
+    neither knows it."""
+    try:
+        noise_n = float(recording.header.get("calibration_noise_n") or 0.0)
+    except (TypeError, ValueError):
+        return None
+    return noise_n if 0.0 < noise_n < inf else None
 
 
 def rig_texts(recording: Recording) -> dict[str, str]:

@@ -21,7 +21,7 @@ class Recordings:
         self._rig = rig
         self._log = log
         self._current: RunRecording | None = None
-        self.calibration_number = rig.calibration.number
+        self.calibration = rig.calibration
         self.plant_in_use = in_use_facts(rig)
 
     def start(self) -> dict[str, Any]:
@@ -33,7 +33,8 @@ class Recordings:
             "rig": rig.name,
             "rig_fingerprint": rig.fingerprint,
             "rig_texts": dict(rig.texts),
-            "calibration": self.calibration_number,
+            "calibration": self.calibration.number,
+            "calibration_noise_n": self.calibration.noise_n,
             "plant_in_use": self.plant_in_use,
             "simulated": rig.simulated,
             "seed": rig.seed,

@@ -267,7 +267,7 @@ class RunningRig:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""
         self._calibration = active.calibration
         self.controller.use(self._rig.calibration_in_use(active.calibration, active.model))
-        self._recordings.calibration_number = active.calibration.number
+        self._recordings.calibration = active.calibration
         lowered = self.bank.set_active_model(active.calibration, active.pointer.active.slot_word)
         if lowered:
             self._log("calibration", lowered)

@@ -1,5 +1,7 @@
 """One settled point per dwell; what is on its way is none."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -17,3 +19,28 @@ def test_the_one_reading_of_a_slew_is_no_point_however_slow_the_readings(rate_hz
     points = find_settled_points(times, np.array(volts), np.array(forces))
     assert points.voltage_v.tolist() == [0.0, 2.0, 4.0]
     assert points.force_n.tolist() == pytest.approx([0.0, 20.0, 40.0])
+
+
+def dwells(tail_n: Callable[[int, np.ndarray], np.ndarray], stairs: int = 40) -> float:
+    """Noise of stairs of 1 s at 80 Hz; tail_n: force from the stair's number and the time within it."""
+    within_s = np.arange(80) / 80.0
+    force_n = np.concatenate([tail_n(stair, within_s) for stair in range(stairs)])
+    volts = np.repeat(0.1 * np.arange(stairs), 80)
+    return find_settled_points(np.arange(force_n.size) / 80.0, volts, np.roll(force_n, 1)).noise_n
+
+
+def test_the_noise_at_rest_is_neither_what_creeps_nor_a_knock() -> None:
+    rng = np.random.default_rng(5)
+    noise: Callable[[], np.ndarray] = lambda: rng.normal(0.0, 0.1, 80)  # noqa: E731
+    assert dwells(lambda stair, at_s: stair + noise()) == pytest.approx(0.1, rel=0.1)
+    assert dwells(lambda stair, at_s: stair + 2.0 * at_s + noise()) == pytest.approx(0.1, rel=0.1)
+    knocked = lambda stair, at_s: stair + noise() + 5.0 * (stair == 7) * (at_s > 0.9)  # noqa: E731
+    assert dwells(knocked) == pytest.approx(0.1, rel=0.1)
+
+
+def test_two_readings_to_a_stair_show_the_noise_as_well() -> None:
+    rng = np.random.default_rng(6)
+    volts = np.repeat(0.1 * np.arange(80), 5)
+    force_n = np.roll(8.0 * volts, 1) + rng.normal(0.0, 0.1, 400)
+    points = find_settled_points(np.arange(400) / 10.0, volts, force_n)
+    assert points.noise_n == pytest.approx(0.1, rel=0.2)

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,11 @@ import pytest
 from click.testing import Result
 
 import gateway.diagnosis
+from gateway.calibrations.store import CalibrationStore, as_text
 from gateway.cli.diagnosis.outputs import write_all
 from gateway.diagnosis.result import Diagnosis, Verdict
-from gateway.profiles import load_plant, shipped_profiles_folder
-from gateway.recording import Recorder
+from gateway.profiles import load_plant, load_rig, shipped_profiles_folder
+from gateway.recording import Recorder, export_csv, read_recording
 from gateway.service.closed_loop.study import ClosedLoopGain
 from gateway.twin import Plant
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
@@ -148,6 +150,49 @@ def test_a_recording_of_the_gateway_brings_its_own_plant(tmp_path: Path, call: C
     answer = call("diagnose", "1", "--state", str(tmp_path))
     assert answer.exit_code == 0, answer.output
     assert engine.asked[0][1].friction.coulomb_n == 3.5
+
+
+def own_recording(state: Path, **header: Any) -> Path:
+    """One of the gateway's own, on the shipped demo rig."""
+    rig = load_rig("demo")
+    facts = {"rig": "demo", "rig_texts": dict(rig.texts)} | header
+    recorder = Recorder(state / "recordings", facts, ("time_s", "command_v", "force_n"))
+    for row in rows():
+        recorder.append(tuple(row))
+    recorder.close()
+    return recorder.path
+
+
+def test_a_recording_carries_the_noise_of_its_calibration(tmp_path: Path, call: Call, engine: Engine) -> None:
+    """None where the calibration was made before noise was kept; an exported table carries it as well."""
+    file = own_recording(tmp_path, calibration_noise_n=0.08)
+    export_csv(read_recording(file), tmp_path / "out.csv")
+    old = own_recording(tmp_path / "old", calibration=3)
+    for name in (file, tmp_path / "out.csv", old):
+        assert call("diagnose", str(name)).exit_code == 0
+    assert [options.calibration_noise_n for _, _, options in engine.asked] == [0.08, 0.08, None]
+
+
+def test_a_calibration_that_is_named_tells_the_noise(tmp_path: Path, call: Call, engine: Engine) -> None:
+    """By its number in the state directory, by file, or as the one in use on the rig that --rig names."""
+    store = CalibrationStore(tmp_path, load_rig("demo").calibration)
+    number = store.add(replace(load_rig("demo").calibration, noise_n=0.05))
+    file = table(tmp_path / "a.csv")
+    for words in ("--calibration", str(number)), ("--rig", "demo"):
+        assert call("diagnose", str(file), "--state", str(tmp_path), *words).exit_code == 0
+    assert [options.calibration_noise_n for _, _, options in engine.asked] == [
+        0.05,
+        load_rig("demo").calibration.noise_n,
+    ]
+
+
+def test_a_calibration_without_noise_is_valid_and_says_so(tmp_path: Path, call: Call, engine: Engine) -> None:
+    old = tmp_path / "old.yaml"
+    old.write_text(as_text(replace(load_rig("demo").calibration, noise_n=0.0)).replace("noise_n: 0.0\n", ""))
+    answer = call("diagnose", str(table(tmp_path / "a.csv")), "--calibration", str(old))
+    assert answer.exit_code == 0, answer.output
+    assert "calibration demo carries no noise of the cell" in " ".join(answer.stdout.split())
+    assert engine.asked[0][2].calibration_noise_n is None
 
 
 def test_a_table_without_a_rig_says_which_plant_is_the_start(tmp_path: Path, call: Call, engine: Engine) -> None:

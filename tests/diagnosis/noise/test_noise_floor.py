@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gateway.diagnosis import Options, diagnose
 from gateway.diagnosis.bench.bench import Bench, bench_of
 from gateway.diagnosis.noise.noise_floor import find_floor, find_rests, replicate_floor_n, rest_floor
 from gateway.diagnosis.result import FloorSource
@@ -49,6 +50,13 @@ def test_a_command_that_moves_all_the_time_has_no_floor_of_its_own() -> None:
     assert find_floor(bench, white(4), None) is None
     known = find_floor(bench, white(4), 0.08)
     assert known is not None and (known.value_n, known.source) == (0.08, FloorSource.CALIBRATION)
+
+
+def test_the_answer_says_that_the_calibration_knows_the_floor() -> None:
+    rows = slice(0, 3000)
+    one = measurement(TIME_S[rows], MOVING_V[rows], 8.5 * MOVING_V[rows] + white(8)[rows], {})
+    found = diagnose([one], None, Options(calibration_noise_n=0.1)).baseline
+    assert (found.noise_floor_n, found.noise_floor_source) == (pytest.approx(0.1, rel=0.02), FloorSource.CALIBRATION)
 
 
 def test_a_line_that_hums_in_the_rests_is_a_cause_and_no_floor() -> None:

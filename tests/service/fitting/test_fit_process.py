@@ -38,6 +38,7 @@ def test_a_ladder_becomes_a_numbered_calibration_with_report_and_provenance(tmp_
     assert "f" * 12 in stored.source
     assert stored.model().force_n(3.0, 1.0) == pytest.approx(22.5, abs=0.5)
     assert stored.model().force_n(3.0, -1.0) == pytest.approx(25.5, abs=0.5)
+    assert stored.noise_n == pytest.approx(0.05, rel=0.3)
     document = json.loads(Path(result["document"]).read_text(encoding="utf-8"))
     assert document["calibration"] == result["stored"]
     assert f"Calibration {result['stored']}" in Path(result["report"]).read_text(encoding="utf-8")
