@@ -32,10 +32,13 @@ REAL_TIME = ("end_to_end", "ports")
 """Folders whose tests start processes or wait for real lines: one worker runs them one after the other, so that their
 bounds in seconds do not compete with each other."""
 
+LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/test_experiment_run.py")
+"""Of these, what waits for minutes while a plan is run, and is held to no second: another worker does that meanwhile."""
+
 SLOW = (
     "service/closed_loop/test_study.py",
     "service/fitting/test_interrupted_ladder.py",
-    "diagnosis/test_each_effect_is_found.py",
+    "diagnosis/foreign/test_what_has_changed.py",
     "watch/test_watch_in_virtual_time.py",
     "paper/test_paper_report.py",
 )
@@ -46,17 +49,19 @@ SPREAD = "hidden_effects/test_hidden_effects.py::test_a_recording_gets_an_answer
 
 
 def group_of(nodeid: str) -> str:
-    """What one worker runs in one piece: a file, whose fixtures are then made once, or everything in real time."""
+    """What one worker runs in one piece: a file, whose fixtures are then made once, or what is in real time, in two parts."""
     name = nodeid.removeprefix("tests/")
     if name.startswith(SPREAD):
         return name
     path = name.partition("::")[0]
+    if path in LONG_WAITS:
+        return "long waits"
     return "real time" if path.partition("/")[0] in REAL_TIME else path
 
 
 def begun_at(nodeid: str) -> int:
-    """Rank of a test's group among the workers' work: real time takes longest and waits most, then what is slow."""
-    order = ("real time", SPREAD, *SLOW)
+    """Rank of a test's group among the workers' work: what is in real time waits most, then what is slow."""
+    order = ("real time", "long waits", SPREAD, *SLOW)
     group = SPREAD if nodeid.removeprefix("tests/").startswith(SPREAD) else group_of(nodeid)
     return order.index(group) if group in order else len(order)
 
@@ -109,7 +114,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Workers of pure tests step back behind the one that is held to seconds."""
-    if hasattr(item.config, "workerinput") and group_of(item.nodeid) != "real time":
+    if hasattr(item.config, "workerinput") and group_of(item.nodeid) not in ("real time", "long waits"):
         os.setpriority(os.PRIO_PROCESS, 0, max(BEHIND_REAL_TIME, os.getpriority(os.PRIO_PROCESS, 0)))
 
 

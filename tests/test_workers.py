@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.conftest import REAL_TIME, SLOW, SPREAD, begun_at, group_of
+from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, group_of
 
 TESTS = Path(__file__).parent
 
@@ -16,6 +16,11 @@ def test_all_that_is_in_real_time_is_one_group_and_begins_first() -> None:
     nodeids = [f"tests/{folder}/test_any.py::test_a" for folder in REAL_TIME]
     assert {group_of(nodeid) for nodeid in nodeids} == {"real time"}
     assert {begun_at(nodeid) for nodeid in nodeids} == {0}
+
+
+def test_what_waits_for_minutes_is_the_second_group() -> None:
+    nodeids = [f"tests/{file}::test_a" for file in LONG_WAITS]
+    assert {(group_of(nodeid), begun_at(nodeid)) for nodeid in nodeids} == {("long waits", 1)}
 
 
 def test_each_recording_of_the_sample_is_a_group_and_the_laws_over_them_are_one() -> None:
@@ -32,5 +37,5 @@ def test_slow_files_begin_before_others() -> None:
 
 def test_every_place_that_the_lists_name_is_there() -> None:
     file, _, name = SPREAD.partition("::")
-    assert all((TESTS / place).exists() for place in (*REAL_TIME, *SLOW))
+    assert all((TESTS / place).exists() for place in (*REAL_TIME, *LONG_WAITS, *SLOW))
     assert f"def {name.removesuffix('[')}(" in (TESTS / file).read_text(encoding="utf-8")
