@@ -117,7 +117,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
 def compare_under_noise(
     bench: Bench, fitted: FittedModel, effects: Sequence[Effect], whiten: Whitener
 ) -> tuple[FittedModel, Whitener, ModelComparison]:
-    """Noise as the remainder shows it, the model at its optimum under that noise, and the effects compared beside it.
+    """Return the model at its optimum under the noise that its remainder shows, that noise, and the effects compared so.
 
     Where even the winner leaves several times that noise, no model is near the truth yet, and a whitening that believes
     in one would look at the fastest details only: the noise is then what the best model leaves.
@@ -149,6 +149,7 @@ def _refit_base(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedMo
 
 
 def not_accepted(effects: Sequence[Effect], accepted: Sequence[AcceptedEffect]) -> list[Effect]:
+    """Return the effects that are not in the model yet."""
     taken = {each.effect.name for each in accepted}
     return [effect for effect in effects if effect.name not in taken]
 
