@@ -38,7 +38,7 @@ LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/
 SLOW = (
     "service/closed_loop/test_study.py",
     "service/fitting/test_interrupted_ladder.py",
-    "diagnosis/foreign/test_what_has_changed.py",
+    "diagnosis/against/test_what_has_changed.py",
     "watch/test_watch_in_virtual_time.py",
     "paper/test_paper_report.py",
 )
