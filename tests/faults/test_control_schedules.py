@@ -23,13 +23,13 @@ CELL_TIMEOUT_S, OUTPUT_TIMEOUT_S, STALL_S, LEASE_S = 0.05, 0.1, 0.1, 0.2
 ENABLE_BIT, RESET_BIT, FAULT_STATE, OFF_STATE = 1, 2, 4, 0
 
 
-def check_range(history: list[Record]) -> None:
+def assert_range(history: list[Record]) -> None:
     for record in history:
         volts = record.output.voltage_v
         assert isfinite(volts) and LOWEST_V <= volts <= HIGHEST_V, f"I1 at {record.time_s}: {volts} V"
 
 
-def check_slew(history: list[Record]) -> None:
+def assert_slew(history: list[Record]) -> None:
     """A running minimum of v - slew t: no later voltage may lie more than one tick's rise above that line."""
     lowest = 0.0
     for record in history:
@@ -54,14 +54,14 @@ def broken_conditions(record: Record) -> Iterator[str]:
         yield "loop stalled"
 
 
-def check_conditions(history: list[Record]) -> None:
+def assert_conditions(history: list[Record]) -> None:
     for record in history:
         if record.output.voltage_v != SAFE_V:
             broken = list(broken_conditions(record))
             assert not broken, f"I4 at {record.time_s}: {record.output.voltage_v} V while {broken}"
 
 
-def check_lease(history: list[Record]) -> None:
+def assert_lease(history: list[Record]) -> None:
     """I3 for the master: a change of the heartbeat, or the enable itself, is at most T + 20 ms ago."""
     renewed_s, beat, enabled = -1.0, 0, False
     for record in history:
@@ -73,7 +73,7 @@ def check_lease(history: list[Record]) -> None:
             assert record.time_s - renewed_s <= LEASE_S + 0.02, f"I3 at {record.time_s}"
 
 
-def check_latching(history: list[Record]) -> None:
+def assert_latching(history: list[Record]) -> None:
     faulted, cause, word = False, 0, 0
     for record in history:
         state, fault = int(record.output.state), int(record.output.fault)
@@ -92,7 +92,7 @@ def check_latching(history: list[Record]) -> None:
         faulted, cause = state == FAULT_STATE, fault
 
 
-def check_one_sentence_per_fault(history: list[Record]) -> None:
+def assert_one_sentence_per_fault(history: list[Record]) -> None:
     before = OFF_STATE
     for record in history:
         state = int(record.output.state)
@@ -102,7 +102,14 @@ def check_one_sentence_per_fault(history: list[Record]) -> None:
         before = state
 
 
-CHECKS = [check_range, check_slew, check_conditions, check_lease, check_latching, check_one_sentence_per_fault]
+INVARIANTS = [
+    assert_range,
+    assert_slew,
+    assert_conditions,
+    assert_lease,
+    assert_latching,
+    assert_one_sentence_per_fault,
+]
 
 
 def _alter(force_n: Callable[[float], float], quality: Quality = Quality.OK) -> Callable[[Bench], None]:
@@ -193,8 +200,8 @@ def heal(bench: Bench) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_faults_break_no_invariant(seed):
     bench = disturbed(seed)
-    for check in CHECKS:
-        check(bench.history)
+    for assert_invariant in INVARIANTS:
+        assert_invariant(bench.history)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -208,8 +215,8 @@ def test_after_healing_and_reset_the_force_is_in_band_within_two_seconds(seed):
     bench.enable(12.0)
     took_s = bench.seconds_until(lambda output: bool(output.status & 8), 2.0)
     assert took_s <= 2.0, f"I13: {bench.last}"
-    for check in CHECKS:
-        check(bench.history)
+    for assert_invariant in INVARIANTS:
+        assert_invariant(bench.history)
 
 
 def test_the_schedules_reach_every_cause_that_they_provoke():
@@ -225,11 +232,11 @@ def test_the_observer_sees_planted_violations():
     stale = replace(good, time_s=good.time_s + 1.0)
     unlatched = [replace(good, output=replace(good.output, state=4, fault=2, voltage_v=0.0)), good]
     for check, history in [
-        (check_range, [bad_range]),
-        (check_slew, [jump]),
-        (check_conditions, [stale]),
-        (check_lease, [stale, replace(stale, time_s=stale.time_s + 1.0)]),
-        (check_latching, unlatched),
+        (assert_range, [bad_range]),
+        (assert_slew, [jump]),
+        (assert_conditions, [stale]),
+        (assert_lease, [stale, replace(stale, time_s=stale.time_s + 1.0)]),
+        (assert_latching, unlatched),
     ]:
         with pytest.raises(AssertionError):
             check(history)

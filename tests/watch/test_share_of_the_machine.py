@@ -7,6 +7,7 @@ import sys
 import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -140,7 +141,11 @@ def test_returned_memory_of_the_compiler_is_read_again_when_it_is_needed() -> No
 
 
 def test_where_nothing_can_be_returned_nothing_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = list[str]()
+    libc = SimpleNamespace(malloc_trim=lambda pad: called.append("trim"), madvise=lambda *_: called.append("advise"))
+    monkeypatch.setattr("gateway.watch.memory._libc", lambda: libc)
     monkeypatch.setattr("gateway.watch.memory._MAPS", Path("/nowhere"))
     return_memory()
     monkeypatch.setattr("gateway.watch.memory._libc", lambda: object())
     return_memory()
+    assert called == ["trim"], "no code is given back where nobody says where it is"
