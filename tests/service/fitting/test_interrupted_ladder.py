@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gateway.bsfm import Calibration
 from gateway.bsfm.ladder.labels import CHECK, DONE, WALK, Labels
 from gateway.calibrations.store import CalibrationStore
 from gateway.cli.calibration.resume import find_rest_of_ladder
@@ -94,7 +95,7 @@ def test_the_labels_are_the_registers_words() -> None:
 def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbed_again(runs, tmp_path: Path) -> None:
     path = written(tmp_path, runs.whole)
     rows, seen, top_v = runs.whole.rows, set(), runs.whole.header["ladder"]["top_v"]
-    for cut in [*range(1, rows, 61), *(np.flatnonzero(np.diff(runs.whole.columns["group"])) + 1).tolist(), rows - 1]:
+    for cut in [*range(1, rows, 197), *(np.flatnonzero(np.diff(runs.whole.columns["group"])) + 1).tolist(), rows - 1]:
         path.unlink()
         assert written(tmp_path, runs.whole, cut) == path
         rest, groups = find_rest_of_ladder(tmp_path), groups_left_behind(runs.whole, cut)
@@ -120,28 +121,37 @@ def test_a_run_that_was_cut_gives_a_calibration_as_good_as_one_that_was_not(runs
     assert np.abs(checked.ladder.force_n - whole.ladder.force_n).max() < 0.6
 
 
+@pytest.fixture(scope="module")
+def whole_fit(runs, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """The state directory of the run that nobody has cut, and what its fit answered."""
+    state = tmp_path_factory.mktemp("whole")
+    return state, fit_and_store(written(state, runs.whole), "demo", state)
+
+
+def stored_calibration(state: Path, result: dict[str, Any]) -> Calibration:
+    return CalibrationStore(state, load_rig("demo").calibration).load(result["stored"])
+
+
 @pytest.mark.parametrize("groups", [1, 2])
-def test_the_fit_of_a_resumed_run_is_offered_and_its_error_is_that_of_a_whole_one(runs, groups, tmp_path: Path) -> None:
-    rms_n = []
-    for state, parts in (("whole", (runs.whole,)), ("cut", (runs.whole, runs.rest[groups]))):
-        for k, part in enumerate(parts):
-            cut = int(np.searchsorted(part.columns["stair"], 9 + 17 * groups + 3)) if k < len(parts) - 1 else None
-            path = written(tmp_path / state, part, cut)
-        result = fit_and_store(path, "demo", tmp_path / state)
-        stored = CalibrationStore(tmp_path / state, load_rig("demo").calibration).load(result["stored"])
+def test_the_fit_of_a_resumed_run_is_offered_and_its_error_is_that_of_a_whole_one(
+    runs, whole_fit, groups, tmp_path: Path
+) -> None:
+    written(tmp_path, runs.whole, int(np.searchsorted(runs.whole.columns["stair"], 9 + 17 * groups + 3)))
+    path = written(tmp_path, runs.rest[groups])
+    resumed, whole = stored_calibration(tmp_path, fit_and_store(path, "demo", tmp_path)), stored_calibration(*whole_fit)
+    for stored in (resumed, whole):
         assert (stored.order, stored.rejected) == (2, "")
-        rms_n.append(stored.rms_n)
-    assert rms_n[1] < 1.2 * rms_n[0] + 0.02  # 59 points: two runs differ by so much for themselves
+    assert resumed.rms_n < 1.2 * whole.rms_n + 0.02  # 59 points: two runs differ by so much for themselves
 
 
-def test_a_finished_run_repeats_nothing_and_its_fit_is_made_once(runs, tmp_path: Path) -> None:
-    path = written(tmp_path, runs.whole)
-    rest = find_rest_of_ladder(tmp_path)
+def test_a_finished_run_repeats_nothing_and_its_fit_is_made_once(whole_fit) -> None:
+    state, first = whole_fit
+    (path,) = (state / "recordings").iterdir()
+    rest = find_rest_of_ladder(state)
     assert rest.is_whole(rest.plan)
     assert rest.name == "left cell"
-    first = fit_and_store(path, "demo", tmp_path)
-    assert fit_and_store(path, "demo", tmp_path) == first
-    assert [entry.number for entry in CalibrationStore(tmp_path).list()] == [first["stored"]]
+    assert fit_and_store(path, "demo", state) == first
+    assert [entry.number for entry in CalibrationStore(state).list()] == [first["stored"]]
     more = rest.plan_with({"groups": 3})
     assert (more["first_group"], rest.is_whole(more)) == (2, False)
 
