@@ -1,15 +1,14 @@
 """A recorded run as its commanded force is judged: the plant that was in use, and the readings as that one had the cell."""
 
-import json
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any
 
 import numpy as np
 
 from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import CommandedForce, ErrorBlock, commanded_force, error_blocks
 from gateway.diagnosis.measurement import Floats
+from gateway.plants.recorded_number import header_in_use
 from gateway.recording import Recording
 
 
@@ -41,16 +40,6 @@ def read_recorded_force(recording: Recording) -> RecordedForce:
     columns = recording.columns
     voltage_v = columns.get("sent_v", columns.get("command_v", np.full(force.time_s.size, nan)))
     return RecordedForce(recording.path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
-
-
-def header_in_use(header: dict[str, Any]) -> dict[str, Any]:
-    """Return what a recording says of the plant that was in use; empty for one that says nothing. A CSV holds it as JSON."""
-    in_use = header.get("plant_in_use") or {}
-    try:
-        in_use = json.loads(in_use) if isinstance(in_use, str) else in_use
-    except ValueError:
-        return {}
-    return in_use if isinstance(in_use, dict) else {}
 
 
 def _through(measured_n: float, voltage_v: float, known: CellMap | None, other: CellMap | None) -> float:

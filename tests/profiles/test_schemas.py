@@ -6,8 +6,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from gateway.profiles import find, list_shipped, schema
-from gateway.profiles.schema import schema_text
+from gateway.profiles import find, list_shipped
+from gateway.profiles.schema import schema, schema_text
 from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.map import map_reader
 

@@ -6,7 +6,7 @@ Not all of them make sense, as not all that people write does: `check` must tell
 from random import Random
 from typing import Any
 
-from gateway.profiles import schema
+from gateway.profiles.schema import schema
 
 SCHEMA = schema("device")
 Profile = dict[str, Any]

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from gateway.profiles import Report, check_report, schema, shipped_profiles_folder
+from gateway.profiles import Report, check_report, shipped_profiles_folder
+from gateway.profiles.schema import schema
 from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.words import State
 from tests.service.drawn_devices import Profile, drawn_cell, drawn_output

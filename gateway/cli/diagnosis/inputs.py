@@ -3,22 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from gateway import defaults
-from gateway.calibrations.store import calibration_in_use
 from gateway.cli.errors import no_such_recording
 from gateway.cli.options import state_directory
-from gateway.devices import cell_host
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.model_fit.base_fit import without_effects
-from gateway.plants.recorded_force import header_in_use
-from gateway.profiles import PlantProfile, Rig, load_plant, load_rig
+from gateway.plants.recorded_number import header_in_use
+from gateway.profiles.kinds.plants import PlantProfile, load_shipped_plant
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.mapping_file import column_mapping
 from gateway.service.fitting.recorded_rig import plant_of, recorded_noise_n, rig_of, rig_texts
 from gateway.twin.plant import values
+
+if TYPE_CHECKING:
+    from gateway.profiles import Rig
 
 _WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
 START_PLANT: Final = defaults.PLANT
@@ -40,7 +41,7 @@ class Sources:
     measurements: tuple[Measurement, ...]
     plant: PlantProfile
     rig: str
-    known_rig: Rig | None
+    known_rig: "Rig | None"
     notes: tuple[str, ...]
     late_s: float = 0.0
     quantum_n: float = 0.0
@@ -68,7 +69,7 @@ def read_sources(
     calibration: number, name or file of the one that the recordings were made under, None for what they say themselves.
     """
     paths = tuple(recording_path(name, rig, state) for name in names)
-    known = load_rig(rig) if rig else None
+    known = _load_rig(rig) if rig else None
     mapping = column_mapping(columns)
     recordings = [read_table(path, mapping) for path in paths]
     measurements = tuple(
@@ -95,7 +96,7 @@ def read_sources(
 
 
 def _calibration_noise(
-    recordings: Sequence[Recording], given: str | None, rig: Rig | None, state: Path | None
+    recordings: Sequence[Recording], given: str | None, rig: "Rig | None", state: Path | None
 ) -> tuple[float | None, tuple[str, ...]]:
     """Noise of the readings at rest, N, None where no calibration tells it, and what to say of that.
 
@@ -115,14 +116,24 @@ def _calibration_noise(
         return max(known), ()
     if rig is None:
         return None, ()
+    from gateway.calibrations.store import calibration_in_use
+
     noise_n = calibration_in_use(rig, state_directory(state, rig.name)).noise_n
     return (noise_n if noise_n > 0.0 else None), ()
 
 
-def _quantum_n(rig: Rig | None) -> float:
+def _load_rig(name: str) -> "Rig":
+    from gateway.profiles import load_rig
+
+    return load_rig(name)
+
+
+def _quantum_n(rig: "Rig | None") -> float:
     """One count of the rig's amplifier, N; 0 where it is not known."""
     if rig is None:
         return 0.0
+    from gateway.devices import cell_host
+
     line = rig.load_cell
     return cell_host(line.device, line.sign, line.unit).resolution_n
 
@@ -137,10 +148,10 @@ def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
     return path
 
 
-def _of_rig(rig: Rig) -> tuple[str, PlantProfile, tuple[str, ...]]:
+def _of_rig(rig: "Rig") -> tuple[str, PlantProfile, tuple[str, ...]]:
     if rig.plant_profile:
         return rig.name, rig.plant_profile, ()
-    plant = rig.fallback_plant or load_plant(START_PLANT)
+    plant = rig.fallback_plant or load_shipped_plant(START_PLANT)
     return rig.name, plant, (f"rig {rig.name} names no plant: {plant.name} is the start",)
 
 
@@ -149,7 +160,7 @@ def _recorded(recordings: Sequence[Recording], plant: PlantProfile | None) -> tu
     names = [str(recording.header.get("rig") or "") for recording in recordings]
     notes = [f"the recordings are of several rigs: {', '.join(sorted(set(names)))}"] if len(set(names)) > 1 else []
     if plant is None:
-        plant = _foreign(load_plant(START_PLANT))
+        plant = _foreign(load_shipped_plant(START_PLANT))
         missing = f"rig {names[0]} is not known here" if names[0] else "the recording names no rig"
         notes.append(f"{missing}: the plant {START_PLANT} without its effects is the start; --rig names another")
     return names[0], plant, tuple(notes)

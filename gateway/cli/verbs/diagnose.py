@@ -100,7 +100,10 @@ def command(**options: Any) -> None:
     _check_effect(options["without"])
     if options["against"] and options["without"]:
         raise click.UsageError("--against compares two recordings of one machine, without --without")
-    _answer(options)
+    from gateway.cli.garbage import spared_garbage_collection
+
+    with spared_garbage_collection():
+        _answer(options)
 
 
 def _answer(options: dict[str, Any]) -> None:

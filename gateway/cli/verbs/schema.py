@@ -11,6 +11,6 @@ KINDS = ("rig", "device", "plant", "calibration", "registers", "plan")
 @click.argument("kind", type=click.Choice(KINDS), default="rig")
 def command(*, kind: str) -> None:
     """Print the JSON Schema of a kind of profile."""
-    from gateway.profiles import schema
+    from gateway.profiles.schema import schema
 
     click.echo(json.dumps(schema(kind), indent=2))

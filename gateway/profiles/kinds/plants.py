@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from gateway.profiles.find import display, locate
 from gateway.profiles.strict_yaml.fault_sentences import number, quote_value, unit_of, unknown_key
-from gateway.profiles.strict_yaml.faults import Path, ProfileFault, path_text
-from gateway.profiles.strict_yaml.text import Document, Mark
+from gateway.profiles.strict_yaml.faults import Path, ProfileError, ProfileFault, path_text
+from gateway.profiles.strict_yaml.text import Document, Mark, parse
 from gateway.profiles.strict_yaml.typed import build, kind_at, names
 from gateway.twin import Plant
 
@@ -55,6 +56,15 @@ def read_plant(document: Document) -> tuple[PlantProfile | None, list[ProfileFau
     if faults or plant is None:
         return None, sorted(faults)
     return PlantProfile(plant=plant, origins=reader.origins, **about), []
+
+
+def load_shipped_plant(name: str) -> PlantProfile:
+    """Return a shipped plant by its name. It is known to be one: what tells the kinds of files apart is not loaded."""
+    file = locate("plant", name)
+    plant, faults = read_plant(parse(file.read_bytes(), display(file)))
+    if plant is None:
+        raise ProfileError(faults)
+    return plant
 
 
 class _PlantReader:

@@ -8,17 +8,28 @@ import json
 from collections.abc import Mapping
 from math import inf
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
-from gateway.profiles import PlantProfile, ProfileError, Rig
-from gateway.profiles.kinds.plants import read_plant
+from gateway.profiles.kinds.plants import PlantProfile, read_plant
+from gateway.profiles.strict_yaml.faults import ProfileError
 from gateway.profiles.strict_yaml.text import Document, parse
 from gateway.recording import Recording
-from gateway.service.fitting.ladder_source import find_rig
+
+if TYPE_CHECKING:
+    from gateway.profiles import Rig
 
 
-def rig_of(recording: Recording) -> Rig | None:
-    """Return the rig that the recording names, from the files that are here now; None where none is named or known."""
-    return find_rig(str(recording.header.get("rig", "")).strip(), str(recording.header.get("rig_file", "")))[0]
+def rig_of(recording: Recording) -> "Rig | None":
+    """Return the rig that the recording names, from the files that are here now; None where none is named or known.
+
+    Of a table that names none nothing is loaded that reads rigs.
+    """
+    name = str(recording.header.get("rig", "")).strip()
+    if not name:
+        return None
+    from gateway.service.fitting.ladder_source import find_rig
+
+    return find_rig(name, str(recording.header.get("rig_file", "")))[0]
 
 
 def plant_of(recording: Recording) -> PlantProfile | None:

@@ -8,8 +8,9 @@ import yaml
 
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.profiles import ProfileError, schema
+from gateway.profiles import ProfileError
 from gateway.profiles.kinds.plans import load_plan_fields, plan_document, plan_of, plan_text
+from gateway.profiles.schema import schema
 from tests.profile_files import load_plan
 
 PLAN = ExperimentPlan(
