@@ -274,6 +274,13 @@ ERRORS: Final = (
         "diagnose FILE --columns force_n=force_n:-n turns it; in the rig file, load_cell: sign.",
     ),
     Explanation(
+        "E523",
+        "not fit to be the reference",
+        "recordings reference was given a recording that does not show the machine.",
+        "It is short, its command hardly moves, or a fault stood in it.",
+        "Record half a minute of work or more while all is well (record on, record off), and name that.",
+    ),
+    Explanation(
         "E500",
         "internal error",
         "A verb ended with an error that its author did not foresee.",

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from gateway import defaults
-from gateway.cli.errors import no_such_recording
+from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import state_directory
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.model_fit.base_fit import without_effects
 from gateway.plants.recorded_number import header_in_use
+from gateway.processes import exit_codes
 from gateway.profiles.kinds.plants import PlantProfile, load_shipped_plant
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.measurement import measurement_of
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from gateway.profiles import Rig
 
 _WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
+REFERENCE: Final = "reference"
+"""What stands for the rig's reference recording where a recording is named."""
 START_PLANT: Final = defaults.PLANT
 _ANY_STATE: Final = defaults.RIG  # whose state directory is meant where neither --state nor --rig says one
 
@@ -139,8 +142,10 @@ def _quantum_n(rig: "Rig | None") -> float:
 
 
 def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
-    """Return the file of a recording given by number or path. CliError (65) where there is none."""
+    """Return the file of a recording: a number, a path, or the rig's `reference`. CliError (65) where there is none."""
     path = Path(name)
+    if name == REFERENCE and not path.exists():
+        return reference_file(state_directory(state, rig or _ANY_STATE))
     if name.isdecimal() and not path.exists():
         return find_recording(state_directory(state, rig or _ANY_STATE), int(name))
     if not path.exists():

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway import defaults
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ class _Finite(click.FloatRange):
     "--against",
     metavar="OLD",
     multiple=True,
-    help="What has changed since this recording of the same machine; again for more of them.",
+    help="What has changed since this recording of the same machine, or since its `reference`; again for more of them.",
 )
 @click.option("--before", metavar="A", help="With --after: what B gained in commanded force over A, two real runs.")
 @click.option("--after", metavar="B", help="See --before.")
@@ -142,7 +143,7 @@ def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
             state=options["state"],
             calibration=options["calibration"],
         )
-        old = _read_old(options)
+        old = _read_old(options, sources.rig)
     check_targets(files.on_disk, (*sources.paths, *(old.paths if old else ())))
     diagnosis, runtime_s = _run_diagnosis(sources, old, options)
     gain = _measure_gain(diagnosis, sources) if options["closed_loop"] else None
@@ -182,13 +183,17 @@ def _check_effect(name: str | None) -> None:
     raise click.UsageError(f"--without: {name} is no effect of the catalogue; {meant}")
 
 
-def _read_old(options: dict[str, Any]) -> "Sources | None":
-    """The recordings that the new ones are compared with; None where --against names none."""
-    from gateway.cli.diagnosis.inputs import read_sources
+def _read_old(options: dict[str, Any], rig: str) -> "Sources | None":
+    """The recordings that the new ones are compared with; None where --against names none. rig: of the new ones, whose
+    reference is meant."""
+    from gateway.cli.diagnosis.inputs import REFERENCE, read_sources, reference_file
+    from gateway.cli.options import state_directory
 
     if not options["against"]:
         return None
-    return read_sources(options["against"], rig=options["rig"], columns=options["columns"], state=options["state"])
+    directory = state_directory(options["state"], options["rig"] or rig or defaults.RIG)
+    names = [str(reference_file(directory)) if each == REFERENCE else each for each in options["against"]]
+    return read_sources(names, rig=options["rig"], columns=options["columns"], state=options["state"])
 
 
 def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str, Any]) -> "tuple[Diagnosis, float]":

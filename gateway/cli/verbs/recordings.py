@@ -1,7 +1,8 @@
-"""`recordings`: what has been recorded, and getting it out as CSV or Parquet."""
+"""`recordings`: what has been recorded, getting it out as CSV or Parquet, and which one is the rig's reference."""
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,11 +13,12 @@ from gateway.cli.options import StateChoice, json_option, state_options
 
 if TYPE_CHECKING:
     from gateway.recording import RecordingEntry
+    from gateway.watch.reference_recording import ReferenceRecording
 
 
 @click.group(name="recordings")
 def command() -> None:
-    """List and export recordings."""
+    """List and export recordings, and choose the reference."""
 
 
 @command.command(name="list")
@@ -91,3 +93,47 @@ def export_command(*, number: int, form: str, output: Path | None, force: bool, 
         raise already_exists(target)
     (room.export_csv if form == "csv" else room.export_parquet)(recording, target)
     click.echo(f"wrote {recording.rows} rows to {target}", err=True)
+
+
+@command.command(name="reference")
+@click.argument("recording", metavar="[RECORDING]", required=False)
+@click.option("--none", "no_reference", is_flag=True, help="Have no reference any more.")
+@state_options
+@json_option
+def reference_command(*, recording: str | None, no_reference: bool, state: StateChoice, as_json: bool) -> None:
+    """Show the rig's reference recording, or make RECORDING (a number or a file) the reference.
+
+    The residual watch reports what differs from it, and `diagnose NEW --against reference` compares with it.
+    """
+    from gateway.watch import reference_recording as reference
+
+    if recording and no_reference:
+        raise click.UsageError("RECORDING or --none, not both")
+    if no_reference:
+        was_there = reference.drop_reference_recording(state.directory)
+        click.echo(json.dumps({"reference": None}) if as_json else "no reference" + (" any more" if was_there else ""))
+        return
+    if recording:
+        _keep_reference(state, recording)
+    known = reference.read_reference_recording(state.directory)
+    click.echo(json.dumps({"reference": known and asdict(known)}) if as_json else _describe_reference(known))
+
+
+def _keep_reference(state: StateChoice, name: str) -> None:
+    """Make this recording the reference. CliError (65) for one that cannot describe a machine."""
+    from gateway.cli.diagnosis.inputs import recording_path
+    from gateway.cli.errors import CliError
+    from gateway.processes import exit_codes
+    from gateway.watch import reference_recording as reference
+
+    path = recording_path(name, state.rig, state.path)
+    if why := reference.why_no_reference(path):
+        raise CliError(f"E523 {path} cannot be the reference: {why}", exit_codes.DATA)
+    reference.keep_reference_recording(state.directory, path)
+
+
+def _describe_reference(known: "ReferenceRecording | None") -> str:
+    if known is None:
+        return "no reference; force-gateway recordings reference RECORDING makes one, of the machine as it should be"
+    why = "chosen" if known.is_chosen else f"the first good one with calibration {known.calibration}"
+    return f"reference: {known.name}, {why}, kept {known.kept_utc}"

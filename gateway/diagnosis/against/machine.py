@@ -3,13 +3,13 @@
 None of that is a finding of the new recordings. They join the old ones under this model, each with its own offset and start.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from gateway.catalogue.effect import Effect, EffectForm
+from gateway.catalogue.effect import Effect, EffectForm, Parameter
 from gateway.diagnosis.against.machine_error import common_error_n, machine_error_columns
 from gateway.diagnosis.bench.bench import Bench, bench_of
 from gateway.diagnosis.bench.parameters import STARTS, ModelParameters
@@ -22,7 +22,6 @@ from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
 from gateway.diagnosis.model_fit.normal_equations import held_out_errors
 from gateway.diagnosis.noise.whitening import Whitener, white_whitener
 from gateway.diagnosis.result import OwnEffect
-from gateway.diagnosis.search.direct_evidence import DirectEvidence
 from gateway.diagnosis.search.model_comparison import is_significant
 from gateway.diagnosis.search.search import SearchResult, compare_under_noise, search_effects
 from gateway.diagnosis.verdict import estimates_of
@@ -37,11 +36,13 @@ NamedForm = tuple[Effect, EffectForm]
 
 @dataclass(frozen=True, slots=True)
 class MachineModel:
-    """A machine by its old recordings. fitted: their model; evidence: what their readings tell by themselves."""
+    """A machine by its old recordings. parameters, free: of the model that was fitted to them; readings: by name, the first
+    number of what their readings told by themselves."""
 
     bench: Bench
-    fitted: FittedModel
-    evidence: tuple[DirectEvidence, ...]
+    parameters: ModelParameters
+    free: tuple[Parameter, ...]
+    readings: Mapping[str, float]
     effects: tuple[OwnEffect, ...]
 
 
@@ -71,7 +72,9 @@ def describe_machine(old: Sequence[Measurement], given: Plant, options: Options)
     effects = tuple(
         OwnEffect(effect.name, estimates_of(start.bench, fitted, form.parameters, plain)) for effect, form in named
     )
-    return MachineModel(start.bench, fitted, start.evidence, effects)
+    free = tuple(each for each in fitted.free if each.section != STARTS)
+    readings = {each.name: each.values[0][1] for each in start.evidence}
+    return MachineModel(start.bench, fitted.parameters, free, readings, effects)
 
 
 def _add_what_predicts(start: SearchStart, found: SearchResult) -> tuple[FittedModel, list[NamedForm]]:
@@ -114,10 +117,9 @@ def _fit_jointly(new: Sequence[Measurement], machine: MachineModel) -> tuple[Ben
     fresh = bench.rows - machine.bench.rows
     bench = replace(bench, usable=np.concatenate([bench.usable[:fresh], machine.bench.usable]))
     parameters = _joined_parameters(new, machine)
-    free = tuple(each for each in machine.fitted.free if each.section != STARTS)
     strains = start_parameters(bench, parameters.plant)
     whiten = white_whitener(bench, machine_residual(bench, parameters))
-    (fitted,) = linearise(bench, [FitProblem(parameters, (*free, *strains))], whiten)
+    (fitted,) = linearise(bench, [FitProblem(parameters, (*machine.free, *strains))], whiten)
     return (*drop_unfelt_starts(bench, fitted, whiten), whiten)
 
 
@@ -128,7 +130,7 @@ def machine_residual(bench: Bench, parameters: ModelParameters) -> Floats:
 
 def _joined_parameters(new: Sequence[Measurement], machine: MachineModel) -> ModelParameters:
     """The machine's parameters with the offsets and starts that fit the new recordings best before those of the old."""
-    own = machine.fitted.parameters
+    own = machine.parameters
     fresh = fit_initial_states(bench_of(new, machine.bench.motion), own.plant).parameters
     olds = range(len(machine.bench.measurements))
     starts = (*(fresh.start(k) for k in range(len(new))), *(own.start(k) for k in olds))

@@ -45,7 +45,7 @@ def _new_part(joint: JointModel, machine: MachineModel) -> Bench:
 
 def _size(machine: MachineModel, name: str) -> float:
     """First number of what the old recordings' readings told by themselves; 0 where they did not."""
-    return max((each.values[0][1] for each in machine.evidence if each.name == name), default=0.0)
+    return machine.readings.get(name, 0.0)
 
 
 def _is_new(evidence: DirectEvidence, machine: MachineModel) -> bool:

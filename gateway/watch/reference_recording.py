@@ -1,0 +1,161 @@
+"""The rig's reference recording: the machine as it is known to be well. What differs from it later is a change.
+
+STATE/reference holds a copy of the recording, so that it outlives the other ones, and who has chosen it. A user does
+(`recordings reference`); else it is the first good recording that begins after a `calibration use`, for then somebody has just
+said that the machine is as it should be. What a user has chosen stays until he chooses again.
+"""
+
+import json
+import shutil
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from gateway.numbered_documents.selection import read_selection
+from gateway.processes.durable_file import lock_directory, make_directory, remove_if_possible, write_durably
+from gateway.recording import RecordingError, list_recordings, read_table
+from gateway.recording.reader import Recording
+
+_FOLDER: Final = "reference"
+_FACTS: Final = "reference.json"
+_COPY: Final = "recording"
+_LEAST_S: Final = 30.0
+_LEAST_EXCITATION_V: Final = 0.2
+_LEAST_MOVES: Final = 4
+"""What a recording must have to describe a machine: a rest, or one step, says little of it."""
+_CLOSED_S: Final = 5.0  # since its last row a recording is not being written any more: rows come ten times a second
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceRecording:
+    """file: the copy's name in STATE/reference; name: of the recording; calibration: the number that was in use then, 0 for one
+    that a user has chosen (is_chosen)."""
+
+    file: str
+    name: str
+    sha256: str
+    kept_utc: str
+    calibration: int = 0
+    is_chosen: bool = False
+
+
+def reference_path(state: Path, reference: ReferenceRecording) -> Path:
+    """Return the copy of the recording."""
+    return state / _FOLDER / reference.file
+
+
+def read_reference_recording(state: Path) -> ReferenceRecording | None:
+    """Return the rig's reference; None where none was kept, or its file is gone."""
+    try:
+        reference = ReferenceRecording(**json.loads((state / _FOLDER / _FACTS).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+    return reference if reference_path(state, reference).is_file() else None
+
+
+def keep_reference_recording(state: Path, recording: Path, calibration: int | None = None) -> ReferenceRecording:
+    """Keep a copy of this recording as the rig's reference, and return what is known of it. calibration: that it was found
+    for; None: a user has chosen it. OSError, and the one before stays, where it cannot be read or the disk refuses."""
+    folder, digest = state / _FOLDER, sha256(recording.read_bytes()).hexdigest()
+    make_directory(folder)
+    kept = ReferenceRecording(
+        file=f"{_COPY}-{digest[:12]}{recording.suffix}",
+        name=recording.name,
+        sha256=digest,
+        kept_utc=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        calibration=calibration or 0,
+        is_chosen=calibration is None,
+    )
+    with lock_directory(folder) as descriptor:
+        if not (folder / kept.file).exists():
+            beside = folder / f".{kept.file}"
+            try:
+                shutil.copyfile(recording, beside)
+                beside.replace(folder / kept.file)
+            finally:
+                beside.unlink(missing_ok=True)
+        write_durably(descriptor, _FACTS, json.dumps(asdict(kept)).encode())
+        _remove_all_but(folder, descriptor, kept.file)
+    return kept
+
+
+def drop_reference_recording(state: Path) -> bool:
+    """Have no reference any more; return whether there was one. OSError where the disk refuses."""
+    folder = state / _FOLDER
+    if read_reference_recording(state) is None:
+        return False
+    with lock_directory(folder) as descriptor:
+        (folder / _FACTS).unlink(missing_ok=True)
+        _remove_all_but(folder, descriptor, "")
+    return True
+
+
+def _remove_all_but(folder: Path, descriptor: int, kept: str) -> None:
+    for path in folder.iterdir():
+        if path.name not in {kept, _FACTS}:
+            remove_if_possible(descriptor, path.name)
+
+
+def keep_first_good_recording(state: Path, now_s: float) -> ReferenceRecording | None:
+    """Return the reference that was kept now, of the first good recording after the last `calibration use`; None where there is
+    nothing to do: no calibration was taken into use, a user has chosen, or the calibration has one. now_s: of the epoch.
+    """
+    since = _calibration_in_use(state)
+    known = read_reference_recording(state)
+    if since is None or (known and (known.is_chosen or known.calibration == since[0])):
+        return None
+    number, since_s = since
+    for entry in list_recordings(state):
+        if entry.header.get("calibration") != number or _begin_s(entry.header) < since_s:
+            continue
+        if now_s - entry.path.stat().st_mtime < _CLOSED_S:
+            return None  # it may become the first good one
+        if not why_no_reference(entry.path):
+            return keep_reference_recording(state, entry.path, number)
+    return None
+
+
+def why_no_reference(path: Path) -> str:
+    """Return why a recording cannot describe a machine, as a sentence; empty where it can."""
+    try:
+        recording = read_table(path)
+    except (OSError, RecordingError) as error:
+        return str(error)
+    return _why_it_says_little(recording)
+
+
+def _why_it_says_little(recording: Recording) -> str:
+    columns = recording.columns
+    time_s, command_v = (columns.get(name, np.zeros(0)) for name in ("time_s", "command_v"))
+    if command_v.size < 2 or time_s[-1] - time_s[0] < _LEAST_S:
+        return f"it is shorter than {_LEAST_S:.0f} s"
+    if np.any(columns.get("fault_code", np.zeros(1)) != 0.0):
+        return "a fault stood in it"
+    signs = np.sign(np.diff(command_v))
+    turns = np.count_nonzero(np.diff(signs[signs != 0.0]))
+    if np.std(command_v) < _LEAST_EXCITATION_V or turns < _LEAST_MOVES:
+        return f"the command hardly moves in it: {np.std(command_v):.2f} V (rms), {turns} turns"
+    return ""
+
+
+def _calibration_in_use(state: Path) -> tuple[int, float] | None:
+    """Number of the calibration that somebody has taken into use, and when, s of the epoch; None for the rig's own."""
+    folder = state / "calibrations"
+    selection, _ = read_selection(folder, "calibration")
+    if not selection.active.number:
+        return None
+    try:
+        return selection.active.number, (folder / f"active.{selection.generation:06d}").stat().st_mtime
+    except OSError:
+        return None
+
+
+def _begin_s(header: dict[str, object]) -> float:
+    try:
+        return datetime.fromisoformat(str(header.get("started_utc")).replace("Z", "+00:00")).timestamp()
+    except ValueError:
+        return 0.0

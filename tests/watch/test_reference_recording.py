@@ -1,0 +1,132 @@
+"""The rig's reference recording: what is kept as one, by whom, and what never is."""
+
+import json
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from gateway.cli.main import command
+from gateway.numbered_documents.selection import Selection, SelectionState, write_selection
+from gateway.processes import exit_codes
+from gateway.processes.durable_file import lock_directory, make_directory
+from gateway.recording import Recorder
+from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.watch.reference_recording import (
+    keep_first_good_recording,
+    keep_reference_recording,
+    read_reference_recording,
+    reference_path,
+    why_no_reference,
+)
+
+
+def record(
+    state: Path, lasts_s: float = 40.0, *, calibration: int = 2, swing_v: float = 1.0, fault: float = 0.0
+) -> Path:
+    """A recording of 20 rows a second, begun a minute from now and not written to any more."""
+    header = {"rig": "demo", "calibration": calibration, "started_utc": _utc(time.time() + 60.0)}
+    recorder = Recorder(state / "recordings", header, COLUMNS)
+    for time_s in np.arange(0.0, lasts_s, 0.05):
+        row = {"time_s": time_s, "command_v": 2.0 + swing_v * np.sin(time_s), "force_n": 17.0, "fault_code": fault}
+        recorder.append(tuple(float(row.get(name, 0.0)) for name in COLUMNS))
+    recorder.close()
+    os.utime(recorder.path, (0.0, 0.0))
+    return recorder.path
+
+
+def _utc(at_s: float) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%S.000Z", time.gmtime(at_s))
+
+
+def use_calibration(state: Path, number: int) -> None:
+    make_directory(state / "calibrations")
+    with lock_directory(state / "calibrations") as descriptor:
+        write_selection(state / "calibrations", descriptor, SelectionState(active=Selection(number)))
+
+
+def reference(state: Path, *words: object) -> Result:
+    return CliRunner().invoke(command, ["recordings", "reference", *map(str, words), "--state", str(state)])
+
+
+def test_a_chosen_recording_outlives_the_recording(tmp_path):
+    path = record(tmp_path)
+    told = reference(tmp_path, 1)
+    assert told.exit_code == 0 and "reference: 0001.fgr, chosen" in told.output
+    content = path.read_bytes()
+    path.unlink()
+    known = read_reference_recording(tmp_path)
+    assert known is not None and reference_path(tmp_path, known).read_bytes() == content
+    assert json.loads(reference(tmp_path, "--json").output)["reference"]["is_chosen"]
+
+
+def test_another_choice_takes_the_first_ones_place(tmp_path):
+    record(tmp_path), record(tmp_path, swing_v=1.5)
+    reference(tmp_path, 1)
+    reference(tmp_path, 2)
+    known = read_reference_recording(tmp_path)
+    assert known is not None and known.name == "0002.fgr"
+    assert sorted(path.name for path in (tmp_path / "reference").iterdir()) == [known.file, "reference.json"]
+    assert "any more" in reference(tmp_path, "--none").output
+    assert read_reference_recording(tmp_path) is None
+
+
+@pytest.mark.parametrize(
+    ("facts", "why"),
+    [({"lasts_s": 10.0}, "shorter"), ({"swing_v": 0.01}, "hardly moves"), ({"fault": 202.0}, "a fault stood")],
+)
+def test_what_does_not_show_the_machine_is_no_reference(tmp_path, facts, why):
+    assert why in why_no_reference(record(tmp_path, **facts))
+    refused = reference(tmp_path, 1)
+    assert refused.exit_code == exit_codes.DATA and "E523" in refused.output
+    assert read_reference_recording(tmp_path) is None
+
+
+def test_against_a_reference_that_is_not_there_says_how_to_make_one(tmp_path):
+    path = record(tmp_path)
+    told = CliRunner().invoke(command, ["diagnose", str(path), "--against", "reference", "--state", str(tmp_path)])
+    assert told.exit_code == exit_codes.DATA
+    assert "E403 no reference recording" in told.output and "recordings reference RECORDING" in told.output
+
+
+def test_the_first_good_recording_after_a_calibration_came_into_use_is_kept(tmp_path):
+    record(tmp_path, calibration=1), record(tmp_path, 10.0), record(tmp_path), record(tmp_path)
+    assert keep_first_good_recording(tmp_path, 1.0e12) is None, "no calibration was taken into use"
+    use_calibration(tmp_path, 2)
+    kept = keep_first_good_recording(tmp_path, 1.0e12)
+    assert kept is not None and (kept.name, kept.is_chosen) == ("0003.fgr", False)
+    assert keep_first_good_recording(tmp_path, 1.0e12) is None, "there is one"
+    use_calibration(tmp_path, 1)
+    kept = keep_first_good_recording(tmp_path, 1.0e12)
+    assert kept is not None and kept.name == "0001.fgr"
+
+
+def test_what_a_user_has_chosen_stays(tmp_path):
+    keep_reference_recording(tmp_path, record(tmp_path, calibration=1))
+    record(tmp_path)
+    use_calibration(tmp_path, 2)
+    assert keep_first_good_recording(tmp_path, 1.0e12) is None
+
+
+def test_a_recording_that_is_being_written_is_waited_for(tmp_path):
+    use_calibration(tmp_path, 2)
+    assert record(tmp_path).stat().st_mtime == 0.0
+    record(tmp_path)
+    assert keep_first_good_recording(tmp_path, 1.0) is None
+    assert keep_first_good_recording(tmp_path, 10.0) is not None
+
+
+def test_a_recording_from_before_the_calibration_came_into_use_is_none(tmp_path):
+    record(tmp_path)
+    use_calibration(tmp_path, 2)
+    os.utime(tmp_path / "calibrations" / "active.000001", (2.0e12, 2.0e12))
+    assert keep_first_good_recording(tmp_path, 1.0e12) is None
+
+
+def test_a_damaged_note_is_no_reference(tmp_path):
+    keep_reference_recording(tmp_path, record(tmp_path))
+    (tmp_path / "reference" / "reference.json").write_text("{")
+    assert read_reference_recording(tmp_path) is None
