@@ -63,9 +63,9 @@ def compare_with_machine(
     found = search_effects(joint.bench, joint.fitted, effects, joint.whiten)
     left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     left = _without_old(joint, found, left) if left else left
-    floor_n = options.noise_floor_n or min(joint.left_n, joint.bench.rms_n(found.base.residual_n))
+    floor_n = options.noise_floor_n or min(machine.error.left_n, joint.bench.rms_n(found.base.residual_n))
     result = compose_diagnosis(SearchFindings(joint.bench, found, evidence, left, effects), floor_n)
-    result = _drop_trifles(result, joint.left_n)
+    result = _drop_trifles(result, machine.error.left_n)
     return replace(
         result,
         base=with_readings_of(given, result.base),
@@ -75,8 +75,8 @@ def compare_with_machine(
         machine=Machine(
             recordings=tuple(each.name for each in machine.bench.measurements),
             effects=machine.effects,
-            common_error_n=joint.common_error_n,
-            left_n=joint.left_n,
+            common_error_n=machine.error.common_n,
+            left_n=machine.error.left_n,
         ),
     )
 

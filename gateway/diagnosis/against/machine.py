@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from gateway.catalogue.effect import Effect, EffectForm, Parameter
-from gateway.diagnosis.against.machine_error import common_error_n, machine_error_columns
+from gateway.diagnosis.against.machine_error import ErrorModel, fit_error
 from gateway.diagnosis.bench.bench import Bench, bench_of
-from gateway.diagnosis.bench.parameters import STARTS, ModelParameters
+from gateway.diagnosis.bench.parameters import STARTS, ModelParameters, StartParameter
 from gateway.diagnosis.diagnose import Options, SearchStart, doubt_times, prepare_search
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.model_fit.base_fit import refit
@@ -28,6 +28,7 @@ from gateway.diagnosis.verdict import estimates_of
 from gateway.twin.plant import Plant
 
 _MOST_EFFECTS: Final = 8  # of a machine; a foreign rig asked for four to six
+_OF_ONE_RECORDING: Final = ("linear-drift", "warm-up", "clock-skew")
 _PREDICTS: Final = 0.995  # of the held-out error: from here on an effect predicts better
 _WAVES: Final = 8  # from the optimum under coloured noise to the plain one
 
@@ -37,29 +38,27 @@ NamedForm = tuple[Effect, EffectForm]
 @dataclass(frozen=True, slots=True)
 class MachineModel:
     """A machine by its old recordings. parameters, free: of the model that was fitted to them; readings: by name, the first
-    number of what their readings told by themselves."""
+    number of what their readings told by themselves; error: their common error."""
 
     bench: Bench
     parameters: ModelParameters
     free: tuple[Parameter, ...]
     readings: Mapping[str, float]
     effects: tuple[OwnEffect, ...]
+    error: ErrorModel
 
 
 @dataclass(frozen=True, slots=True)
 class JointModel:
     """New recordings, which come first, and old ones under the machine's model.
 
-    bench: judges by the new ones, and counts the machine's common error as explained; error_n: that error, (rows,);
-    common_error_n, left_n: RMS of it, and of what is left beside it, in the old recordings.
+    bench: judges by the new ones, and counts the machine's common error as explained; error_n: that error, (rows,).
     """
 
     bench: Bench
     fitted: FittedModel
     whiten: Whitener
     error_n: Floats
-    common_error_n: float
-    left_n: float
 
 
 def describe_machine(old: Sequence[Measurement], given: Plant, options: Options) -> MachineModel:
@@ -74,7 +73,7 @@ def describe_machine(old: Sequence[Measurement], given: Plant, options: Options)
     )
     free = tuple(each for each in fitted.free if each.section != STARTS)
     readings = {each.name: each.values[0][1] for each in start.evidence}
-    return MachineModel(start.bench, fitted.parameters, free, readings, effects)
+    return MachineModel(start.bench, fitted.parameters, free, readings, effects, fit_error(start.bench, fitted))
 
 
 def _add_what_predicts(start: SearchStart, found: SearchResult) -> tuple[FittedModel, list[NamedForm]]:
@@ -84,7 +83,7 @@ def _add_what_predicts(start: SearchStart, found: SearchResult) -> tuple[FittedM
     named = [(each.effect, each.form) for each in found.accepted]
     while len(named) < _MOST_EFFECTS:
         taken = {effect.name for effect, _ in named}
-        effects = [effect for effect in start.effects if effect.name not in taken]
+        effects = [effect for effect in start.effects if effect.name not in taken and _comes_again(effect)]
         fitted, whiten, comparison = compare_under_noise(bench, fitted, effects, whiten)
         if not comparison.ranked or not is_significant(comparison.winner, comparison.starts):
             break
@@ -97,18 +96,33 @@ def _add_what_predicts(start: SearchStart, found: SearchResult) -> tuple[FittedM
     return fitted, named
 
 
+def _comes_again(effect: Effect) -> bool:
+    """Is it the same in another recording? Not what has a phase, or steps so fine that no fit finds them again."""
+    return effect.name not in _OF_ONE_RECORDING and not any(form.quadrature or form.everywhere for form in effect.forms)
+
+
 def join_recordings(new: Sequence[Measurement], machine: MachineModel, given: Plant, options: Options) -> JointModel:
-    """Return the new recordings beside the old ones, under the machine's model fitted to all of them."""
+    """Return the new recordings beside the old ones, under the machine's model.
+
+    Its numbers stay as they were fitted to the old ones: a fit that moves a dozen of them, some at a bound, beside every
+    change went nowhere, and left sizes at a third of the true ones. What they are uncertain by counts as explained, as the
+    common error does: a share of their derivatives, the same for all recordings.
+    """
     bench, fitted, whiten = _fit_jointly(new, machine)
     if options.late_s > 0.0 or any(each.even_s for each in bench.measurements):
         fitted, whiten = doubt_times(bench, fitted, whiten, options.late_s)
         bench, fitted = fit_line_lengths(bench, fitted, whiten, given.regulator.command_step_v)
-    rows = bench.judged & (np.arange(bench.rows) >= bench.rows - machine.bench.rows)
-    columns = machine_error_columns(bench, fitted, rows)
-    error_n, common_n, left_n = common_error_n(fitted, columns, rows)
-    bench = replace(bench.without_columns(columns), raw_n=bench.raw_n - error_n, witnesses=frozenset(range(len(new))))
+    columns = machine.error.columns(bench, fitted.parameters)
+    error_n = machine.error.error_n(columns)
+    old_starts = [each for each in start_parameters(bench, machine.parameters.plant) if _recording_of(each) >= len(new)]
+    uncertain = _derivatives(bench, fitted, (*machine.free, *old_starts), whiten)
+    bench = replace(
+        bench.without_columns(np.vstack([columns, uncertain])),
+        raw_n=bench.raw_n - error_n,
+        witnesses=frozenset(range(len(new))),
+    )
     fitted = refit(bench, fitted, whiten)
-    return JointModel(bench, fitted, whiten, error_n, common_n, left_n)
+    return JointModel(bench, fitted, whiten, error_n)
 
 
 def _fit_jointly(new: Sequence[Measurement], machine: MachineModel) -> tuple[Bench, FittedModel, Whitener]:
@@ -117,10 +131,23 @@ def _fit_jointly(new: Sequence[Measurement], machine: MachineModel) -> tuple[Ben
     fresh = bench.rows - machine.bench.rows
     bench = replace(bench, usable=np.concatenate([bench.usable[:fresh], machine.bench.usable]))
     parameters = _joined_parameters(new, machine)
-    strains = start_parameters(bench, parameters.plant)
+    strains = tuple(each for each in start_parameters(bench, parameters.plant) if _recording_of(each) < len(new))
     whiten = white_whitener(bench, machine_residual(bench, parameters))
-    (fitted,) = linearise(bench, [FitProblem(parameters, (*machine.free, *strains))], whiten)
+    (fitted,) = linearise(bench, [FitProblem(parameters, strains)], whiten)
     return (*drop_unfelt_starts(bench, fitted, whiten), whiten)
+
+
+def _recording_of(parameter: Parameter) -> int:
+    """The recording that a start belongs to."""
+    return parameter.recording if isinstance(parameter, StartParameter) else 0
+
+
+def _derivatives(bench: Bench, fitted: FittedModel, free: tuple[Parameter, ...], whiten: Whitener) -> Floats:
+    """What each of these parameters changes in the readings, all of one size, (parameters, rows)."""
+    (felt,) = linearise(bench, [FitProblem(fitted.parameters, free)], whiten)
+    rows = felt.jacobian[len(fitted.parameters.offsets_n) :]
+    sizes = np.sqrt(np.mean(rows**2, axis=1))
+    return np.asarray(rows[sizes > 0.0] / sizes[sizes > 0.0, None])
 
 
 def machine_residual(bench: Bench, parameters: ModelParameters) -> Floats:

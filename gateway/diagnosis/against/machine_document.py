@@ -4,7 +4,7 @@ The recordings themselves are not in it: who reads it back has them.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +15,7 @@ from gateway.catalogue.effect import Parameter
 from gateway.catalogue.regulator import LAG
 from gateway.catalogue.sensing import CLOCK_OFFSET
 from gateway.diagnosis.against.machine import MachineModel
+from gateway.diagnosis.against.machine_error import ErrorModel
 from gateway.diagnosis.bench.bench import bench_of
 from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.measurement import Flags, Measurement
@@ -46,6 +47,7 @@ def machine_document(machine: MachineModel) -> dict[str, Any]:
         "starts": [each._asdict() for each in parameters.starts],
         "free": [each.path for each in machine.free],
         "readings": dict(machine.readings),
+        "error": asdict(machine.error),
         "effects": [{"name": each.name, "parameters": _told(each)} for each in machine.effects],
     }
 
@@ -64,6 +66,7 @@ def read_machine(document: dict[str, Any], old: Sequence[Measurement]) -> Machin
             tuple(_PARAMETERS[path] for path in document["free"]),
             {name: float(size) for name, size in document["readings"].items()},
             tuple(_effect(each) for each in document["effects"]),
+            _error(document["error"]),
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"is no described machine: {error}") from None
@@ -79,6 +82,11 @@ def _effect(facts: dict[str, Any]) -> OwnEffect:
         for name, (section, value, unit, low, high) in facts["parameters"].items()
     }
     return OwnEffect(facts["name"], told)
+
+
+def _error(facts: dict[str, Any]) -> ErrorModel:
+    lists = {name: tuple(facts[name]) for name in ("scale", "sizes")}
+    return ErrorModel(**facts | lists | {"added": tuple(tuple(each) for each in facts["added"])})
 
 
 def _parameters(document: dict[str, Any]) -> ModelParameters:

@@ -13,6 +13,7 @@ left. So the delayed pressures are fitted first, and friction is driven by the p
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,7 @@ import numpy as np
 from gateway.catalogue.cylinder import AREA
 from gateway.compiled import loop
 from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.measurement import Flags, Floats
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.twin.replay.drive import Floats as Series
@@ -37,36 +39,95 @@ _LEAST_SPREAD: Final = 1.0e-6  # of a column, of its own scale: less is rounding
 Columns = Callable[[int], Iterator[Floats]]
 
 
-def machine_error_columns(bench: Bench, fitted: FittedModel, rows: Flags) -> Floats:
-    """Return columns (k, rows) of the machine's common error at the point of a fitted model; zero beyond the force channels.
-
-    rows: (rows,) of the old recordings, which show what the regulator does beyond its model.
+@dataclass(frozen=True, slots=True)
+class ErrorModel:
+    """How large each column is on one machine. largest_pa, largest_n: by which pressure and force are measured; added: sizes
+    of the delayed pressures in each round, by which friction is driven; scale: of each column, 0 for one without a spread;
+    sizes: of the scaled columns, N; common_n, left_n: RMS of what they explain beside the model, and of what neither does.
     """
-    time_s = [each.time_s for each in bench.measurements]
-    pressures_pa, forces_n = _simulated_series(bench, fitted)
-    largest_pa = max(float(np.max(np.abs(each))) for each in pressures_pa)
-    largest_n = max(float(np.max(np.abs(each))) for each in forces_n)
-    pressure = [each / max(largest_pa, 1.0) for each in pressures_pa]
-    force = [each / max(largest_n, 1.0e-9) for each in forces_n]
-    linear = _stack(bench, lambda k: _delayed(time_s[k], pressure[k]))
-    curved = _stack(bench, lambda k: _curved(time_s[k], pressure[k], force[k]))
-    driving = pressure
+
+    largest_pa: float
+    largest_n: float
+    area_m2: float
+    added: tuple[tuple[float, ...], ...]
+    scale: tuple[float, ...]
+    sizes: tuple[float, ...]
+    common_n: float
+    left_n: float
+
+    def columns(self, bench: Bench, parameters: ModelParameters) -> Floats:
+        """Return the scaled columns (k, rows) of these recordings; zero beyond the force channels."""
+        series = _Series.of(bench, parameters, self.largest_pa, self.largest_n)
+        driving = series.pressure
+        for sizes in self.added:
+            driving = _driven(
+                bench, series, driving, np.array(sizes) @ series.linear / (self.area_m2 * self.largest_pa)
+            )
+        scale = np.array(self.scale)
+        return np.asarray(series.with_stops(bench, driving)[scale > 0.0] * scale[scale > 0.0, None])
+
+    def error_n(self, columns: Floats) -> Floats:
+        """Return the common error at every row, N. columns: of `columns`."""
+        return np.asarray(np.array(self.sizes) @ columns)
+
+
+def fit_error(bench: Bench, fitted: FittedModel) -> ErrorModel:
+    """Return the common error of the recordings that a model was fitted to."""
+    rows, parameters = bench.judged, fitted.parameters
+    largest_pa, largest_n = (max(float(np.max(np.abs(one))) for one in each) for each in _simulate(bench, parameters))
+    largest_pa, largest_n = max(largest_pa, 1.0), max(largest_n, 1.0e-9)
+    series = _Series.of(bench, parameters, largest_pa, largest_n)
+    area_m2, driving, added = parameters.value(AREA), series.pressure, list[tuple[float, ...]]()
     for _ in range(_ROUNDS):
-        columns = np.vstack([linear, curved, _stack(bench, lambda k: _stopped(driving[k], force[k]))])  # noqa: B023
-        added_n = _fit_columns(fitted, columns, rows)[: linear.shape[0]] @ linear
-        added = added_n / (fitted.parameters.value(AREA) * largest_pa)
-        driving = [each + part for each, part in zip(pressure, _split(bench, added), strict=True)]
-    columns = np.vstack([linear, curved, _stack(bench, lambda k: _stopped(driving[k], force[k]))])
+        sizes = _fit_columns(fitted, series.with_stops(bench, driving), rows)[: series.linear.shape[0]]
+        added.append(tuple(map(float, sizes)))
+        driving = _driven(bench, series, driving, sizes @ series.linear / (area_m2 * largest_pa))
+    columns = series.with_stops(bench, driving)
     spread = np.sqrt(np.mean(columns[:, bench.usable] ** 2, axis=1))
-    return np.asarray(columns[spread > _LEAST_SPREAD] / spread[spread > _LEAST_SPREAD, None])
+    is_column = spread > _LEAST_SPREAD
+    scale = np.where(is_column, 1.0 / np.where(is_column, spread, 1.0), 0.0)
+    columns = columns[is_column] * scale[is_column, None]
+    sizes = _fit_columns(fitted, columns, rows)
+    common_n, left_n = _rms_with_and_without(fitted, columns, rows)
+    told, found = tuple(map(float, scale)), tuple(map(float, sizes))
+    return ErrorModel(largest_pa, largest_n, area_m2, tuple(added), told, found, common_n, left_n)
 
 
-def _simulated_series(bench: Bench, fitted: FittedModel) -> tuple[list[Floats], list[Floats]]:
+@dataclass(frozen=True, slots=True)
+class _Series:
+    """Simulated pressure and force of each recording as shares of the largest, and the columns that do not depend on how
+    friction is driven, stacked along the rows."""
+
+    pressure: list[Floats]
+    force: list[Floats]
+    linear: Floats
+    curved: Floats
+
+    @classmethod
+    def of(cls, bench: Bench, parameters: ModelParameters, largest_pa: float, largest_n: float) -> "_Series":
+        time_s = [each.time_s for each in bench.measurements]
+        pressures_pa, forces_n = _simulate(bench, parameters)
+        pressure, force = [each / largest_pa for each in pressures_pa], [each / largest_n for each in forces_n]
+        linear = _stack(bench, lambda k: _delayed(time_s[k], pressure[k]))
+        return cls(pressure, force, linear, _stack(bench, lambda k: _curved(time_s[k], pressure[k], force[k])))
+
+    def with_stops(self, bench: Bench, driving: list[Floats]) -> Floats:
+        """All columns, those of friction as it is driven by this pressure."""
+        stops = _stack(bench, lambda k: _stopped(driving[k], self.force[k]))
+        return np.vstack([self.linear, self.curved, stops])
+
+
+def _driven(bench: Bench, series: _Series, driving: list[Floats], added: Floats) -> list[Floats]:
+    """The pressure with what the delayed ones add to it, a share of the largest."""
+    return [each + part for each, part in zip(driving, _split(bench, added), strict=True)]
+
+
+def _simulate(bench: Bench, parameters: ModelParameters) -> tuple[list[Floats], list[Floats]]:
     """Simulated pressure, Pa, and force, N, of each recording."""
     pressures, forces = [], []
     for recording, replay in enumerate(bench.replays):
-        plant = fitted.parameters.plant_of(recording)
-        result = replay.run([plant], [fitted.parameters.start(recording)])
+        plant = parameters.plant_of(recording)
+        result = replay.run([plant], [parameters.start(recording)])
         pressures.append(result.pressure_pa[0])
         forces.append(result.reading_n[0] - plant.cell.zero_n)
     return pressures, forces
@@ -86,15 +147,13 @@ def _split(bench: Bench, stacked: Floats) -> list[Floats]:
     return [stacked[each.rows] for each in bench.channels if each.is_force]
 
 
-def common_error_n(fitted: FittedModel, columns: Floats, rows: Flags) -> tuple[Floats, float, float]:
-    """Return what the columns explain at these rows beside the model, at every row, N; the RMS at these rows of what the model
-    alone cannot explain but they can, and of what neither can, N."""
-    error_n = _fit_columns(fitted, columns, rows) @ columns
+def _rms_with_and_without(fitted: FittedModel, columns: Floats, rows: Flags) -> tuple[float, float]:
+    """RMS at these rows of what the model alone cannot explain but the columns can, and of what neither can, N."""
     model = _felt(fitted, rows)
     alone_n, both_n = (
         _rms_beside(each[:, rows], fitted.residual_n[rows]) for each in (model, np.vstack([model, columns]))
     )
-    return np.asarray(error_n), float(np.sqrt(max(alone_n**2 - both_n**2, 0.0))), both_n
+    return float(np.sqrt(max(alone_n**2 - both_n**2, 0.0))), both_n
 
 
 def _rms_beside(columns: Floats, residual_n: Floats) -> float:

@@ -97,13 +97,15 @@ class Bench:
         for recording, replay in enumerate(self.replays):
             for first in range(0, len(parameter_sets), _AT_ONCE):
                 some = slice(first, first + _AT_ONCE)
-                plants = [parameters.plant_of(recording) for parameters in parameter_sets[some]]
-                response = replay.run(plants, [parameters.start(recording) for parameters in parameter_sets[some]])
+                models = [(each.plant_of(recording), each.start(recording)) for each in parameter_sets[some]]
+                places = {model: place for place, model in enumerate(dict.fromkeys(models))}
+                response = replay.run([plant for plant, _ in places], [start for _, start in places])
+                of_each = [places[model] for model in models]
                 for channel in self.channels:
                     if channel.recording == recording and channel.is_force:
-                        result[some, channel.rows] = response.reading_n
+                        result[some, channel.rows] = response.reading_n[of_each]
                     elif channel.recording == recording:
-                        result[some, channel.rows] = response.pressure_pa
+                        result[some, channel.rows] = [response.pressure_pa[place] for place in of_each]
                         result[some, channel.rows] *= NOMINAL_AREA_M2
         if self.character_n_per_s is not None:
             result += np.outer([parameters.character_s for parameters in parameter_sets], self.character_n_per_s)
