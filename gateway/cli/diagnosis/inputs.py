@@ -153,6 +153,17 @@ def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
     return path
 
 
+def reference_file(directory: Path) -> Path:
+    """Return the rig's reference recording. CliError (65) where none was kept."""
+    from gateway.watch.reference_recording import read_reference_recording, reference_path
+
+    known = read_reference_recording(directory)
+    if known is None:
+        told = "force-gateway recordings reference RECORDING makes one, of the machine as it should be"
+        raise CliError(f"E403 no reference recording in {directory}: {told}", exit_codes.DATA)
+    return reference_path(directory, known)
+
+
 def _of_rig(rig: "Rig") -> tuple[str, PlantProfile, tuple[str, ...]]:
     if rig.plant_profile:
         return rig.name, rig.plant_profile, ()

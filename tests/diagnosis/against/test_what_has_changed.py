@@ -4,13 +4,18 @@ The fast part looks at one machine for 20 s; `--long` at all fourteen effects, 4
 Measured there: thirteen alone, by their name or a group with it; dwell-stiction is seen and has no name.
 """
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from gateway.diagnosis import Diagnosis, Options, Verdict, find_changes
 from gateway.diagnosis.against.compare_recordings import compare_with_machine
-from gateway.diagnosis.against.machine import MachineModel, describe_machine
+from gateway.diagnosis.against.machine import MachineModel, describe_machine, join_recordings
+from gateway.diagnosis.against.machine_document import machine_document, read_machine
 from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT
+from gateway.diagnosis.result import Cause
 from tests.diagnosis.against.foreign_rig import EFFECTS, Day, Wish, readings, record
 
 COLUMNS = {
@@ -20,11 +25,12 @@ COLUMNS = {
 }
 NAMES = {"position-friction": {"side-load", "position-dependent-friction"}}
 """Names that an effect may have; its own where nothing is said."""
+DESCRIBED = Path(__file__).with_name("described_machine.json")
 LEAST_NAMED = 12  # of the fourteen
 
 
-def machine_of(columns: tuple[str, ...], duration_s: float) -> MachineModel:
-    old, _ = record(Wish(seed=103, columns=columns, duration_s=duration_s))
+def machine_of(seed: int, columns: tuple[str, ...], duration_s: float) -> MachineModel:
+    old, _ = record(Wish(seed=seed + 100, columns=columns, duration_s=duration_s))
     return describe_machine([old], DEFAULT_PLANT, Options())
 
 
@@ -40,23 +46,50 @@ def is_named_alone(found: Diagnosis, effect: str) -> bool:
 
 @pytest.fixture(scope="module")
 def short_machine() -> MachineModel:
-    return machine_of((), 20.0)
+    """As `machine_of(3, (), 20.0)` describes it."""
+    old, _ = record(Wish(seed=103, duration_s=20.0))
+    return read_machine(json.loads(DESCRIBED.read_text()), [old])
 
 
-def test_a_machines_own_nature_has_no_name(short_machine):
-    found = changes(short_machine, Wish(seed=3, duration_s=20.0))
-    assert found.causes == ()
-    assert found.machine is not None and found.machine.common_error_n > 0.05
+def joint_rms_n(machine: MachineModel, wish: Wish) -> float:
+    """RMS of what the described machine leaves of a recording, before anything is searched for."""
+    new, _ = record(wish)
+    joint = join_recordings([new], machine, DEFAULT_PLANT, Options())
+    return joint.bench.rms_n(joint.fitted.residual_n)
 
 
-def test_a_change_is_named_alone_beside_what_was_there_before(short_machine):
-    wish = Wish(seed=3, effect="transport-delay", size=2.0, duration_s=20.0)
-    found = changes(short_machine, wish)
+def test_a_machines_own_nature_is_no_more_than_its_noise(short_machine):
+    assert short_machine.error.common_n > 0.05
+    assert joint_rms_n(short_machine, Wish(seed=3, duration_s=20.0)) < 1.1 * short_machine.error.left_n
+    assert (
+        joint_rms_n(short_machine, Wish(seed=3, effect="leak", size=2.0, duration_s=20.0))
+        > 1.25 * short_machine.error.left_n
+    )
+
+
+def test_a_change_is_named_alone_with_its_size_beside_what_was_there_before(short_machine):
+    new, amount = record(Wish(seed=3, effect="transport-delay", size=2.0, duration_s=20.0))
+    found = compare_with_machine([new], short_machine, DEFAULT_PLANT, Options())
     assert is_named_alone(found, "transport-delay")
     assert found.verdict in {Verdict.PARTIAL, Verdict.CONFIRMED}
     (cause,) = found.causes
-    for name, estimate in cause.parameters.items():
-        assert estimate.value != getattr(getattr(found.base, estimate.section), name)
+    assert change_of(found, cause, "delay_s") == pytest.approx(amount, rel=0.25)
+
+
+def change_of(found: Diagnosis, cause: Cause, name: str) -> float:
+    """By how much a number is another one now."""
+    estimate = cause.parameters[name]
+    return estimate.value - float(getattr(getattr(found.base, estimate.section), name))
+
+
+def test_a_described_machine_is_the_same_when_it_is_read_back(short_machine):
+    document = machine_document(short_machine)
+    again = read_machine(json.loads(json.dumps(document)), short_machine.bench.measurements)
+    assert machine_document(again) == document
+    with pytest.raises(ValueError, match="rows"):
+        read_machine(document, [record(Wish(seed=103, duration_s=10.0))[0]])
+    with pytest.raises(ValueError, match="no described machine"):
+        read_machine({"format": 1}, short_machine.bench.measurements)
 
 
 def test_without_recordings_there_is_nothing_to_compare():
@@ -72,14 +105,15 @@ def test_nothing_of_an_effect_is_no_effect(effect):
 
 
 @pytest.mark.long
-def test_most_effects_are_named_without_a_companion(capsys):
+@pytest.mark.parametrize("seed", [3001, 3002])
+def test_most_effects_are_named_without_a_companion(seed, capsys):
     machines: dict[tuple[str, ...], MachineModel] = {}
     lines, right = [], 0
     for effect in ("", *EFFECTS):
         columns = COLUMNS.get(effect, ())
-        machine = machines.setdefault(columns, None) or machine_of(columns, 40.0)  # type: ignore[arg-type]
-        machines[columns] = machine
-        found = changes(machine, Wish(seed=3, effect=effect, size=1.5, duration_s=40.0, columns=columns))
+        if columns not in machines:
+            machines[columns] = machine_of(seed, columns, 40.0)
+        found = changes(machines[columns], Wish(seed=seed, effect=effect, size=1.5, duration_s=40.0, columns=columns))
         right += bool(effect) and is_named_alone(found, effect)
         lines.append(f"{effect or 'quiet':22s} {[[each.name, *each.group[1:]] for each in found.causes]}")
         assert effect or not found.causes
