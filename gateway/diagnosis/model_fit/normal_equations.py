@@ -79,8 +79,9 @@ def orthonormal(rows: Floats) -> Floats:
     """Return orthonormal rows that span the same."""
     if not rows.shape[0]:
         return rows
-    _, sizes, vectors = np.linalg.svd(rows, full_matrices=False)
-    return np.asarray(vectors[sizes > 1.0e-9 * sizes[0]])
+    long, small = np.linalg.qr(rows.T)
+    _, sizes, vectors = np.linalg.svd(small.T)
+    return np.asarray(vectors[sizes > 1.0e-9 * sizes[0]] @ long.T)
 
 
 def block_sums(bench: Bench, values: Floats, rows: Floats | None = None) -> Floats:
