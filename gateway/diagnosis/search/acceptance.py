@@ -1,14 +1,14 @@
 """When the search accepts an effect, and what counts as more than a trifle.
 
-Chi-square at 1 % over the number of starts; a held-out gain over blocks of time that the fit did not see, in nearly all
-ways to resample them, and without the blocks that still feel how the recording began; at least 4 % of the held-out
-squared error, or 2 % where chi-square overwhelms; and, for every effect after the first, a few percent of what the
-others explain, or much of the error that is left: no form is exact, and what a cause's wrong form leaves must not be
-named. What oscillates does not count there: the rest of a sine is no bent line.
+Chi-square at 1 % over the number of starts, also under the noise that the effect's own model leaves; a held-out gain over
+blocks of time that the fit did not see, in nearly all ways to resample them, and without the blocks that still feel how the
+recording began; at least 4 % of the held-out squared error, or 2 % where chi-square overwhelms; and, for every effect after
+the first, a few percent of what the others explain, or much of the error that is left: no form is exact, and what a cause's
+wrong form leaves must not be named. What oscillates does not count there: the rest of a sine is no bent line.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from gateway.catalogue.effect import Effect, EffectForm, SearchHints
 from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
-from gateway.diagnosis.model_fit.normal_equations import block_sums, held_out_errors
-from gateway.diagnosis.noise.whitening import Whitener
+from gateway.diagnosis.model_fit.normal_equations import block_sums, held_out_errors, model_span, orthonormal
+from gateway.diagnosis.noise.whitening import Whitener, coloured_whitener
 from gateway.diagnosis.residuals.dependence_tests import Dependence
 from gateway.diagnosis.search.model_comparison import (
     ModelComparison,
     RefinedEffect,
+    is_significant,
 )
 
 _CLEARLY_STRONGER: Final = 1.15  # a nameless dependence must explain this much more than the best effect ...
@@ -84,6 +85,24 @@ def is_clearly_stronger(dependence: Dependence, strongest: RefinedEffect | None,
 def saves_enough(refined: RefinedEffect, saved: float) -> bool:
     """Return whether what an effect saves of the held-out squared error is no trifle."""
     return saved > (_LEAST_SURE_GAIN if refined.gain > _OVERWHELMING_CHI2 else _LEAST_GAIN)
+
+
+def stands_in_its_own_noise(
+    bench: Bench, before: FittedModel, winner: RefinedEffect, starts: int, whiten: Whitener
+) -> bool:
+    """Return whether an effect is significant under the noise that its own model leaves, too.
+
+    The search's noise is what a hundred candidates leave together. Of slow noise they leave next to nothing, so that its slow
+    end is a guess, measured at a sixth to all of what it is, 0.6 in the middle: half a minute of it passed for warm-up and
+    for steps of the command. What only one effect took a share of has all of it; but the causes that are not found yet as
+    well. So an effect whose chi-square overwhelms is believed.
+    """
+    if winner.gain > _OVERWHELMING_CHI2:
+        return True
+    after = winner.fitted
+    own = coloured_whitener(bench, after.residual_n, orthonormal(after.jacobian), whiten.weights)
+    left_before, left_after = (float(np.sum(model_span(each, own).left ** 2)) for each in (before, after))
+    return is_significant(replace(winner, gain=left_before - left_after), starts)
 
 
 def saved_share(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten: Whitener, explained: float) -> float:

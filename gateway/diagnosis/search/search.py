@@ -33,6 +33,7 @@ from gateway.diagnosis.search.acceptance import (
     is_noticeable,
     saved_share,
     saves_enough,
+    stands_in_its_own_noise,
 )
 from gateway.diagnosis.search.candidates import simulate_candidates, unexplained_residual
 from gateway.diagnosis.search.hints import search_hints
@@ -88,6 +89,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
                 winner = _pick_with_companions(bench, comparison, not_accepted(effects, accepted), whiten)
                 saved = saved if winner is comparison.winner else saved_share(bench, fitted, winner, whiten, explained)
             saved *= is_more_than_a_wrong_form(winner, saved, explained)
+            saved *= saved > 0.0 and stands_in_its_own_noise(bench, fitted, winner, comparison.starts, whiten)
         progress.report("looking for what no effect explains")
         dependence = strongest_dependence(bench, fitted, whiten, unnamed, outside=True)
         strongest = comparison.winner if saved > 0.0 else None

@@ -28,9 +28,14 @@ def assert_quiet(beginning: str, seed: int, colour: str, floor_n: float | None) 
     assert found.verdict is Verdict.NOTHING_FOUND
 
 
-@pytest.mark.parametrize(("beginning", "colour"), [("in a stroke", "white"), ("after a wiggle", "lorentzian")])
-def test_a_quiet_recording_that_begins_amid_motion_is_quiet(beginning: str, colour: str) -> None:
-    assert_quiet(beginning, 3, colour, None)
+@pytest.mark.parametrize(
+    ("beginning", "seed", "colour"),
+    [("in a stroke", 3, "white"), ("after a wiggle", 9, "lorentzian"), ("in a stroke", 21, "lorentzian")],
+)
+def test_a_quiet_recording_that_begins_amid_motion_is_quiet(beginning: str, seed: int, colour: str) -> None:
+    """The slow noise of the latter two was called warm-up and command-quantisation: its level was taken for a third of what
+    it is, for a hundred candidates together leave next to nothing of it."""
+    assert_quiet(beginning, seed, colour, None)
 
 
 @pytest.mark.long
