@@ -8,11 +8,13 @@ quadratic divides 0 by 0 at w = 1, b = (0, 18, 36)).
 
 Newton runs on f(t) - force, written in r = t/(1-t) (mirrored above 1/2): f(t) is nearly straight where the polynomial
 in r is not, which takes 3-5 iterations instead of 6/11/18 at n = 2/5/15. Bisection in the logarithm of r guards it, so
-that a flat end costs no more.
+that a flat end costs no more. Control asks for the same few forces again and again, within a step and from one to the
+next, so Newton's last answers are kept.
 """
 
 from collections.abc import Callable, Sequence
 from enum import StrEnum
+from functools import lru_cache
 from math import comb, inf, sqrt
 
 
@@ -30,6 +32,7 @@ OK, LOW, HIGH = (
     InverseStatus.LOW,
     InverseStatus.HIGH,
 )  # an enum member looked up on its class costs 30 ns
+KEPT = 8  # answers: the aim, and where the slide is, before and after a movement
 PLAIN = 1.0e60  # closed forms square their terms: outside 1e-60..1e60 the Newton form, which does not, is used
 
 
@@ -42,7 +45,7 @@ def inverse_of(x0: float, x1: float, handles: Sequence[float], weights: Sequence
         return _inverse_1(x0, x1, (handles[0], handles[1]), ratios[1])
     if len(weights) == 3 and plain:
         return _inverse_2(x0, x1, (handles[0], handles[1], handles[2]), (ratios[1], ratios[2]))
-    return _inverse_n(x0, x1, tuple(handles), tuple(weights))
+    return lru_cache(KEPT)(_inverse_n(x0, x1, tuple(handles), tuple(weights)))
 
 
 def refuse_inverse(_force_n: float) -> tuple[float, InverseStatus]:
@@ -97,8 +100,9 @@ def _inverse_n(x0: float, x1: float, handles: tuple[float, ...], weights: tuple[
     n = len(handles) - 1
     first, last = handles[0], handles[-1]
     w = tuple(comb(n, i) * weight for i, weight in enumerate(weights))
-    w_mirrored = w[::-1]
-    half = sum(a * b for a, b in zip(w, handles, strict=True)) / sum(w)
+    terms = tuple(zip(w, handles, strict=True))
+    terms_down = terms[::-1]
+    half = sum(a * b for a, b in terms) / sum(w)
     span = x1 - x0
 
     def inverse(force_n: float) -> tuple[float, InverseStatus]:
@@ -106,10 +110,10 @@ def _inverse_n(x0: float, x1: float, handles: tuple[float, ...], weights: tuple[
         if not first < force_n < last:
             return _at_an_end(force_n, (first, last), x0, x1)
         if force_n <= half:
-            g = [a * (b - force_n) for a, b in zip(w, handles, strict=True)]
-            return x0 + span * _near_share(g, w, (force_n - first) / (half - first)), OK
-        g = [a * (force_n - b) for a, b in zip(w_mirrored, reversed(handles), strict=True)]
-        return x1 - span * _near_share(g, w_mirrored, (last - force_n) / (last - half)), OK
+            pairs = [(a * (b - force_n), a) for a, b in terms_down]
+            return x0 + span * _near_share(pairs, (force_n - first) / (half - first)), OK
+        pairs = [(a * (force_n - b), a) for a, b in terms]
+        return x1 - span * _near_share(pairs, (last - force_n) / (last - half)), OK
 
     return inverse
 
@@ -122,12 +126,11 @@ def _at_an_end(force_n: float, ends: tuple[float, float], x0: float, x1: float) 
     raise ValueError(f"force {force_n!r} N is not a number")
 
 
-def _near_share(g: Sequence[float], w: Sequence[float], share: float) -> float:
+def _near_share(pairs: Sequence[tuple[float, float]], share: float) -> float:
     """The root t in (0, 1/2] of sum g_i r^i = 0, r = t/(1-t), where g_0 < 0 and the curve increases.
 
-    g_i = C(n,i) w_i (b_i - force), w_i = C(n,i) w_i, lowest power first; share: a first guess of 2t.
+    pairs: (g_i, C(n,i) w_i), g_i = C(n,i) w_i (b_i - force), highest power first; share: a first guess of 2t.
     """
-    pairs = tuple(zip(reversed(g), reversed(w), strict=True))
     low, high, shrink, last_step = 0.0, 2.0, 0.25, inf
     r = share / (2.0 - share)
     for _ in range(200):

@@ -69,6 +69,11 @@ class Bsfm:
         rising_n, falling_n = self.branches.rising.value(voltage_v), self.branches.falling.value(voltage_v)
         return falling_n + rising_share * (rising_n - falling_n)
 
+    def branch_forces_n(self, voltage_v: float) -> tuple[float, float]:
+        """Return `force_n` at the branch shares 1 and -1, N."""
+        rising_n, falling_n = self.branches.rising.value(voltage_v), self.branches.falling.value(voltage_v)
+        return falling_n + (rising_n - falling_n), falling_n
+
     def settled_n(self, voltage_v: float, branch_share: float) -> float:
         """Return the force whose `voltage_v` at this branch share is this voltage: bracketed Newton between the branches."""
         rising, falling = self.branches.rising, self.branches.falling

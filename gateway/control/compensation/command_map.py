@@ -67,6 +67,10 @@ class SentBsfm(Bsfm):
         """Return the force at a voltage that was sent, N."""
         return Bsfm.force_n(self, self._straight_v(voltage_v), branch_share)
 
+    def branch_forces_n(self, voltage_v: float) -> tuple[float, float]:
+        """Return `force_n` at the branch shares 1 and -1, N."""
+        return Bsfm.branch_forces_n(self, self._straight_v(voltage_v))
+
     def settled_n(self, voltage_v: float, branch_share: float) -> float:
         """Return the force that comes to rest at a voltage that was sent, N."""
         straight = Bsfm(self.branches, self.reversal, self.limits_n)

@@ -12,6 +12,7 @@ from math import isfinite
 from typing import Final
 
 from gateway.bsfm import RISING, Bsfm, InverseStatus
+from gateway.bsfm.slip.reversal import Memory
 from gateway.control.demand import Demand
 from gateway.control.force_loop.setpoint_trend import SetpointTrend
 from gateway.control.limits import TICK_S, RateBudget, is_below_usable, narrow_limits, ramp_limited
@@ -76,7 +77,8 @@ class Approach:
 
 
 class Feedforward:
-    """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers."""
+    """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers. branch_share:
+    place of the plant between the branches, -1 .. 1, by that memory."""
 
     def __init__(
         self, model: Bsfm, limits: Limits, response_lag_s: float, delay_s: float = 0.0, ahead_s: float = 0.0
@@ -103,15 +105,14 @@ class Feedforward:
         self.applied_n = self.aimed_n = self.reference_n = 0.0
         self._delayed.restart(0.0)
         self._trend.restart()
-        self._memory = self._slide = self.model.reversal.start()
+        self._remember(self.model.reversal.start())
+        self._slide = self._memory
         self._slid_n = 0.0
         self._pace = RateBudget()
         self._carry_over_v = 0.0
 
-    @property
-    def branch_share(self) -> float:
-        """Place of the plant between the branches, -1 .. 1."""
-        return self.model.reversal.branch_share(self._memory)
+    def _remember(self, memory: Memory) -> None:
+        self._memory, self.branch_share = memory, self.model.reversal.branch_share(memory)
 
     def approaching_n(self, precontact_n: float) -> float:
         """Return the pre-contact force, but never one that cannot move a vented tool.
@@ -126,7 +127,8 @@ class Feedforward:
             return
         before_v = self._total_v(gravity_n, is_corrected)
         slide = model.reversal.at(self.model.reversal.branch_share(self._slide))
-        self.model, self._memory, self._slide = model, model.reversal.at(self.branch_share), slide
+        self.model, self._slide = model, slide
+        self._remember(model.reversal.at(self.branch_share))
         self._limits = narrow_limits(self._rig_limits, model.limits_n)
         self._carry_over_v += before_v - self._total_v(gravity_n, is_corrected)
 
@@ -163,9 +165,9 @@ class Feedforward:
     def _turn(self, from_n: float, to_n: float) -> None:
         """What the slide, whose thrust the model knows, remembers of this movement."""
         if self.applied_n <= 0.0:
-            self._memory = self.model.reversal.start()
+            self._remember(self.model.reversal.start())
         elif from_n != to_n:
-            self._memory = self.model.memory_after(self._memory, from_n, to_n)
+            self._remember(self.model.memory_after(self._memory, from_n, to_n))
 
     def correct(self, correction_n: float, gravity_n: float) -> None:
         """Slide to where the aim and a trim's correction of it lead, in one movement.
@@ -186,7 +188,8 @@ class Feedforward:
     def fall_back(self, goal_n: float) -> None:
         """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact."""
         self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
-        self._memory = self._slide = self.model.reversal.at(RISING)
+        self._remember(self.model.reversal.at(RISING))
+        self._slide = self._memory
 
     def slope_n_per_v(self, gravity_n: float) -> float:
         """Return how much force a volt makes at the working point, N/V, by the branches as they are shared there."""
@@ -199,7 +202,8 @@ class Feedforward:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
-        self._memory = self._slide = self.model.reversal.at(branch_share)
+        self._remember(self.model.reversal.at(branch_share))
+        self._slide = self._memory
         self._slid_n = self.applied_n
 
     def compute_voltage(self, gravity_n: float) -> tuple[float, LimitedBy]:

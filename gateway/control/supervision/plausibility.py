@@ -51,8 +51,7 @@ class ExpectedForce:
             self._evaluate()
 
     def _evaluate(self) -> None:
-        self.rising_n = self._model.force_n(self._lagged_v, 1.0)
-        self.falling_n = self._model.force_n(self._lagged_v, -1.0)
+        self.rising_n, self.falling_n = self._model.branch_forces_n(self._lagged_v)
 
     def force_n(self, branch_share: float) -> float:
         """Return the expected cell force at this branch share."""
