@@ -1,7 +1,9 @@
 """Put a decision into sentences, status bits and warning bits: what one step answers."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import nan
+from typing import Final, NamedTuple
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
@@ -16,6 +18,12 @@ from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 
 _ENABLED, _READY, _CONTACT, _IN_BAND = 1, 2, 4, 8  # StatusBit as plain integers: an IntFlag operation costs 0.5 us
 _FAULT, _WARNING, _LIMITED, _UNREACHABLE = 16, 32, 64, 128
+_RESTARTED, _MASTER_LOST = WarningBit.RESTARTED.value, WarningBit.MASTER_LOST.value
+_TARGET_UNREACHABLE, _TRIM_SATURATED = WarningBit.TARGET_UNREACHABLE.value, WarningBit.TRIM_SATURATED.value
+_STATUS_WORDS: Final = tuple(StatusBit(word) for word in range(256))
+_warning_word = lru_cache(WarningBit)  # to make a flag of an integer costs as much as all of the bits
+_FORCE, _NOT_LIMITED = Mode.FORCE, LimitedBy.NONE  # as is a member that is looked up on its class, in Python 3.11
+_IN_FAULT, _CALIBRATING = State.FAULT, State.CALIBRATING
 
 
 @dataclass(slots=True)
@@ -30,9 +38,13 @@ class StepOutcome:
         """Add sentences for the log; empty ones are none."""
         self.events.extend(filter(None, sentences))
 
+    @property
+    def is_empty(self) -> bool:
+        """Decide whether there is nothing to say and nothing to do."""
+        return not (self.events or self.clear_command or self.release_owner)
 
-@dataclass(frozen=True, slots=True)
-class ControllerStatus:
+
+class ControllerStatus(NamedTuple):
     """The state of the controller at the end of a step, for the output."""
 
     state: State
@@ -69,9 +81,9 @@ def status_bits(status: ControllerStatus, loop: ForceLoop) -> int:
         | (_READY if not status.block else 0)
         | (_CONTACT if status.touching else 0)
         | (_IN_BAND if loop.in_band else 0)
-        | (_FAULT if status.state is State.FAULT else 0)
+        | (_FAULT if status.state is _IN_FAULT else 0)
         | (_WARNING if status.warnings else 0)
-        | (_LIMITED if loop.limited_by is not LimitedBy.NONE else 0)
+        | (_LIMITED if loop.limited_by is not _NOT_LIMITED else 0)
         | (_UNREACHABLE if loop.unreachable else 0)
     )
 
@@ -80,10 +92,10 @@ def warning_bits(word: int, loop: ForceLoop, restarted: bool, master_lost: bool)
     """Return the warning word. word: what the line and the process warn of."""
     return (
         word
-        | (WarningBit.RESTARTED.value if restarted else 0)
-        | (WarningBit.TARGET_UNREACHABLE.value if loop.unreachable else 0)
-        | (WarningBit.TRIM_SATURATED.value if loop.is_trim_at_limit else 0)
-        | (WarningBit.MASTER_LOST.value if master_lost else 0)
+        | (_RESTARTED if restarted else 0)
+        | (_TARGET_UNREACHABLE if loop.unreachable else 0)
+        | (_TRIM_SATURATED if loop.is_trim_at_limit else 0)
+        | (_MASTER_LOST if master_lost else 0)
     )
 
 
@@ -92,7 +104,7 @@ def output_of(
 ) -> Output:
     """Return the answer of a step. The measured force is nan unless fresh and usable: a stale number with an age is still a lie
     to most readers."""
-    is_force = command.mode is Mode.FORCE or status.state is State.CALIBRATING
+    is_force = command.mode is _FORCE or status.state is _CALIBRATING
     believed = reading.is_fresh and reading.is_usable
     return Output(
         loop.voltage_v,
@@ -100,9 +112,9 @@ def output_of(
         loop.trim_v,
         loop.limited_by,
         status.state,
-        StatusBit(status_bits(status, loop)),
+        _STATUS_WORDS[status_bits(status, loop)],
         status.fault,
-        WarningBit(status.warnings),
+        _warning_word(status.warnings),
         force_measured_n=reading.contact_n if believed else nan,
         force_requested_n=command.force_requested_n,
         force_accepted_n=status.accepted_n if is_force else 0.0,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import nan
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.model import Response
@@ -60,8 +60,7 @@ class LineStatus:
     output_held: Held = NOT_HELD
 
 
-@dataclass(frozen=True, slots=True)
-class LoopInputs:
+class LoopInputs(NamedTuple):
     """What one step of the force loop knows. expected_n: the model's contact force at the lagged voltage; held_back: the
     first rise looks wrong; outside_n: contact force that neither slide nor payload gives (compensation)."""
 
@@ -74,8 +73,7 @@ class LoopInputs:
     outside_n: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Output:
+class Output(NamedTuple):
     """One decision with its reasons. voltage_v is what must be written now."""
 
     voltage_v: float

@@ -1,9 +1,8 @@
 """Condition the samples of the load cell: corrected for its known defects, zeroed, gravity compensated, with their age and
 whether they can be used."""
 
-from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.control.compensation.cell_map import CellMap
 from gateway.control.settings import Supervision
@@ -11,8 +10,7 @@ from gateway.control.tare import Zero
 from gateway.devices.messages import ForceSample, Quality
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+class Reading(NamedTuple):
     """cell_n: zeroed cell force, nan unless usable; contact_n: with the payload's weight; interval_s: since the sample
     before, 0 unless this one is new; overload: saturated or said so by the device; age_s: nan before the first
     sample; raw_n: as the cell said it, in N."""
@@ -29,12 +27,14 @@ class Reading:
 
 
 NO_READING: Final = Reading()
+_OVERLOAD: Final = Quality.OVERLOAD
 
 
 def at_time(reading: Reading, later_s: float, supervision: Supervision) -> Reading:
     """Return the same reading later_s after it was made: older, and perhaps no longer fresh; not new any more."""
     age_s = reading.age_s + max(0.0, later_s)
-    return replace(reading, age_s=age_s, interval_s=0.0, is_new=False, is_fresh=age_s <= supervision.sample_timeout_s)
+    is_fresh = age_s <= supervision.sample_timeout_s
+    return reading._replace(age_s=age_s, interval_s=0.0, is_new=False, is_fresh=is_fresh)
 
 
 class SampleConditioner:
@@ -64,7 +64,7 @@ class SampleConditioner:
         if sample is None:
             return NO_READING
         force_n = sample.force_n
-        overload = sample.quality is Quality.OVERLOAD or abs(force_n) >= self._saturation_n
+        overload = sample.quality is _OVERLOAD or abs(force_n) >= self._saturation_n
         usable = isfinite(force_n) and not overload
         if self._cell is not None and usable:
             force_n = self._cell.force_n(force_n, *around)

@@ -51,7 +51,8 @@ class Transitions:
 
     def begin_step(self) -> None:
         """Begin a step with an empty outcome."""
-        self.outcome = StepOutcome()
+        if not self.outcome.is_empty:
+            self.outcome = StepOutcome()
 
     def tell(self, *sentences: str) -> None:
         """Add sentences for the log; empty ones are none."""

@@ -42,12 +42,11 @@ class OneShotEvents:
     def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
         """Return a sentence where the target has just become unreachable, else nothing. Ask after each step in force or
         voltage mode. measured_n: contact force, smoothed."""
-        is_first = loop.unreachable and not self._said_unreachable
-        evidence = self._evidence(loop.voltage_v, measured_n, inputs.expected_n)
-        self._said_unreachable = loop.unreachable
+        is_first, self._said_unreachable = loop.unreachable and not self._said_unreachable, loop.unreachable
+        sentence = self._unreachable_sentence(loop.voltage_v, measured_n, inputs.expected_n) if is_first else ""
         if loop.in_band and inputs.touching:
             self._learn(loop.voltage_v)
-        return unreachable_sentence(evidence) if is_first else ""
+        return sentence
 
     def _learn(self, voltage_v: float) -> None:
         """Learn the pressure per volt: the force is in band, so the pressure at this voltage is right, too."""
@@ -56,9 +55,9 @@ class OneShotEvents:
             ratio, known = self._pressure_pa / voltage_v, self._learned_pa_per_v
             self._learned_pa_per_v = known + _LEARNING * (ratio - known) if isfinite(known) else ratio
 
-    def _evidence(self, voltage_v: float, measured_n: float, expected_n: float) -> Evidence:
+    def _unreachable_sentence(self, voltage_v: float, measured_n: float, expected_n: float) -> str:
         learned = isfinite(self._learned_pa_per_v)
-        return Evidence(
+        evidence = Evidence(
             voltage_v=voltage_v,
             measured_n=measured_n,
             expected_n=expected_n,
@@ -67,6 +66,7 @@ class OneShotEvents:
             learned=learned,
             was_in_band=self._was_in_band,
         )
+        return unreachable_sentence(evidence)
 
     def hunting_event(self, loop: ForceLoop) -> str:
         """Return a sentence where the trim has just begun to hunt. Ask after each step in force or voltage mode."""

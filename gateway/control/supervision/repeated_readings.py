@@ -92,8 +92,8 @@ class RepeatedReadings:
                 self._window = SampleWindow()
                 self._renew(under_force)
         self._window.change(steps)
-        if not self.runs.is_explained(self._run, self._stay):
-            self.limit = max(self.limit, LONGEST_RUNS * self._run)
+        if LONGEST_RUNS * self._run > self.limit and not self.runs.is_explained(self._run, self._stay):
+            self.limit = LONGEST_RUNS * self._run
 
     def _renew(self, under_force: bool) -> None:
         """After a window: what all that is remembered, and the pool that is not full yet, allow."""

@@ -66,16 +66,16 @@ class StuckSensorCheck:
         must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
         if self._same_s >= self._frozen_s and must_have_moved:
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
-        observation = f"repeated for {self._equal_s:.2f} s, {self._equal} samples bit for bit"
         if self._told_limit is not None:
-            return (
-                f"{observation}, allowed {self._told_limit} (frozen_equal_samples)"
-                if self._equal > self._told_limit
-                else ""
-            )
+            is_over = self._equal > self._told_limit
+            return f"{self._repeats}, allowed {self._told_limit} (frozen_equal_samples)" if is_over else ""
         if self._equal >= self._noise.limit and self._equal_s >= self._frozen_s:
-            return f"{observation}, while its noise has left at most {self._noise.longest} equal so far"
+            return f"{self._repeats}, while its noise has left at most {self._noise.longest} equal so far"
         return ""
+
+    @property
+    def _repeats(self) -> str:
+        return f"repeated for {self._equal_s:.2f} s, {self._equal} samples bit for bit"
 
     @property
     def found_s(self) -> float:

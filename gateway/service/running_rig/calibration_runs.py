@@ -7,7 +7,7 @@ must not leave a tool climbing stairs.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -142,10 +142,10 @@ class CalibrationRuns:
         """Record a sample with the cell's own force, without the payload's weight: the model means that force."""
         if self._recording and self._calibrating.running:
             self._payload_n = decision.force_measured_n - self._calibrating.cell_n
-            row = replace(decision, force_measured_n=self._calibrating.cell_n)
+            row = decision._replace(force_measured_n=self._calibrating.cell_n)
             self._recording.append(sample, row, line, *self._labels())
         elif self._recording and self._closing_s is not None:
-            row = replace(decision, force_measured_n=decision.force_measured_n - self._payload_n)
+            row = decision._replace(force_measured_n=decision.force_measured_n - self._payload_n)
             self._recording.append(sample, row, line, float(self._calibrating.phase), -1.0, float(self._stairs))
             self._close_ladder()
 
