@@ -227,10 +227,10 @@ def test_the_schedules_reach_every_cause_that_they_provoke():
 def test_the_observer_sees_planted_violations():
     bench = disturbed(1)
     good = next(record for record in bench.history if record.output.voltage_v > 1.0)
-    bad_range = replace(good, output=replace(good.output, voltage_v=nan))
-    jump = replace(good, output=replace(good.output, voltage_v=5.0), time_s=0.001)
+    bad_range = replace(good, output=good.output._replace(voltage_v=nan))
+    jump = replace(good, output=good.output._replace(voltage_v=5.0), time_s=0.001)
     stale = replace(good, time_s=good.time_s + 1.0)
-    unlatched = [replace(good, output=replace(good.output, state=4, fault=2, voltage_v=0.0)), good]
+    unlatched = [replace(good, output=good.output._replace(state=4, fault=2, voltage_v=0.0)), good]
     for check, history in [
         (assert_range, [bad_range]),
         (assert_slew, [jump]),
