@@ -52,16 +52,16 @@ def loop(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Res
     def run(*arguments: _Parameters.args, **named: _Parameters.kwargs) -> _Result:
         result: _Result
         try:
-            result = _compiled(function, function not in _unkept)(*arguments, **named)
+            result = _compile(function, function not in _unkept)(*arguments, **named)
         except OSError:  # of the folder, which is full or gone: loops themselves read and write nothing
             _unkept.add(function)
-            result = _compiled(function, False)(*arguments, **named)
+            result = _compile(function, False)(*arguments, **named)
         return result
 
     return run
 
 
-def _compiled(function: Callable[_Parameters, _Result], is_kept: bool) -> Callable[_Parameters, _Result]:
+def _compile(function: Callable[_Parameters, _Result], is_kept: bool) -> Callable[_Parameters, _Result]:
     """Return the function with a compiler before it, the same one to all threads: it has compiled for some types already."""
     with _one_at_a_time:
         return _compiler_of(function, is_kept)

@@ -143,7 +143,7 @@ def _explanations(
     if as_is.alike < -_ALIKE:
         yield 0.0, Suspect(TURNED, "", "force_n", 0.0, "-n")
     for column, other in _EXCHANGES:
-        exchanged = _exchanged(measurement, column, other)
+        exchanged = _exchange_columns(measurement, column, other)
         if exchanged is not None and _moves(exchanged, plant) and not _beyond(exchanged, plant):
             fit = _fit(exchanged, plant)
             is_better = fit.unexplained < _BETTER * as_is.unexplained or bool(_beyond(measurement, plant))
@@ -153,7 +153,7 @@ def _explanations(
         own = column.rpartition("_")[2]
         for unit in _UNITS[quantity]:
             factor = LINEAR[quantity][unit][0] / LINEAR[quantity][own][0]
-            converted = _converted(measurement, column, factor)
+            converted = _convert_column(measurement, column, factor)
             if converted is None or _beyond(converted, plant) or not _moves(converted, plant):
                 continue
             fit = _fit(converted, plant)
@@ -253,7 +253,7 @@ def _regression(x: Floats, y: Floats) -> _ColumnFit:
     return _ColumnFit(float(np.copysign(spread_y / spread_x, alike)), alike)
 
 
-def _converted(measurement: Measurement, column: str, factor: float) -> Measurement | None:
+def _convert_column(measurement: Measurement, column: str, factor: float) -> Measurement | None:
     """The same with one column in its name's unit; None where it is not there or does not drive."""
     if column == "force_n":
         return replace(measurement, force_n=measurement.force_n * factor)
@@ -264,7 +264,7 @@ def _converted(measurement: Measurement, column: str, factor: float) -> Measurem
     return None
 
 
-def _exchanged(measurement: Measurement, column: str, other: str) -> Measurement | None:
+def _exchange_columns(measurement: Measurement, column: str, other: str) -> Measurement | None:
     """The same with two columns exchanged, number by number; None where one is not there."""
     columns = {
         "command_v": measurement.command_v,

@@ -113,7 +113,7 @@ def compose_diagnosis(
     causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
     causes.sort(key=lambda cause: cause.gain.held_out_rms_after_n**2 - cause.gain.held_out_rms_before_n**2)
     unseen = _unseen(findings, found, causes)
-    told = {*_grouped(causes), *(each.name for each in causes), *(each.name for each in unseen)}
+    told = {*_names_in_groups(causes), *(each.name for each in causes), *(each.name for each in unseen)}
     duration_s = sum(each.duration_s for each in bench.measurements)
     return Diagnosis(
         verdict=_decide_verdict(
@@ -123,13 +123,13 @@ def compose_diagnosis(
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
-        rejected=_rejected(bench, found, noise.rms_n, told, dropped),
+        rejected=_rejected_effects(bench, found, noise.rms_n, told, dropped),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant_of(reported.base),
         plant=_extended_plant(reported, causes),
         base_parameters=_base_estimates(bench, reported),
         traces=_traces(bench, reported),
-        experiments=_experiments(causes),
+        experiments=_experiments_for_groups(causes),
         notes=tuple(_notes(bench, reported, noise, dropped)),
     )
 
@@ -253,11 +253,11 @@ def _extended_plant(reported: ReportedModels, causes: Sequence[Cause]) -> Plant:
     return plant
 
 
-def _grouped(causes: Sequence[Cause]) -> set[str]:
+def _names_in_groups(causes: Sequence[Cause]) -> set[str]:
     return {name for cause in causes for name in cause.group}
 
 
-def _rejected(
+def _rejected_effects(
     bench: Bench, found: SearchResult, rms_n: float, told: set[str], dropped: Sequence[DoubtfulEffect]
 ) -> tuple[Rejected, ...]:
     """Effects that lost the first comparison and the last, by the part of the RMS that they would save of unseen blocks, N."""
@@ -282,7 +282,7 @@ def _traces(bench: Bench, reported: ReportedModels) -> tuple[Trace, ...]:
     )
 
 
-def _experiments(causes: Sequence[Cause]) -> tuple[str, ...]:
+def _experiments_for_groups(causes: Sequence[Cause]) -> tuple[str, ...]:
     """What to record to tell the members of each group apart."""
     names = [name for cause in causes if len(cause.group) > 1 for name in cause.group]
     return tuple(dict.fromkeys(BY_NAME[name].experiment for name in names if name in BY_NAME))

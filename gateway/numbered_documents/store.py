@@ -195,8 +195,8 @@ class NumberedStore(ABC, Generic[Document]):
         return sorted(int(match[1]) for name in names if (match := _NAME.fullmatch(name)))
 
     def _next_number(self) -> int:
-        spoken_of, _ = read_selection(self.directory, self.noun)
-        number = 1 + max(0, *self.numbers(), *spoken_of.numbers, self.number_of(self.built_in) if self.built_in else 0)
+        selected, _ = read_selection(self.directory, self.noun)
+        number = 1 + max(0, *self.numbers(), *selected.numbers, self.number_of(self.built_in) if self.built_in else 0)
         if number > _LAST:
             raise StoreError(
                 "E431", f"{self.directory} holds {self.noun} {_LAST}, the last number: start a new --state"

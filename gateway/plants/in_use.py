@@ -56,9 +56,9 @@ def with_plant_in_use(rig: Rig, plant: NumberedPlant | None) -> Rig:
     if plant is None:
         return rig
     compensation = compensation_on(rig, plant.profile)
-    said_before = compensation_words(rig.compensation)
+    notes_before = compensation_words(rig.compensation)
     words = (f"plant {plant.number} ({plant.profile.name}) in use", *compensation_words(compensation))
-    notes = (*(note for note in rig.notes if note not in said_before), *words)
+    notes = (*(note for note in rig.notes if note not in notes_before), *words)
     in_use = PlantInUse(plant.number, plant.profile)
     return replace(rig, compensation=compensation, plant_in_use=in_use, notes=notes)
 

@@ -28,7 +28,7 @@ class RecordedForce:
         if cell == self.cell:
             return error_blocks(self.force)
         rows = zip(self.force.measured_n, self.voltage_v, strict=True)
-        measured_n = np.array([_through(force_n, voltage_v, self.cell, cell) for force_n, voltage_v in rows])
+        measured_n = np.array([_read_through(force_n, voltage_v, self.cell, cell) for force_n, voltage_v in rows])
         return error_blocks(replace(self.force, measured_n=measured_n))
 
 
@@ -42,7 +42,7 @@ def read_recorded_force(recording: Recording) -> RecordedForce:
     return RecordedForce(recording.path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
 
 
-def _through(measured_n: float, voltage_v: float, known: CellMap | None, other: CellMap | None) -> float:
+def _read_through(measured_n: float, voltage_v: float, known: CellMap | None, other: CellMap | None) -> float:
     """Return what a reading straightened by `known` would be when straightened by `other`."""
     raw_n = known.reading_n(measured_n, nan, voltage_v) if known else measured_n
     return other.force_n(raw_n, nan, voltage_v) if other else raw_n

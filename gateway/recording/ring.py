@@ -74,7 +74,7 @@ class RingReader:
         return self._map is not None or self._open()
 
     @property
-    def written(self) -> int:
+    def rows_written(self) -> int:
         """Rows since the beginning; 0 before there is a ring."""
         if not self.is_ready or self._map is None:
             return 0
@@ -83,12 +83,12 @@ class RingReader:
 
     def newest(self, rows: int) -> bytes:
         """Return at most this many of the newest rows, oldest first, each len(columns) float64, little-endian."""
-        end = self.written - 1  # the newest one is left alone: its count may be seen before it on some processors
+        end = self.rows_written - 1  # the newest one is left alone: its count may be seen before it on some processors
         first = max(0, end - min(rows, self._capacity - 1), 0)
         if self._map is None or end <= first:
             return b""
         data = b"".join(self._map[start:stop] for start, stop in self._places(first, end))
-        lost = max(0, self.written + 1 - self._capacity - first)  # overwritten while we copied
+        lost = max(0, self.rows_written + 1 - self._capacity - first)  # overwritten while we copied
         return data[lost * len(self.columns) * _ITEM :]
 
     def _places(self, first: int, end: int) -> list[tuple[int, int]]:

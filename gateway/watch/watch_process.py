@@ -113,26 +113,26 @@ def watch_forever(options: dict[str, Any]) -> None:
     ring, state, budget = RingReader(options["ring"]), Path(options["state"]), ProcessorBudget()
     time.sleep(options["window_s"])
     watch, force = make_watch(ring, options)
-    known: PlantSince | None = None
-    told_s, spent_s = time.monotonic(), 0.0
+    last_plant: PlantSince | None = None
+    reported_s, spent_s = time.monotonic(), 0.0
     while True:
         plant = _plant_of(report_to_control(state, {}))
-        if plant is not None and plant != known:
-            if known is not None:  # rows from before the change were read and commanded otherwise
+        if plant is not None and plant != last_plant:
+            if last_plant is not None:  # rows from before the change were read and commanded otherwise
                 time.sleep(max(0.0, options["window_s"] - (time.monotonic() - plant.since_s)))
                 watch, force = make_watch(ring, options)
-            known = plant
+            last_plant = plant
             force.follow(plant)
-        said_before = force.sentence
+        sentence_before = force.sentence
         force.look(ring.newest(_ALL_ROWS), ring.columns)
-        if force.sentence != said_before:
+        if force.sentence != sentence_before:
             report_to_control(state, _report(watch, force, {}))
         with progress.listen(_return_memory_between_stages), one_after_another():
             watch.check_newest_window()
         return_memory()
         now_s, total_s = time.monotonic(), time.process_time()
-        rest_s = budget.pause_s(options["every_s"], now_s - told_s, total_s - spent_s)
-        told_s, spent_s = now_s, total_s
+        rest_s = budget.pause_s(options["every_s"], now_s - reported_s, total_s - spent_s)
+        reported_s, spent_s = now_s, total_s
         counters = {"cpu_s": total_s, "pause_s": rest_s, "memory_mb": resident_mb()}
         report_to_control(state, _report(watch, force, counters))
         time.sleep(rest_s)

@@ -37,7 +37,7 @@ def test_a_reader_sees_the_newest_whole_rows_in_order(descriptor, written):
     filled(descriptor, written)
     reader = RingReader(descriptor)
     found = rows_of(reader.newest(100))
-    assert reader.written == written
+    assert reader.rows_written == written
     assert reader.columns == COLUMNS
     newest = max(0, written - 1)
     assert [row[0] for row in found] == [float(k) for k in range(max(0, written - 15), newest)]
@@ -57,12 +57,12 @@ def test_other_columns_begin_a_new_ring(descriptor):
     filled(descriptor, 10).close()
     SampleRing(descriptor, (*COLUMNS, "pressure_kpa"), 16)
     reader = RingReader(descriptor)
-    assert (reader.written, len(reader.columns)) == (0, 4)
+    assert (reader.rows_written, len(reader.columns)) == (0, 4)
 
 
 def test_before_there_is_a_ring_a_reader_waits(descriptor):
     reader = RingReader(descriptor)
-    assert (reader.is_ready, reader.written, reader.newest(5)) == (False, 0, b"")
+    assert (reader.is_ready, reader.rows_written, reader.newest(5)) == (False, 0, b"")
     filled(descriptor, 3)
     assert len(rows_of(reader.newest(5))) == 2
 

@@ -67,10 +67,10 @@ def fit_lags(steps: Sequence[StepResponse], shapes: Shapes) -> LagFit:
 def choose_shapes(steps: Sequence[StepResponse]) -> Shapes:
     """Return the shapes to fit: those that predict steps best that the fit has not seen. The simpler ones first: two lags
     have to be better than one, and a pair of complex poles, asked for where the best lags are equal, much better than both."""
-    one, two = (_held_out(steps, shapes) for shapes in (ONE_LAG, TWO_LAGS))
+    one, two = (_compute_held_out_loss(steps, shapes) for shapes in (ONE_LAG, TWO_LAGS))
     if two.loss >= BETTER * one.loss:
         return ONE_LAG
-    if two.are_equal and _held_out(steps, RINGING).loss < MUCH_BETTER * two.loss:
+    if two.are_equal and _compute_held_out_loss(steps, RINGING).loss < MUCH_BETTER * two.loss:
         return RINGING
     return TWO_LAGS
 
@@ -82,7 +82,7 @@ class _HeldOut(NamedTuple):
     are_equal: bool
 
 
-def _held_out(steps: Sequence[StepResponse], shapes: Shapes) -> _HeldOut:
+def _compute_held_out_loss(steps: Sequence[StepResponse], shapes: Shapes) -> _HeldOut:
     halves = steps[::2], steps[1::2]
     fits = [fit_lags(half, shapes) for half in halves]
     scale_n = _scale_n(steps)

@@ -95,7 +95,7 @@ def fit_joint(branches: Branches, walks: Sequence[Walk], highest_order: int = HI
     best = fit_stops(branches, walks)
     if branches.rising.order != branches.falling.order:
         return best
-    starts = [branches, _elevated(branches)] if branches.rising.order < highest_order else [branches]
+    starts = [branches, _raise_orders(branches)] if branches.rising.order < highest_order else [branches]
     for start in starts:
         joint = _usable_joint(start, walks)
         if joint and (_is_worth_an_order(joint, best) if best.joint else joint.rms_n < best.rms_n):
@@ -122,7 +122,7 @@ def _is_worth_an_order(higher: SlipFit, lower: SlipFit) -> bool:
     return bool(higher.rms_n < min(lower.rms_n * share, lower.rms_n - LEAST_GAIN_N))
 
 
-def _elevated(branches: Branches) -> Branches:
+def _raise_orders(branches: Branches) -> Branches:
     """The same curves with one order more."""
     return Branches(elevate_order(branches.rising), elevate_order(branches.falling))
 

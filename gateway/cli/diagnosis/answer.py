@@ -76,11 +76,11 @@ def render_files(answer: Answer, files: AnswerFiles) -> dict[Path, str]:
     """Return what is to be written, by file."""
     texts: dict[Path, str] = {}
     if files.json:
-        texts[files.json] = json.dumps(_document(answer), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        texts[files.json] = json.dumps(_compose_document(answer), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     if files.report:
-        texts[files.report] = _report(answer)
+        texts[files.report] = _render_report(answer)
     if files.extend and _can_extend(answer, files.extend):
-        profile = _extended(answer, files.extend.stem)
+        profile = _extend_plant(answer, files.extend.stem)
         texts[files.extend] = plant_text(
             profile, f"Written by force-gateway diagnose; verdict: {answer.diagnosis.verdict}"
         )
@@ -89,7 +89,7 @@ def render_files(answer: Answer, files: AnswerFiles) -> dict[Path, str]:
     return texts
 
 
-def _document(answer: Answer) -> dict[str, Any]:
+def _compose_document(answer: Answer) -> dict[str, Any]:
     """The contract's fields; closed_loop besides, where it was asked for."""
     document = diagnosis_document(answer.diagnosis, answer.runtime_s)
     if answer.gain is not None:
@@ -97,7 +97,7 @@ def _document(answer: Answer) -> dict[str, Any]:
     return document
 
 
-def _report(answer: Answer) -> str:
+def _render_report(answer: Answer) -> str:
     circumstances = ReportContext(
         rig=answer.sources.rig or "not named",
         plant=answer.sources.plant.name,
@@ -120,7 +120,7 @@ def _can_extend(answer: Answer, target: Path | str) -> bool:
     return not why
 
 
-def _extended(answer: Answer, name: str) -> PlantProfile:
+def _extend_plant(answer: Answer, name: str) -> PlantProfile:
     sources = answer.sources
     profile = extended_plant(answer.diagnosis, sources.plant, sources.name, f"{datetime.now(UTC):%Y-%m-%d}")
     return replace(profile, name=name)
@@ -136,7 +136,7 @@ def save_plant(answer: Answer, state: Path | None, rig: str | None) -> int | Non
         return None
     directory = state_directory(state, rig or sources.rig or defaults.RIG)
     name = f"{sources.plant.name}-{'-'.join(cause.name for cause in diagnosis.causes[:2])}"
-    return save_diagnosed(directory, diagnosis, sources, _extended(answer, name))
+    return save_diagnosed(directory, diagnosis, sources, _extend_plant(answer, name))
 
 
 def print_answer(answer: Answer, written: Iterable[Path]) -> None:

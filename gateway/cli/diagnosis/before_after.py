@@ -73,12 +73,12 @@ def document(found: BeforeAfter) -> dict[str, Any]:
 
 
 def _facts(change: ForceChange) -> dict[str, Any]:
-    return {name: _known(value) for name, value in asdict(change).items()}
+    return {name: _known_or_none(value) for name, value in asdict(change).items()}
 
 
-def _known(value: Any) -> Any:
+def _known_or_none(value: Any) -> Any:
     if isinstance(value, tuple):
-        known = [_known(each) for each in value]
+        known = [_known_or_none(each) for each in value]
         return None if None in known else known
     return None if isinstance(value, float) and not isfinite(value) else value
 

@@ -11,7 +11,7 @@ from gateway.service.closed_loop.study import ClosedLoopGain
 from gateway.twin.plant import with_value
 
 
-def measured_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoopGain | str:
+def measure_gain(diagnosis: Diagnosis, sources: Sources) -> ClosedLoopGain | str:
     """Return the gain, or a sentence that says why it could not be measured.
 
     The cell makes the noise of the plant at the start: the diagnosis has taken it away, and control takes a cell without

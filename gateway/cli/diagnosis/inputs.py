@@ -80,7 +80,7 @@ def read_sources(
         for each in recordings
     )
     plant_of_first = None if known else plant_of(recordings[0])
-    rig_name, plant, notes = _of_rig(known) if known else _recorded(recordings, plant_of_first)
+    rig_name, plant, notes = _of_rig(known) if known else _find_rig_of_recordings(recordings, plant_of_first)
     here = known or rig_of(recordings[0])
     noise_n, unknown = _calibration_noise(recordings, calibration, known, state)
     return Sources(
@@ -171,18 +171,20 @@ def _of_rig(rig: "Rig") -> tuple[str, PlantProfile, tuple[str, ...]]:
     return rig.name, plant, (f"rig {rig.name} names no plant: {plant.name} is the start",)
 
 
-def _recorded(recordings: Sequence[Recording], plant: PlantProfile | None) -> tuple[str, PlantProfile, tuple[str, ...]]:
+def _find_rig_of_recordings(
+    recordings: Sequence[Recording], plant: PlantProfile | None
+) -> tuple[str, PlantProfile, tuple[str, ...]]:
     """The rig that the first recording carries or names, and its plant where there is one; else the paper's."""
     names = [str(recording.header.get("rig") or "") for recording in recordings]
     notes = [f"the recordings are of several rigs: {', '.join(sorted(set(names)))}"] if len(set(names)) > 1 else []
     if plant is None:
-        plant = _foreign(load_shipped_plant(START_PLANT))
+        plant = _undescribed_machine(load_shipped_plant(START_PLANT))
         missing = f"rig {names[0]} is not known here" if names[0] else "the recording names no rig"
         notes.append(f"{missing}: the plant {START_PLANT} without its effects is the start; --rig names another")
     return names[0], plant, tuple(notes)
 
 
-def _foreign(profile: PlantProfile) -> PlantProfile:
+def _undescribed_machine(profile: PlantProfile) -> PlantProfile:
     """The start for a machine that nobody described: nobody said that it has this one's delay or seals."""
     plant = without_effects(profile.plant)
     now = {f"{section}.{name}": value for section, name, value in values(plant)}

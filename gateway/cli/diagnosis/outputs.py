@@ -9,7 +9,7 @@ from typing import Final
 
 import click
 
-from gateway.cli.diagnosis.progress_line import handled_interrupt
+from gateway.cli.diagnosis.progress_line import handle_interrupt
 
 STDOUT: Final = Path("-")  # as the name of a file
 
@@ -33,7 +33,7 @@ def write_all(texts: Mapping[Path, str]) -> None:
     is renamed: KeyboardInterrupt, and no file has changed either; later it comes too late.
     """
     pressed = threading.Event()
-    with handled_interrupt(lambda number, frame: pressed.set()):
+    with handle_interrupt(lambda number, frame: pressed.set()):
         _write_all(texts, pressed)
 
 

@@ -20,10 +20,10 @@ _CLEAR: Final = "\r\x1b[2K"
 
 
 @contextmanager
-def shown_progress(task: str) -> Iterator[None]:
+def show_progress(task: str) -> Iterator[None]:
     """Show what the calculation in this block reports. task: what it does, in a word. KeyboardInterrupt at Ctrl-C."""
     line = ProgressLine(task, sys.stderr)
-    with _interruptible() as check, line.written():
+    with _interruptible() as check, line.keep_writing():
 
         def show(progress: Progress) -> None:
             check()
@@ -46,7 +46,7 @@ class ProgressLine:
         self._is_over = threading.Event()
 
     @contextmanager
-    def written(self) -> Iterator[None]:
+    def keep_writing(self) -> Iterator[None]:
         """Write from a thread of its own, for what calculates says nothing for seconds now and then."""
         writer = threading.Thread(target=self._write_on, daemon=True)
         writer.start()
@@ -97,7 +97,7 @@ def _interruptible() -> Iterator[Callable[[], None]]:
         pressed.set()
         raise KeyboardInterrupt
 
-    with handled_interrupt(on_interrupt), _silent_when_swallowed():
+    with handle_interrupt(on_interrupt), _silent_when_swallowed():
         yield check
         check()
 
@@ -119,7 +119,7 @@ def _silent_when_swallowed() -> Iterator[None]:
 
 
 @contextmanager
-def handled_interrupt(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+def handle_interrupt(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
     """Have Ctrl-C handled otherwise in this block; nothing changes where it is ignored, or outside of the main thread."""
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         yield

@@ -22,11 +22,11 @@ def sockets_near(host: str, root: Path) -> list[Path]:
 def running_at(host: str, port: int, root: Path) -> dict[str, Any] | None:
     """Return what the gateway that serves this port says of itself (`running`); None where it is elsewhere, nobody
     says, or two do."""
-    answer = [one for directory in sockets_near(host, root) if (one := _said_by(directory)).get("port") == port]
+    answer = [one for directory in sockets_near(host, root) if (one := _ask_what_runs(directory)).get("port") == port]
     return answer[0] if len(answer) == 1 else None
 
 
-def _said_by(directory: Path) -> dict[str, Any]:
+def _ask_what_runs(directory: Path) -> dict[str, Any]:
     try:
         return control_socket.ask(directory, {"do": "running"})
     except CliError:  # one that was killed, an older one, another user's

@@ -62,8 +62,8 @@ def find_plant(state: StateChoice, which: str) -> PlantProfile:
 def add_file(state: StateChoice, file: Path) -> int:
     """Add a plant file; return its number. ProfileError with every fault of the file."""
     profile = load_plant(file)
-    told = Provenance(made_utc=now_utc(), version=VERSION, rig=state.rig, start="", file=file.name)
-    return add(state.directory, profile, told)
+    provenance = Provenance(made_utc=now_utc(), version=VERSION, rig=state.rig, start="", file=file.name)
+    return add(state.directory, profile, provenance)
 
 
 def add(directory: Path, profile: PlantProfile, provenance: Provenance) -> int:
@@ -81,19 +81,19 @@ def save_diagnosed(directory: Path, diagnosis: "Diagnosis", sources: "Sources", 
     recordings = tuple(
         SourceRecording(name=path.name, sha256=sha256(path.read_bytes()).hexdigest()) for path in sources.paths
     )
-    told = Provenance(
+    provenance = Provenance(
         made_utc=now_utc(),
         version=VERSION,
         rig=sources.rig,
         start=sources.plant.name,
         verdict=diagnosis.verdict.value,
         recordings=recordings,
-        causes=tuple(_found(cause) for cause in diagnosis.causes),
+        causes=tuple(_cause_of(cause) for cause in diagnosis.causes),
     )
-    return add(directory, with_cell_terms(profile, sources.straightened), told)
+    return add(directory, with_cell_terms(profile, sources.straightened), provenance)
 
 
-def _found(cause: "Cause") -> FoundCause:
+def _cause_of(cause: "Cause") -> FoundCause:
     parameters = {
         name: {"value": float(each.value), "unit": each.unit, "ci95": [float(end) for end in each.ci95]}
         for name, each in cause.parameters.items()
@@ -182,7 +182,7 @@ def plant_facts(entry: StoredDocument[NumberedPlant], *, is_active: bool) -> dic
     }
 
 
-def shown_facts(plant: NumberedPlant, rig: Rig | None) -> dict[str, Any]:
+def all_plant_facts(plant: NumberedPlant, rig: Rig | None) -> dict[str, Any]:
     """Return everything of a plant as JSON has it."""
     from gateway.cli.plants.words import compensation_facts
 

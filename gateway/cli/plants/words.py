@@ -12,13 +12,13 @@ from gateway.twin.plant import values
 
 def describe_provenance(plant: NumberedPlant) -> Iterator[str]:
     """Yield where a plant comes from: its recordings and causes."""
-    told = plant.provenance
-    yield f"plant {plant.number} ({plant.profile.name}), made {told.made_utc} by force-gateway {told.version}"
-    if told.file:
-        yield f"added from {told.file}"
-    for recording in told.recordings:
-        yield f"diagnosed from {recording.name}, sha256 {recording.sha256[:16]}, starting from {told.start}: {told.verdict}"
-    for cause in told.causes:
+    source = plant.provenance
+    yield f"plant {plant.number} ({plant.profile.name}), made {source.made_utc} by force-gateway {source.version}"
+    if source.file:
+        yield f"added from {source.file}"
+    for recording in source.recordings:
+        yield f"diagnosed from {recording.name}, sha256 {recording.sha256[:16]}, starting from {source.start}: {source.verdict}"
+    for cause in source.causes:
         yield f"  {cause.name}: {_numbers(cause)}, confidence {cause.confidence:.2f}"
 
 

@@ -39,7 +39,7 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         facts = {
             "active": _number(selected),
             "notes": selected.notes,
-            "built_in": _built_in(store.built_in, selected),
+            "built_in": _built_in_facts(store.built_in, selected),
             "calibrations": [_facts(entry, selected) for entry in entries],
         }
         click.echo(json.dumps(facts, indent=2))
@@ -171,7 +171,7 @@ def _number(selected: "SelectedDocument[Calibration]") -> int | None:
     return selected.document.number if selected.document else None
 
 
-def _built_in(own: "Calibration | None", selected: "SelectedDocument[Calibration]") -> dict[str, Any] | None:
+def _built_in_facts(own: "Calibration | None", selected: "SelectedDocument[Calibration]") -> dict[str, Any] | None:
     """Return the rig's own calibration, which is no file of the store."""
     from gateway.numbered_documents.selection import OWN
     from gateway.registers.upload.coefficients import model_hash

@@ -133,9 +133,9 @@ def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
     from gateway.cli.diagnosis.answer import Answer, add_plan
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets
-    from gateway.cli.diagnosis.progress_line import shown_progress
+    from gateway.cli.diagnosis.progress_line import show_progress
 
-    with shown_progress("reading"):
+    with show_progress("reading"):
         sources = read_sources(
             options["recordings"],
             rig=options["rig"],
@@ -197,7 +197,7 @@ def _read_old(options: dict[str, Any], rig: str) -> "Sources | None":
 
 
 def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str, Any]) -> "tuple[Diagnosis, float]":
-    from gateway.cli.diagnosis.progress_line import shown_progress
+    from gateway.cli.diagnosis.progress_line import show_progress
     from gateway.diagnosis import Options, diagnose, find_changes
     from gateway.diagnosis.input_checks import name_options
 
@@ -211,7 +211,7 @@ def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str,
     )
     plant = sources.plant.plant
     began_s = time.perf_counter()
-    with shown_progress("diagnosing"):
+    with show_progress("diagnosing"):
         if old:
             diagnosis = find_changes(sources.measurements, old.measurements, plant, engine_options)
         else:
@@ -221,8 +221,8 @@ def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str,
 
 
 def _measure_gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoopGain | str":
-    from gateway.cli.diagnosis.closed_loop import measured_gain
-    from gateway.cli.diagnosis.progress_line import shown_progress
+    from gateway.cli.diagnosis.closed_loop import measure_gain
+    from gateway.cli.diagnosis.progress_line import show_progress
 
-    with shown_progress("closing the loop on the twin"):
-        return measured_gain(diagnosis, sources)
+    with show_progress("closing the loop on the twin"):
+        return measure_gain(diagnosis, sources)

@@ -59,13 +59,13 @@ def _line(entry: "StoredDocument[NumberedPlant]") -> str:
 @json_option
 def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
     """Show plant N: where it comes from, what is compensated of it, and its file."""
-    from gateway.cli.plants.store_access import load_rig_or_none, load_stored, open_store, shown_facts
+    from gateway.cli.plants.store_access import all_plant_facts, load_rig_or_none, load_stored, open_store
     from gateway.cli.plants.words import describe_compensation, describe_provenance
     from gateway.plants.store import as_text
 
     plant, rig = load_stored(open_store(state.directory), number), load_rig_or_none(state)
     if as_json:
-        click.echo(json.dumps(shown_facts(plant, rig), indent=2))
+        click.echo(json.dumps(all_plant_facts(plant, rig), indent=2))
         return
     for line in (*describe_provenance(plant), *describe_compensation(plant, rig), "", as_text(plant).rstrip()):
         click.echo(line)

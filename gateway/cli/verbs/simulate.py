@@ -40,7 +40,7 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
     """
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
-    from gateway.cli.diagnosis.progress_line import shown_progress
+    from gateway.cli.diagnosis.progress_line import show_progress
     from gateway.extras import require
     from gateway.profiles import load_plant
 
@@ -49,7 +49,7 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
     sources = read_sources([recording], **options)
     measurement, profile = sources.measurements[0], profile or sources.plant
     check_targets([csv_file] if csv_file else [], [*sources.paths, *([Path(plant)] if plant else [])])
-    with shown_progress("simulating"):
+    with show_progress("simulating"):
         simulated_n, notes = _simulate(measurement, profile)
     facts = _facts(measurement, simulated_n) | {
         "plant": profile.name,

@@ -176,7 +176,7 @@ class FaultDetector:
         if self._over >= self._limits.over_force_samples:
             return stop_cause(FaultCode.OVER_FORCE, self._over_words(reading, expected_n))
         if words := self._frozen.words:
-            self._frozen.tripped()
+            self._frozen.note_trip()
             observation = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
             return stop_cause(FaultCode.SAMPLE_FROZEN, observation)
         if self._response_fault is FaultCode.SIGN_INVERTED:

@@ -100,6 +100,6 @@ class StuckSensorCheck:
             f"{1.0 / noise.interval_s:.0f} samples/s; set a finer count, a faster rate or less filter on the amplifier"
         )
 
-    def tripped(self) -> None:
+    def note_trip(self) -> None:
         """Note that the fault is told: these equal samples are not learned from."""
         self._noise.forget_run()

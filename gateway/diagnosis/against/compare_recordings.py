@@ -87,8 +87,8 @@ def _drop_trifles(result: Diagnosis, left_n: float) -> Diagnosis:
     kept = tuple(each for each in result.causes if _saved_n2(each) > _LEAST_SHARE_OF_LEFT * usual_n2)
     if len(kept) == len(result.causes):
         return result
-    gone = ", ".join(each.name for each in result.causes if each not in kept)
-    note = f"{gone}: no change is told, for it saves less than the machine's own model is uncertain by"
+    dropped = ", ".join(each.name for each in result.causes if each not in kept)
+    note = f"{dropped}: no change is told, for it saves less than the machine's own model is uncertain by"
     quiet = Verdict.UNKNOWN if result.leftover else Verdict.NOTHING_FOUND
     return replace(
         result,

@@ -65,7 +65,7 @@ def describe_machine(old: Sequence[Measurement], given: Plant, options: Options)
     """Return the machine that these recordings show, with as many effects as they ask for. given: the plant to start from."""
     start = prepare_search(old, given, options)
     found = search_effects(start.bench, start.base, start.effects, start.whiten)
-    fitted, named = _add_what_predicts(start, found)
+    fitted, named = _add_predictive_effects(start, found)
     plain = white_whitener(start.bench, fitted.residual_n)  # the whitened optimum leaves slow errors, which come again
     fitted = refit(start.bench, fitted, plain, waves=_WAVES)
     effects = tuple(
@@ -76,7 +76,7 @@ def describe_machine(old: Sequence[Measurement], given: Plant, options: Options)
     return MachineModel(start.bench, fitted.parameters, free, readings, effects, fit_error(start.bench, fitted))
 
 
-def _add_what_predicts(start: SearchStart, found: SearchResult) -> tuple[FittedModel, list[NamedForm]]:
+def _add_predictive_effects(start: SearchStart, found: SearchResult) -> tuple[FittedModel, list[NamedForm]]:
     """The model of the search with every further effect that predicts better, however small, and all its effects: the machine
     is to be described, not to be explained."""
     bench, fitted, whiten = start.bench, found.fitted, found.whiten

@@ -60,7 +60,7 @@ class ErrorModel:
         series = _Series.of(bench, parameters, self.largest_pa, self.largest_n)
         driving = series.pressure
         for sizes in self.added:
-            driving = _driven(
+            driving = _drive_friction(
                 bench, series, driving, np.array(sizes) @ series.linear / (self.area_m2 * self.largest_pa)
             )
         scale = np.array(self.scale)
@@ -81,7 +81,7 @@ def fit_error(bench: Bench, fitted: FittedModel) -> ErrorModel:
     for _ in range(_ROUNDS):
         sizes = _fit_columns(fitted, series.with_stops(bench, driving), rows)[: series.linear.shape[0]]
         added.append(tuple(map(float, sizes)))
-        driving = _driven(bench, series, driving, sizes @ series.linear / (area_m2 * largest_pa))
+        driving = _drive_friction(bench, series, driving, sizes @ series.linear / (area_m2 * largest_pa))
     columns = series.with_stops(bench, driving)
     spread = np.sqrt(np.mean(columns[:, bench.usable] ** 2, axis=1))
     is_column = spread > _LEAST_SPREAD
@@ -89,8 +89,8 @@ def fit_error(bench: Bench, fitted: FittedModel) -> ErrorModel:
     columns = columns[is_column] * scale[is_column, None]
     sizes = _fit_columns(fitted, columns, rows)
     common_n, left_n = _rms_with_and_without(fitted, columns, rows)
-    told, found = tuple(map(float, scale)), tuple(map(float, sizes))
-    return ErrorModel(largest_pa, largest_n, area_m2, tuple(added), told, found, common_n, left_n)
+    scales, found = tuple(map(float, scale)), tuple(map(float, sizes))
+    return ErrorModel(largest_pa, largest_n, area_m2, tuple(added), scales, found, common_n, left_n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,16 +108,18 @@ class _Series:
         time_s = [each.time_s for each in bench.measurements]
         pressures_pa, forces_n = _simulate(bench, parameters)
         pressure, force = [each / largest_pa for each in pressures_pa], [each / largest_n for each in forces_n]
-        linear = _stack(bench, lambda k: _delayed(time_s[k], pressure[k]))
-        return cls(pressure, force, linear, _stack(bench, lambda k: _curved(time_s[k], pressure[k], force[k])))
+        linear = _stack(bench, lambda k: _delayed_pressures(time_s[k], pressure[k]))
+        return cls(
+            pressure, force, linear, _stack(bench, lambda k: _smooth_functions(time_s[k], pressure[k], force[k]))
+        )
 
     def with_stops(self, bench: Bench, driving: list[Floats]) -> Floats:
         """All columns, those of friction as it is driven by this pressure."""
-        stops = _stack(bench, lambda k: _stopped(driving[k], self.force[k]))
+        stops = _stack(bench, lambda k: _stop_operators(driving[k], self.force[k]))
         return np.vstack([self.linear, self.curved, stops])
 
 
-def _driven(bench: Bench, series: _Series, driving: list[Floats], added: Floats) -> list[Floats]:
+def _drive_friction(bench: Bench, series: _Series, driving: list[Floats], added: Floats) -> list[Floats]:
     """The pressure with what the delayed ones add to it, a share of the largest."""
     return [each + part for each, part in zip(driving, _split(bench, added), strict=True)]
 
@@ -149,7 +151,7 @@ def _split(bench: Bench, stacked: Floats) -> list[Floats]:
 
 def _rms_with_and_without(fitted: FittedModel, columns: Floats, rows: Flags) -> tuple[float, float]:
     """RMS at these rows of what the model alone cannot explain but the columns can, and of what neither can, N."""
-    model = _felt(fitted, rows)
+    model = _drop_unfelt_columns(fitted, rows)
     alone_n, both_n = (
         _rms_beside(each[:, rows], fitted.residual_n[rows]) for each in (model, np.vstack([model, columns]))
     )
@@ -158,27 +160,27 @@ def _rms_with_and_without(fitted: FittedModel, columns: Floats, rows: Flags) -> 
 
 def _rms_beside(columns: Floats, residual_n: Floats) -> float:
     """RMS of what these columns cannot explain."""
-    scaled = _normalised(columns)
+    scaled = _normalise(columns)
     sizes = np.linalg.lstsq(scaled.T, residual_n, rcond=_INDEPENDENT)[0]
     return float(np.sqrt(np.mean((residual_n - sizes @ scaled) ** 2)))
 
 
 def _fit_columns(fitted: FittedModel, columns: Floats, rows: Flags) -> Floats:
     """Size of each column beside the model, by least squares over these rows with a ridge: columns are nearly alike."""
-    model = _felt(fitted, rows)
+    model = _drop_unfelt_columns(fitted, rows)
     both = np.vstack([model, columns])[:, rows]
-    scaled = _normalised(both)
+    scaled = _normalise(both)
     normal_matrix = scaled @ scaled.T + _RIDGE * np.eye(scaled.shape[0])
     sizes = np.linalg.solve(normal_matrix, scaled @ fitted.residual_n[rows]) / _norms(both)
     return np.asarray(sizes[model.shape[0] :])
 
 
-def _felt(fitted: FittedModel, rows: Flags) -> Floats:
+def _drop_unfelt_columns(fitted: FittedModel, rows: Flags) -> Floats:
     """The model's derivatives that these rows feel at all."""
     return np.asarray(fitted.jacobian[np.any(fitted.jacobian[:, rows] != 0.0, axis=1)])
 
 
-def _normalised(columns: Floats) -> Floats:
+def _normalise(columns: Floats) -> Floats:
     return np.asarray(columns / _norms(columns)[:, None])
 
 
@@ -186,33 +188,33 @@ def _norms(columns: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300)))
 
 
-def _delayed(time_s: Floats, pressure: Floats) -> Iterator[Floats]:
+def _delayed_pressures(time_s: Floats, pressure: Floats) -> Iterator[Floats]:
     for delay_s in _DELAYS_S:
         yield np.interp(time_s - delay_s, time_s, pressure) - pressure
 
 
-def _curved(time_s: Floats, pressure: Floats, force: Floats) -> Iterator[Floats]:
+def _smooth_functions(time_s: Floats, pressure: Floats, force: Floats) -> Iterator[Floats]:
     """Powers of the force, slow lags, and what grows with the rate."""
     rate = np.gradient(pressure, time_s)
     yield from (pressure, force, force**2, force**3, force**4)
     for lag_s in _SLOW_LAGS_S:
         slow = np.empty_like(pressure)
-        _follow(time_s, pressure, lag_s, slow)
+        _apply_lag(time_s, pressure, lag_s, slow)
         yield from (slow, slow * force)
     yield from (rate * force, np.abs(rate), np.abs(rate) * force, rate**2, rate * np.abs(rate))
 
 
-def _stopped(pressure: Floats, force: Floats) -> Iterator[Floats]:
+def _stop_operators(pressure: Floats, force: Floats) -> Iterator[Floats]:
     """Friction of several widths: as it is, with the force, and rounded."""
     for width in _WIDTHS:
         stopped = np.empty_like(pressure)
-        _stop(pressure, width, stopped)
+        _apply_stop(pressure, width, stopped)
         share = stopped / width
         yield from (share, share * force, share**3)
 
 
 @loop
-def _stop(series: Series, width: float, stopped: Series) -> None:
+def _apply_stop(series: Series, width: float, stopped: Series) -> None:
     """Fill in the stop operator: what a spring of friction `width` is strained by."""
     state = 0.0
     stopped[0] = 0.0
@@ -222,7 +224,7 @@ def _stop(series: Series, width: float, stopped: Series) -> None:
 
 
 @loop
-def _follow(time_s: Series, series: Series, lag_s: float, lagged: Series) -> None:
+def _apply_lag(time_s: Series, series: Series, lag_s: float, lagged: Series) -> None:
     """Fill in the series behind a first-order lag."""
     lagged[0] = series[0]
     for row in range(1, series.size):

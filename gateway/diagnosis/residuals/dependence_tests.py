@@ -18,7 +18,7 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.normal_equations import NormalEquations, model_span
 from gateway.diagnosis.noise.whitening import Whitener
-from gateway.diagnosis.residuals.leftovers import describe, is_one_thing
+from gateway.diagnosis.residuals.leftovers import describe_leftover, is_one_thing
 from gateway.diagnosis.residuals.regressors import Regressors, list_regressors
 from gateway.diagnosis.residuals.unsteadiness import find_unsteadiness
 from gateway.diagnosis.result import Leftover
@@ -112,29 +112,30 @@ def find_dependences(
 
     Each answer is taken out before the next question.
     """
-    found, told = list(given), list[Dependence]()
+    found, distinct = list(given), list[Dependence]()
     for each in found:
-        told += [each] if _is_new(bench, each, told) else []
-    while len(found) < _MOST_DEPENDENCES and len(told) < MOST_LEFTOVERS:
+        distinct += [each] if _is_new(bench, each, distinct) else []
+    while len(found) < _MOST_DEPENDENCES and len(distinct) < MOST_LEFTOVERS:
         dependence = strongest_dependence(bench, fitted, whiten, found, outside=False)
         if dependence is None:
             break
-        told += [dependence] if _is_new(bench, dependence, told) else []
+        distinct += [dependence] if _is_new(bench, dependence, distinct) else []
         found.append(dependence)
         taken = np.vstack([fitted.jacobian, bench.reduced(dependence.regressors.columns)])
         fitted = FittedModel(fitted.parameters, fitted.free, fitted.residual_n, fitted.chi2, taken)
-    leftovers = [describe(bench, each.regressors, each.sizes, each.share) for each in told]
-    is_uneven = any(each.regressors.kind in ("jump", "slow") for each in told)  # these are louder somewhere themselves
+    leftovers = [describe_leftover(bench, each.regressors, each.sizes, each.share) for each in distinct]
+    kinds = {each.regressors.kind for each in distinct}
+    is_uneven = bool(kinds & {"jump", "slow"})  # these are louder somewhere themselves
     if not is_uneven and bench.rms_n(fitted.residual_n) >= RESOLUTION_N:
         leftovers += find_unsteadiness(bench, fitted, whiten)
     return tuple(leftovers[:MOST_LEFTOVERS])
 
 
-def _is_new(bench: Bench, dependence: Dependence, told: Sequence[Dependence]) -> bool:
-    """Is it of another thing than all that was told?"""
+def _is_new(bench: Bench, dependence: Dependence, distinct: Sequence[Dependence]) -> bool:
+    """Return whether it is of another thing than all of these."""
     return not any(
         is_one_thing(
             dependence.regressors, each.regressors, (dependence.contribution_n, each.contribution_n), bench.judged
         )
-        for each in told
+        for each in distinct
     )

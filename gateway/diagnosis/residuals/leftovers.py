@@ -36,7 +36,7 @@ _EXPERIMENTS: Final[Mapping[str, str]] = {
 }
 
 
-def describe(bench: Bench, regressors: Regressors, sizes: Floats, share: float) -> Leftover:
+def describe_leftover(bench: Bench, regressors: Regressors, sizes: Floats, share: float) -> Leftover:
     """Return a dependence in words and numbers. sizes: of its columns, N; share: of what is left."""
     contribution_n = sizes @ regressors.columns
     amplitude_n = _amplitude_n(bench, regressors, contribution_n)
@@ -53,7 +53,7 @@ def describe(bench: Bench, regressors: Regressors, sizes: Floats, share: float) 
         amplitude_n=amplitude_n,
         period_s=period_s,
         file=file,
-        experiment=propose(
+        experiment=propose_experiment(
             regressors.kind,
             hertz=regressors.frequency_hz or 0.0,
             at_s=regressors.at_s or 0.0,
@@ -63,7 +63,7 @@ def describe(bench: Bench, regressors: Regressors, sizes: Floats, share: float) 
     )
 
 
-def propose(kind: str, **numbers: float | str) -> str:
+def propose_experiment(kind: str, **numbers: float | str) -> str:
     """Return the experiment that would show the nature of a leftover of this kind."""
     return _EXPERIMENTS[kind].format(**numbers)
 

@@ -12,7 +12,7 @@ from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.normal_equations import orthonormal
 from gateway.diagnosis.noise.whitening import Whitener
-from gateway.diagnosis.residuals.leftovers import propose
+from gateway.diagnosis.residuals.leftovers import propose_experiment
 from gateway.diagnosis.result import Leftover
 
 _SIGNIFICANCE: Final = 1.0e-3  # of noise that seems louder somewhere by chance
@@ -40,9 +40,9 @@ def find_unsteadiness(bench: Bench, fitted: FittedModel, whiten: Whitener) -> It
     if whiten.knows_times and all(map(_evenly_sampled, bench.measurements)):
         loud = [_loud_stretch(bench, fitted.residual_n, left, each) for each in channels]
     for found in (loud, [_wandering_line(bench, fitted.residual_n, left, each) for each in channels]):
-        told = [each for each in found if each is not None]
-        if told:
-            yield max(told, key=lambda each: each.share)
+        leftovers = [each for each in found if each is not None]
+        if leftovers:
+            yield max(leftovers, key=lambda each: each.share)
 
 
 def _evenly_sampled(measurement: Measurement) -> bool:
@@ -72,7 +72,9 @@ def _loud_stretch(bench: Bench, residual_n: Floats, white: Floats, channel: Chan
     shape = when = f"from {time_s[inside[0]]:.0f} to {time_s[inside[-1]]:.0f} s"
     shape = f"louder {when}: {inside_n:.2g} N against {outside_n:.2g} N elsewhere"
     share = float(np.sum(np.maximum(levels - usual, 0.0)) / np.sum(levels))
-    return Leftover("time", shape, share, amplitude_n=inside_n, file=_file(bench, channel), experiment=propose("loud"))
+    return Leftover(
+        "time", shape, share, amplitude_n=inside_n, file=_file(bench, channel), experiment=propose_experiment("loud")
+    )
 
 
 def _about(peak: int, is_high: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -116,7 +118,7 @@ def _wandering_line(bench: Bench, residual_n: Floats, white: Floats, channel: Ch
         frequency_hz=hertz,
         amplitude_n=amplitude_n,
         file=_file(bench, channel),
-        experiment=propose("line", hertz=hertz),
+        experiment=propose_experiment("line", hertz=hertz),
     )
 
 

@@ -93,13 +93,13 @@ def check_reply_timeout(parts: Parts) -> Found:
     """Yield a fault for a device whose reply_timeout_s is over before its answer can be through the wire."""
     if parts.output_device and parts.output:
         for name, took_s in _talks(parts):
-            yield from _given_up("output.baud", parts.output_device, parts.output.baud, (name, took_s))
+            yield from _check_reply_time("output.baud", parts.output_device, parts.output.baud, (name, took_s))
     for reading in _readings(parts):
         if reading.is_asked:
-            yield from _given_up("load_cell.baud", reading.device, reading.baud, ("read_force", reading.wire_s))
+            yield from _check_reply_time("load_cell.baud", reading.device, reading.baud, ("read_force", reading.wire_s))
 
 
-def _given_up(path: str, device: DeviceProfile, baud: int, talk: tuple[str, float]) -> Found:
+def _check_reply_time(path: str, device: DeviceProfile, baud: int, talk: tuple[str, float]) -> Found:
     if talk[1] > device.reply_timeout_s:
         reason = f"question and answer of {talk[0]} take {talk[1]:.3f} s on the wire"
         bound = f"{device.name} gives up after reply_timeout_s = {second(device.reply_timeout_s)}"

@@ -34,7 +34,7 @@ def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None,
         value: T = adapter(cast("Any", kind)).validate_json(json.dumps(document.at(*path)), strict=True)
         return value, []
     except ValidationError as error:
-        findings = _told_once(error)
+        findings = _keep_first_findings(error)
     faults = [_fault(kind, document, path, finding) for finding in findings]
     return None, sorted(_without_echoes(faults))
 
@@ -51,7 +51,7 @@ def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
     return build(kind, Document(document.file, known, document.marks))[0]
 
 
-def _told_once(error: ValidationError) -> list[Any]:
+def _keep_first_findings(error: ValidationError) -> list[Any]:
     """Return one finding per place, the first: a union reports each of its members. No more than a person
     reads: a sentence takes half a millisecond, and a hostile document may have thousands."""
     first = error.errors(include_url=False)[:_MOST_FINDINGS]

@@ -89,7 +89,7 @@ class DocumentReader:
             return WordOrder.ABCD
         return WordOrder(given)
 
-    def numbered(
+    def read_numbered(
         self, place: Place, given: Any, most: int, known: Mapping[str, Mapping[int, str]]
     ) -> Mapping[int, str]:
         """Return {number: name}, as given or as the named one of `known` has it; numbers may have become text (JSON)."""

@@ -125,8 +125,8 @@ class _MapReader(DocumentReader):
             minimum=low,
             maximum=high,
             text=self.text(place, entry, "text"),
-            values=self.numbered((*place, "values"), entry.get("values", {}), 0xFFFF, VALUE_NAMES),
-            bits=self.numbered((*place, "bits"), entry.get("bits", {}), 15, BIT_NAMES),
+            values=self.read_numbered((*place, "values"), entry.get("values", {}), 0xFFFF, VALUE_NAMES),
+            bits=self.read_numbered((*place, "bits"), entry.get("bits", {}), 15, BIT_NAMES),
             word_order=self.order(place, entry),
             constant=self.number(place, entry, "constant") if "constant" in entry else None,
         )

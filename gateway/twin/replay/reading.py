@@ -35,7 +35,7 @@ class Readings:
     def fill(self, plant: Plant, contact_n: Floats, force_n: Floats, found: Floats) -> None:
         """Fill in readings in N. contact_n: on the grid, without the spindle; force_n: at the rows, with it."""
         cell, conditions = plant.cell, self._grid.row_conditions
-        reading = self._amplified(plant, contact_n, force_n)
+        reading = self._read_amplifier(plant, contact_n, force_n)
         for term in active_formulas(TERMS, cell, conditions):
             reading = term(cell, reading, conditions)
         if cell.zero_n != 0.0:
@@ -48,7 +48,7 @@ class Readings:
             reading = _convert_reading(cell, reading)
         found[:] = reading if cell.repeated_share == 0.0 or self._shown is None else reading[self._shown]
 
-    def _amplified(self, plant: Plant, contact_n: Floats, force_n: Floats) -> Floats:
+    def _read_amplifier(self, plant: Plant, contact_n: Floats, force_n: Floats) -> Floats:
         """Behind the filter and by the logger's clock."""
         cell, grid = plant.cell, self._grid
         shifted = is_switched_on(cell, ("clock_offset_s", "clock_skew"))

@@ -34,13 +34,13 @@ class Pressures:
     ) -> tuple[list[Floats], NDArray[np.intp]]:
         """Return (the different pressures, which of them each regulator has)."""
         if self._drive.command_v is None:
-            return [self._measured()], np.zeros(len(regulators), dtype=np.intp)
+            return [self._measured_pressure()], np.zeros(len(regulators), dtype=np.intp)
         places: dict[tuple[Regulator, StartState], int] = {}
         each = ((one, _of_pressure(start)) for one, start in zip(regulators, starts, strict=True))
         which = np.array([places.setdefault(one, len(places)) for one in each], dtype=np.intp)
-        return self._pressures.get_all(list(places), self._followed), which
+        return self._pressures.get_all(list(places), self._follow_target), which
 
-    def _measured(self) -> Floats:
+    def _measured_pressure(self) -> Floats:
         pressure = self._pressures.get("measured")
         if pressure is not None:
             return pressure
@@ -48,7 +48,7 @@ class Pressures:
         column = np.array(self._drive.pressure_pa, dtype=float)
         return self._pressures.put("measured", self._grid.from_rows(column))
 
-    def _followed(self, key: tuple[Regulator, StartState]) -> Floats:
+    def _follow_target(self, key: tuple[Regulator, StartState]) -> Floats:
         """What lags and delay make of the target, then ceiling, leak and hunting."""
         regulator, start = key
         pressure, lags = np.empty(self._grid.points), lags_of(regulator)

@@ -47,7 +47,7 @@ class Slides:
 
         def move(key: tuple[Hashable, StartState]) -> Floats:
             place = first[key]
-            return self._moved(plants[place], pressures[which[place]], starts[place])
+            return self._quasi_static_force_n(plants[place], pressures[which[place]], starts[place])
 
         different = list(dict.fromkeys(keys))
         forces = dict(zip(different, self._forces.get_all(different, move), strict=True))
@@ -58,7 +58,7 @@ class Slides:
         pad = (contact.pad_stiffness_n_per_m, contact.gap_m, contact.mass_kg, contact.tilt_deg)
         return (plant.regulator if self._driven else None, plant.cylinder, plant.friction, pad)
 
-    def _moved(self, plant: Plant, pressure_pa: Floats, start: StartState) -> Floats:
+    def _quasi_static_force_n(self, plant: Plant, pressure_pa: Floats, start: StartState) -> Floats:
         """The force of the quasi-static slide, by its own motion or by the measured one."""
         slide = without_mass(slide_of(plant))
         thrust_n = slide.area_m2 * self._in_chamber(plant, pressure_pa)

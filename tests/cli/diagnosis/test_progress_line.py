@@ -19,7 +19,7 @@ import gateway.diagnosis
 from gateway import progress
 from gateway.cli.diagnosis import progress_line
 from gateway.cli.diagnosis.outputs import write_all
-from gateway.cli.diagnosis.progress_line import ProgressLine, shown_progress
+from gateway.cli.diagnosis.progress_line import ProgressLine, show_progress
 from tests.cli.verbs.test_diagnose import table
 from tests.reports.fake_diagnosis import diagnosis
 
@@ -50,7 +50,7 @@ def test_the_newest_stage_is_shown_as_it_is_asked_for(at_once: None, is_terminal
     stream = Terminal(is_terminal=is_terminal)
     line = ProgressLine("diagnosing", stream, iter(range(10_000)).__next__)
     line.text = "refining leak: 3 of 16"
-    with line.written():
+    with line.keep_writing():
         assert all(stream.was_written.acquire(timeout=10) for _ in range(2))
     if is_terminal:
         assert stream.getvalue().startswith("\r\x1b[2Kdiagnosing, 1 s: refining leak: 3 of 16\r\x1b[2Kdiagnosing, 2 s")
@@ -60,7 +60,7 @@ def test_the_newest_stage_is_shown_as_it_is_asked_for(at_once: None, is_terminal
 
 
 def test_what_is_quick_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    with shown_progress("diagnosing"):
+    with show_progress("diagnosing"):
         progress.report("fitting the base model")
     assert capsys.readouterr().err == ""
 

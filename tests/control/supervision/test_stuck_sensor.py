@@ -240,7 +240,7 @@ def test_what_was_frozen_teaches_nothing() -> None:
     for _ in range(3):
         cell.frozen = True
         assert watched.after(cell, 3.0) <= 2.0
-        watched.watch.tripped()
+        watched.watch.note_trip()
         assert watched.watch.words
         for _ in range(1000):
             watched.after(cell, 0.01)
