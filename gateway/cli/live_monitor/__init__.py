@@ -1,1 +1,1 @@
-"""The live page of `monitor`: what is remembered (track), how it looks (page, table, parts, picture), the polling (poll)."""
+"""The live page of `monitor`: the polling (poll), what is remembered (history), its looks (page, register_table, drawing)."""

@@ -101,9 +101,9 @@ def command(**options: Any) -> None:
     _check_effect(options["without"])
     if options["against"] and options["without"]:
         raise click.UsageError("--against compares two recordings of one machine, without --without")
-    from gateway.cli.garbage import spared_garbage_collection
+    from gateway.cli.garbage_collection import pause_garbage_collection
 
-    with spared_garbage_collection():
+    with pause_garbage_collection():
         _answer(options)
 
 
