@@ -33,6 +33,10 @@ SLOWEST_WIRE_S: Final = 0.1  # a later answer was a hitch
 LATE_S: Final = 0.005  # by which a decision that waited for the wire is old
 SHARE: Final = 0.12  # of the sum of the lags
 DAMPING: Final = 0.9
+UNKEPT_DAMPING: Final = 1.4  # on a way down, where the shorter lag lets go before the setting that brakes it ends
+KEPT_DAMPING: Final = 0.5  # by which less is needed for each time of the wire that the shorter lag is long
+MOST_DAMPING: Final = 1.2
+FAR_V: Final = 0.6  # above the wish, from which on it is a step that is braked, and not a ramp that is followed
 GROWTH: Final = 1.2  # from one horizon to the next
 HORIZONS: Final = 20
 SLEW_SHARE: Final = 0.7  # of h: how far the slew takes the output in a pulse that it has to fill
@@ -65,7 +69,7 @@ class LagInverse:
         self.first_v = self.second_v = limits.safe_voltage_v
         self._limits = limits
         self._lags_s = lags_s = 2.0 * lags.natural_s if lags.is_ringing else lags.lag_s + self._second_lag_s
-        self._is_slow, self._damping = True, DAMPING
+        self._is_slow, self._damping, self._falling_damping = True, DAMPING, DAMPING
         longest_s = _longest_horizon_s(lags)
         self._horizons = [
             SHORTEST_S * GROWTH**k for k in range(HORIZONS) if k == 0 or SHORTEST_S * GROWTH**k < longest_s
@@ -83,12 +87,18 @@ class LagInverse:
         self._wire_s = wire_s = min(wire_s, SLOWEST_WIRE_S)
         self._is_slow = self._lags_s >= min(SLOWEST_S, SLOW_S + SLOW_WIRES * wire_s)
         self._damping = DAMPING if self._is_slow else 1.0
+        self._falling_damping = max(DAMPING, self._braking_damping(wire_s)) if self._is_slow else self._damping
         least_s = max(SHARE * self._lags_s, PERIODS * wire_s + LATE_S) if self._is_slow else FAST_PERIODS * wire_s
         if not self._second_lag_s:  # it follows at once: a setting that outlasts its horizon goes beyond the wish
             least_s = wire_s + LATE_S + TICK_S
         self._first = next((k for k, at_s in enumerate(self._horizons) if at_s >= least_s), len(self._horizons) - 1)
         self.horizon_s = self._horizons[self._first]
         self._decay = exp(-self.horizon_s / self._lag_s)
+
+    def _braking_damping(self, wire_s: float) -> float:
+        """What a way down needs: its brake goes up, late by the slew, and is kept for a whole setting."""
+        kept = self._second_lag_s / wire_s if wire_s > 0.0 else 1.0
+        return min(MOST_DAMPING, UNKEPT_DAMPING - KEPT_DAMPING * kept)
 
     @property
     def landing_s(self) -> float:
@@ -158,7 +168,9 @@ class LagInverse:
     def _linear(self, first_v: float, second_v: float) -> float:
         """The second-order law of the shortest horizon, as a distance to the wish."""
         speed = (first_v - second_v) / self._second_lag_s
-        bend = -(second_v / self.horizon_s + 2.0 * self._damping * speed) / self.horizon_s
+        far = min(1.0, max(0.0, second_v / FAR_V))
+        damping = self._damping + far * (self._falling_damping - self._damping)
+        bend = -(second_v / self.horizon_s + 2.0 * damping * speed) / self.horizon_s
         return second_v + self._plant.delay_s * speed + self._plant.bend_s2 * bend
 
 

@@ -90,6 +90,14 @@ def test_it_comes_near_to_the_best_bang_bang_command_and_does_not_pass_the_wish(
     assert max(way * (course_v - to_v)) < BAND_V
 
 
+@pytest.mark.parametrize("lags", [(0.075, 0.02), (0.12, 0.02)])
+@pytest.mark.parametrize(("from_v", "to_v"), [(6.5, 4.6), (3.2, 1.7)])
+def test_a_way_down_hardly_passes_the_wish_where_the_shorter_lag_ends_before_a_setting_does(lags, from_v, to_v):
+    """Friction would keep what has gone too far."""
+    course_v = Loop(lags, at_v=from_v, wire_s=0.03).run(to_v, 1.0)
+    assert to_v - min(course_v) < 0.04 * (from_v - to_v)
+
+
 @pytest.mark.parametrize("lags", LAGS + RINGING)
 def test_lags_that_are_a_tenth_off_make_no_more_than_a_tenth_of_the_step(lags):
     for off in (0.9, 1.1):
