@@ -74,8 +74,13 @@ def read_recording(path: Path) -> Recording:
 
 def list_recordings(state_directory: Path) -> list[RecordingEntry]:
     """Return the recordings of one state directory by number; unreadable ones are listed with their fault."""
+    return [_entry(path) for path in recording_paths(state_directory)]
+
+
+def recording_paths(state_directory: Path) -> list[Path]:
+    """Return the files of the recordings of one state directory by number."""
     paths = [path for path in (state_directory / "recordings").glob(f"*{SUFFIX}") if path.stem.isdigit()]
-    return [_entry(path) for path in sorted(paths, key=lambda path: int(path.stem))]
+    return sorted(paths, key=lambda path: int(path.stem))
 
 
 def find_recording(state_directory: Path, number: int) -> Path:

@@ -17,8 +17,8 @@ import numpy as np
 
 from gateway.numbered_documents.selection import read_selection
 from gateway.processes.durable_file import lock_directory, make_directory, remove_if_possible, write_durably
-from gateway.recording import RecordingError, list_recordings, read_table
-from gateway.recording.reader import Recording
+from gateway.recording import RecordingError, read_table
+from gateway.recording.reader import Recording, recording_paths
 
 _FOLDER: Final = "reference"
 _FACTS: Final = "reference.json"
@@ -100,23 +100,39 @@ def _remove_all_but(folder: Path, descriptor: int, kept: str) -> None:
             remove_if_possible(descriptor, path.name)
 
 
-def keep_first_good_recording(state: Path, now_s: float) -> ReferenceRecording | None:
-    """Return the reference that was kept now, of the first good recording after the last `calibration use`; None where there is
-    nothing to do: no calibration was taken into use, a user has chosen, or the calibration has one. now_s: of the epoch.
-    """
-    since = _calibration_in_use(state)
-    known = read_reference_recording(state)
-    if since is None or (known and (known.is_chosen or known.calibration == since[0])):
+class FirstGoodRecording:
+    """Looks for the first good recording that begins after the last `calibration use`; each recording is read once."""
+
+    def __init__(self, state: Path) -> None:
+        self._state = state
+        self._passed: set[tuple[Path, int]] = set()
+
+    def keep(self, now_s: float) -> ReferenceRecording | None:
+        """Return the reference that was kept now; None where there is nothing to do: no calibration was taken into use, a user
+        has chosen, or the calibration has one. now_s: of the epoch."""
+        since = _calibration_in_use(self._state)
+        known = read_reference_recording(self._state)
+        if since is None or (known and (known.is_chosen or known.calibration == since[0])):
+            return None
+        for path in recording_paths(self._state):
+            if (path, since[0]) in self._passed:
+                continue
+            if now_s - path.stat().st_mtime < _CLOSED_S:
+                return None  # it may become the first good one
+            if _is_first_good(path, *since):
+                return keep_reference_recording(self._state, path, since[0])
+            self._passed.add((path, since[0]))
         return None
-    number, since_s = since
-    for entry in list_recordings(state):
-        if entry.header.get("calibration") != number or _begin_s(entry.header) < since_s:
-            continue
-        if now_s - entry.path.stat().st_mtime < _CLOSED_S:
-            return None  # it may become the first good one
-        if not why_no_reference(entry.path):
-            return keep_reference_recording(state, entry.path, number)
-    return None
+
+
+def _is_first_good(path: Path, calibration: int, since_s: float) -> bool:
+    try:
+        recording = read_table(path)
+    except (OSError, RecordingError):
+        return False
+    header = recording.header
+    is_of_it = header.get("calibration") == calibration and _begin_s(header) >= since_s
+    return is_of_it and not _why_it_says_little(recording)
 
 
 def why_no_reference(path: Path) -> str:

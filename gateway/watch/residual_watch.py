@@ -9,37 +9,48 @@ was called a longer lag). A cause that stands is searched for again less and les
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
-from typing import Final
+from typing import Final, Protocol
 
 from gateway.recording.ring import RingReader
 from gateway.registers.residual_cause import ResidualCause
-from gateway.watch.reference import WatchReference
 from gateway.watch.warning_filter import WarningFilter, WindowVerdict
 from gateway.watch.window import Window, window_of
-from gateway.watch.window_verdict import Diagnose, judge_window
 
-_LEAST_EXCITATION_V: Final = 0.2
-_LEAST_MOVES: Final = 4
-"""What the first window that is judged must have: later ones are compared with it."""
 _FRESH_SHARE: Final = 0.6
 """Share of a window that must be younger than the last healthy one: half old and half new has a wrong name."""
 _ALL_ROWS: Final = 1 << 30
 _LONGEST_PAUSE_S: Final = 600.0  # between searches: a cause that has stood for long is looked at every ten minutes
 _WINDOWS_TO_BE_SURE: Final = 2
 """Windows in a row that show the same cause, from which on the search pauses longer and longer: more add nothing."""
-_TOLERANCE_SHARE: Final = 0.25
+TOLERANCE_SHARE: Final = 0.25
 """Share of the rig's band: a smaller change of the force does not matter to whoever holds it."""
+
+
+class WindowComparison(Protocol):
+    """What windows are compared with."""
+
+    def why_unsuitable(self, window: Window) -> str:
+        """Return why this window cannot be compared; empty where it can."""
+
+    def rms_n(self, window: Window) -> float:
+        """Return what is off in it, N; cheap."""
+
+    def floor_n(self, window: Window) -> float | None:
+        """Return what is usually off, N; None where that is not known yet."""
+
+    def is_exceeded(self, window: Window, rms_n: float) -> bool:
+        """Return whether that is worth a search."""
+
+    def judge(self, window: Window) -> WindowVerdict:
+        """Search for the cause, which takes seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class WatchSettings:
-    """How often and how strictly the watch looks. window_s, every_s: of the rig file. tolerance_n: the rig's band, of which
-    a quarter matters.
-    """
+    """How often the watch looks, and at how much; of the rig file."""
 
     window_s: float
     every_s: float
-    tolerance_n: float
 
 
 class Watch:
@@ -50,15 +61,13 @@ class Watch:
     def __init__(
         self,
         ring: RingReader,
-        reference: WatchReference,
+        comparison: WindowComparison,
         setup: WatchSettings,
-        diagnose: Diagnose,
         clock: Callable[[], float],
     ) -> None:
         self._ring = ring
-        self._reference = reference
+        self._comparison = comparison
         self._setup = setup
-        self._diagnose = diagnose
         self._clock = clock
         self._filter = WarningFilter()
         self._search_s = 0.0
@@ -75,17 +84,17 @@ class Watch:
         """Look once; `published` and `counters` tell."""
         self.counters["looks"] += 1
         window = self._window(self._setup.window_s)
-        self.why_skipped = window if isinstance(window, str) else self._why_unsuitable(window)
+        self.why_skipped = window if isinstance(window, str) else self._comparison.why_unsuitable(window)
         if self.why_skipped or isinstance(window, str):
             self.counters["skipped"] += 1
             return
-        rms_n = self._reference.rms_n(window)
+        rms_n = self._comparison.rms_n(window)
         self.counters["rms_n"] = rms_n
-        if not self._reference.is_exceeded(window, rms_n):
+        if not self._comparison.is_exceeded(window, rms_n):
             self._note_healthy(window)
         elif self._clock() >= self._search_s:
             self._search(window)
-        if (floor_n := self._reference.floor_n(window)) is not None:
+        if (floor_n := self._comparison.floor_n(window)) is not None:
             self.counters["floor_n"] = floor_n
 
     def _window(self, window_s: float) -> Window | str:
@@ -104,19 +113,10 @@ class Watch:
         if not isinstance(fresh, str):
             self._judge(fresh)
 
-    def _why_unsuitable(self, window: Window) -> str:
-        """Return why this window may not be the first; empty when it may, or when it is not."""
-        enough = window.excitation_v >= _LEAST_EXCITATION_V and window.moves >= _LEAST_MOVES
-        return "" if self._reference.is_settled or enough else "too little was commanded to begin with"
-
     def _judge(self, window: Window) -> None:
         self.counters["judged"] += 1
-        diagnosis = self._diagnose([window.measurement], self._reference.plant)
-        if not self._reference.is_settled:
-            self._reference.take_line_delays(diagnosis)
-        finding = judge_window(window, diagnosis, self._reference, _TOLERANCE_SHARE * self._setup.tolerance_n)
+        finding = self._comparison.judge(window)
         if finding.cause is ResidualCause.NONE:
-            self._reference.raise_floor(window, self._reference.rms_n(window))
             self._healthy_s = window.end_s
         self._filter.add(finding)
         if self._filter.agreeing_windows > _WINDOWS_TO_BE_SURE:

@@ -30,9 +30,10 @@ from gateway.watch.processor_budget import ProcessorBudget
 
 if TYPE_CHECKING:
     from gateway.diagnosis import Diagnosis, Measurement
+    from gateway.profiles import Rig
     from gateway.twin.plant import Plant
     from gateway.watch.force_watch import ForceWatch, PlantSince
-    from gateway.watch.residual_watch import Watch
+    from gateway.watch.residual_watch import Watch, WindowComparison
 
 _ALL_ROWS: Final = 1 << 30
 _ANSWER_S: Final = 5.0
@@ -78,24 +79,43 @@ def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:
 
 
 def make_watch(ring: RingReader, options: dict[str, Any]) -> tuple["Watch", "ForceWatch"]:
-    """Return the watch over the rig's plant, the one in use where there is one, and that over the force. Everything heavy is
-    imported here."""
-    from gateway.calibrations.store import calibration_in_use
+    """Return the watch over the rig, and that over the force. Everything heavy is imported here."""
     from gateway.plants.in_use import with_selected_plant
     from gateway.profiles import load_rig
     from gateway.watch.force_watch import ForceWatch
-    from gateway.watch.reference import WatchReference
     from gateway.watch.residual_watch import Watch, WatchSettings
 
     state = Path(options["state"])
     rig, _ = with_selected_plant(load_rig(options["rig"], simulated=options["simulated"]), state)
+    setup = WatchSettings(options["window_s"], options["every_s"])
+    watch = Watch(ring, make_comparison(rig, state), setup, time.monotonic)
+    return watch, ForceWatch(state, rig.control.defaults.in_band_tolerance_n)
+
+
+def make_comparison(rig: "Rig", state: Path) -> "WindowComparison":
+    """Return what windows are compared with: the machine of the reference recording where one is kept whose readings were
+    straightened as they are now, else the plant, the one in use where there is one."""
+    from gateway.calibrations.store import calibration_in_use
+    from gateway.recording import RecordingError
+    from gateway.watch.described_machine import described_machine, is_straightened_alike
+    from gateway.watch.machine_comparison import MachineComparison
+    from gateway.watch.plant_comparison import PlantComparison
+    from gateway.watch.reference import WatchReference
+    from gateway.watch.reference_recording import read_reference_recording
+    from gateway.watch.residual_watch import TOLERANCE_SHARE
+
     assert rig.reference_plant is not None  # or nobody had started us
-    tolerance_n = rig.control.defaults.in_band_tolerance_n
-    setup = WatchSettings(options["window_s"], options["every_s"], tolerance_n)
+    least_n = TOLERANCE_SHARE * rig.control.defaults.in_band_tolerance_n
+    known = read_reference_recording(state)
+    try:
+        if known and is_straightened_alike(state, known, rig.compensation.cell):
+            machine = described_machine(state, known, rig.reference_plant)
+            return MachineComparison(machine, known.name, rig.reference_plant, least_n)
+    except (OSError, RecordingError, ValueError) as error:
+        sys.stderr.write(f"the reference {known and known.name} is left out: {error}\n")
     noise_n = calibration_in_use(rig, state).noise_n or None
     diagnose = partial(diagnose_window, calibration_noise_n=noise_n)
-    watch = Watch(ring, WatchReference(rig.reference_plant), setup, diagnose, time.monotonic)
-    return watch, ForceWatch(state, tolerance_n)
+    return PlantComparison(WatchReference(rig.reference_plant), diagnose, least_n)
 
 
 def diagnose_window(
@@ -110,10 +130,13 @@ def diagnose_window(
 def watch_forever(options: dict[str, Any]) -> None:
     """Look, tell, sleep; for ever. Begin anew where another plant has come into use. The look at the force is cheap, so it is
     told before the other begins, which may take long."""
+    from gateway.watch.reference_recording import FirstGoodRecording, read_reference_recording
+
     ring, state, budget = RingReader(options["ring"]), Path(options["state"]), ProcessorBudget()
     time.sleep(options["window_s"])
     watch, force = make_watch(ring, options)
     last_plant: PlantSince | None = None
+    reference, search = read_reference_recording(state), FirstGoodRecording(state)
     reported_s, spent_s = time.monotonic(), 0.0
     while True:
         plant = _plant_of(report_to_control(state, {}))
@@ -123,6 +146,11 @@ def watch_forever(options: dict[str, Any]) -> None:
                 watch, force = make_watch(ring, options)
             last_plant = plant
             force.follow(plant)
+        with contextlib.suppress(OSError):  # a full disk: the next look tries again
+            search.keep(time.time())
+        if (found := read_reference_recording(state)) != reference:
+            reference = found
+            watch, _ = make_watch(ring, options)
         sentence_before = force.sentence
         force.look(ring.newest(_ALL_ROWS), ring.columns)
         if force.sentence != sentence_before:

@@ -19,6 +19,7 @@ from gateway.profiles import load_rig
 from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.twin.plant import with_value
+from gateway.watch.plant_comparison import PlantComparison
 from gateway.watch.reference import WatchReference
 from gateway.watch.residual_watch import Watch, WatchSettings
 from gateway.watch.watch_process import diagnose_window
@@ -94,7 +95,10 @@ def watched(kind: str, seed: int, lasts_s: float, window_s: float) -> tuple[list
     ring, plant = Ring(rows_of(kind, seed, lasts_s)), load_rig("demo").plant
     assert plant is not None
     watch = Watch(
-        ring, WatchReference(plant), WatchSettings(window_s, 0.5 * window_s, 1.0), diagnose_window, lambda: ring.now_s
+        ring,
+        PlantComparison(WatchReference(plant), diagnose_window, 0.25),
+        WatchSettings(window_s, 0.5 * window_s),
+        lambda: ring.now_s,
     )  # type: ignore[arg-type]
     stood = []
     for now_s in np.arange(1.3 * window_s, ring.last_s, 0.5 * window_s):

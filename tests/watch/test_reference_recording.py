@@ -16,7 +16,7 @@ from gateway.processes.durable_file import lock_directory, make_directory
 from gateway.recording import Recorder
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.watch.reference_recording import (
-    keep_first_good_recording,
+    FirstGoodRecording,
     keep_reference_recording,
     read_reference_recording,
     reference_path,
@@ -94,13 +94,13 @@ def test_against_a_reference_that_is_not_there_says_how_to_make_one(tmp_path):
 
 def test_the_first_good_recording_after_a_calibration_came_into_use_is_kept(tmp_path):
     record(tmp_path, calibration=1), record(tmp_path, 10.0), record(tmp_path), record(tmp_path)
-    assert keep_first_good_recording(tmp_path, 1.0e12) is None, "no calibration was taken into use"
+    assert FirstGoodRecording(tmp_path).keep(1.0e12) is None, "no calibration was taken into use"
     use_calibration(tmp_path, 2)
-    kept = keep_first_good_recording(tmp_path, 1.0e12)
+    kept = FirstGoodRecording(tmp_path).keep(1.0e12)
     assert kept is not None and (kept.name, kept.is_chosen) == ("0003.fgr", False)
-    assert keep_first_good_recording(tmp_path, 1.0e12) is None, "there is one"
+    assert FirstGoodRecording(tmp_path).keep(1.0e12) is None, "there is one"
     use_calibration(tmp_path, 1)
-    kept = keep_first_good_recording(tmp_path, 1.0e12)
+    kept = FirstGoodRecording(tmp_path).keep(1.0e12)
     assert kept is not None and kept.name == "0001.fgr"
 
 
@@ -108,22 +108,22 @@ def test_what_a_user_has_chosen_stays(tmp_path):
     keep_reference_recording(tmp_path, record(tmp_path, calibration=1))
     record(tmp_path)
     use_calibration(tmp_path, 2)
-    assert keep_first_good_recording(tmp_path, 1.0e12) is None
+    assert FirstGoodRecording(tmp_path).keep(1.0e12) is None
 
 
 def test_a_recording_that_is_being_written_is_waited_for(tmp_path):
     use_calibration(tmp_path, 2)
     assert record(tmp_path).stat().st_mtime == 0.0
     record(tmp_path)
-    assert keep_first_good_recording(tmp_path, 1.0) is None
-    assert keep_first_good_recording(tmp_path, 10.0) is not None
+    assert FirstGoodRecording(tmp_path).keep(1.0) is None
+    assert FirstGoodRecording(tmp_path).keep(10.0) is not None
 
 
 def test_a_recording_from_before_the_calibration_came_into_use_is_none(tmp_path):
     record(tmp_path)
     use_calibration(tmp_path, 2)
     os.utime(tmp_path / "calibrations" / "active.000001", (2.0e12, 2.0e12))
-    assert keep_first_good_recording(tmp_path, 1.0e12) is None
+    assert FirstGoodRecording(tmp_path).keep(1.0e12) is None
 
 
 def test_a_damaged_note_is_no_reference(tmp_path):

@@ -18,6 +18,7 @@ from gateway.recording.ring import RingReader, SampleRing
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.twin.plant import plain_section
 from gateway.watch.memory import return_memory
+from gateway.watch.plant_comparison import PlantComparison
 from gateway.watch.processor_budget import SHARE, STORE_S, ProcessorBudget
 from gateway.watch.reference import WatchReference
 from gateway.watch.residual_watch import Watch, WatchSettings
@@ -93,7 +94,7 @@ def watch_of(reader: RingReader) -> Watch:
         raise AssertionError("a floor is known")
 
     reference = WatchReference(plant, is_settled=True, floors_n=dict.fromkeys(range(-8, 4), 1e3))
-    return Watch(reader, reference, WatchSettings(5.0, EVERY_S, 1.0), diagnose, lambda: 0.0)
+    return Watch(reader, PlantComparison(reference, diagnose, 0.25), WatchSettings(5.0, EVERY_S), lambda: 0.0)
 
 
 def traced_bytes() -> int:

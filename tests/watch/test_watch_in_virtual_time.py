@@ -18,6 +18,7 @@ from gateway.registers.residual_cause import ResidualCause
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
+from gateway.watch.plant_comparison import PlantComparison
 from gateway.watch.reference import WatchReference
 from gateway.watch.residual_watch import Watch, WatchSettings
 from gateway.watch.watch_process import diagnose_window
@@ -66,8 +67,10 @@ class Scene:
         assert plant is not None
         self.plant = with_value(plant, "regulator", "delay_s", plant.regulator.delay_s + WIRE_S)
         self.search = StubDiagnosis(self.plant)
-        setup = WatchSettings(window_s=20.0, every_s=5.0, tolerance_n=1.0)
-        self.watch = Watch(self.reader, WatchReference(plant), setup, self.search, lambda: self.wired.now_s)
+        setup = WatchSettings(window_s=20.0, every_s=5.0)
+        self.reference = WatchReference(plant)
+        comparison = PlantComparison(self.reference, self.search, 0.25)
+        self.watch = Watch(self.reader, comparison, setup, lambda: self.wired.now_s)
         self._rng = np.random.default_rng(3)
         self.wired.ready()
 
@@ -120,7 +123,7 @@ def test_what_the_wire_adds_is_taken_into_the_reference_and_nothing_more(scene):
     scene.search.plant = with_value(scene.plant, "friction", "coulomb_n", 1.1)
     scene.work(25)
     scene.looks(1)
-    reference = scene.watch._reference.plant
+    reference = scene.reference.plant
     assert reference.regulator.delay_s == pytest.approx(scene.plant.regulator.delay_s)
     assert reference.friction.coulomb_n == scene.plant.friction.coulomb_n
     assert reference.cell.noise_n == 0.0
@@ -164,7 +167,7 @@ def test_a_standing_cause_is_searched_for_less_and_less(scene):
 def test_a_change_that_hardly_moves_the_force_disturbs_nobody(scene):
     scene.work(25)
     scene.looks(1)
-    scene.watch._reference.floors_n.clear()  # so that every look searches
+    scene.reference.floors_n.clear()  # so that every look searches
     scene.search.plant = with_value(scene.plant, "friction", "coulomb_n", 1.05)
     assert scene.looks(3) == [ResidualCause.NONE] * 3
 
@@ -173,7 +176,7 @@ def test_a_name_for_a_force_that_is_where_it_should_be_disturbs_nobody(scene):
     """The demo, clean, raised A345 for a refit that changed two numbers against each other and the force not at all."""
     scene.work(25)
     scene.looks(1)
-    scene.watch._reference.floors_n.clear()
+    scene.reference.floors_n.clear()
     worn = with_value(with_value(scene.plant, "friction", "coulomb_n", 2.0), "cylinder", "area_m2", 9.8e-5)
     scene.search.plant = with_value(worn, "cell", "warm_up_n", 3.0)
     size = Estimate("cell", 3.0, "N", (2.0, 4.0))
@@ -223,6 +226,6 @@ def test_a_cell_whose_sign_turned_is_told_as_such(scene):
     window = scene.watch._window(20.0)
     turned = replace(window.measurement, force_n=-window.measurement.force_n)
     result = diagnose_window([turned], scene.plant)
-    sentence = judge_window(replace(window, measurement=turned), result, scene.watch._reference, 0.25).sentence
+    sentence = judge_window(replace(window, measurement=turned), result, scene.reference, 0.25).sentence
     assert "E522" in sentence
     assert "falls where it should rise" in sentence

@@ -17,7 +17,7 @@ _LAG_STARTS: Final = ((0.01,), (-0.01,))  # s
 _AREA_STARTS: Final = ((2.0e-6,),)  # m2; the response is proportional
 _OF_THE_START: Final = ("warm-up",)
 """A decay from the first row on: what friction, pads and lags remember there is each recording's own, and no change."""
-_SHARES: Final = (0.3, -0.3, 1.0)  # of a size that the machine has already
+_SHARES: Final = (0.3, -0.3, -0.65, 1.0)  # of a size that the machine has already
 _GAIN_CHANGE: Final = Effect(
     name=GAIN,
     number=0,

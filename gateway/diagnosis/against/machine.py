@@ -28,7 +28,7 @@ from gateway.diagnosis.verdict import estimates_of
 from gateway.twin.plant import Plant
 
 _MOST_EFFECTS: Final = 8  # of a machine; a foreign rig asked for four to six
-_OF_ONE_RECORDING: Final = ("linear-drift", "warm-up", "clock-skew")
+_OF_ONE_RECORDING: Final = ("linear-drift", "warm-up", "clock-skew", "creep")  # slow: what they fit is a wander
 _PREDICTS: Final = 0.995  # of the held-out error: from here on an effect predicts better
 _WAVES: Final = 8  # from the optimum under coloured noise to the plain one
 

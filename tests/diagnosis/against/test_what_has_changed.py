@@ -68,12 +68,12 @@ def test_a_machines_own_nature_is_no_more_than_its_noise(short_machine):
 
 
 def test_a_change_is_named_alone_with_its_size_beside_what_was_there_before(short_machine):
-    new, amount = record(Wish(seed=3, effect="transport-delay", size=2.0, duration_s=20.0))
+    new, amount = record(Wish(seed=3, effect="leak", size=2.0, duration_s=20.0))
     found = compare_with_machine([new], short_machine, DEFAULT_PLANT, Options())
-    assert is_named_alone(found, "transport-delay")
+    assert is_named_alone(found, "leak")
     assert found.verdict in {Verdict.PARTIAL, Verdict.CONFIRMED}
     (cause,) = found.causes
-    assert change_of(found, cause, "delay_s") == pytest.approx(amount, rel=0.25)
+    assert change_of(found, cause, "leak_per_s") == pytest.approx(amount, rel=0.25)
 
 
 def change_of(found: Diagnosis, cause: Cause, name: str) -> float:
