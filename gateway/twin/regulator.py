@@ -10,6 +10,7 @@ without any lag jumps: there the pressure of a step is the mean of the targets t
 
 import math
 from collections import deque
+from functools import lru_cache
 from typing import NamedTuple
 
 from gateway.compiled import step
@@ -113,6 +114,9 @@ def lag_shares(lags: PressureLags, held_s: float) -> LagShares:
     return LagShares(filling, emptying, second, lags.slew_pa_per_s * held_s)
 
 
+_kept_lag_shares = lru_cache(maxsize=16)(lag_shares)  # a delay cuts its steps at the same place again and again
+
+
 @step
 def follow_target(state: PressureState, target_pa: float, shares: LagShares) -> PressureState:
     """Return the state after the time of the shares under one target."""
@@ -161,7 +165,8 @@ class RegulatorState:
         """Return the pressure at the end of one step, Pa."""
         if self._changes:
             self._send(self._held_pa())
-        pressure = self._follow() if self._arriving else self._advance(self._step_s)
+        has_arrival = self._arriving and self._arriving[0][0] < self._now + 1
+        pressure = self._follow() if has_arrival else self._advance(self._step_s)
         self._now += 1
         regulator = self._regulator
         if pressure > regulator.ceiling_pa:
@@ -180,7 +185,7 @@ class RegulatorState:
             self._seen_pa = target_pa
 
     def _follow(self) -> float:
-        """One step in which targets may arrive."""
+        """One step in which targets arrive."""
         at, total = float(self._now), 0.0
         while self._arriving and self._arriving[0][0] < self._now + 1:
             moment, target = self._arriving.popleft()
@@ -193,7 +198,7 @@ class RegulatorState:
     def _advance(self, held_s: float) -> float:
         """Live under the target that is seen now."""
         target = self._seen_pa if self.air else 0.0
-        shares = self._shares if held_s == self._step_s else lag_shares(self._lags, held_s)
+        shares = self._shares if held_s == self._step_s else _kept_lag_shares(self._lags, held_s)
         self._state = follow_target(self._state, target, shares)
         return self._state.slewed_pa
 
