@@ -54,5 +54,5 @@ class DriveMap:
 
 
 def _along(places: list[float], values: list[float], at: float) -> float:
-    k = min(max(bisect_right(places, at) - 1, 0), len(places) - 2)
+    k = bisect_right(places, at, 1, len(places) - 1) - 1
     return values[k] + (at - places[k]) * (values[k + 1] - values[k]) / (places[k + 1] - places[k])

@@ -25,6 +25,11 @@ from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _CALIBRATE, _TAKE = int(ControlBit.START_CALIBRATION), int(ControlBit.TAKE_OWNERSHIP)
 _WHOLE: Final = ControlBit(0)
+_OFF: Final = State.OFF
+_BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
+    State.FAULT: RefusalReason.FAULT_LATCHED,
+    State.CALIBRATING: RefusalReason.CALIBRATING,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +58,8 @@ class Readiness:
 
     def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         """Return why an enable would be refused now; NONE where it would be accepted, or has been."""
-        match self._machine.state:
-            case State.FAULT:
-                return RefusalReason.FAULT_LATCHED
-            case State.CALIBRATING:
-                return RefusalReason.CALIBRATING
-            case State.OFF:
-                return self._block_in_off(now_s, reading, line)
-            case _:
-                return RefusalReason.NONE
+        state = self._machine.state
+        return self._block_in_off(now_s, reading, line) if state is _OFF else _BLOCKS[state]
 
     def situation(self, now_s: float, reading: Reading, line: LineStatus) -> Situation:
         """Return where the controller stands. reading: as old as it is now."""

@@ -19,6 +19,7 @@ TICK_S: Final = defaults.TICK_S  # nominal tick: what a movement may claim at on
 LONGEST_STEP_S: Final = 0.02  # a later step catches up no more than this
 
 Limited = tuple[float, LimitedBy]
+_NONE, _VOLTAGE_SLEW = LimitedBy.NONE, LimitedBy.VOLTAGE_SLEW  # a look-up on the class costs as much as a limit
 
 
 class NotFiniteError(ValueError):
@@ -36,7 +37,7 @@ def force_limited(target_n: float, limits: Limits) -> Limited:
     """Limit a setpoint to 0 .. force_max_n (rig limits); the bank refuses such a setpoint before, this is the second line."""
     target_n = finite(target_n, "force_setpoint_n")
     ranged_n = max(0.0, min(limits.force_max_n, target_n))
-    return ranged_n, LimitedBy.NONE if ranged_n == target_n else LimitedBy.FORCE_RANGE
+    return ranged_n, _NONE if ranged_n == target_n else LimitedBy.FORCE_RANGE
 
 
 def narrow_limits(limits: Limits, own_n: tuple[float, float] | None) -> Limits:
@@ -56,22 +57,22 @@ def is_below_usable(target_n: float, limits: Limits) -> bool:
 def trim_limited(trim_v: float, limit_v: float) -> Limited:
     """Limit a correction to +- limit_v (rig, trim.limit_v): the trim corrects the model, it does not replace it."""
     ranged_v = max(-limit_v, min(limit_v, finite(trim_v, "trim_v")))
-    return ranged_v, LimitedBy.NONE if abs(ranged_v) < limit_v or limit_v == 0.0 else LimitedBy.TRIM_RANGE
+    return ranged_v, _NONE if abs(ranged_v) < limit_v or limit_v == 0.0 else LimitedBy.TRIM_RANGE
 
 
 def voltage_limited(target_v: float, limits: Limits) -> Limited:
     """Limit a voltage to voltage_min_v .. voltage_max_v (rig limits, within the output device's range)."""
     target_v = finite(target_v, "voltage_v")
     ranged_v = max(limits.voltage_min_v, min(limits.voltage_max_v, target_v))
-    return ranged_v, LimitedBy.NONE if ranged_v == target_v else LimitedBy.VOLTAGE_RANGE
+    return ranged_v, _NONE if ranged_v == target_v else LimitedBy.VOLTAGE_RANGE
 
 
 def slew_limited(target_v: float, last_v: float, slew_v_per_s: float, dt_s: float) -> Limited:
     """Limit a rise to at most slew_v_per_s x dt_s above last_v; falling is immediate: less voltage is less force."""
     highest_v = last_v + slew_v_per_s * finite(dt_s, "dt_s")
     if finite(target_v, "voltage_v") > highest_v:
-        return highest_v, LimitedBy.VOLTAGE_SLEW
-    return target_v, LimitedBy.NONE
+        return highest_v, _VOLTAGE_SLEW
+    return target_v, _NONE
 
 
 def ramp_limited(target_n: float, last_n: float, rate_n_per_s: float, dt_s: float) -> float:
@@ -88,7 +89,8 @@ class RateBudget:
 
     def earn(self, dt_s: float) -> None:
         """Add the time that has passed, within what one movement may claim."""
-        self.available_s = min(self.available_s + dt_s, max(TICK_S, min(dt_s, LONGEST_STEP_S)))
+        most_s = TICK_S if dt_s <= TICK_S else min(dt_s, LONGEST_STEP_S)
+        self.available_s = min(self.available_s + dt_s, most_s)
 
     def spend(self, step: float, rate_per_s: float) -> None:
         """Take what a movement costs from the budget. step: by how much the value went; rate_per_s: its limit, in the same
@@ -98,7 +100,7 @@ class RateBudget:
 
 def strongest(*limits: LimitedBy) -> LimitedBy:
     """Return the strongest of several limits that act at once: the smallest number but NONE."""
-    return min((limit for limit in limits if limit), default=LimitedBy.NONE)
+    return min(filter(None, limits), default=_NONE)
 
 
 class VoltageLimiter:

@@ -7,13 +7,13 @@ its end has reached 0; it waits and settles by its own rules. FAULT: latched; th
 has exactly one first cause.
 """
 
-from enum import Enum
+from enum import StrEnum
 from typing import Final
 
 from gateway.registers.words import State
 
 
-class StateEvent(Enum):
+class StateEvent(StrEnum):
     """Event that makes a state go over into another."""
 
     ENABLE = "enable"  # rise of control_word bit 0, accepted

@@ -31,23 +31,18 @@ class ControllerParts:
 
 
 class Transitions:
-    """Holds the present state; the latched fault, and when it came (monotonic s, -inf before the first); whether the force is
-    on its way to 0 and then off, and whether it stays off then (is_stopping); whether the master is lost; whether nobody
-    has acknowledged a restart; and what the present step wants besides the voltage."""
+    """Holds the present state, and whether it is an enabled one; the latched fault, and when it came (monotonic s, -inf before
+    the first); whether the force is on its way to 0 and then off, and whether it stays off then (is_stopping); whether the
+    master is lost; whether nobody has acknowledged a restart; and what the present step wants besides the voltage."""
 
     def __init__(self, parts: ControllerParts, *, is_restarted: bool) -> None:
-        self.state = State.OFF
+        self.state, self.is_enabled = State.OFF, False
         self.fault = FaultCode.NONE
         self.faulted_s = -inf
         self.is_ramping_down = self.is_master_lost = self.is_stopping = False
         self.is_restarted = is_restarted
         self.outcome = StepOutcome()
         self._parts = parts
-
-    @property
-    def is_enabled(self) -> bool:
-        """Decide whether the state is an enabled one."""
-        return self.state in ENABLED_STATES
 
     def begin_step(self) -> None:
         """Begin a step with an empty outcome."""
@@ -61,6 +56,7 @@ class Transitions:
     def fire(self, event: StateEvent) -> None:
         """Go where the table leads. TransitionError for a pair that is not in it."""
         self.state = next_state(self.state, event)
+        self.is_enabled = self.state in ENABLED_STATES
 
     def enable(self, now_s: float) -> None:
         """Enable the output and tell who asked for it."""

@@ -5,6 +5,7 @@ the terms of the twin's load cell, in their order. The constant zero stays in th
 """
 
 from dataclasses import dataclass
+from functools import cache
 from math import inf, isfinite, sqrt
 from typing import Final
 
@@ -49,7 +50,7 @@ class CellMap:
         stay one."""
         if (self.quadratic_per_n == 0.0 and self.cubic_per_n2 == 0.0) or not isfinite(bent_n):
             return bent_n
-        low_n, high_n = self._steep_range_n()
+        low_n, high_n = _steep_range_n(self.quadratic_per_n, self.cubic_per_n2)
         end_n = high_n if bent_n > 0.0 else low_n
         if isfinite(end_n) and abs(bent_n) > abs(self._bent_n(end_n)):
             return end_n + (bent_n - self._bent_n(end_n)) / _FLATTEST
@@ -67,14 +68,16 @@ class CellMap:
     def _slope(self, force_n: float) -> float:
         return max(_FLATTEST, 1.0 + (2.0 * self.quadratic_per_n + 3.0 * self.cubic_per_n2 * force_n) * force_n)
 
-    def _steep_range_n(self) -> tuple[float, float]:
-        """Around 0 where the slope is above _FLATTEST: up to the nearest roots of 3 c F^2 + 2 q F + 1 - _FLATTEST."""
-        quadratic, cubic, above = self.quadratic_per_n, self.cubic_per_n2, 1.0 - _FLATTEST
-        inside = quadratic * quadratic - 3.0 * cubic * above
-        if inside < 0.0:
-            return -inf, inf
-        larger = -quadratic - sqrt(inside) if quadratic > 0.0 else -quadratic + sqrt(inside)
-        roots_n = [above / larger] if larger else []
-        roots_n += [larger / (3.0 * cubic)] if cubic else []
-        low_n = max((root_n for root_n in roots_n if root_n < 0.0), default=-inf)
-        return low_n, min((root_n for root_n in roots_n if root_n > 0.0), default=inf)
+
+@cache
+def _steep_range_n(quadratic: float, cubic: float) -> tuple[float, float]:
+    """Around 0 where the slope is above _FLATTEST: up to the nearest roots of 3 c F^2 + 2 q F + 1 - _FLATTEST."""
+    above = 1.0 - _FLATTEST
+    inside = quadratic * quadratic - 3.0 * cubic * above
+    if inside < 0.0:
+        return -inf, inf
+    larger = -quadratic - sqrt(inside) if quadratic > 0.0 else -quadratic + sqrt(inside)
+    roots_n = [above / larger] if larger else []
+    roots_n += [larger / (3.0 * cubic)] if cubic else []
+    low_n = max((root_n for root_n in roots_n if root_n < 0.0), default=-inf)
+    return low_n, min((root_n for root_n in roots_n if root_n > 0.0), default=inf)

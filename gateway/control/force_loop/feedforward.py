@@ -24,6 +24,7 @@ AHEAD_N: Final = 4.0  # how far the aim may run ahead of the target, or what the
 APPROACH_N: Final = 1.0  # above what friction keeps: a vented tool moves
 LEAST_SLOPE_N_PER_V: Final = 1.0  # a flatter model is a model's end, not a plant's
 _OK: Final = InverseStatus.OK
+_NONE: Final = LimitedBy.NONE
 
 
 class ModelError(Exception):
@@ -144,21 +145,26 @@ class Feedforward:
         last_n = self.applied_n
         self.applied_n = ramp_limited(goal_n, last_n, rate_n_per_s, self._pace.available_s)
         moved_n = self.applied_n - last_n
-        self._pace.spend(moved_n, rate_n_per_s)
-        is_led = goal_n > 0.0 and rate_n_per_s > 0.0
-        ahead_s = min(self._ahead_s, max(AHEAD_N / rate_n_per_s, self._lag_s)) if is_led else 0.0
-        aimed_n = self.aimed_n
-        self.aimed_n = ramp_limited(self._coming_n(goal_n), self.applied_n, rate_n_per_s, ahead_s)
+        if moved_n:
+            self._pace.spend(moved_n, rate_n_per_s)
+        aimed_n, self.aimed_n = self.aimed_n, self._aim_n(goal_n, rate_n_per_s)
         self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
         heard_n = self._delayed.advance(self.applied_n, dt_s)
         self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
         return moved_n
 
+    def _aim_n(self, goal_n: float, rate_n_per_s: float) -> float:
+        """Where the target will be ahead_s later."""
+        if self._ahead_s <= 0.0 or goal_n <= 0.0 or rate_n_per_s <= 0.0:
+            return self.applied_n
+        ahead_s = min(self._ahead_s, max(AHEAD_N / rate_n_per_s, self._lag_s))
+        return ramp_limited(self._coming_n(goal_n), self.applied_n, rate_n_per_s, ahead_s)
+
     def _coming_n(self, goal_n: float) -> float:
-        """Where the goal will be ahead_s later; never outside what may be commanded, nor where nothing is."""
-        moved_n = self._trend.ahead_n(self._ahead_s) if self._ahead_s > 0.0 else 0.0
-        if moved_n == 0.0 or goal_n <= 0.0 or is_below_usable(goal_n + moved_n, self._limits):
+        """Where a goal above 0 will be ahead_s later; never outside what may be commanded."""
+        moved_n = self._trend.ahead_n(self._ahead_s)
+        if moved_n == 0.0 or is_below_usable(goal_n + moved_n, self._limits):
             return goal_n
         return min(max(goal_n, self._limits.force_max_n), goal_n + moved_n)
 
@@ -209,7 +215,7 @@ class Feedforward:
     def compute_voltage(self, gravity_n: float) -> tuple[float, LimitedBy]:
         """Return the voltage for the applied contact force by the inverse model and what limited it. ModelError without one."""
         if self.applied_n <= 0.0:
-            return 0.0, LimitedBy.NONE
+            return 0.0, _NONE
         if is_below_usable(self.applied_n, self._limits):
             return 0.0, LimitedBy.SMALLEST_FORCE
         try:
@@ -218,4 +224,4 @@ class Feedforward:
             raise ModelError(f"model: {error}") from error
         if not isfinite(voltage_v):
             raise ModelError(f"model: {voltage_v} V for {self.aimed_n:.2f} N")
-        return voltage_v + self._carry_over_v, LimitedBy.NONE if status is _OK else LimitedBy.CALIBRATION_RANGE
+        return voltage_v + self._carry_over_v, _NONE if status is _OK else LimitedBy.CALIBRATION_RANGE

@@ -8,7 +8,6 @@ less than QUIET_N ahead of where the plant can be (not ramping fast). With a mea
 thrust on its way, which is counted as come.
 """
 
-from collections.abc import Callable
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
@@ -34,6 +33,7 @@ Moved: TypeAlias = StateEvent | StopCause
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
 LANDING_SHARE: Final = 0.2  # of a step's landing time: so late is the lags' inverse on a ramp, on the drawn machines
+_FORCE, _NONE, _TRIM_RANGE, _SMALLEST_FORCE = Mode.FORCE, LimitedBy.NONE, LimitedBy.TRIM_RANGE, LimitedBy.SMALLEST_FORCE
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 
 
@@ -149,7 +149,7 @@ class ForceLoop:
     @property
     def is_trim_at_limit(self) -> bool:
         """Decide whether the trim stands at its limit."""
-        return self._trim.limited_by is not LimitedBy.NONE
+        return self._trim.limited_by is not _NONE
 
     @property
     def is_hunting(self) -> bool:
@@ -186,12 +186,20 @@ class ForceLoop:
 
     def step(self, demand: Demand, inputs: LoopInputs) -> Moved:
         """Make one step towards the demand."""
-        return _or_fault(lambda: self._step(demand, inputs))
+        try:
+            event = self._step_force(demand, inputs) if demand.mode is _FORCE else self._step_voltage(demand, inputs)
+        except (ModelError, NotFiniteError) as error:
+            return _fault_of(error)
+        self._was_touching = inputs.touching
+        return event
 
     def descend(self, demand: Demand, dt_s: float, given_n: float) -> Moved:
         """Make one step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that
         is being calibrated may not fit, and never up."""
-        return _or_fault(lambda: self._step_down(demand, dt_s, given_n))
+        try:
+            return self._step_down(demand, dt_s, given_n)
+        except (ModelError, NotFiniteError) as error:
+            return _fault_of(error)
 
     def drive_run(self, voltage_v: float, branch_share: float) -> None:
         """Put out the voltage of a calibration run, within the limits: nothing learned, nothing judged."""
@@ -217,11 +225,6 @@ class ForceLoop:
         self.feedforward_v = voltage_v
         self.limited_by = self._limiter.drive(voltage_v)
 
-    def _step(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
-        event = self._step_force(demand, inputs) if demand.mode is Mode.FORCE else self._step_voltage(demand, inputs)
-        self._was_touching = inputs.touching
-        return event
-
     def _step_force(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         law = self.feedforward
         goal_n, rate_n_per_s = self._approach.goal(inputs.now_s, demand, inputs.touching, law)
@@ -236,7 +239,7 @@ class ForceLoop:
         if isinstance(self._trim, MeasuredTrim) and self._is_correcting:
             law.correct(self._trim.value_n, given_n)
             self._trim.take_volts(law.correction_v(given_n))
-        has_model = law.applied_n > 0.0 and by_model is not LimitedBy.SMALLEST_FORCE
+        has_model = law.applied_n > 0.0 and by_model is not _SMALLEST_FORCE
         wanted_v = model_v + self._trim.value_v
         push_v = self._compensated_v(wanted_v) - wanted_v if has_model else 0.0
         if demand.force_n <= 0.0:
@@ -280,7 +283,7 @@ class ForceLoop:
             trim.integrate(error_n, law.slope_n_per_v(given_n), reading.interval_s)
 
     def _may_learn(self, inputs: LoopInputs) -> bool:
-        free = self.limited_by is LimitedBy.NONE or self.limited_by is LimitedBy.TRIM_RANGE  # of the step before
+        free = self.limited_by is _NONE or self.limited_by is _TRIM_RANGE  # of the step before
         return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
@@ -291,11 +294,7 @@ class ForceLoop:
         return self._settling.judge_voltage(demand, inputs, is_slewing=self.limited_by is LimitedBy.VOLTAGE_SLEW)
 
 
-def _or_fault(move: Callable[[], StateEvent]) -> Moved:
-    """What a movement answers, or the fault that it could not be computed."""
-    try:
-        return move()
-    except ModelError as error:
-        return stop_cause(FaultCode.MODEL_INVALID, str(error))
-    except NotFiniteError as error:
-        return stop_cause(FaultCode.NOT_FINITE, str(error))
+def _fault_of(error: ModelError | NotFiniteError) -> StopCause:
+    """The fault that a movement could not be computed."""
+    is_of_model = isinstance(error, ModelError)
+    return stop_cause(FaultCode.MODEL_INVALID if is_of_model else FaultCode.NOT_FINITE, str(error))

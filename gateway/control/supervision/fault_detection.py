@@ -19,6 +19,7 @@ from gateway.control.settings import ControlSettings
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 
+_RIGHT, _WRONG_SIGN, _WRONG_GAIN = FaultCode.NONE, FaultCode.SIGN_INVERTED, FaultCode.GAIN_WRONG
 _STUCK_S: Final = 1.0  # that a force must stay at the safe voltage, not only decay
 _FAR_OFF: Final = 3.0  # measured over expected force that points at the cell rather than at the process
 
@@ -179,9 +180,9 @@ class FaultDetector:
             self._frozen.note_trip()
             observation = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
             return stop_cause(FaultCode.SAMPLE_FROZEN, observation)
-        if self._response_fault is FaultCode.SIGN_INVERTED:
+        if self._response_fault is _WRONG_SIGN:
             return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self._rise.measured_rise_n, expected_n))
-        if self._response_fault is FaultCode.GAIN_WRONG:
+        if self._response_fault is _WRONG_GAIN:
             return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.measured_rise_n, expected_n))
         return None
 

@@ -14,6 +14,7 @@ from gateway.control.demand import Demand
 from gateway.control.inputs import LoopInputs
 from gateway.control.state_table import StateEvent
 
+_WAIT, _MOVE, _SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
 
@@ -73,16 +74,16 @@ class SettlingCheck:
         self._answer.restart()
         if demand.force_n <= 0.0:
             self._band.restart()
-            return StateEvent.WAIT if applied_n <= 0.0 else StateEvent.MOVE
+            return _WAIT if applied_n <= 0.0 else _MOVE
         if abs(goal_n - applied_n) > demand.tolerance_n:
             self._band.restart()
-            return StateEvent.MOVE
+            return _MOVE
         inside = inputs.touching and abs(demand.force_n - applied_n) <= demand.tolerance_n
         inside = inside and abs(inputs.reading.contact_n - demand.force_n) <= demand.tolerance_n
         self._band.update(inputs.now_s, inside, demand.in_band_time_s)
         if self._band.in_band:
-            return StateEvent.SETTLE
-        return StateEvent.MOVE if inputs.touching or applied_n != goal_n else StateEvent.WAIT
+            return _SETTLE
+        return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
 
     def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
         """Return the event of a step in voltage mode. is_slewing: the output is still on its way."""
@@ -90,6 +91,6 @@ class SettlingCheck:
         self._answer.update(inputs.now_s, answered, inf)
         if is_slewing or demand.voltage_v <= 0.0:
             self._band.restart()
-            return StateEvent.MOVE if is_slewing else StateEvent.WAIT
+            return _MOVE if is_slewing else _WAIT
         self._band.update(inputs.now_s, True, demand.in_band_time_s)
-        return StateEvent.SETTLE if self._band.in_band else StateEvent.MOVE
+        return _SETTLE if self._band.in_band else _MOVE

@@ -42,7 +42,8 @@ class OneShotEvents:
     def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
         """Return a sentence where the target has just become unreachable, else nothing. Ask after each step in force or
         voltage mode. measured_n: contact force, smoothed."""
-        is_first, self._said_unreachable = loop.unreachable and not self._said_unreachable, loop.unreachable
+        is_unreachable = loop.unreachable
+        is_first, self._said_unreachable = is_unreachable and not self._said_unreachable, is_unreachable
         sentence = self._unreachable_sentence(loop.voltage_v, measured_n, inputs.expected_n) if is_first else ""
         if loop.in_band and inputs.touching:
             self._learn(loop.voltage_v)
@@ -70,7 +71,8 @@ class OneShotEvents:
 
     def hunting_event(self, loop: ForceLoop) -> str:
         """Return a sentence where the trim has just begun to hunt. Ask after each step in force or voltage mode."""
-        is_first, self._said_hunting = loop.is_hunting and not self._said_hunting, loop.is_hunting
+        is_hunting = loop.is_hunting
+        is_first, self._said_hunting = is_hunting and not self._said_hunting, is_hunting
         return hunting_sentence(loop.applied_n, MOST_TURNS) if is_first else ""
 
     def stuck_event(self, is_stuck: bool, reading: Reading) -> str:
