@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 from paper.figures.all_figures import FIGURES
-from paper.verdicts.tracking import roughness
+from paper.verdicts.tracking import judge_roughness
 
 COMMAND = Path(__file__).parents[2] / "tools" / "paper" / "reproduce"
 
@@ -29,8 +29,8 @@ def pictures_in(page: str) -> set[str]:
 
 
 def test_figure_10_is_outside_software_whatever_the_numbers() -> None:
-    assert roughness().where == "Fig. 10"
-    assert roughness().verdict == "outside software"
+    assert judge_roughness().where == "Fig. 10"
+    assert judge_roughness().verdict == "outside software"
 
 
 SMALL = """

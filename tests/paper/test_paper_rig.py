@@ -9,7 +9,7 @@ from paper.experiments.calibration import READ_ONCE, Calibrated, calibrate, cond
 from paper.experiments.closed_loop import Surroundings, run
 from paper.experiments.laws import LAW_NAMES, Ours, Switched, law
 from paper.experiments.limit import Fastest
-from paper.experiments.rigs import copy_of, lifted, paper_plant, rig_lanes
+from paper.experiments.rigs import copy_of, lift_pad, paper_plant, rig_lanes
 from paper.experiments.trials import Lane
 
 from gateway.bsfm.ladder.measured_ladder import ladder_plan
@@ -66,7 +66,7 @@ def test_a_flat_plate_and_a_still_spindle_are_as_good_as_none() -> None:
     wish = np.full((60, 1), 20.0)
     still = Surroundings(lambda time_s: np.zeros(1), lambda time_s: np.zeros(1))
     records = [
-        run(rig_lanes([lifted(paper_plant())], [0], 7), [Switched(rig_itself().bsfm)], wish, around)
+        run(rig_lanes([lift_pad(paper_plant())], [0], 7), [Switched(rig_itself().bsfm)], wish, around)
         for around in (still, Surroundings())
     ]
     np.testing.assert_array_equal(records[0].force_n, records[1].force_n)
@@ -83,7 +83,7 @@ def test_the_plate_starts_at_its_own_height_and_stands_still_after_the_travel() 
 
 
 def test_ours_settles_where_the_open_loop_never_comes_within_a_newton() -> None:
-    plants = [lifted(paper_plant())] * 2
+    plants = [lift_pad(paper_plant())] * 2
     wish = np.full((200, 2), 5.0)
     record = run(rig_lanes(plants, [0, 0], 8), [Switched(rig_itself().bsfm), Ours(rig_itself().ours)], wish)
     paper_n, ours_n = np.abs(record.error_n[-300:]).max(axis=0)

@@ -154,7 +154,7 @@ class ForceLoop:
     @property
     def is_hunting(self) -> bool:
         """The trim stands still because its corrections kept changing sign."""
-        return isinstance(self._trim, MeasuredTrim) and self._trim.hunted
+        return isinstance(self._trim, MeasuredTrim) and self._trim.has_hunted
 
     @property
     def in_band(self) -> bool:
@@ -180,9 +180,8 @@ class ForceLoop:
         self._limiter.make_safe()
         self.feedforward.reset()
         self._trim.reset()
-        self._approach = Approach()
         self._settling.restart()
-        self.feedforward_v, self.limited_by = 0.0, LimitedBy.NONE
+        self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
 
     def step(self, demand: Demand, inputs: LoopInputs) -> Moved:
         """Make one step towards the demand."""

@@ -60,7 +60,7 @@ class MeasuredTrim:
         return self._settings.gain_v_per_n_s <= 0.0
 
     @property
-    def hunted(self) -> bool:
+    def has_hunted(self) -> bool:
         """Decide whether the trim has turned round too often."""
         return self._turns >= MOST_TURNS
 
@@ -133,7 +133,7 @@ class MeasuredTrim:
     def integrate(self, error_n: float, slope_n_per_v: float, interval_s: float) -> None:
         """Learn from one new sample. error_n: wanted minus what is measured and still comes; slope_n_per_v:
         of the model at the working point, which tells the limit in newtons."""
-        if self.is_off or self.hunted:
+        if self.is_off or self.has_hunted:
             return
         self._smooth(error_n, interval_s)
         zone_n = self._zone_n()

@@ -115,7 +115,7 @@ class SampleWindow:
         return sum(count * level * level for level, count in self._levels.items()) - total * total / WINDOW
 
     @property
-    def centred(self) -> float:
+    def centring(self) -> float:
         """1 where the force stands in the middle of a count, -1 where it stands between two."""
         return cos(tau * (self._half_sums[0] + self._half_sums[1]) / WINDOW)
 
@@ -142,7 +142,7 @@ class Pool:
         self._in_two += window.in_two
         self._squares += window.squares
         self._deviations += window.deviations
-        self._centred += window.centred
+        self._centred += window.centring
         self._changes += window.changes
         self._expected += window.expected_changes
 

@@ -48,7 +48,7 @@ def machine_document(machine: MachineModel) -> dict[str, Any]:
         "free": [each.path for each in machine.free],
         "readings": dict(machine.readings),
         "error": asdict(machine.error),
-        "effects": [{"name": each.name, "parameters": _told(each)} for each in machine.effects],
+        "effects": [{"name": each.name, "parameters": _parameter_facts(each)} for each in machine.effects],
     }
 
 
@@ -72,16 +72,16 @@ def read_machine(document: dict[str, Any], old: Sequence[Measurement]) -> Machin
         raise ValueError(f"is no described machine: {error}") from None
 
 
-def _told(effect: OwnEffect) -> dict[str, list[Any]]:
+def _parameter_facts(effect: OwnEffect) -> dict[str, list[Any]]:
     return {name: [each.section, each.value, each.unit, *each.ci95] for name, each in effect.parameters.items()}
 
 
 def _effect(facts: dict[str, Any]) -> OwnEffect:
-    told = {
+    estimates = {
         name: Estimate(section, value, unit, (low, high))
         for name, (section, value, unit, low, high) in facts["parameters"].items()
     }
-    return OwnEffect(facts["name"], told)
+    return OwnEffect(facts["name"], estimates)
 
 
 def _error(facts: dict[str, Any]) -> ErrorModel:

@@ -82,12 +82,12 @@ def test_hunting_slows_it_down_and_stops_it_until_there_is_a_new_target():
         for _ in range(200):
             one.integrate(3.0 * way, SLOPE_N_PER_V, SAMPLE_S)
         way = -way
-    assert one.hunted
+    assert one.has_hunted
     stood_n = one.value_n
     held(one, 2.0, 1.0)
     assert one.value_n == stood_n
     one.travel(NEW_TARGET_N + 0.1)
-    assert not one.hunted
+    assert not one.has_hunted
 
 
 def test_it_stays_within_its_limit_and_says_so():

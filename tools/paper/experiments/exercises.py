@@ -14,7 +14,7 @@ from gateway.twin.experiment import Floats
 from paper.experiments.calibration import Calibrated
 from paper.experiments.closed_loop import Surroundings
 from paper.experiments.laws import LAW_NAMES, TICK_S
-from paper.experiments.rigs import drifted, lifted
+from paper.experiments.rigs import drift_months, lift_pad
 from paper.experiments.trials import Lane, Trial, TrialConditions, trial
 from paper.paper_values import SPINDLE_HZ, TARGETS_N, TRACKING_FEEDS_M_PER_S, TRACKING_FORCES_N
 
@@ -78,11 +78,11 @@ def without_first_step(series: Floats) -> Floats:
 def steps(copies: Sequence[Calibrated]) -> Trial:
     """Run the steps of Fig. 8, one fresh start per target: no load, the pad lifted."""
     wishes = [_constant(target_n) for target_n in TARGETS_N]
-    return trial(copies, LAW_NAMES, wishes, TrialConditions(8, conditioned=False, changed=_lifted))
+    return trial(copies, LAW_NAMES, wishes, TrialConditions(8, conditioned=False, changed=_lift_pad))
 
 
-def _lifted(plant: Plant, case: int) -> Plant:
-    return lifted(plant)
+def _lift_pad(plant: Plant, case: int) -> Plant:
+    return lift_pad(plant)
 
 
 def _constant(target_n: float, duration_s: float = STEP_S) -> Callable[[int], Floats]:
@@ -109,8 +109,8 @@ def partial_reversals(copies: Sequence[Calibrated], quick: bool) -> Trial:
     """Hold random forces one after the other, a series of its own for each seed. Case 0: as calibrated, case 1: months
     later.
     """
-    wish = _held(holds(quick))
-    conditions = TrialConditions(10, changed=lambda plant, case: drifted(plant) if case else plant)
+    wish = _hold_wish(holds(quick))
+    conditions = TrialConditions(10, changed=lambda plant, case: drift_months(plant) if case else plant)
     return trial(copies, LAW_NAMES, [wish, wish], conditions)
 
 
@@ -119,7 +119,7 @@ def holds(quick: bool) -> int:
     return QUICK_HOLDS if quick else HOLDS
 
 
-def _held(count: int) -> Callable[[int], Floats]:
+def _hold_wish(count: int) -> Callable[[int], Floats]:
     def wish(seed: int) -> Floats:
         return np.repeat(np.random.default_rng([seed, 3]).uniform(3.0, 37.0, count), ticks(HOLD_S))
 
@@ -139,7 +139,7 @@ def tracking(copies: Sequence[Calibrated], laws: tuple[str, ...] = ("bsfm", "our
     """Make contact from the lifted pad, then feed along the plate (Fig. 9). Cases are CONDITIONS."""
     longest_s = FEED_FROM_S + TRAVEL_M / min(TRACKING_FEEDS_M_PER_S)
     wishes = [_constant(force_n, longest_s) for force_n, _, _ in CONDITIONS]
-    return trial(copies, laws, wishes, TrialConditions(11, conditioned=False, changed=_lifted, around=moving_surface))
+    return trial(copies, laws, wishes, TrialConditions(11, conditioned=False, changed=_lift_pad, around=moving_surface))
 
 
 def moving_surface(lanes: list[Lane]) -> Surroundings:

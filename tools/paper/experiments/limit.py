@@ -22,7 +22,7 @@ from gateway.twin.replay.grid import Grid
 from gateway.twin.replay.loops import march_slide
 from gateway.twin.replay.regulator import Pressures
 from gateway.twin.slide import SlideState, slide_of, without_motion
-from paper.experiments.rigs import lifted
+from paper.experiments.rigs import lift_pad
 
 HIGH_V: Final = 10.0
 DURATION_S: Final = 0.6
@@ -44,7 +44,7 @@ class Fastest:
 
 def responses(plant: Plant, commands_v: Floats) -> Floats:
     """Return the force every millisecond for commands every millisecond, both (steps, lanes): the twin's steps, compiled."""
-    slide = slide_of(lifted(plant))
+    slide = slide_of(lift_pad(plant))
     time_s = np.arange(len(commands_v) + 1) * STEP_S
     force_n = np.empty_like(commands_v)
     for lane, command_v in enumerate(commands_v.T):

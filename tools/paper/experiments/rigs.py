@@ -53,14 +53,14 @@ def copy_of(seed: int) -> Plant:
     return plant
 
 
-def drifted(plant: Plant) -> Plant:
+def drift_months(plant: Plant) -> Plant:
     """Return the same rig, months later."""
     for (section, name), factor in DRIFT.items():
         plant = with_value(plant, section, name, getattr(getattr(plant, section), name) * factor)
     return plant
 
 
-def lifted(plant: Plant) -> Plant:
+def lift_pad(plant: Plant) -> Plant:
     """Return the same rig with the pad off the workpiece."""
     return with_value(plant, "contact", "gap_m", LIFTED_M)
 

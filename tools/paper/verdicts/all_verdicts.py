@@ -3,24 +3,24 @@
 from collections.abc import Callable, Sequence
 
 from paper.study import Study
-from paper.verdicts.fits import per_direction, pooled
-from paper.verdicts.tracking import roughness, spindle, tracking
-from paper.verdicts.validation_and_steps import steps, two_steps, validation
+from paper.verdicts.fits import judge_per_direction, judge_pooled
+from paper.verdicts.tracking import judge_roughness, judge_spindle, judge_tracking
+from paper.verdicts.validation_and_steps import judge_steps, judge_two_steps, judge_validation
 from paper.verdicts.verdict import NO, OUTSIDE, YES, Verdict
 
 
 def verdicts(study: Study) -> list[Verdict]:
     """Return all lines of the table, in the order of the paper's figures."""
     parts: list[Callable[[Study], list[Verdict]]] = [
-        pooled,
-        per_direction,
-        validation,
-        steps,
-        two_steps,
-        tracking,
-        spindle,
+        judge_pooled,
+        judge_per_direction,
+        judge_validation,
+        judge_steps,
+        judge_two_steps,
+        judge_tracking,
+        judge_spindle,
     ]
-    return [line for part in parts for line in part(study)] + [roughness()]
+    return [line for part in parts for line in part(study)] + [judge_roughness()]
 
 
 def counts(lines: Sequence[Verdict]) -> str:

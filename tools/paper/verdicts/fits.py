@@ -41,7 +41,7 @@ def order_line(study: Study, names: tuple[str, str], where: str, statement: str,
     return Verdict(where, statement, *(", ".join(labels).format(*v) for v in (paper, ours)), word(ours == paper), why)
 
 
-def pooled(study: Study) -> list[Verdict]:
+def judge_pooled(study: Study) -> list[Verdict]:
     """Judge the models with one curve for both directions."""
     pfm = "one curve runs through the middle of the loop: what remains is half its width, whatever the order"
     size = f"{pfm}; a norm within {NORM_TOLERANCE:.0%} counts, the slide is another one"
@@ -58,7 +58,7 @@ def pooled(study: Study) -> list[Verdict]:
     ]
 
 
-def per_direction(study: Study) -> list[Verdict]:
+def judge_per_direction(study: Study) -> list[Verdict]:
     """Judge the models with a curve for each direction."""
     smooth = (
         "the twin's loop is smoother than a real one and its noise averages out over ten groups, so high orders leave less; "

@@ -29,7 +29,7 @@ def mean_of(values: dict[int, float], **wanted: object) -> float:
     return float(np.mean(chosen))
 
 
-def tracking(study: Study) -> list[Verdict]:
+def judge_tracking(study: Study) -> list[Verdict]:
     """Judge the tracking of Fig. 9."""
     slow, fast = paper_values.TRACKING_FEEDS_M_PER_S
     worst = {case: float(np.max(np.abs(fed_error_n(study, "bsfm", case)))) for case in range(len(CONDITIONS))}
@@ -76,7 +76,7 @@ def stiff_variation_n() -> float:
     return float(np.ptp(height_m) * paper_plant().contact.pad_stiffness_n_per_m)
 
 
-def spindle(study: Study) -> list[Verdict]:
+def judge_spindle(study: Study) -> list[Verdict]:
     """Judge what the spindle does to the force."""
     cases = range(len(CONDITIONS))
     shaking = {case: exercises.shaking_n(fed_error_n(study, "bsfm", case)) for case in cases}
@@ -105,7 +105,7 @@ def spindle(study: Study) -> list[Verdict]:
     ]
 
 
-def roughness() -> Verdict:
+def judge_roughness() -> Verdict:
     """Leave out Fig. 10: roughness of a ground surface is outside software."""
     return Verdict(
         "Fig. 10",

@@ -29,7 +29,7 @@ def largest(trial: Trial, name: str) -> float:
     return float(np.max(np.abs(exercises.without_first_step(trial.of(name).error_n[:, 0]))))
 
 
-def validation(study: Study) -> list[Verdict]:
+def judge_validation(study: Study) -> list[Verdict]:
     """Judge how large the errors are, and on which side."""
     return [*largest_errors(study.validation), *sides(study.validation)]
 
@@ -99,7 +99,7 @@ def step_times_s(study: Study, law: str, band_n: float) -> Floats:
     return study.steps.score(settled_s(band_n), law)[0]
 
 
-def steps(study: Study) -> list[Verdict]:
+def judge_steps(study: Study) -> list[Verdict]:
     """Judge the settling times in both bands."""
     return [line for band_n in paper_values.SETTLING_S for line in step_lines(study, band_n)]
 
@@ -128,7 +128,7 @@ def rest_n(study: Study, law: str) -> Floats:
     return study.steps.score(lambda force_n, wanted_n: largest_n(force_n[-300:], wanted_n[-300:]), law)[0]
 
 
-def two_steps(study: Study) -> list[Verdict]:
+def judge_two_steps(study: Study) -> list[Verdict]:
     """Judge what is left at rest: at the step to 5 N, and above 10 N."""
     bsfm_n, psfm_n = rest_n(study, "bsfm"), rest_n(study, "psfm")
     above = np.array(paper_values.TARGETS_N) > 10.0
