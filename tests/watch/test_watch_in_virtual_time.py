@@ -26,6 +26,8 @@ from gateway.watch.window_verdict import judge_window
 from tests.service.wired import ENABLE, Wired
 
 WIRE_S = 0.012  # what 9600 and 115200 baud add to the plant's delay
+WINDOW_S, EVERY_S, SETPOINT_S = 10.0, 2.5, 0.5  # as short as the watch's laws hold: a second of all this takes 0.08 s
+FIRST_WINDOW_S = 12.5
 GAIN = Gain(1.0, 0.2, (0.7, 0.9), 0.9)
 
 
@@ -67,7 +69,7 @@ class Scene:
         assert plant is not None
         self.plant = with_value(plant, "regulator", "delay_s", plant.regulator.delay_s + WIRE_S)
         self.search = StubDiagnosis(self.plant)
-        setup = WatchSettings(window_s=20.0, every_s=5.0)
+        setup = WatchSettings(window_s=WINDOW_S, every_s=EVERY_S)
         self.reference = WatchReference(plant)
         comparison = PlantComparison(self.reference, self.search, 0.25)
         self.watch = Watch(self.reader, comparison, setup, lambda: self.wired.now_s)
@@ -79,10 +81,10 @@ class Scene:
         self.reader.close()
 
     def work(self, duration_s: float) -> "Scene":
-        """Random setpoints, one a second."""
-        for _ in range(round(duration_s)):
+        """Random setpoints, two a second."""
+        for _ in range(round(duration_s / SETPOINT_S)):
             self.wired.write(0, ENABLE, int(self._rng.integers(400, 4000)))
-            self.wired.run(1.0)
+            self.wired.run(SETPOINT_S)
         return self
 
     def change(self, **values: float) -> None:
@@ -97,7 +99,7 @@ class Scene:
     def looks(self, count: int) -> list[ResidualCause]:
         causes = []
         for _ in range(count):
-            self.work(5)
+            self.work(EVERY_S)
             self.watch.check_newest_window()
             causes.append(self.watch.published.cause)
         return causes
@@ -113,7 +115,7 @@ def scene() -> Iterator[Scene]:
 
 
 def test_a_healthy_machine_is_searched_once_and_then_only_looked_at(scene):
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     assert scene.looks(6) == [ResidualCause.NONE] * 6
     assert scene.search.requests == 1
     assert scene.watch.counters["rms_n"] < 0.3
@@ -121,7 +123,7 @@ def test_a_healthy_machine_is_searched_once_and_then_only_looked_at(scene):
 
 def test_what_the_wire_adds_is_taken_into_the_reference_and_nothing_more(scene):
     scene.search.plant = with_value(scene.plant, "friction", "coulomb_n", 1.1)
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(1)
     reference = scene.reference.plant
     assert reference.regulator.delay_s == pytest.approx(scene.plant.regulator.delay_s)
@@ -135,13 +137,13 @@ def test_a_hose_that_is_longer_than_a_wire_can_be_is_a_finding_from_the_start(sc
     scene.search.causes = (
         Cause("transport-delay", ("transport-delay", "clock-offset"), 0.9, {"delay_s": delay}, GAIN),
     )
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     assert scene.looks(2)[-1] is ResidualCause.TRANSPORT_DELAY
     assert "cannot tell it from clock-offset" in scene.watch.published.sentence
 
 
 def test_more_friction_raises_the_warning_by_its_name_and_its_end_clears_it(scene):
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(2)
     scene.change(friction__coulomb_n=3.0)
     result = scene.looks(6)
@@ -150,12 +152,12 @@ def test_more_friction_raises_the_warning_by_its_name_and_its_end_clears_it(scen
     assert "coulomb_n 1 -> 3 N" in scene.watch.published.sentence
     scene.wired.fault("plant", on=False)
     scene.search.plant = scene.plant
-    scene.work(30)
+    scene.work(WINDOW_S + EVERY_S)
     assert scene.looks(2)[-1] is ResidualCause.NONE
 
 
 def test_a_standing_cause_is_searched_for_less_and_less(scene):
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(1)
     scene.change(friction__coulomb_n=3.0)
     scene.looks(4)
@@ -165,7 +167,7 @@ def test_a_standing_cause_is_searched_for_less_and_less(scene):
 
 
 def test_a_change_that_hardly_moves_the_force_disturbs_nobody(scene):
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(1)
     scene.reference.floors_n.clear()  # so that every look searches
     scene.search.plant = with_value(scene.plant, "friction", "coulomb_n", 1.05)
@@ -174,7 +176,7 @@ def test_a_change_that_hardly_moves_the_force_disturbs_nobody(scene):
 
 def test_a_name_for_a_force_that_is_where_it_should_be_disturbs_nobody(scene):
     """The demo, clean, raised A345 for a refit that changed two numbers against each other and the force not at all."""
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(1)
     scene.reference.floors_n.clear()
     worn = with_value(with_value(scene.plant, "friction", "coulomb_n", 2.0), "cylinder", "area_m2", 9.8e-5)
@@ -186,7 +188,7 @@ def test_a_name_for_a_force_that_is_where_it_should_be_disturbs_nobody(scene):
 
 
 def test_what_no_effect_explains_is_an_unknown_cause(scene):
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(1)
     scene.change(regulator__hysteresis_pa=3.0e4)
     scene.search.plant = scene.plant
@@ -196,7 +198,7 @@ def test_what_no_effect_explains_is_an_unknown_cause(scene):
 
 
 def test_an_idle_gateway_is_never_searched(scene):
-    scene.wired.run(40.0)
+    scene.wired.run(2.0 * WINDOW_S)
     scene.watch.check_newest_window()
     assert scene.watch.why_skipped == "nothing was commanded"
     assert scene.search.requests == 0
@@ -204,14 +206,14 @@ def test_an_idle_gateway_is_never_searched(scene):
 
 def test_the_first_window_must_have_seen_something(scene):
     scene.wired.write(0, ENABLE, 1200)
-    scene.wired.run(40.0)
+    scene.wired.run(2.0 * WINDOW_S)
     scene.watch.check_newest_window()
     assert "too little" in scene.watch.why_skipped
     assert scene.search.requests == 0
 
 
 def test_a_gain_has_no_name_in_the_catalogue_but_is_told(scene):
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(1)
     area_m2 = scene.plant.cylinder.area_m2
     scene.change(cylinder__area_m2=1.15 * area_m2)
@@ -221,9 +223,9 @@ def test_a_gain_has_no_name_in_the_catalogue_but_is_told(scene):
 
 def test_a_cell_whose_sign_turned_is_told_as_such(scene):
     """By the engine itself: it looks for no cause in such a window, so that this is fast."""
-    scene.work(25)
+    scene.work(FIRST_WINDOW_S)
     scene.looks(1)
-    window = scene.watch._window(20.0)
+    window = scene.watch._window(WINDOW_S)
     turned = replace(window.measurement, force_n=-window.measurement.force_n)
     result = diagnose_window([turned], scene.plant)
     sentence = judge_window(replace(window, measurement=turned), result, scene.reference, 0.25).sentence

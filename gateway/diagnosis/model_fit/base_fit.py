@@ -5,8 +5,10 @@ recorder's machine has the delay, the second lag or the seals of the paper's. A 
 first, for a search that begins with the wrong half of the loop never finds the other; then Levenberg-Marquardt.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -21,7 +23,7 @@ from gateway.diagnosis.bench.bench import Bench, unsettled_rows
 from gateway.diagnosis.bench.parameters import ModelParameters, StartParameter
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.model_fit.initial_state import start_parameters, try_initial_states, without_pressures
-from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.model_fit.levenberg_marquardt import Contest, FitProblem, FittedModel, refine
 from gateway.diagnosis.noise.whitening import Whitener
 from gateway.twin.plant import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, with_value
 
@@ -42,6 +44,7 @@ _KNOWN_SHARE: Final = 0.1  # of a gain: ten standard errors, for slow noise make
 _LEAST_OF_PRESSURES_CHI2: Final = 16.0  # that three parameters exceed by chance once in 900 recordings
 _WAVES: Final = 8  # most waves of a base fit ...
 _WAVES_WITH_START: Final = 16  # ... and of one that also fits how a recording begins
+_LEAST_GAIN: Final = 1.0e-4  # of chi-square, in a wave: what is less is left to the fits that follow
 
 
 def without_effects(plant: Plant) -> Plant:
@@ -84,16 +87,17 @@ def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Wh
     tried = try_initial_states(bench, coarse, whiten)
     strains = tuple(each for each in starts if isinstance(each, StartParameter) and each.elements)
     settled = list(dict.fromkeys(map(without_pressures, tried)))
-    plain, whole = (
-        min(
-            refine(bench, [FitProblem(each, (*free, *more)) for each in points], whiten, waves=_WAVES_WITH_START),
-            key=lambda each: each.chi2,
-        )
-        for points, more in ((settled, strains), (tried, starts))
-    )
+    whole = _best_start(bench, [FitProblem(each, (*free, *starts)) for each in tried], whiten)
+    plain = _best_start(bench, [FitProblem(each, (*free, *strains)) for each in settled], whiten, whole.chi2)
     usual = max(whole.chi2 / max(int(bench.usable.sum()), 1), 1.0)  # per row: no cause is found yet
     asked = _LEAST_OF_PRESSURES_CHI2 * usual * len(bench.measurements)
     return whole if whole.chi2 < plain.chi2 - asked else plain
+
+
+def _best_start(bench: Bench, problems: Sequence[FitProblem], whiten: Whitener, best_chi2: float = inf) -> FittedModel:
+    """The best of one model's fits from several starts."""
+    contest = Contest(best_chi2, _LEAST_GAIN)
+    return min(refine(bench, problems, whiten, _WAVES_WITH_START, contest), key=lambda each: each.chi2)
 
 
 def refit(bench: Bench, fitted: FittedModel, whiten: Whitener, waves: int = 3) -> FittedModel:

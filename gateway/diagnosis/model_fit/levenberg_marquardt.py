@@ -6,6 +6,7 @@ tried for each of them in one wave.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,9 @@ from gateway.diagnosis.noise.whitening import Whitener
 
 _DAMPINGS: Final = (0.0, 1.0, 30.0)  # tried side by side: Gauss-Newton, and two steps as careful as that goes wrong
 _SECANT_SHARE: Final = 0.02  # of a size that is there: large against the twin's steps, small against its bends
-_LEAST_PROGRESS: Final = 0.02  # a gain in chi-square below this share of one row's is no progress
+_LEAST_PROGRESS: Final = 0.02  # a gain in chi-square below this share of one row's is no progress ...
+_LEAST_GAIN: Final = 1.0e-5  # ... nor one below this share of chi-square itself
+_CATCHES_UP: Final = 5.0  # times its last gain, that a problem may be behind the best: gains shrink from wave to wave
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,30 +53,50 @@ class FitProblem:
     free: tuple[Parameter, ...]
 
 
-def refine(bench: Bench, problems: Sequence[FitProblem], whiten: Whitener, waves: int) -> list[FittedModel]:
-    """Move each problem's free parameters and offsets to the least whitened squares, in at most `waves` waves."""
+@dataclass(frozen=True, slots=True)
+class Contest:
+    """Problems of which the best is wanted: one that is too far behind to catch up is refined no further.
+
+    best_chi2: of a rival that has been refined before. least_gain: share of chi-square that a step must gain to be progress.
+    """
+
+    best_chi2: float = inf
+    least_gain: float = _LEAST_GAIN
+
+
+def refine(
+    bench: Bench, problems: Sequence[FitProblem], whiten: Whitener, waves: int, contest: Contest | None = None
+) -> list[FittedModel]:
+    """Move each problem's free parameters and offsets to the least whitened squares, in at most `waves` waves.
+
+    contest: None where every problem is wanted for itself.
+    """
     fitted = linearise(bench, problems, whiten)
     active = list(range(len(fitted)))
     for wave in range(waves):
         if not active:
             break
         progress.advance(wave + 1, waves)
-        better = _try_steps(bench, [fitted[index] for index in active], whiten)
-        moving = []
-        for index, found in zip(active, better, strict=True):
-            if found is not None:
-                gain = fitted[index].chi2 - found.chi2
-                fitted[index] = found
-                if gain > max(_LEAST_PROGRESS, 1.0e-5 * found.chi2):
-                    moving.append(index)
-        active = moving
-        for index, found in zip(
-            active,
-            linearise(bench, [FitProblem(fitted[i].parameters, fitted[i].free) for i in active], whiten),
-            strict=True,
-        ):
-            fitted[index] = found
+        gains = _step_all(bench, fitted, active, whiten)
+        least_gain = contest.least_gain if contest else _LEAST_GAIN
+        active = [k for k in active if gains[k] > max(_LEAST_PROGRESS, least_gain * fitted[k].chi2)]
+        if contest:
+            best = min(contest.best_chi2, *(each.chi2 for each in fitted))
+            active = [k for k in active if fitted[k].chi2 - best <= _CATCHES_UP * gains[k]]
+        problems = [FitProblem(fitted[k].parameters, fitted[k].free) for k in active]
+        for k, found in zip(active, linearise(bench, problems, whiten), strict=True):
+            fitted[k] = found
     return fitted
+
+
+def _step_all(bench: Bench, fitted: list[FittedModel], active: Sequence[int], whiten: Whitener) -> dict[int, float]:
+    """Move each active problem by its best step; return what each gained in chi-square."""
+    gains = dict.fromkeys(active, 0.0)
+    for k, found in zip(active, _try_steps(bench, [fitted[k] for k in active], whiten), strict=True):
+        if found is not None:
+            gains[k] = fitted[k].chi2 - found.chi2
+            fitted[k] = found
+    return gains
 
 
 def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whitener) -> list[FittedModel]:

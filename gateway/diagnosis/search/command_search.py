@@ -119,7 +119,7 @@ def _liken(
     def look(some: Floats) -> Floats:
         slope, power = np.zeros(some.size), np.full(some.size, 1.0e-300)
         for channel, command_v, row_s in _commanded_channels(bench):
-            bunch = max(int(_BUNCH_SHARE_OF_LAG * parameters.value(LAG) / row_s), 1) if bunched else 1
+            bunch = max(round(_BUNCH_SHARE_OF_LAG * parameters.value(LAG) / row_s), 1) if bunched else 1
             rows = np.arange(0, command_v.size, bunch)
             sums = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0))
             alike, squares = np.empty(some.size), np.empty(some.size)

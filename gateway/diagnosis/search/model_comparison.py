@@ -18,7 +18,7 @@ from gateway.diagnosis.bench.recording_drive import begins_at_rest
 from gateway.diagnosis.light_statistics import chi2_tail
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.model_fit.initial_state import with_start_of
-from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
+from gateway.diagnosis.model_fit.levenberg_marquardt import Contest, FitProblem, FittedModel, refine
 from gateway.diagnosis.model_fit.normal_equations import block_sums
 from gateway.diagnosis.noise.whitening import Whitener
 from gateway.diagnosis.search.candidates import (
@@ -146,7 +146,8 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     problems = [FitProblem(each.parameters, joined_parameters(bench, fitted, each.candidate.form)) for each in best]
     if best:
         progress.report(f"refining {progress.few([each.candidate.effect.name for each in best])}")
-    refined = refine(bench, problems, whiten, _WAVES)
+    contest = Contest(incumbent.fitted.chi2) if incumbent else Contest()
+    refined = refine(bench, problems, whiten, _WAVES, contest)
     ranked = [
         refined_effect(bench, (score.candidate.effect, score.candidate.form), each, fitted, whiten)
         for score, each in zip(best, refined, strict=True)
