@@ -78,7 +78,7 @@ class UploadService:
         self._shows = False  # whether commit_status tells of what is being done
         self._notice = NO_NOTICE
         self._jobs = 0
-        self._said, self._failed_last, self._reason = "", False, 0
+        self._outcome, self._failed_last, self._reason = "", False, 0
         staging.on_commit = self._on_commit
         staging.on_select = self._on_select
 
@@ -158,7 +158,7 @@ class UploadService:
             "built_in": self._pointer.active.number is None,
             "job": self._jobs,
             "busy": bool(self._doing),
-            "said": self._said,
+            "said": self._outcome,
             "failed": self._failed_last,
             "reason": self._reason,
         }
@@ -204,7 +204,7 @@ class UploadService:
         self._end(CommitStatus.FAILED, sentence, index, reason)
 
     def _end(self, status: CommitStatus, sentence: str, index: int = 0, reason: int = 0) -> None:
-        self._doing, self._said, self._reason = "", sentence, reason
+        self._doing, self._outcome, self._reason = "", sentence, reason
         self._failed_last = status is CommitStatus.FAILED
         if self._shows:
             self._staging.show_commit(status, index, reason, self._notice)

@@ -14,7 +14,7 @@ def facts(checked: "Checked", *, whole: bool = False) -> dict[str, str]:
     """Return facts of a profile for the terminal, name -> words. whole: the fingerprint in full."""
     if checked.kind == "rig":
         return _rig(checked.value) | ({"fingerprint": checked.value.fingerprint} if whole else {})
-    return {checked.kind: _SAID[checked.kind](checked.value)}
+    return {checked.kind: _FACTS_OF[checked.kind](checked.value)}
 
 
 def _rig(rig: "Rig") -> dict[str, str]:
@@ -61,7 +61,7 @@ def _plan(plan: Any) -> str:
     return f"a ladder of {plan.groups} groups in steps of {plan.step_v:g} V"
 
 
-_SAID: Final[dict[str, Callable[[Any], str]]] = {
+_FACTS_OF: Final[dict[str, Callable[[Any], str]]] = {
     "device": _device,
     "plant": _plant,
     "calibration": _calibration,

@@ -253,7 +253,7 @@ class Controller:
             self._machine.end_run("calibration stopped: ramping down", self._given_n)
             return True
         stop = self.active_run.step(now_s, self._reading, self._loop)
-        self._machine.tell(self.active_run.take_said())
+        self._machine.tell(self.active_run.take_message())
         if stop is None:
             self._machine.fire(StateEvent.MOVE)
         elif stop.fault:

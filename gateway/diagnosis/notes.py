@@ -20,11 +20,11 @@ def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[flo
         yield from each.notes
         yield from _dead_drive_notes(each)
     if max(offsets_n) - min(offsets_n) > _OFFSETS_APART_RATIO * floor_n:
-        told = ", ".join(
+        offsets = ", ".join(
             f"{each.name} {offset_n:.3g} N" for each, offset_n in zip(measurements, offsets_n, strict=True)
         )
         yield (
-            f"the recordings have offsets of their own ({told}); the extended plant has their mean: "
+            f"the recordings have offsets of their own ({offsets}); the extended plant has their mean: "
             "a simulation of one of them is off by the difference"
         )
 

@@ -113,7 +113,7 @@ def compose_diagnosis(
     causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
     causes.sort(key=lambda cause: cause.gain.held_out_rms_after_n**2 - cause.gain.held_out_rms_before_n**2)
     unseen = _unseen(findings, found, causes)
-    told = {*_names_in_groups(causes), *(each.name for each in causes), *(each.name for each in unseen)}
+    named = {*_names_in_groups(causes), *(each.name for each in causes), *(each.name for each in unseen)}
     duration_s = sum(each.duration_s for each in bench.measurements)
     return Diagnosis(
         verdict=_decide_verdict(
@@ -123,7 +123,7 @@ def compose_diagnosis(
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
-        rejected=_rejected_effects(bench, found, noise.rms_n, told, dropped),
+        rejected=_rejected_effects(bench, found, noise.rms_n, named, dropped),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant_of(reported.base),
         plant=_extended_plant(reported, causes),
@@ -135,10 +135,10 @@ def compose_diagnosis(
 
 
 def _noise_floor(
-    bench: Bench, found: SearchResult, reported: ReportedModels, told_n: tuple[float | None, float | None]
+    bench: Bench, found: SearchResult, reported: ReportedModels, known_floors_n: tuple[float | None, float | None]
 ) -> _Noise:
-    """told_n: floors from the user and from the calibration, N."""
-    given_n, calibration_n = told_n
+    """Return the floor, and what is known of it. known_floors_n: from the user and from the calibration, N."""
+    given_n, calibration_n = known_floors_n
     rms_n = bench.rms_n(reported.base.residual_n)
     too_high_n = given_n if given_n is not None and given_n > rms_n else None
     if given_n is not None and too_high_n is None:
@@ -258,14 +258,14 @@ def _names_in_groups(causes: Sequence[Cause]) -> set[str]:
 
 
 def _rejected_effects(
-    bench: Bench, found: SearchResult, rms_n: float, told: set[str], dropped: Sequence[DoubtfulEffect]
+    bench: Bench, found: SearchResult, rms_n: float, named: set[str], dropped: Sequence[DoubtfulEffect]
 ) -> tuple[Rejected, ...]:
     """Effects that lost the first comparison and the last, by the part of the RMS that they would save of unseen blocks, N."""
     gains = {each.name: each.gain_n for each in dropped}
     for comparison in (found.first, found.last):
         before_n = held_out_errors(bench, comparison.beside, found.whiten).rms_n
         for refined in comparison.ranked:
-            if refined.effect.name not in {*told, *(each.name for each in dropped)}:
+            if refined.effect.name not in {*named, *(each.name for each in dropped)}:
                 share = 1.0 - held_out_errors(bench, refined.fitted, found.whiten).rms_n / before_n
                 gains[refined.effect.name] = rms_n * share
     best = sorted(gains.items(), key=lambda item: -item[1])

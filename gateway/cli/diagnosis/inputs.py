@@ -159,8 +159,8 @@ def reference_file(directory: Path) -> Path:
 
     known = read_reference_recording(directory)
     if known is None:
-        told = "force-gateway recordings reference RECORDING makes one, of the machine as it should be"
-        raise CliError(f"E403 no reference recording in {directory}: {told}", exit_codes.DATA)
+        cure = "force-gateway recordings reference RECORDING makes one, of the machine as it should be"
+        raise CliError(f"E403 no reference recording in {directory}: {cure}", exit_codes.DATA)
     return reference_path(directory, known)
 
 

@@ -47,10 +47,10 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
 def _line(entry: "StoredDocument[NumberedPlant]") -> str:
     if entry.document is None:
         return f"unusable: {entry.fault}"
-    told = entry.document.provenance
-    causes = ", ".join(cause.name for cause in told.causes) or "no cause"
-    source = told.file or ", ".join(each.name for each in told.recordings)
-    return f"{told.made_utc:<22}{told.verdict or 'added':<12}{causes} · from {source}"
+    provenance = entry.document.provenance
+    causes = ", ".join(cause.name for cause in provenance.causes) or "no cause"
+    source = provenance.file or ", ".join(each.name for each in provenance.recordings)
+    return f"{provenance.made_utc:<22}{provenance.verdict or 'added':<12}{causes} · from {source}"
 
 
 @command.command(name="show")

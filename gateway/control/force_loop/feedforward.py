@@ -49,9 +49,9 @@ class TransportDelay:
         if self.delay_s <= 0.0:
             return value
         self._now_s += dt_s
-        past, heard_s = self._past, self._now_s - self.delay_s
+        past, entered_s = self._past, self._now_s - self.delay_s
         past.append((self._now_s, value))
-        while past and past[0][0] <= heard_s:
+        while past and past[0][0] <= entered_s:
             self._value = past.popleft()[1]
         return self._value
 
@@ -149,8 +149,8 @@ class Feedforward:
             self._pace.spend(moved_n, rate_n_per_s)
         aimed_n, self.aimed_n = self.aimed_n, self._aim_n(goal_n, rate_n_per_s)
         self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
-        heard_n = self._delayed.advance(self.applied_n, dt_s)
-        self.reference_n += (heard_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
+        delayed_n = self._delayed.advance(self.applied_n, dt_s)
+        self.reference_n += (delayed_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
         return moved_n
 

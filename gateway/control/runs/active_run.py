@@ -38,7 +38,7 @@ class ActiveRun:
         self.eta_s = 0.0
         self.cell_n = nan
         self.target_n = 0.0
-        self.said = self.refused = ""
+        self.message = self.refused = ""
         self.is_local = False
         self.run: AnyRun | None = None
         self.last_row: LadderRow | None = None
@@ -142,9 +142,9 @@ class ActiveRun:
         refused, self.refused = self.refused, ""
         return refused
 
-    def take_said(self) -> str:
+    def take_message(self) -> str:
         """Return what the run has said, once; empty for nothing."""
-        sentence, self.said = self.said, ""
+        sentence, self.message = self.message, ""
         return sentence
 
     # -- the rig's largest force
@@ -168,7 +168,7 @@ class ActiveRun:
             return None
         if not run.leave_out(now_s, step.voltage_v, was_there=was_reached):
             return None
-        self.said = self._too_high(step.voltage_v, "the run goes on with the stairs below")
+        self.message = self._too_high(step.voltage_v, "the run goes on with the stairs below")
         return min(present_v, step.voltage_v)
 
     def _too_high(self, voltage_v: float, what_now: str) -> str:

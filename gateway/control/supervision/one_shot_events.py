@@ -21,8 +21,8 @@ class OneShotEvents:
     """Remembers what has been told. stuck_n: measured at the safe voltage, from which a force counts as stuck."""
 
     def __init__(self, stuck_n: float) -> None:
-        self._said_unreachable = False
-        self._said_stuck = self._said_hunting = False
+        self._was_unreachable = False
+        self._was_stuck = self._was_hunting = False
         self._stuck_n = stuck_n
         self._was_in_band = False
         self._pressure_pa = self._profile_pa_per_v = self._learned_pa_per_v = nan
@@ -33,7 +33,7 @@ class OneShotEvents:
 
     def forget_unreachable(self) -> None:
         """Let an unreachable target be told anew, after the output went off."""
-        self._said_unreachable = False
+        self._was_unreachable = False
 
     def observe_line(self, line: LineStatus) -> None:
         """Take over the pressure that the output device measures."""
@@ -43,7 +43,7 @@ class OneShotEvents:
         """Return a sentence where the target has just become unreachable, else nothing. Ask after each step in force or
         voltage mode. measured_n: contact force, smoothed."""
         is_unreachable = loop.unreachable
-        is_first, self._said_unreachable = is_unreachable and not self._said_unreachable, is_unreachable
+        is_first, self._was_unreachable = is_unreachable and not self._was_unreachable, is_unreachable
         sentence = self._unreachable_sentence(loop.voltage_v, measured_n, inputs.expected_n) if is_first else ""
         if loop.in_band and inputs.touching:
             self._learn(loop.voltage_v)
@@ -72,10 +72,10 @@ class OneShotEvents:
     def hunting_event(self, loop: ForceLoop) -> str:
         """Return a sentence where the trim has just begun to hunt. Ask after each step in force or voltage mode."""
         is_hunting = loop.is_hunting
-        is_first, self._said_hunting = is_hunting and not self._said_hunting, is_hunting
+        is_first, self._was_hunting = is_hunting and not self._was_hunting, is_hunting
         return hunting_sentence(loop.applied_n, MOST_TURNS) if is_first else ""
 
     def stuck_event(self, is_stuck: bool, reading: Reading) -> str:
         """Return a sentence where a force has just been found stuck at the safe voltage. Ask while the output is off."""
-        is_first, self._said_stuck = is_stuck and not self._said_stuck, is_stuck
+        is_first, self._was_stuck = is_stuck and not self._was_stuck, is_stuck
         return stuck_sentence(reading.contact_n, self._stuck_n) if is_first else ""

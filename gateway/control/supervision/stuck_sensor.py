@@ -27,7 +27,7 @@ class StuckSensorCheck:
     def __init__(self, supervision: Supervision) -> None:
         self._frozen_s = supervision.frozen_s
         self._least_change_n = _QUANTA * supervision.sample_quantum_n
-        self._told_limit = supervision.frozen_equal_samples
+        self._reported_limit = supervision.frozen_equal_samples
         self._noise = RepeatedReadings()
         self._value_n = inf
         self._slack_n = 0.0
@@ -66,9 +66,9 @@ class StuckSensorCheck:
         must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
         if self._same_s >= self._frozen_s and must_have_moved:
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
-        if self._told_limit is not None:
-            is_over = self._equal > self._told_limit
-            return f"{self._repeats}, allowed {self._told_limit} (frozen_equal_samples)" if is_over else ""
+        if self._reported_limit is not None:
+            is_over = self._equal > self._reported_limit
+            return f"{self._repeats}, allowed {self._reported_limit} (frozen_equal_samples)" if is_over else ""
         if self._equal >= self._noise.limit and self._equal_s >= self._frozen_s:
             return f"{self._repeats}, while its noise has left at most {self._noise.longest} equal so far"
         return ""
@@ -80,7 +80,7 @@ class StuckSensorCheck:
     @property
     def found_s(self) -> float:
         """Time, s, that a cell which freezes now repeats itself, the force at rest, until it is called frozen; inf: never."""
-        limit = self._noise.limit if self._told_limit is None else self._told_limit
+        limit = self._noise.limit if self._reported_limit is None else self._reported_limit
         if limit == inf:
             return inf
         return max(self._frozen_s, (ceil(limit) - 1) * self._noise.interval_s)  # the first of them was alive

@@ -44,8 +44,8 @@ class Channel:
 class Bench:
     """Simulates points for all recordings at once and compares them with what was measured; a value: nothing changes it.
 
-    raw_n, usable, block_of_row, young: (rows,) of all segments; usable: rows that count; block_of_row: the block that
-    each is held out with; young: rows that still feel how their recording began. taken_out: columns (rows,) whose
+    raw_n, usable, block_of_row, unsettled: (rows,) of all segments; usable: rows that count; block_of_row: the block that
+    each is held out with; unsettled: rows that still feel how their recording began. taken_out: columns (rows,) whose
     share of every vector counts as explained: dependences that no effect has a name for. character_n_per_s: (rows,) what
     the time of a character on the settings' line changes in the readings, None where it cannot matter. witnesses: recordings
     that a model is judged by, None for all; the others are fitted with them.
@@ -58,7 +58,7 @@ class Bench:
     raw_n: Floats
     usable: Flags
     block_of_row: NDArray[np.int64]
-    young: Flags
+    unsettled: Flags
     taken_out: tuple[Floats, ...] = ()
     witnesses: frozenset[int] | None = None
     character_n_per_s: Floats | None = None
@@ -196,7 +196,7 @@ def bench_of(measurements: Sequence[Measurement], motion: Motion = "inferred") -
         raw_n=raw_n,
         usable=usable,
         block_of_row=np.concatenate([_blocks(each, usable) for each in channels]),
-        young=np.zeros(raw_n.size, dtype=bool),
+        unsettled=np.zeros(raw_n.size, dtype=bool),
     )
 
 

@@ -120,8 +120,8 @@ def plan_next(diagnosis: Diagnosis, *, longest_s: float = USUAL_LONGEST_S) -> Pl
 
 def _describe_needs(experiment: Experiment) -> str:
     wanted = [name for name in experiment.columns if name not in RECORDED]
-    said = [f"record {' and '.join(wanted)}"] if wanted else []
-    return "; ".join([*said, *(text for text in (experiment.meanwhile, experiment.apart) if text)])
+    columns = [f"record {' and '.join(wanted)}"] if wanted else []
+    return "; ".join([*columns, *(text for text in (experiment.meanwhile, experiment.apart) if text)])
 
 
 def _choose_within_time(

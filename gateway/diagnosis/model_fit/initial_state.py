@@ -164,7 +164,7 @@ def _squares_per_recording(bench: Bench, residual: Floats) -> list[float]:
 
 
 def drop_unfelt_starts(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[Bench, FittedModel]:
-    """Return the same fit without what of its start a recording does not feel, on a bench whose young rows are those that
+    """Return the same fit without what of its start a recording does not feel, on a bench whose unsettled rows are those that
     feel it."""
     offsets = len(fitted.parameters.offsets_n)
     columns = whiten.spectra(fitted.jacobian)
@@ -174,8 +174,8 @@ def drop_unfelt_starts(bench: Bench, fitted: FittedModel, whiten: Whitener) -> t
     ]
     free = tuple(parameter for parameter, keep in zip(fitted.free, kept, strict=True) if keep)
     rows = [True] * offsets + kept
-    young = replace(bench, young=_rows_that_feel_the_start(bench, fitted, whiten))
-    return young, replace(fitted, free=free, jacobian=fitted.jacobian[np.array(rows)])
+    fitted_bench = replace(bench, unsettled=_rows_that_feel_the_start(bench, fitted, whiten))
+    return fitted_bench, replace(fitted, free=free, jacobian=fitted.jacobian[np.array(rows)])
 
 
 def settle_known_rests(bench: Bench, fitted: FittedModel, whiten: Whitener) -> FittedModel:
@@ -206,7 +206,7 @@ def _usual_way(parameter: StartParameter) -> float:
 
 def _rows_that_feel_the_start(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Flags:
     """Rows until the last one that feels the start of its recording, at most the first quarter of it."""
-    young = np.zeros(bench.rows, dtype=bool)
+    unsettled = np.zeros(bench.rows, dtype=bool)
     offsets = len(fitted.parameters.offsets_n)
     for parameter, column in zip(fitted.free, fitted.jacobian[offsets:], strict=True):
         if isinstance(parameter, StartParameter):
@@ -218,5 +218,5 @@ def _rows_that_feel_the_start(bench: Bench, fitted: FittedModel, whiten: Whitene
                     part = np.flatnonzero(np.abs(way * column[channel.rows]) > _FORGOTTEN_SHARE * whiten.floor_n)
                     most = int(_LONGEST_START_SHARE * (channel.rows.stop - channel.rows.start))
                     last = min(int(part[-1]) + 1, most) if part.size else 0
-                    young[channel.rows.start : channel.rows.start + last] = True
-    return young
+                    unsettled[channel.rows.start : channel.rows.start + last] = True
+    return unsettled

@@ -131,8 +131,8 @@ def saved_share(bench: Bench, before: FittedModel, winner: RefinedEffect, whiten
 def _blocks_past_the_start(bench: Bench) -> NDArray[np.intp]:
     """Return the blocks that do not feel any more how their recording began: a cause must show without them."""
     counted = block_sums(bench, bench.judged.astype(np.float64))
-    young = block_sums(bench, (bench.judged & bench.young).astype(np.float64))
-    return np.flatnonzero(young <= 0.5 * counted)
+    unsettled = block_sums(bench, (bench.judged & bench.unsettled).astype(np.float64))
+    return np.flatnonzero(unsettled <= 0.5 * counted)
 
 
 def is_noticeable(

@@ -157,7 +157,7 @@ class _LineReader:
         self._form = form
         self._chosen = chosen
         self._lenient = lenient
-        self._told: list[str] = []
+        self._findings: list[str] = []
         self._ragged: tuple[int, int] | None = None  # (line, cells) of a row that may be the torn last one
         self._wrong: dict[int, int] = {}  # column -> cells that were no number
         self._first_wrong: dict[int, str] = {}
@@ -184,7 +184,7 @@ class _LineReader:
         table = np.concatenate(blocks)
         columns = {k: table[:, k].copy() for k in range(len(self._chosen)) if not self._is_words(k, len(table))}
         notes = self._notes(columns)
-        return NumberTable(facts, columns, np.array(lines, dtype=np.int64), notes, dropped=bool(self._told))
+        return NumberTable(facts, columns, np.array(lines, dtype=np.int64), notes, dropped=bool(self._findings))
 
     def _values(self, at: int, line: str) -> list[float] | None:
         """Return the chosen numbers of a row; None when it is left out."""
@@ -215,7 +215,7 @@ class _LineReader:
                 f"{self._form.path}:{at}, column {pick.name} (the {pick.index + 1}. of the table): {cell[:20]!r} is no number"
             )
         if pick.is_contract:
-            self._told.append(f"line {at}, {pick.name}: {cell[:20]!r} is no number")
+            self._findings.append(f"line {at}, {pick.name}: {cell[:20]!r} is no number")
         self._wrong[k] = self._wrong.get(k, 0) + 1
         self._first_wrong.setdefault(k, f"line {at}, {pick.name}: {cell[:20]!r} is no number")
         return nan
@@ -226,12 +226,12 @@ class _LineReader:
         sentence = f"{cells} cells, {'the header' if self._form.has_header else 'expected'} {width}"
         if not self._lenient:
             raise RecordingError(f"{self._form.path}:{at}: {sentence}")
-        self._told.append(f"line {at} has {sentence}: left out")
+        self._findings.append(f"line {at} has {sentence}: left out")
 
     def _end_of_file(self) -> None:
         if self._ragged:
             at, cells = self._ragged
-            self._told.append(
+            self._findings.append(
                 f"line {at}, the last, is torn: {cells} of {len(self._form.names)} cells; it was left out"
             )
 
@@ -241,7 +241,7 @@ class _LineReader:
     def _notes(self, columns: "dict[int, NDArray[np.float64]]") -> list[str]:
         mixed = [k for k in self._first_wrong if k in columns and not self._chosen[k].is_contract]
         words = [pick.name for k, pick in enumerate(self._chosen) if k not in columns]
-        notes = shorten_notes(self._told, "such lines")
+        notes = shorten_notes(self._findings, "such lines")
         notes += shorten_notes(
             [f"{self._first_wrong[k]} ({self._wrong[k]} such cells): not known there" for k in mixed], "such columns"
         )

@@ -149,8 +149,8 @@ class Admission:
         """Return whether a master that writes in cycles holds start_calibration at 1: only its own 0 lets the next 1 count."""
         if not self._is_held and not written & CALIBRATE:
             return False
-        is_told = CONTROL_WORD in self._offsets(write) and bool(write.touched & CALIBRATE)
-        if not is_told or not self._ownership.admits(write.host):
+        is_commanded = CONTROL_WORD in self._offsets(write) and bool(write.touched & CALIBRATE)
+        if not is_commanded or not self._ownership.admits(write.host):
             return self._is_held
         return bool(written & CALIBRATE) and (
             self._is_held or bool(int(self._commands.values[CONTROL_WORD]) & CALIBRATE)

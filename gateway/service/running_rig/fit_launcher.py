@@ -31,7 +31,7 @@ class FitLauncher:
         assert self._process.stdout
         self._descriptor = self._process.stdout.fileno()
         os.set_blocking(self._descriptor, False)
-        self._said = b""
+        self._output = b""
         self._on_result = on_result
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(self._descriptor, self._read)
@@ -42,7 +42,7 @@ class FitLauncher:
         except BlockingIOError:
             return
         if chunk:
-            self._said += chunk
+            self._output += chunk
             return
         self._forget()
         self._reap()
@@ -55,7 +55,7 @@ class FitLauncher:
 
     def _result(self) -> Result:
         try:
-            result: Result = json.loads(self._said)
+            result: Result = json.loads(self._output)
         except ValueError:
             return {"refused": "A331 the fit process ended without a result; force-gateway fit RECORDING shows why"}
         return result

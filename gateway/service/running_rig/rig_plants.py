@@ -44,7 +44,7 @@ class RigPlants:
         self._thread = DiskWorker()
         self.run_in_background: Callable[[Work, Done], None] = self._thread
         self._waiting: Rig | None = None
-        self._doing, self._said, self._has_failed, self._jobs = "", "", False, 0
+        self._doing, self._outcome, self._has_failed, self._jobs = "", "", False, 0
         self._since_s = 0.0
 
     def serve(self, edges: PlantEdges) -> None:
@@ -78,7 +78,7 @@ class RigPlants:
             "waiting": None if waiting is None else waiting.plant_in_use.number if waiting.plant_in_use else 0,
             "job": self._jobs,
             "busy": bool(self._doing),
-            "said": self._said,
+            "said": self._outcome,
             "failed": self._has_failed,
         }
 
@@ -98,15 +98,15 @@ class RigPlants:
         doing, self._doing = self._doing, ""
         self._has_failed = isinstance(result, Exception)
         if isinstance(result, StoreError):
-            self._said = f"{result}; {_plant(self.rig)} stays in use"
+            self._outcome = f"{result}; {_plant(self.rig)} stays in use"
         elif isinstance(result, Exception):
-            self._said = f"A499 internal error, please report it: {result!r}; {_plant(self.rig)} stays in use"
+            self._outcome = f"A499 internal error, please report it: {result!r}; {_plant(self.rig)} stays in use"
         else:
             self._waiting = result
             self.take_waiting()
             when = f"will be in use {_WAITS}" if self._waiting else "is in use"
-            self._said = "; ".join((f"{_plant(result)} {when}", *compensation_words(result.compensation)))
-        self._edges.log("plant", f"{doing}: {self._said}")
+            self._outcome = "; ".join((f"{_plant(result)} {when}", *compensation_words(result.compensation)))
+        self._edges.log("plant", f"{doing}: {self._outcome}")
 
     def _take(self, rig: Rig) -> None:
         self.rig, self._since_s = rig, self._edges.clock()
