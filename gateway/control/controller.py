@@ -11,7 +11,7 @@ The controller asks its own parts and none of theirs: commands, conditioner, fau
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
-from gateway.control.decision import ControllerStatus, output_of, safe_output, warning_bits
+from gateway.control.decision import safe_output
 from gateway.control.demand import Demand, ramp_down_demand
 from gateway.control.edge_checks import EdgeCheck, Readiness, Situation
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
@@ -23,6 +23,7 @@ from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
+from gateway.control.step_output import OutputComposer
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
@@ -67,6 +68,7 @@ class Controller:
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
         self._readiness = Readiness(parts, self._machine)
+        self._composer = OutputComposer(parts, self._machine, self._readiness)
 
     # -- for the service
 
@@ -155,7 +157,7 @@ class Controller:
             self._supervise(now_s, line)
         if self._machine.is_enabled:
             self._move(now_s, dt_s)
-        return output_of(command, self._status(now_s, line), self._loop, self._reading, self._machine.outcome)
+        return self._composer.compose(now_s, self._reading, line, self._contact.touching, self._outside_n)
 
     @property
     def _given_n(self) -> float:
@@ -216,7 +218,7 @@ class Controller:
     def _supervise(self, now_s: float, line: LineStatus) -> None:
         name = self._commands.not_finite
         cause = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
-        cause = cause or self._faults.first_cause(now_s, self._reading, line, self._loop.expected_rise_n)
+        cause = cause or self._faults.first_cause(now_s, self._reading, line, self._loop.compute_expected_rise)
         if cause:
             self._machine.fail(now_s, cause)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
@@ -277,22 +279,3 @@ class Controller:
             self._machine.disable("force ramped to 0, output disabled")
         else:
             self._machine.fire(event)
-
-    # -- what people see
-
-    def _status(self, now_s: float, line: LineStatus) -> ControllerStatus:
-        run = self.active_run
-        return ControllerStatus(
-            state=self.state,
-            fault=self._machine.fault,
-            block=self._readiness.enable_block(now_s, self._reading, line),
-            warnings=warning_bits(
-                int(line.warnings), self._loop, self._machine.is_restarted, self._machine.is_master_lost
-            ),
-            touching=self._contact.touching,
-            accepted_n=run.target_n or self._target().force_n if self._machine.is_enabled else 0.0,
-            expected_cell_n=self._loop.expected_n + self._outside_n,
-            calibration_phase=run.phase,
-            calibration_progress=run.progress,
-            calibration_time_left_s=run.eta_s,
-        )

@@ -74,7 +74,7 @@ class Readiness:
             excuse=self._parts.faults.excuse(block, now_s, reading, line),
             voltage_v=loop.voltage_v,
             applied_n=loop.applied_n,
-            expected_n=loop.expected_rise_n,
+            expected_n=loop.compute_expected_rise(),
             ramps_down=machine.is_ramping_down or machine.is_stopping,
         )
 

@@ -78,7 +78,9 @@ def slew_limited(target_v: float, last_v: float, slew_v_per_s: float, dt_s: floa
 def ramp_limited(target_n: float, last_n: float, rate_n_per_s: float, dt_s: float) -> float:
     """Move towards the target by at most rate x dt, both ways (command register force_ramp, or the rig's default)."""
     step_n = rate_n_per_s * finite(dt_s, "dt_s")
-    return max(last_n - step_n, min(last_n + step_n, finite(target_n, "force_target_n")))
+    if finite(target_n, "force_target_n") > last_n + step_n:
+        return last_n + step_n
+    return last_n - step_n if target_n < last_n - step_n else target_n
 
 
 class RateBudget:

@@ -51,7 +51,7 @@ class Transitions:
 
     def tell(self, *sentences: str) -> None:
         """Add sentences for the log; empty ones are none."""
-        self.outcome.tell(*sentences)
+        self.outcome.events.extend(filter(None, sentences))
 
     def fire(self, event: StateEvent) -> None:
         """Go where the table leads. TransitionError for a pair that is not in it."""

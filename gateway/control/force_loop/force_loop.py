@@ -132,9 +132,8 @@ class ForceLoop:
         """Cell force that the model expects now."""
         return self.expected.force_n(self.branch_share)
 
-    @property
-    def expected_rise_n(self) -> float:
-        """The same above the force at rest."""
+    def compute_expected_rise(self) -> float:
+        """Return the same above the force at rest, N."""
         return self.expected.rise_n(self.branch_share)
 
     @property
@@ -269,10 +268,11 @@ class ForceLoop:
         lags, the trim's own included. So the trim learns as soon as that is little, without waiting for it to arrive."""
         law, reading, lead = self.feedforward, inputs.reading, self._lead
         assert isinstance(lead, LinearizedLagInverse)
-        arrived_n = self._arrived.advance(-lead.away_n(0.0), inputs.dt_s)
+        away_n = lead.away_n(0.0)
+        arrived_n = self._arrived.advance(-away_n, inputs.dt_s)
         if not reading.is_new:
             return
-        coming_n = lead.away_n(self._wanted_v) - lead.away_n(0.0) - arrived_n
+        coming_n = lead.away_n(self._wanted_v) - away_n - arrived_n
         is_near = abs(coming_n) < NEAR_N and abs(law.applied_n - law.aimed_n) < STILL_N
         self._near_s = self._near_s + reading.interval_s if is_near else 0.0
         if self._near_s <= 0.0:

@@ -49,12 +49,11 @@ class LeadCompensator:
         first_v, second_v = self.first_v - voltage_v, self.second_v - voltage_v
         decay = exp(-dt_s / self._lag_s)
         self.first_v = voltage_v + decay * first_v
-        self.second_v = voltage_v + self._second(first_v, second_v, dt_s)
+        self.second_v = voltage_v + self._second(first_v, second_v, dt_s, decay)
 
-    def _second(self, first_v: float, second_v: float, dt_s: float) -> float:
-        """Return the second lag behind the first, both as differences to the held voltage."""
+    def _second(self, first_v: float, second_v: float, dt_s: float, decay: float) -> float:
+        """Return the second lag behind the first, both as differences to the held voltage. decay: of the first."""
         lag_s, second_lag_s = self._lag_s, self._second_lag_s
-        decay = exp(-dt_s / lag_s)
         if second_lag_s <= 0.0:
             return decay * first_v
         second_decay = exp(-dt_s / second_lag_s)

@@ -5,6 +5,7 @@ then the output line, then the cell, then what the cell says, then the master). 
 refuse an enable.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -134,8 +135,10 @@ class FaultDetector:
             return cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "")[1]
         return ""
 
-    def first_cause(self, now_s: float, reading: Reading, line: LineStatus, expected_n: float) -> StopCause | None:
-        """Return the first cause of a fault, None where there is none. expected_n: the model's rise, for the sentences."""
+    def first_cause(
+        self, now_s: float, reading: Reading, line: LineStatus, expected_n: Callable[[], float]
+    ) -> StopCause | None:
+        """Return the first cause of a fault, None where there is none. expected_n: asked for the model's rise by sentences."""
         return self._of_line(now_s, line) or self._of_cell(reading, line) or self._of_force(reading, expected_n)
 
     def _is_silent(self, now_s: float, line: LineStatus) -> bool:
@@ -173,17 +176,17 @@ class FaultDetector:
             return stop_cause(FaultCode.NOT_FINITE, "the load cell's reading is not a number")
         return None
 
-    def _of_force(self, reading: Reading, expected_n: float) -> StopCause | None:
+    def _of_force(self, reading: Reading, expected_n: Callable[[], float]) -> StopCause | None:
         if self._over >= self._limits.over_force_samples:
-            return stop_cause(FaultCode.OVER_FORCE, self._over_words(reading, expected_n))
+            return stop_cause(FaultCode.OVER_FORCE, self._over_words(reading, expected_n()))
         if words := self._frozen.words:
             self._frozen.note_trip()
             observation = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
             return stop_cause(FaultCode.SAMPLE_FROZEN, observation)
         if self._response_fault is _WRONG_SIGN:
-            return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self._rise.measured_rise_n, expected_n))
+            return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self._rise.measured_rise_n, expected_n()))
         if self._response_fault is _WRONG_GAIN:
-            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.measured_rise_n, expected_n))
+            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.measured_rise_n, expected_n()))
         return None
 
     def _over_words(self, reading: Reading, expected_n: float) -> str:
