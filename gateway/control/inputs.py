@@ -27,8 +27,7 @@ class CalibrationInUse:
     response: Response | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LineStatus:
+class LineStatus(NamedTuple):
     """What the output line and the process know, at the time of a step.
 
     acknowledged_v: voltage that the device confirmed last, None before the first; sent_v: voltage that went out last on the

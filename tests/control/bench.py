@@ -152,11 +152,12 @@ class Bench:
 
     def step(self) -> Output:
         if self.output_silent and self.line.unanswered_since_s is None:
-            self.line = replace(self.line, unanswered_since_s=self.now_s)
+            self.line = self.line._replace(unanswered_since_s=self.now_s)
         output = self.controller.step(self.now_s, self.command, self.sample, self.line)
         self.voltage_v = output.voltage_v
         self.history.append(Record(self.now_s, output, self.plant.force_n, self.command, self.sample, self.line))
-        self.line = replace(self.line, late_s=0.0)
+        if self.line.late_s:
+            self.line = self.line._replace(late_s=0.0)
         self.events.extend(output.events)
         self.releases += output.release_owner
         if output.clear_command and not self.ignores_clearing:
@@ -200,7 +201,7 @@ class Bench:
         self.loop_blocked = True
         self.run(seconds)
         self.loop_blocked = False
-        self.line = replace(self.line, late_s=seconds)
+        self.line = self.line._replace(late_s=seconds)
 
     def silence_output(self) -> None:
         self.output_silent = True

@@ -1,6 +1,5 @@
 """A device that was not heard in time: what the machine did to us is told apart from what a wire does."""
 
-from dataclasses import replace
 from math import nan
 
 import pytest
@@ -50,7 +49,7 @@ def test_no_alarm_and_no_refusal_names_a_wire_for_a_machine_that_stood_still(is_
     bench.run(0.5)
     bench.enable(15.0)
     bench.run(1.0)
-    bench.line = replace(bench.line, **{"cell_held" if is_cell else "output_held": held})
+    bench.line = bench.line._replace(**{"cell_held" if is_cell else "output_held": held})
     bench.cell_silent, bench.output_silent = is_cell, not is_cell
     fault = BUSY if held.rig_waited_s else STALE if is_cell else SILENT
     assert bench.seconds_until(has_fault(fault), 0.2) < 0.15

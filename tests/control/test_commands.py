@@ -232,5 +232,5 @@ def test_without_a_lease_a_closed_connection_changes_nothing():
     bench = enabled()
     bench.force(12.0)
     bench.run(1.0)
-    bench.line = replace(bench.line, owner_connected=False)
+    bench.line = bench.line._replace(owner_connected=False)
     assert bench.run(1.0).state is State.HOLDING

@@ -82,7 +82,7 @@ def test_a_closed_connection_is_loss_where_a_lease_is_set():
     bench.run(0.3)
     bench.enable(12.0)
     bench.run(1.0)
-    bench.line = replace(bench.line, owner_connected=False)
+    bench.line = bench.line._replace(owner_connected=False)
     assert_faulted(bench, FaultCode.MASTER_LOST, TICK_S)
 
 
@@ -258,13 +258,13 @@ def test_a_silent_output_stops_within_its_time():
 @pytest.mark.parametrize("code", [FaultCode.OUTPUT_REFUSED, FaultCode.OUTPUT_ALTERED, FaultCode.OUTPUT_LOST])
 def test_what_the_output_line_reports_is_the_fault_of_the_next_step(code):
     bench = pressing()
-    bench.line = replace(bench.line, fault=code)
+    bench.line = bench.line._replace(fault=code)
     assert_faulted(bench, code, TICK_S)
 
 
 def test_a_lost_cell_port_is_the_fault_of_the_next_step():
     bench = pressing()
-    bench.line = replace(bench.line, cell_lost=True)
+    bench.line = bench.line._replace(cell_lost=True)
     assert_faulted(bench, FaultCode.CELL_LOST, TICK_S)
 
 
@@ -294,7 +294,7 @@ def test_a_stalled_loop_drops_what_arrived_in_it():
 )
 def test_a_busy_machine_is_told_from_a_defect_of_ours(waited_s, fault):
     bench = pressing()
-    bench.line = replace(bench.line, late_s=0.12, waited_s=waited_s)
+    bench.line = bench.line._replace(late_s=0.12, waited_s=waited_s)
     output = bench.run(TICK_S)
     assert (output.fault, output.voltage_v) == (fault, 0.0)
     assert any("120 ms late, allowed 100 ms" in event for event in bench.events)
@@ -305,7 +305,7 @@ def test_an_enable_that_waited_for_a_stalled_loop_is_not_obeyed():
     bench.run(0.3)
     bench.block_loop(0.12)
     bench.run(0.005)  # a sample comes first
-    bench.line = replace(bench.line, late_s=0.12)
+    bench.line = bench.line._replace(late_s=0.12)
     output = bench.enable(12.0)
     assert output.voltage_v == 0.0
     assert output.state is State.FAULT
@@ -328,10 +328,10 @@ def test_a_model_that_answers_nonsense_is_named():
 
 def test_the_first_cause_stays_when_others_follow():
     bench = pressing()
-    bench.line = replace(bench.line, fault=FaultCode.OUTPUT_REFUSED)
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_REFUSED)
     bench.run(0.02)
     bench.cell_silent = True
-    bench.line = replace(bench.line, cell_lost=True)
+    bench.line = bench.line._replace(cell_lost=True)
     bench.run(1.0)
     assert bench.last.fault is FaultCode.OUTPUT_REFUSED
     assert bench.last.enable_block is RefusalReason.FAULT_LATCHED
@@ -340,7 +340,7 @@ def test_the_first_cause_stays_when_others_follow():
 
 def test_a_reset_needs_its_rise_setpoint_zero_and_enable_zero():
     bench = pressing()
-    bench.line = replace(bench.line, fault=FaultCode.OUTPUT_REFUSED)
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_REFUSED)
     bench.run(0.02)
     bench.heal()
     assert bench.write(control_word=ControlBit.RESET_FAULT, force_setpoint_n=5.0).state is State.FAULT

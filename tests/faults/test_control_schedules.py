@@ -129,7 +129,7 @@ def _plant(name: str, value: object) -> Callable[[Bench], None]:
 
 def _line(**changes: object) -> Callable[[Bench], None]:
     def act(bench: Bench) -> None:
-        bench.line = replace(bench.line, **changes)  # type: ignore[arg-type]
+        bench.line = bench.line._replace(**changes)  # type: ignore[arg-type]
 
     return act
 

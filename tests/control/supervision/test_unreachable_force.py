@@ -20,7 +20,7 @@ class Measured(Bench):
     def _measure(self) -> None:
         super()._measure()
         pressure_pa = self.plant._pressure * PASCAL_PER_V
-        self.line = replace(self.line, pressure_pa=pressure_pa, pressure_pa_per_v=self.by_profile_pa_per_v)
+        self.line = self.line._replace(pressure_pa=pressure_pa, pressure_pa_per_v=self.by_profile_pa_per_v)
 
 
 def holding(bench: Bench, force_n: float = 12.0) -> Bench:
