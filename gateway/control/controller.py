@@ -11,7 +11,7 @@ The controller asks its own parts and none of theirs: commands, conditioner, fau
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
-from gateway.control.decision import safe_output
+from gateway.control.decision import OutputComposer, safe_output
 from gateway.control.demand import Demand, ramp_down_demand
 from gateway.control.edge_checks import EdgeCheck, Readiness, Situation
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
@@ -23,7 +23,6 @@ from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
-from gateway.control.step_output import OutputComposer
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents

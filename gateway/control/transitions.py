@@ -3,12 +3,11 @@
 Where each event leads says gateway.control.state_table; whether a command may ask for it, gateway.control.edge_checks.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker
-from gateway.control.decision import StepOutcome
 from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.messages import fault_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
@@ -28,6 +27,20 @@ class ControllerParts:
     one_shot: OneShotEvents
     loop: ForceLoop
     run: ActiveRun
+
+
+@dataclass(slots=True)
+class StepOutcome:
+    """Answer of a step beside the voltage."""
+
+    events: list[str] = field(default_factory=list)
+    clear_command: bool = False
+    release_owner: bool = False
+
+    @property
+    def is_empty(self) -> bool:
+        """Decide whether there is nothing to say and nothing to do."""
+        return not (self.events or self.clear_command or self.release_owner)
 
 
 class Transitions:
