@@ -20,7 +20,7 @@ from gateway.diagnosis.force_error import (
     compare_runs,
     error_blocks,
 )
-from gateway.plants.reference import ForceReference, read_reference
+from gateway.plants.force_reference import ForceReference, read_reference
 
 _LONGEST_S: Final = 300.0
 """Newest rows that are looked at: a machine that gets worse later is soon seen."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gateway.cli.diagnosis.inputs import Sources
     from gateway.control.compensation.cell_map import CellMap
     from gateway.diagnosis.result import Cause, Diagnosis
-    from gateway.plants.reference import ForceReference
+    from gateway.plants.force_reference import ForceReference
 
 
 def open_store(directory: Path) -> PlantStore:
@@ -140,7 +140,7 @@ def _change_without_gateway(directory: Path, request: dict[str, Any]) -> dict[st
 def _keep_reference(state: StateChoice, number: int, before: str | None) -> dict[str, Any]:
     """Keep how large the error of the force was before, where a plant comes into use; a sentence of it, and the numbers."""
     from gateway.diagnosis.force_error import rms_n
-    from gateway.plants.reference import keep_reference
+    from gateway.plants.force_reference import keep_reference
 
     if not number:
         return {}
@@ -158,7 +158,7 @@ def _keep_reference(state: StateChoice, number: int, before: str | None) -> dict
 
 def _reference(state: StateChoice, number: int, cell: "CellMap | None", before: str | None) -> "ForceReference | None":
     from gateway.cli.diagnosis.inputs import recording_path
-    from gateway.plants.reference import find_reference, reference_of
+    from gateway.plants.force_reference import find_reference, reference_of
     from gateway.recording import read_table
 
     if before is None:
@@ -184,7 +184,7 @@ def plant_facts(entry: StoredDocument[NumberedPlant], *, is_active: bool) -> dic
 
 def all_plant_facts(plant: NumberedPlant, rig: Rig | None) -> dict[str, Any]:
     """Return everything of a plant as JSON has it."""
-    from gateway.cli.plants.words import compensation_facts
+    from gateway.cli.plants.descriptions import compensation_facts
 
     return {
         "number": plant.number,

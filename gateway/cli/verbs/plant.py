@@ -59,8 +59,8 @@ def _line(entry: "StoredDocument[NumberedPlant]") -> str:
 @json_option
 def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
     """Show plant N: where it comes from, what is compensated of it, and its file."""
+    from gateway.cli.plants.descriptions import describe_compensation, describe_provenance
     from gateway.cli.plants.store_access import all_plant_facts, load_rig_or_none, load_stored, open_store
-    from gateway.cli.plants.words import describe_compensation, describe_provenance
     from gateway.plants.store import as_text
 
     plant, rig = load_stored(open_store(state.directory), number), load_rig_or_none(state)
@@ -81,8 +81,8 @@ def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool) -> Non
 
     Numbers of the store (0: the rig's own), shipped names or files.
     """
+    from gateway.cli.plants.descriptions import describe_difference, differing_numbers
     from gateway.cli.plants.store_access import find_plant
-    from gateway.cli.plants.words import describe_difference, differing_numbers
 
     first, second = find_plant(state, a), find_plant(state, b)
     differing = differing_numbers(first, second)
@@ -119,8 +119,8 @@ def use_command(*, number: int, before: str | None, dry_run: bool, state: StateC
 
     A running gateway takes it while its output is disabled. `plant rollback` goes back.
     """
+    from gateway.cli.plants.descriptions import compensation_facts, describe_compensation
     from gateway.cli.plants.store_access import change, load_rig_or_none, load_stored, open_store
-    from gateway.cli.plants.words import compensation_facts, describe_compensation
 
     plant, rig = load_stored(open_store(state.directory), number) if number else None, load_rig_or_none(state)
     if not as_json and plant:

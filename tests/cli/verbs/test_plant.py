@@ -8,7 +8,7 @@ from click.testing import CliRunner, Result
 
 import gateway.diagnosis
 from gateway.cli.main import command
-from gateway.plants.reference import read_reference
+from gateway.plants.force_reference import read_reference
 from gateway.plants.store import PlantStore
 from gateway.processes import exit_codes
 from gateway.profiles.kinds.plant_writer import plant_text

@@ -12,9 +12,9 @@ from click.testing import CliRunner
 
 from gateway.cli.main import command
 from gateway.diagnosis.force_error import GainVerdict, compare_runs
+from gateway.plants.force_reference import keep_reference, reference_of
 from gateway.plants.in_use import with_plant_in_use
 from gateway.plants.recorded_force import read_recorded_force
-from gateway.plants.reference import keep_reference, reference_of
 from gateway.plants.store import NumberedPlant, PlantStore
 from gateway.recording import Recording
 from gateway.registers.words import State
