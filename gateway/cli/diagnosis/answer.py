@@ -1,31 +1,31 @@
-"""The answer of `diagnose`: everything put into words, as files, in the terminal, and as a plant of the store."""
+"""The answer of `diagnose`: everything put into words, as files, in the terminal, and as a plant of the store.
+
+What only some answers need (a report, a plan, a plant of the store, the loop on the twin) is loaded by those: it would take a
+second of every diagnosis.
+"""
 
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.console import Console
 
 from gateway import defaults
-from gateway.cli.diagnosis import closed_loop, next_plan
 from gateway.cli.diagnosis.inputs import Sources
 from gateway.cli.diagnosis.outputs import STDOUT
 from gateway.cli.diagnosis.terminal import render_diagnosis
-from gateway.cli.options import state_directory
-from gateway.cli.plants.store_access import save_diagnosed
 from gateway.diagnosis import EFFECTS, Diagnosis
-from gateway.diagnosis.experiments.experiments import Plan
-from gateway.profiles import PlantProfile
-from gateway.profiles.kinds.plant_writer import plant_text
 from gateway.reports.diagnosis.document import diagnosis_document
-from gateway.reports.diagnosis.extended_plant import extended_plant
-from gateway.reports.diagnosis.page import ReportContext, diagnosis_page
 from gateway.reports.diagnosis.wording import why_blind
-from gateway.service.closed_loop.study import ClosedLoopGain
+
+if TYPE_CHECKING:
+    from gateway.diagnosis.experiments.experiments import Plan
+    from gateway.profiles import PlantProfile
+    from gateway.service.closed_loop.study import ClosedLoopGain
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,20 +51,26 @@ class Answer:
     diagnosis: Diagnosis
     sources: Sources
     runtime_s: float
-    gain: ClosedLoopGain | str | None
-    plan: Plan | None = None
+    gain: "ClosedLoopGain | str | None"
+    plan: "Plan | None" = None
     run: str = ""
 
     @property
     def loop_sentences(self) -> tuple[str, ...]:
         """The gain in commanded force in words; empty where it was not asked for."""
-        return () if self.gain is None else tuple(closed_loop.sentences(self.gain))
+        if self.gain is None:
+            return ()
+        from gateway.cli.diagnosis import closed_loop
+
+        return tuple(closed_loop.sentences(self.gain))
 
 
 def add_plan(answer: Answer, file: Path | None) -> Answer:
     """Return the answer with what to record next; where that is nothing, say so: there will be no file."""
     if file is None:
         return answer
+    from gateway.cli.diagnosis import next_plan
+
     plan = next_plan.next_plan(answer.diagnosis)
     if plan is None:
         click.echo(f"{next_plan.NOTHING}; {file} is not written", err=True)
@@ -80,11 +86,10 @@ def render_files(answer: Answer, files: AnswerFiles) -> dict[Path, str]:
     if files.report:
         texts[files.report] = _render_report(answer)
     if files.extend and _can_extend(answer, files.extend):
-        profile = _extend_plant(answer, files.extend.stem)
-        texts[files.extend] = plant_text(
-            profile, f"Written by force-gateway diagnose; verdict: {answer.diagnosis.verdict}"
-        )
+        texts[files.extend] = _render_plant(answer, files.extend.stem)
     if answer.plan is not None and files.plan:
+        from gateway.cli.diagnosis import next_plan
+
         texts[files.plan] = next_plan.text(answer.plan, answer.sources.name)
     return texts
 
@@ -93,11 +98,15 @@ def _compose_document(answer: Answer) -> dict[str, Any]:
     """The contract's fields; closed_loop besides, where it was asked for."""
     document = diagnosis_document(answer.diagnosis, answer.runtime_s)
     if answer.gain is not None:
+        from gateway.cli.diagnosis import closed_loop
+
         document["closed_loop"] = closed_loop.document(answer.gain)
     return document
 
 
 def _render_report(answer: Answer) -> str:
+    from gateway.reports.diagnosis.page import ReportContext, diagnosis_page
+
     circumstances = ReportContext(
         rig=answer.sources.rig or "not named",
         plant=answer.sources.plant.name,
@@ -120,7 +129,16 @@ def _can_extend(answer: Answer, target: Path | str) -> bool:
     return not why
 
 
-def _extend_plant(answer: Answer, name: str) -> PlantProfile:
+def _render_plant(answer: Answer, name: str) -> str:
+    from gateway.profiles.kinds.plant_writer import plant_text
+
+    written_by = f"Written by force-gateway diagnose; verdict: {answer.diagnosis.verdict}"
+    return plant_text(_extend_plant(answer, name), written_by)
+
+
+def _extend_plant(answer: Answer, name: str) -> "PlantProfile":
+    from gateway.reports.diagnosis.extended_plant import extended_plant
+
     sources = answer.sources
     profile = extended_plant(answer.diagnosis, sources.plant, sources.name, f"{datetime.now(UTC):%Y-%m-%d}")
     return replace(profile, name=name)
@@ -134,6 +152,9 @@ def save_plant(answer: Answer, state: Path | None, rig: str | None) -> int | Non
         return None
     if not _can_extend(answer, "the plant"):
         return None
+    from gateway.cli.options import state_directory
+    from gateway.cli.plants.store_access import save_diagnosed
+
     directory = state_directory(state, rig or sources.rig or defaults.RIG)
     name = f"{sources.plant.name}-{'-'.join(cause.name for cause in diagnosis.causes[:2])}"
     return save_diagnosed(directory, diagnosis, sources, _extend_plant(answer, name))

@@ -6,16 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-_ONLY_FOR_RIGS = ("gateway.control.controller", "gateway.profiles.rigs.rig_file", "gateway.devices.codecs", "asyncio")
+_ONLY_FOR_RIGS = ("gateway.control.controller", "gateway.profiles.rigs.rig_file", "gateway.devices.codecs")
+_ONLY_FOR_SOME = ("scipy", "asyncio", "gateway.reports.diagnosis.page", "gateway.service.closed_loop.study")
 
 
-def test_a_table_that_names_no_rig_is_read_without_what_reads_rigs(tmp_path: Path) -> None:
+def test_a_table_that_names_no_rig_is_diagnosed_without_what_reads_rigs_and_writes_reports(tmp_path: Path) -> None:
     columns = np.stack([np.arange(200) * 0.01, np.arange(200.0), np.arange(200) * 0.02], axis=1)
     np.savetxt(tmp_path / "a.csv", columns, delimiter=",", header="time_s,force_n,command_v", comments="")
     script = (
-        "import sys; from gateway.cli.diagnosis.inputs import read_sources\n"
+        "import sys; import gateway.cli.diagnosis.answer; from gateway.cli.diagnosis.inputs import read_sources\n"
         f"sources = read_sources([{str(tmp_path / 'a.csv')!r}], rig=None, columns=None, state=None)\n"
-        f"print(sources.plant.name, [each for each in {_ONLY_FOR_RIGS!r} if each in sys.modules])"
+        f"print(sources.plant.name, [each for each in {(*_ONLY_FOR_RIGS, *_ONLY_FOR_SOME)!r} if each in sys.modules])"
     )
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     assert told.split()[1:] == ["[]"]
