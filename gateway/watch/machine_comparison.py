@@ -48,8 +48,9 @@ class MachineComparison:
         """Return whether more is off than disturbs nobody."""
         return self._excess_n(rms_n) >= self._least_n
 
-    def judge(self, window: Window) -> WindowVerdict:
-        """Search for what has changed; the change that does most to the force."""
+    def judge(self, window: Window) -> WindowVerdict | None:
+        """Search for what has changed; the change that does most to the force. None where something is off, but too little to
+        be told without a name."""
         found = compare_with_machine([window.measurement], self._machine, self._plant, _OPTIONS)
         best = max(found.causes, key=_saved_n, default=None)
         if best is not None and _saved_n(best) >= self._least_n:
@@ -59,7 +60,7 @@ class MachineComparison:
         if excess_n >= _WITHOUT_A_NAME * self._least_n:
             sentence = f"{self._differs(excess_n)}: {_describe_leftover(found)}"
             return WindowVerdict(ResidualCause.UNKNOWN, sentence, window.excitation_v)
-        return WindowVerdict(excitation_v=window.excitation_v)
+        return None if excess_n >= self._least_n else WindowVerdict(excitation_v=window.excitation_v)
 
     def _excess_n(self, rms_n: float) -> float:
         return sqrt(max(rms_n**2 - self._machine.error.left_n**2, 0.0))

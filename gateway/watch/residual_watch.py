@@ -41,8 +41,8 @@ class WindowComparison(Protocol):
     def is_exceeded(self, window: Window, rms_n: float) -> bool:
         """Return whether that is worth a search."""
 
-    def judge(self, window: Window) -> WindowVerdict:
-        """Search for the cause, which takes seconds."""
+    def judge(self, window: Window) -> WindowVerdict | None:
+        """Search for the cause, which takes seconds; None where this window neither shows one nor shows that there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +116,8 @@ class Watch:
     def _judge(self, window: Window) -> None:
         self.counters["judged"] += 1
         finding = self._comparison.judge(window)
+        if finding is None:
+            return
         if finding.cause is ResidualCause.NONE:
             self._healthy_s = window.end_s
         self._filter.add(finding)

@@ -17,6 +17,8 @@ _LAG_STARTS: Final = ((0.01,), (-0.01,))  # s
 _AREA_STARTS: Final = ((2.0e-6,),)  # m2; the response is proportional
 _OF_THE_START: Final = ("warm-up",)
 """A decay from the first row on: what friction, pads and lags remember there is each recording's own, and no change."""
+_OF_THE_CONVERTER: Final = ("command-quantisation",)
+"""Steps of the command do not wear in, and with hundreds of steps to choose from a saw tooth fits what other changes leave."""
 _SHARES: Final = (0.3, -0.3, -0.65, 1.0)  # of a size that the machine has already
 _GAIN_CHANGE: Final = Effect(
     name=GAIN,
@@ -42,7 +44,7 @@ def change_effects(machine: ModelParameters, recordings: frozenset[int], late_s:
     found = []
     for effect in (*entries, _GAIN_CHANGE):
         forms = [form for form in effect.forms if not unknown & {each.path for each in form.parameters}]
-        if forms and not effect.direct and effect.name not in _OF_THE_START:
+        if forms and not effect.direct and effect.name not in (*_OF_THE_START, *_OF_THE_CONVERTER):
             found.append(replace(effect, forms=tuple(_change_form(form, machine, recordings) for form in forms)))
     return tuple(found)
 
