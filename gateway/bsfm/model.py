@@ -11,7 +11,7 @@ from typing import Final
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.curve import RationalBezier
-from gateway.bsfm.inverse import InverseStatus
+from gateway.bsfm.inverse import OK, InverseStatus
 from gateway.bsfm.slip.reversal import LinearBlend, Memory, Reversal
 from gateway.bsfm.slip.slip_stops import SlipStops
 
@@ -55,7 +55,7 @@ class Bsfm:
         if rising_share == 0.0:
             return falling_v, falling_status
         rising_v, rising_status = self.branches.rising.inverse(force_n)
-        status = falling_status if rising_status is InverseStatus.OK else rising_status
+        status = falling_status if rising_status is OK else rising_status
         return falling_v + rising_share * (rising_v - falling_v), status
 
     def force_n(self, voltage_v: float, branch_share: float) -> float:

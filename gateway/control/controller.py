@@ -33,7 +33,7 @@ from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
-_CALIBRATE = int(ControlBit.START_CALIBRATION)
+_CALIBRATE, _RUNNING = int(ControlBit.START_CALIBRATION), State.CALIBRATING
 
 
 class Controller:
@@ -118,7 +118,7 @@ class Controller:
 
     def refusal_of(self, now_s: float, proposal: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
-        is_busy = self.state is State.CALIBRATING or self._machine.is_ramping_down or self._machine.is_stopping
+        is_busy = self._machine.state is _RUNNING or self._machine.is_ramping_down or self._machine.is_stopping
         if not is_busy and not self._commands.edges_of(proposal.command).rises:
             return None  # most writes: a setpoint, a heartbeat
         return self._edge_check.refusal(proposal, self._situation(now_s, line))
@@ -229,7 +229,7 @@ class Controller:
     @property
     def _goes_on_alone(self) -> bool:
         """No master is needed: a run of this machine, or the way to 0 after any run."""
-        return self.active_run.is_local or (self.state is State.CALIBRATING and not self.active_run.running)
+        return self.active_run.is_local or (self._machine.state is _RUNNING and not self.active_run.running)
 
     def _target(self) -> Demand:
         """What to go for now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
@@ -237,7 +237,7 @@ class Controller:
         return ramp_down_demand(demand, self._settings) if self._machine.is_ramping_down else demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
-        if self.state is State.CALIBRATING:
+        if self._machine.state is _RUNNING:
             if not self.active_run.running or self._step_run(now_s):
                 self._follow(now_s, self._loop.descend(self._target(), dt_s, self._given_n))
             return

@@ -20,7 +20,7 @@ from gateway.control.settings import ControlSettings
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 
-_RIGHT, _WRONG_SIGN, _WRONG_GAIN = FaultCode.NONE, FaultCode.SIGN_INVERTED, FaultCode.GAIN_WRONG
+_WRONG_SIGN, _WRONG_GAIN = FaultCode.SIGN_INVERTED, FaultCode.GAIN_WRONG
 _STUCK_S: Final = 1.0  # that a force must stay at the safe voltage, not only decay
 _FAR_OFF: Final = 3.0  # measured over expected force that points at the cell rather than at the process
 

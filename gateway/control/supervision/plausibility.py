@@ -25,6 +25,9 @@ _HIGHEST_SHARE: Final = 3.0  # of it: N read as kgf is ten times
 _SLACK_N: Final = 1.0  # beside what friction explains: zero and noise
 
 
+_RIGHT, _WRONG_GAIN = FaultCode.NONE, FaultCode.GAIN_WRONG
+
+
 class ExpectedForce:
     """What the model expects now: both branches at the lagged voltage, N of cell force above rest."""
 
@@ -113,7 +116,7 @@ class RiseCheck:
         if not self._proven and touching and expected_n >= _LEAST_RISE_N:
             return self._judge_gain(expected_n, response.width_n + _SLACK_N, response.kept_n, interval_s)
         self.is_too_high = False
-        return FaultCode.NONE
+        return _RIGHT
 
     def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
         off_n = self.measured_rise_n - expected_n
@@ -123,4 +126,4 @@ class RiseCheck:
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0
         self._right_gain_s = self._right_gain_s + interval_s if expected_n >= _PROVING_RISE_N and not wrong else 0.0
         self._proven = self._right_gain_s >= _LASTING_S
-        return FaultCode.GAIN_WRONG if self._wrong_gain_s >= _LASTING_S else FaultCode.NONE
+        return _WRONG_GAIN if self._wrong_gain_s >= _LASTING_S else _RIGHT
