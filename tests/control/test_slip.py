@@ -2,7 +2,8 @@
 
 import pytest
 
-from gateway.bsfm import Bsfm, SlipStops
+from gateway.bsfm import Branches, Bsfm, SlipStops
+from gateway.bsfm.curve import elevate_order
 from gateway.control import CalibrationInUse, Controller
 from gateway.control.force_loop.feedforward import Feedforward
 from tests.control.bench import Bench, bsfm, settings
@@ -92,3 +93,22 @@ def test_chatter_of_the_setpoint_does_not_leave_the_band():
         bench.force(20.0 + (0.05 if index % 2 else -0.05))
         bench.run(0.02)
     assert abs(bench.plant.force_n - 20.0) < 1.0
+
+
+def test_a_held_force_costs_no_inversion_and_a_moving_one_a_single_one_per_branch():
+    """Newton is what a step spends most on: memory and voltage ask for the same forces."""
+    flat = slip().branches
+    branches = Branches(elevate_order(flat.rising), elevate_order(flat.falling))
+    force_law = law(Bsfm(branches, slip().reversal))
+    go(force_law, 30.0, 20.0)
+
+    def inversions_of_a_step_to(goal_n: float) -> list[int]:
+        before = [curve.inverse.cache_info().misses for curve in (branches.rising, branches.falling)]
+        force_law.advance(goal_n, 100.0, 0.01)
+        force_law.compute_voltage(0.0)
+        after = [curve.inverse.cache_info().misses for curve in (branches.rising, branches.falling)]
+        return [now - then for now, then in zip(after, before, strict=True)]
+
+    assert inversions_of_a_step_to(20.0) == [0, 0]
+    assert inversions_of_a_step_to(15.0) == [1, 1]
+    assert inversions_of_a_step_to(15.0) == [1, 1]
