@@ -1,0 +1,107 @@
+"""What is written to a serial port: in order, with a deadline for the last words, and no device can hold the loop up."""
+
+import asyncio
+import termios
+from typing import Any
+
+import pytest
+
+from gateway.ports import PortError, Pty
+from gateway.ports.serial_port import MOST_UNSENT_BYTES
+from tests.ports.raw_bytes import gather, read_all
+
+
+def test_what_the_driver_does_not_take_at_once_follows_in_order(ear: Any, line: Pty) -> None:
+    """A pty takes about 20 kB; the rest waits here, and no byte is lost or moved."""
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        sent = b""
+        while not port._unsent:
+            chunk = len(sent).to_bytes(4) * 250
+            assert port.write(chunk)
+            sent += chunk
+        tail = b"the last words"
+        assert port.write(tail)
+        assert port.unsent_bytes > len(tail)
+        assert await gather(line.fd, len(sent + tail)) == sent + tail
+        await port.drain()
+        assert port.unsent_bytes == 0
+        port.close()
+
+    asyncio.run(scene())
+
+
+def test_a_device_that_takes_no_bytes_is_a_lost_one(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        while port.write(b"x" * 1000):
+            pass
+        await ear.until(lambda: bool(ear.losses))
+        assert ear.losses[0].code == "E111"
+        assert f"more than {MOST_UNSENT_BYTES} unsent" in str(ear.losses[0])
+        port.close()
+
+    asyncio.run(scene())
+
+
+def test_the_last_words_are_waited_for_with_a_deadline(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        await port.write_last(b"SET 0\r\n")
+        assert read_all(line.fd) == b"SET 0\r\n"
+        termios.tcflow(ear.opened[-1], termios.TCOOFF)  # a buffer that is only full has room again at any time
+        port.write(b"x" * 1000)
+        assert port._unsent
+        with pytest.raises(PortError, match=r"E111 .* takes no bytes"):
+            await port.write_last(b"SET 0\r\n", deadline_s=0.01)
+        port.close()
+        with pytest.raises(PortError, match="E102"):
+            await port.write_last(b"SET 0\r\n")
+
+    asyncio.run(scene())
+
+
+def test_a_failing_drain_is_a_port_error_whatever_its_family(
+    ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(descriptor: int) -> None:
+        raise termios.error(5, "Input/output error")
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        with monkeypatch.context() as patched:
+            patched.setattr("gateway.ports.serial_port.termios.tcdrain", failing)
+            with pytest.raises(PortError, match="Input/output error"):
+                await port.write_last(b"SET 0\r\n")
+        port.close()
+
+    asyncio.run(scene())
+
+
+def test_closing_does_not_drop_the_last_bytes(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        port.write(b"SET 0\r\n")
+        port.close()
+        assert read_all(line.fd) == b"SET 0\r\n"
+
+    asyncio.run(scene())
+
+
+def test_closing_a_stuck_port_does_not_hang(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        while not port._unsent:
+            port.write(b"x" * 1000)
+        started_s = asyncio.get_running_loop().time()
+        port.close()
+        assert asyncio.get_running_loop().time() - started_s < 1.0
+
+    asyncio.run(scene())
