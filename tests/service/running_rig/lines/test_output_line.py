@@ -1,13 +1,9 @@
 """One question on the wire, and of waiting setpoints only the last: the output line with a device played by the test."""
 
-from dataclasses import replace
-from math import isnan
-
 import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.devices import output_host
-from gateway.devices.exchange import VoltageExchange, VoltageRange
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.service.rigs import demo
 
@@ -310,79 +306,3 @@ def test_opened_again_nothing_said_before_counts(wire: Wire) -> None:
     assert len(wire.written) == before, "the old wish is not sent to a device behind a new opening"
     wire.answer("900")  # of a question asked before
     assert exchange.acknowledged_v is None
-
-
-# -- devices that have fewer words
-
-
-def with_words(**words: object) -> Wire:
-    """The regulator with other words: an acknowledgement without a number, no pressure, no reading."""
-    wire = Wire()
-    profile = replace(demo().output.device, **words)  # type: ignore[arg-type]
-    wire.exchange = OutputExchange(output_host(profile), wire.written.append, REPLY_TIMEOUT_S)
-    return wire
-
-
-OBEYED = VoltageExchange(ask="SET {counts:d}", answer=">", range=demo().output.device.set_voltage.range)  # type: ignore[union-attr]
-TELLS_NOTHING = replace(OBEYED, answer="")
-
-
-def test_a_device_without_a_pressure_is_asked_for_its_setting() -> None:
-    wire = with_words(read_pressure=None)
-    wire.settle(512)
-    wire.tick(0.2)
-    assert wire.last == "REQ"
-    wire.answer("512")
-    assert wire.exchange.fault is FaultCode.NONE
-    assert isnan(wire.exchange.pressure_pa)
-
-
-def test_a_device_that_can_be_asked_nothing_is_told_its_setting_again() -> None:
-    """So that it does not go unnoticed when it falls silent."""
-    wire = with_words(read_pressure=None, read_voltage=None, set_voltage=OBEYED)
-    wire.set_voltage(512)
-    wire.answer(">")
-    wire.tick(0.2)
-    assert wire.written == [b"SET 512\r\n"] * 2
-    wire.tick(0.05)
-    assert wire.exchange.unanswered_since_s is not None
-
-
-def test_a_setting_that_somebody_else_has_changed_is_set_anew_and_at_last_a_fault() -> None:
-    wire = with_words(read_pressure=None)
-    wire.settle(512)
-    for _ in range(3):
-        assert wire.exchange.fault is FaultCode.NONE
-        while wire.last != "REQ":
-            wire.tick(0.2)
-        wire.answer("400")
-        assert wire.last == "SET 512"
-        wire.answer("512")
-    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED, "its echo says one thing, its reading another"
-
-
-def test_a_device_that_says_nothing_to_a_setting_is_read_back_in_the_same_breath() -> None:
-    wire = with_words(read_pressure=None, set_voltage=TELLS_NOTHING)
-    wire.set_voltage(512)
-    assert wire.written == [b"SET 512\r\nREQ\r\n"]
-    wire.answer("512")
-    assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
-    wire.set_voltage(600)
-    for _ in range(4):  # the first is the answer to a poll
-        wire.answer("512")
-    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
-
-
-def test_an_answer_that_counts_in_coarser_steps_confirms_and_is_not_asked_for_ever() -> None:
-    fine = replace(
-        OBEYED, ask="V {volts:.3f}", answer="{volts:.1f}", range=VoltageRange(device=(0, 10), voltage_v=(0, 10))
-    )
-    wire = with_words(read_pressure=None, read_voltage=None, set_voltage=fine)
-    wire.exchange.set_voltage(1.234, wire.now_s)
-    assert wire.last == "V 1.234"
-    wire.answer("1.2")
-    assert wire.exchange.fault is FaultCode.NONE
-    wire.exchange.set_voltage(1.234, wire.now_s + 0.01)
-    assert len(wire.written) == 1
-    wire.exchange.set_voltage(1.240, wire.now_s + 0.02)
-    assert wire.last == "V 1.240"

@@ -1,0 +1,61 @@
+"""A fault has one first cause and latches; what a reset needs."""
+
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.control import LeaseAction
+from gateway.registers.words import ControlBit, Mode, State
+from tests.control.bench import Bench, has_fault, settings
+from tests.faults.test_control_reactions import SAMPLE_S, TICK_S, assert_faulted, pressing
+
+
+def test_the_first_cause_stays_when_others_follow():
+    bench = pressing()
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_REFUSED)
+    bench.run(0.02)
+    bench.cell_silent = True
+    bench.line = bench.line._replace(cell_lost=True)
+    bench.run(1.0)
+    assert bench.last.fault is FaultCode.OUTPUT_REFUSED
+    assert bench.last.enable_block is RefusalReason.FAULT_LATCHED
+    assert sum(event[:2] == "A3" for event in bench.events) == 1
+
+
+def test_a_reset_needs_its_rise_setpoint_zero_and_enable_zero():
+    bench = pressing()
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_REFUSED)
+    bench.run(0.02)
+    bench.heal()
+    assert bench.write(control_word=ControlBit.RESET_FAULT, force_setpoint_n=5.0).state is State.FAULT
+    bench.write(control_word=ControlBit(0), force_setpoint_n=0.0)
+    both = ControlBit.RESET_FAULT | ControlBit.ENABLE
+    assert bench.write(control_word=both, force_setpoint_n=0.0).state is State.FAULT
+    bench.write(control_word=ControlBit(0))
+    assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.OFF
+    assert bench.last.fault is FaultCode.NONE
+    assert bench.enable(12.0).state is not State.FAULT
+
+
+def test_a_reset_with_a_lease_needs_a_heartbeat_since_the_fault():
+    bench = Bench(settings(lease_s=0.2, lease_action=LeaseAction.FAULT))
+    bench.clearing_zeroes_heartbeat = True  # a bank's own clearing is no beat
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(0.5)
+    bench.heartbeat_every_ms = 0
+    bench.seconds_until(has_fault(FaultCode.MASTER_LOST), 0.5)
+    bench.run(0.05)
+    assert bench.command.heartbeat == 0
+    assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.FAULT
+    bench.write(control_word=ControlBit(0), heartbeat=5)
+    assert bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=6).state is State.OFF
+
+
+def test_direct_voltage_needs_a_fresh_cell_too():
+    bench = Bench(gain_n_per_v=5.0)
+    bench.run(0.3)
+    bench.voltage(3.0)
+    bench.run(0.5)
+    assert bench.command.mode is Mode.VOLTAGE
+    bench.cell_silent = True
+    assert_faulted(bench, FaultCode.SAMPLE_STALE, 0.05 + SAMPLE_S + TICK_S)

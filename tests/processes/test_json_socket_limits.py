@@ -1,0 +1,170 @@
+"""What callers of a local socket may cost: too many, silent, slow and flooding ones, and none is left behind."""
+
+import asyncio
+import json
+import random
+import socket
+import time
+from pathlib import Path
+from typing import Any
+
+from gateway.processes.json_connection import SocketLimits
+from gateway.processes.json_socket import JsonLineServer
+from tests.processes.test_json_socket import with_server
+
+
+def talk(path: Path, data: bytes = b"") -> socket.socket:
+    """A connection from this very thread: non-blocking, so that the loop under test goes on."""
+    caller = socket.socket(socket.AF_UNIX)
+    caller.setblocking(False)
+    try:
+        caller.connect(str(path))
+        caller.send(data)
+    except OSError:  # the kernel's queue is full
+        caller.close()
+        raise
+    return caller
+
+
+async def patiently(path: Path, data: bytes) -> socket.socket:
+    """As `talk`, as often as the kernel's queue is full."""
+    while True:
+        try:
+            return talk(path, data)
+        except BlockingIOError:
+            await asyncio.sleep(0.002)
+
+
+async def heard(caller: socket.socket) -> bytes:
+    """Everything up to the end of the connection."""
+    loop, found = asyncio.get_running_loop(), b""
+    try:
+        while chunk := await loop.sock_recv(caller, 65536):
+            found += chunk
+    except ConnectionError:
+        pass
+    caller.close()
+    return found
+
+
+async def line_from(caller: socket.socket) -> Any:
+    loop, found = asyncio.get_running_loop(), b""
+    while not found.endswith(b"\n"):
+        chunk = await loop.sock_recv(caller, 65536)
+        assert chunk, "closed without a line"
+        found += chunk
+    return json.loads(found)
+
+
+def descriptors() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+ECHO = b'{"do": "echo", "say": 1}\n'
+
+
+def test_more_callers_than_allowed_are_told_so_and_closed(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        served = [talk(path, ECHO) for _ in range(32)]
+        assert all([(await line_from(caller))["ok"] for caller in served])
+        surplus = [talk(path, ECHO) for _ in range(40)]
+        told = [json.loads(await heard(caller)) for caller in surplus]
+        assert all("32 connections are open" in answer["error"] for answer in told)
+        served[0].close()
+        await asyncio.sleep(0.02)
+        fresh = talk(path, ECHO)
+        assert (await line_from(fresh))["ok"]
+        for caller in (*served, fresh):
+            caller.close()
+
+    assert with_server(tmp_path, scene) == []
+
+
+def test_callers_that_say_nothing_make_room_for_one_that_does(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        silent = [talk(path) for _ in range(32)]
+        await asyncio.sleep(0.15)
+        fresh = talk(path, ECHO)
+        assert (await line_from(fresh))["ok"]
+        assert b"others are waiting" in await heard(silent[0])
+        for caller in (*silent, fresh):
+            caller.close()
+
+    assert with_server(tmp_path, scene, SocketLimits(spared_s=0.02)) == []
+
+
+def test_who_says_nothing_half_a_line_or_reads_nothing_is_closed_in_time(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        callers = [
+            talk(path),
+            talk(path, b'{"do": "ec'),
+            talk(path, b'{"do": "echo", "say": "' + b"x" * 60_000 + b'"}\n' * 2),
+        ]
+        left = [await heard(caller) for caller in callers[:2]]
+        assert all(b"no whole request for 0.2 s" in said for said in left)
+        deaf = callers[2]
+        while True:
+            try:
+                deaf.send(ECHO)
+            except BlockingIOError:
+                await asyncio.sleep(0.01)
+            except OSError:
+                break
+        deaf.close()
+
+    assert with_server(tmp_path, scene, SocketLimits(idle_s=0.2)) == []
+
+
+def test_a_request_without_its_newline_is_one_when_the_caller_has_ended(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        caller = talk(path, ECHO + ECHO.rstrip())
+        caller.shutdown(socket.SHUT_WR)
+        assert (await heard(caller)).count(b'"ok": true') == 2
+
+    assert with_server(tmp_path, scene) == []
+
+
+def test_two_hundred_callers_of_all_kinds_leave_no_descriptor_and_no_caller_behind(tmp_path: Path) -> None:
+    chance = random.Random(5)
+    kinds = (b"", ECHO, ECHO * 30, b"{", b"\x00\xff\n", b"x" * 70_000, b"[" * 900 + b"\n")
+    before = descriptors()
+
+    async def scene(path: Path) -> None:
+        for _ in range(200):
+            caller = await patiently(path, chance.choice(kinds))
+            if chance.random() < 0.3:
+                await asyncio.sleep(0)
+            caller.close()
+        fresh = await patiently(path, ECHO)
+        assert (await line_from(fresh))["ok"]
+        fresh.close()
+
+    assert with_server(tmp_path, scene) == []
+    assert descriptors() <= before + 1
+
+
+def test_a_flood_of_requests_leaves_nine_tenths_of_the_loop(tmp_path: Path) -> None:
+    """However many ask: each turn rests nine times as long as it took. A busy machine makes it fewer, never more."""
+    served = 0
+
+    def costly(request: dict[str, Any]) -> dict[str, Any]:
+        nonlocal served
+        served += 1
+        end_s = time.thread_time() + 0.002
+        while time.thread_time() < end_s:
+            pass
+        return {}
+
+    async def play() -> None:
+        server = JsonLineServer(tmp_path / "control.sock", {"costly": costly})
+        await server.start()
+        flood = [talk(tmp_path / "control.sock", b'{"do": "costly"}\n' * 500) for _ in range(20)]
+        began_s = time.monotonic()
+        await asyncio.sleep(0.4)
+        took_s = time.monotonic() - began_s
+        assert 1 <= served <= 1 + took_s / 0.02
+        for caller in flood:
+            caller.close()
+        await server.close()
+
+    asyncio.run(play())
