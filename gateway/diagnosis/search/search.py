@@ -79,6 +79,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
     base, whiten, comparison = compare_under_noise(bench, base, effects, whiten)
     first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
     unnamed: list[Dependence] = []
+    is_newest_settled = False
     while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
         explained = explained_chi2(base, fitted, accepted)
         winner, saved = None, 0.0
@@ -90,6 +91,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
                 saved = saved if winner is comparison.winner else saved_share(bench, fitted, winner, whiten, explained)
             saved *= is_more_than_a_wrong_form(winner, saved, explained)
             saved *= saved > 0.0 and stands_in_its_own_noise(bench, fitted, winner, comparison.starts, whiten)
+        counted = len(accepted)
         progress.report("looking for what no effect explains")
         dependence = strongest_dependence(bench, fitted, whiten, unnamed, outside=True)
         strongest = comparison.winner if saved > 0.0 else None
@@ -107,12 +109,13 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
         else:
             usual.append(winner.effect)
             base, fitted = _widen_base(bench, base, winner, whiten), winner.fitted
+        is_newest_settled = len(accepted) > counted
         effects = [effect for effect in effects if effect not in usual]
         fitted, whiten, comparison = compare_under_noise(bench, fitted, not_accepted(effects, accepted), whiten)
         base = _refit_base(bench, base, whiten)
     found = SearchResult(bench, base, fitted, tuple(accepted), tuple(unnamed), whiten, first, comparison)
     if len(accepted) > 1:
-        return _exchange_effects(found, effects)
+        return _exchange_effects(found, effects, len(accepted) - is_newest_settled)
     return found
 
 
@@ -199,14 +202,15 @@ def _widen_base(bench: Bench, base: FittedModel, usual: RefinedEffect, whiten: W
     )[0]
 
 
-def _exchange_effects(found: SearchResult, effects: Sequence[Effect]) -> SearchResult:
-    """Return the search's result after each accepted effect was taken out and all that are not in the model competed for
-    its place.
+def _exchange_effects(found: SearchResult, effects: Sequence[Effect], doubtful: int) -> SearchResult:
+    """Return the search's result after each of the first `doubtful` accepted effects was taken out and all that are not in
+    the model competed for its place.
 
-    It competes itself with the optimum that it has already reached.
+    It competes itself with the optimum that it has already reached. One that nothing joined since has just won beside the
+    same others.
     """
     bench, whiten = found.bench, found.whiten
-    for index in range(len(found.accepted) - 1, -1, -1):
+    for index in range(doubtful - 1, -1, -1):
         if len(found.accepted) < 2:
             break
         incumbent, before, after = found.accepted[index], found.accepted[:index], found.accepted[index + 1 :]
