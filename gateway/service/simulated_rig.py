@@ -48,13 +48,17 @@ _SETTLED_S = 1.0  # until a changed plant has come to what is commanded
 
 
 class SimulatedRig:
-    """The twin behind the device ends of both wires. Bytes in through `on_output_bytes`, out through the two `send`s."""
+    """The twin behind the device ends of both wires. Bytes in through `on_output_bytes`, out through the two `send`s.
+
+    It begins as a calibration leaves a rig and as any later vent does: pressed before, and vented.
+    """
 
     def __init__(
         self, rig: Rig, *, send_output: Callable[[bytes], None], send_cell: Callable[[bytes], None], now_s: float
     ) -> None:
         assert rig.plant
         self.twin = Twin(rig.plant, rig.seed)
+        self.twin.press_and_vent()
         self.is_cell_cut = False
         self.is_output_cut = False
         self._output = output_device(rig.output.device)
@@ -146,8 +150,9 @@ class SimulatedRig:
         """Another machine in the place of this one, which has come to the standing command already. ValueError, and nothing has
         changed, where its physics do not compute."""
         twin = Twin(plant, self._seed + 1)
-        twin.command(self._setting_v)
         try:
+            twin.press_and_vent()
+            twin.command(self._setting_v)
             twin.advance(_SETTLED_S)
             measured_n = float(twin.measured_n)
         except ArithmeticError as error:

@@ -3,7 +3,7 @@
 from gateway.defaults import UNLIMITED
 from gateway.twin.lags import follow_ramp, ramp_shares
 from gateway.twin.plant import Plant
-from gateway.twin.slide import SlideState, advance_slide, slide_of, with_gap
+from gateway.twin.slide import SlideState, advance_slide, slide_of, with_gap, without_motion
 
 
 class MovingSlide:
@@ -53,6 +53,13 @@ class MovingSlide:
     def set_disturbance(self, force_n: float) -> None:
         """Set an outside force on the slide, positive towards the workpiece; 0 is null."""
         self._disturbance_n = force_n
+
+    def press_and_vent(self, pressure_pa: float) -> None:
+        """Put the slide where a slow stroke with this pressure and its vent leave it: friction keeps a part of the force."""
+        still = without_motion(self._slide)
+        for thrust_n in (still.area_m2 * pressure_pa, 0.0):
+            self.state = advance_slide(still, self.state, (thrust_n, 0.0, 0.0, 0.0), self._step_s, self._step_s)
+        self.state = self.state._replace(travel_m=0.0)
 
     def step(self, pressure_pa: float) -> float:
         """Advance one step under this pressure."""

@@ -19,6 +19,7 @@ from gateway.twin.surroundings import Surroundings, TwinConditions
 
 STEP_S: Final = 1.0e-3
 _ROUNDING: Final = 1.0e-6  # of a step: ten times 0.001 s are ten steps
+_STROKE_SHARE: Final = 0.5  # of the full scale: presses every friction element over, whatever the plant
 
 
 class Twin:
@@ -42,6 +43,15 @@ class Twin:
         self._steps = 0
         self._owed_steps = 0.0
         self._reading: float | None = None
+
+    def press_and_vent(self) -> None:
+        """Be a machine that has worked before: pressed once and vented, time and noise as they were.
+
+        A new machine's friction holds nothing yet; one that was vented keeps its pad pressed by what friction holds, and
+        needs less for the next force. A pad that hangs above the workpiece has nothing to keep.
+        """
+        if self.plant.contact.gap_m <= 0.0:
+            self._slide.press_and_vent(_STROKE_SHARE * self.plant.regulator.full_scale_pa)
 
     def command(self, voltage_v: float) -> None:
         """Apply a command voltage, V; it holds until the next one. ValueError when it is not finite."""

@@ -137,3 +137,27 @@ def test_with_the_workpiece_gone_the_slide_runs_to_its_end_and_pressing_resumes_
 def test_the_end_stop_takes_the_thrust_from_the_pad() -> None:
     plant = Plant(cylinder=Cylinder(stroke_m=4.0e-4))  # the pad is 16.4 N strong there
     np.testing.assert_allclose(forces(plant, [1.0, 5.0, 1.0]), [9.0, 16.4, 9.0], atol=1.0e-9)
+
+
+@pytest.mark.parametrize("presliding_m", [0.0, 3.0e-4])
+def test_a_machine_that_has_worked_begins_as_a_stroke_and_its_vent_leave_it(presliding_m: float) -> None:
+    """Friction keeps the pad pressed by its whole limit, in time and noise nothing has passed."""
+    plant = Plant(friction=Friction(coulomb_n=2.0, load_dependent_n_per_n=0.03, presliding_m=presliding_m))
+    worked, stroke = Twin(plant, 1), Twin(plant, 1)
+    worked.press_and_vent()
+    for voltage_v in [*loop_v(5.0, 50), 0.0]:
+        stroke.command(float(voltage_v))
+        stroke.advance(0.02)
+    assert (worked.force_n, worked.time_s) == (pytest.approx(2.0, abs=0.01), 0.0)
+    assert worked.force_n == pytest.approx(float(stroke.force_n), abs=0.01)
+    for twin in (worked, stroke):
+        twin.command(0.5)
+        twin.advance(0.5)
+    assert float(worked.force_n) == pytest.approx(float(stroke.force_n), abs=0.01)
+
+
+def test_a_pad_above_the_workpiece_has_nothing_to_keep() -> None:
+    plant = Plant(friction=Friction(coulomb_n=2.0), contact=Contact(gap_m=0.002))
+    twin = Twin(plant, 1)
+    twin.press_and_vent()
+    assert (twin.force_n, twin.position_m) == (0.0, 0.0)

@@ -5,7 +5,8 @@ after a first-order lag, above its force at rest. SIGN_INVERTED: the cell goes d
 as long as the output is enabled, with or without contact (a cell with swapped wires never reports contact). GAIN_WRONG:
 in contact, under 30 % of the expected rise beyond friction, or over 300 % of it and off by more than friction explains, until
 one rise has passed;
-later the same signature means lost air, which only warns. While the first rise is too high the target is held back
+later the same signature means lost air, which only warns, and so does a force that stays where it was: friction keeps a vented
+tool pressed. While the first rise is too high the target is held back
 (`is_too_high`), so that a wrong gain is named before it becomes over-force. Below the contact threshold a cell that
 reads ten times too little looks like air: the tool waits, and the warning A301 tells.
 """
@@ -22,6 +23,9 @@ _LEAST_RISE_N: Final = 1.0  # below it noise decides
 _PROVING_RISE_N: Final = 5.0  # a rise of this size with the right gain ends the gain check
 _LOWEST_SHARE: Final = 0.3  # of the expected rise beyond friction: kgf read as N is a tenth
 _HIGHEST_SHARE: Final = 3.0  # of it: N read as kgf is ten times
+_MOVED_SHARE: Final = (
+    0.05  # of the expected rise, from the force at rest: a force that has not moved has no wrong unit but no air
+)
 _SLACK_N: Final = 1.0  # beside what friction explains: zero and noise
 
 
@@ -86,6 +90,7 @@ class RiseCheck:
 
     def start(self) -> None:
         """Take the force at rest, at an enable. A positive rest counts as residual force in contact, not as zero error."""
+        self._at_rest_n = self.smooth_n
         self._base_n = min(self.smooth_n, self._threshold_n)
         self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = 0.0
         self._proven = False
@@ -104,6 +109,7 @@ class RiseCheck:
     def shift(self, moved_n: float) -> None:
         """Take over a zero that has moved: what was measured before reads that much less now."""
         self.smooth_n -= moved_n
+        self._at_rest_n -= moved_n
 
     def judge(self, response: "ExpectedForce", branch_share: float, touching: bool, interval_s: float) -> FaultCode:
         """Judge one new sample against the rise that the model expects at this branch share."""
@@ -122,7 +128,8 @@ class RiseCheck:
         off_n = self.measured_rise_n - expected_n
         self.is_too_high = off_n > slack_n + kept_n and self.measured_rise_n > _HIGHEST_SHARE * expected_n
         too_low = -off_n > slack_n and self.measured_rise_n < _LOWEST_SHARE * (expected_n - slack_n)
-        wrong = self.is_too_high or too_low
+        has_moved = self.smooth_n - self._at_rest_n > _MOVED_SHARE * expected_n
+        wrong = self.is_too_high or (too_low and has_moved)
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0
         self._right_gain_s = self._right_gain_s + interval_s if expected_n >= _PROVING_RISE_N and not wrong else 0.0
         self._proven = self._right_gain_s >= _LASTING_S

@@ -196,4 +196,4 @@ def test_the_demo_rig_settles_sooner_and_the_trim_learns_nothing_of_the_push(see
     plain_s, plain_v = course(LeadSettings(), seed)
     assert sum(led_s) < 0.7 * sum(plain_s)
     assert all(led <= plain + 0.02 for led, plain in zip(led_s, plain_s, strict=True))
-    assert led_v < plain_v + 0.02
+    assert led_v < plain_v + 0.05  # less than half a newton
