@@ -57,6 +57,7 @@ class Controller:
         self.active_run = ActiveRun(settings, model)
         self._loop = ForceLoop(settings, model, compensation.timing)
         self._faults = FaultDetector(settings)
+        self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
         self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
@@ -96,6 +97,7 @@ class Controller:
         self._loop.use(calibration.model, self._given_n, timing_of(calibration.response, self._rig_settings))
         self.active_run.use(calibration.model)
         self._commands.use(calibration.model)
+        self._faults.expect_noise(calibration.noise_n)
         self.calibration_id = calibration.number
 
     @property

@@ -20,11 +20,12 @@ _NO_STATUS: Final = StatusBit(0)
 @dataclass(frozen=True, slots=True)
 class CalibrationInUse:
     """A calibration as control uses it. model: as volts are sent (`apply_command_map`); response: as the calibration measured
-    it, None where the rig file's timing counts."""
+    it, None where the rig file's timing counts; noise_n: of the load cell, as it was measured, 0 where that is not known."""
 
     model: Bsfm
     number: int
     response: Response | None = None
+    noise_n: float = 0.0
 
 
 class LineStatus(NamedTuple):

@@ -72,6 +72,10 @@ class FaultDetector:
         self._response_fault = FaultCode.NONE
         self._stuck_s = 0.0
 
+    def expect_noise(self, noise_n: float) -> None:
+        """Begin with the cell's noise as the calibration in use has measured it, N; 0: not known."""
+        self._frozen.expect_noise(noise_n)
+
     def start(self) -> None:
         """Forget what was counted before, at an enable."""
         self._rise.start()

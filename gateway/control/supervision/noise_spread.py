@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 from gateway.control.supervision.repeat_law import MOST_COUNTS
 
 WINDOW: Final = 32
+EXPECTED_ERROR: Final = 0.1  # of a noise that a calibration has measured: 50 readings; the cell may have changed since
 STILL_COUNTS: Final = 0.5  # between the halves of a window: more is a force that moves
 _CAREFUL: Final = 0.3  # of the harmonic's size: how unsure a spread is below 0.4 counts
 _CONTRADICTION: Final = 1.5  # standard errors of the variance, by which neighbours differ by less: the force drifted
@@ -30,6 +31,13 @@ class Spread(NamedTuple):
         share = self.changes / self.expected if self.expected else 1.0
         unsure = sqrt(max(0.0, 1.0 - share) / self.changes) if self.changes else 0.0
         return share if share < 1.0 - _SURELY * unsure else 1.0
+
+
+def expected_spread(noise_n: float, count_n: float) -> Spread:
+    """Return the spread that a calibration's noise makes in counts, Sheppard's correction taken off. It says nothing of how
+    many samples are new ones."""
+    variance = (noise_n / count_n) ** 2 - 1.0 / 12.0
+    return Spread(sqrt(max(0.0, variance)), EXPECTED_ERROR, 0.0, 0.0)
 
 
 def quietest(pools: Iterable[Spread]) -> Spread:

@@ -33,6 +33,10 @@ class StuckSensorCheck:
         self._slack_n = 0.0
         self.start()
 
+    def expect_noise(self, noise_n: float) -> None:
+        """Begin with the noise of the calibration in use, N; 0: not known."""
+        self._noise.expect(noise_n)
+
     def start(self) -> None:
         """Begin anew at an enable: what happened before does not count."""
         self._equal = 1

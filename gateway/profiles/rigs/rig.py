@@ -137,16 +137,21 @@ class Rig:
 
     def response_of(self, calibration: Calibration) -> Response | None:
         """Return how this rig follows, as the calibration measured it; None for one that another rig was measured with."""
+        return calibration.response if self._has_made(calibration) else None
+
+    def _has_made(self, calibration: Calibration) -> bool:
+        """Decide whether the calibration was measured on this very rig, or on the twin of its plant."""
         own_names = [
             self.name,
             *([f"twin of plant {self.plant_profile.name}"] if self.simulated and self.plant_profile else []),
         ]
-        return calibration.response if calibration.rig in own_names else None
+        return calibration.rig in own_names
 
     def calibration_in_use(self, calibration: Calibration, model: Bsfm | None = None) -> CalibrationInUse:
         """Return the calibration as control uses it here. model: its model, where that has been made already."""
         model = self.model_of(calibration, model or calibration.model())
-        return CalibrationInUse(model, calibration.number, self.response_of(calibration))
+        noise_n = calibration.noise_n if self._has_made(calibration) else 0.0
+        return CalibrationInUse(model, calibration.number, self.response_of(calibration), noise_n)
 
     def ports(self) -> dict[str, str]:
         """Return the serial ports of a real rig, by line; empty for a simulated one."""

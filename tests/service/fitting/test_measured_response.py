@@ -34,6 +34,13 @@ def test_a_response_is_used_on_the_rig_that_it_was_measured_on_and_on_no_other()
     assert replace(rig, name="other").response_of(replace(shipped, rig="other")) is shipped.response
 
 
+def test_the_noise_that_a_calibration_measured_counts_on_its_own_rig() -> None:
+    rig = demo()
+    shipped = replace(rig.calibration, noise_n=0.12)
+    assert rig.calibration_in_use(shipped).noise_n == 0.12
+    assert replace(rig, simulated=False).calibration_in_use(shipped).noise_n == 0.0
+
+
 def test_the_shipped_response_is_that_of_the_twin_and_the_wires() -> None:
     response, plant = demo().calibration.response, demo().plant
     assert response
