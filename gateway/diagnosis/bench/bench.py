@@ -113,9 +113,9 @@ class Bench:
 
     def residuals(self, simulated_n: Floats) -> Floats:
         """Return measured minus simulated, zero where a row does not count; same shape as given."""
-        return self.reduced(self.measured_n - simulated_n)
+        return self.reduce(self.measured_n - simulated_n)
 
-    def reduced(self, columns: Floats) -> Floats:
+    def reduce(self, columns: Floats) -> Floats:
         """Return the same vectors (..., rows) with rows that do not count at zero and the transducer's own errors taken out."""
         masked: Floats = columns * self.usable
         if self.nuisance.shape[1]:

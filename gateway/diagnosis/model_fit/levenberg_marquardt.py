@@ -117,7 +117,7 @@ def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whitener) ->
             rows.append((simulated[at + 1 + k] - centre) / step if step else np.zeros_like(centre))
         at += 1 + len(problem.free)
         residual = bench.residuals(centre)
-        jacobian = bench.reduced(np.array(rows)) if rows else np.empty((0, bench.rows))
+        jacobian = bench.reduce(np.array(rows)) if rows else np.empty((0, bench.rows))
         result.append(FittedModel(problem.parameters, problem.free, residual, float(_chi2(residual, whiten)), jacobian))
     return result
 

@@ -83,7 +83,7 @@ class Whitener:
         side_by_side(fill, _some_at_once(flat.shape[0]))
         return found.reshape(*vectors.shape[:-1], -1)
 
-    def transposed(self, spectrum: Floats) -> Floats:
+    def apply_adjoint(self, spectrum: Floats) -> Floats:
         """Return the vector (rows,) whose product with any vector is that of `spectrum`, (coordinates,), with the spectra of
         this vector: products with many vectors then need no spectra of them."""
         found, at = np.empty(self.weights.size), 0

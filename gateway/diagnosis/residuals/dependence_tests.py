@@ -77,7 +77,7 @@ def _strongest(bench: Bench, fitted: FittedModel, whiten: Whitener, asked: Itera
     tried, best = 0, None
     while some := list(islice(asked, _REGRESSORS_AT_ONCE)):
         tried += sum(each.among for each in some)
-        columns = whiten.spectra(bench.reduced(np.vstack([each.columns for each in some])))
+        columns = whiten.spectra(bench.reduce(np.vstack([each.columns for each in some])))
         found = [
             each
             for each in _dependences(NormalEquations(span, columns), some, total, least_power)
@@ -121,7 +121,7 @@ def find_dependences(
             break
         distinct += [dependence] if _is_new(bench, dependence, distinct) else []
         found.append(dependence)
-        taken = np.vstack([fitted.jacobian, bench.reduced(dependence.regressors.columns)])
+        taken = np.vstack([fitted.jacobian, bench.reduce(dependence.regressors.columns)])
         fitted = FittedModel(fitted.parameters, fitted.free, fitted.residual_n, fitted.chi2, taken)
     leftovers = [describe_leftover(bench, each.regressors, each.sizes, each.share) for each in distinct]
     kinds = {each.regressors.kind for each in distinct}

@@ -71,7 +71,7 @@ def _changes_n(bench: Bench, fitted: FittedModel, parameter_sets: Sequence[Model
     centre = (bench.measured_n - fitted.residual_n) * bench.usable
     for first in range(0, found.shape[0], _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
-        found[some] = bench.reduced(found[some] - centre)
+        found[some] = bench.reduce(found[some] - centre)
     return found
 
 

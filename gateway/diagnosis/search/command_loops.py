@@ -49,28 +49,28 @@ def fill_force_v(given_v: Floats, chain: ForceChain, force_v: Floats) -> None:
 
 
 @step
-def liken_force(
-    given_v: Floats, sent_v: Floats, told: Floats, chain: ForceChain, force_v: Floats
+def correlate_force(
+    given_v: Floats, sent_v: Floats, target: Floats, chain: ForceChain, force_v: Floats
 ) -> tuple[float, float]:
-    """Return how the force of a command is like `told`, beside that of the command as it was sent, and the squares of what it
-    is beside that about its mean. force_v: filled in on the way."""
+    """Return how the force of a command goes with `target`, beside that of the command as it was sent, and the squares of the
+    difference about its mean. force_v: filled in on the way."""
     fill_force_v(given_v, chain, force_v)
-    total = squares = alike = told_sum = 0.0
+    total = squares = alike = target_sum = 0.0
     for row in range(sent_v.size):
         column_v = force_v[row] - sent_v[row]
         total += column_v
         squares += column_v * column_v
-        alike += told[row] * column_v
-        told_sum += told[row]
+        alike += target[row] * column_v
+        target_sum += target[row]
     mean_v = total / sent_v.size
-    return alike - told_sum * mean_v, squares - total * mean_v
+    return alike - target_sum * mean_v, squares - total * mean_v
 
 
 @loop
 def fill_first_waves(
-    command_v: Floats, told: Floats, steps_v: Floats, chain: ForceChain, found: tuple[Floats, Floats]
+    command_v: Floats, target: Floats, steps_v: Floats, chain: ForceChain, found: tuple[Floats, Floats]
 ) -> None:
-    """Fill in, for each step, how its wave is like `told` (rows,), and the wave's own sum of squares about its mean.
+    """Fill in, for each step, how its wave goes with `target` (rows,), and the wave's own sum of squares about its mean.
 
     The wave: what it makes of the force that teeth are rounded off which are their first harmonic only.
     """
@@ -81,14 +81,14 @@ def fill_first_waves(
         per_v, size_v = 1.0 / steps_v[k], steps_v[k] / math.pi
         for row in range(rows):
             given_v[row] = command_v[row] - size_v * sine_of_turns(command_v[row] * per_v)
-        found[0][k], found[1][k] = liken_force(given_v, sent_v, told, chain, force_v)
+        found[0][k], found[1][k] = correlate_force(given_v, sent_v, target, chain, force_v)
 
 
 @loop
-def liken_roundings(
-    command_v: Floats, told: Floats, steps_v: Floats, chain: ForceChain, found: tuple[Floats, Floats]
+def correlate_roundings(
+    command_v: Floats, target: Floats, steps_v: Floats, chain: ForceChain, found: tuple[Floats, Floats]
 ) -> None:
-    """Fill in, for each step, how what its rounding makes of the force is like `told` (rows,), and its squares."""
+    """Fill in, for each step, how what its rounding makes of the force goes with `target` (rows,), and its squares."""
     rows = command_v.size
     given_v, sent_v, force_v = np.empty(rows), np.empty(rows), np.empty(rows)
     fill_force_v(command_v, chain, sent_v)
@@ -96,14 +96,14 @@ def liken_roundings(
         size_v = steps_v[k]
         for row in range(rows):
             given_v[row] = np.rint(command_v[row] / size_v) * size_v
-        found[0][k], found[1][k] = liken_force(given_v, sent_v, told, chain, force_v)
+        found[0][k], found[1][k] = correlate_force(given_v, sent_v, target, chain, force_v)
 
 
 @loop
-def liken_dead_bands(
-    command_v: Floats, told: Floats, bands_v: Floats, chain: ForceChain, found: tuple[Floats, Floats]
+def correlate_dead_bands(
+    command_v: Floats, target: Floats, bands_v: Floats, chain: ForceChain, found: tuple[Floats, Floats]
 ) -> None:
-    """Fill in, for each dead band, how what it makes of the force is like `told` (rows,), and its squares."""
+    """Fill in, for each dead band, how what it makes of the force goes with `target` (rows,), and its squares."""
     rows = command_v.size
     given_v, sent_v, force_v = np.empty(rows), np.empty(rows), np.empty(rows)
     fill_force_v(command_v, chain, sent_v)
@@ -113,7 +113,7 @@ def liken_dead_bands(
             if abs(command_v[row] - noticed_v) > bands_v[k]:
                 noticed_v = command_v[row]
             given_v[row] = noticed_v
-        found[0][k], found[1][k] = liken_force(given_v, sent_v, told, chain, force_v)
+        found[0][k], found[1][k] = correlate_force(given_v, sent_v, target, chain, force_v)
 
 
 @loop

@@ -9,8 +9,8 @@ tried in the twin, with rigid friction. The whole twin refines the best.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -24,10 +24,10 @@ from gateway.diagnosis.model_fit.normal_equations import NormalEquations, model_
 from gateway.diagnosis.noise.whitening import Whitener
 from gateway.diagnosis.search.command_loops import (
     ForceChain,
+    correlate_dead_bands,
+    correlate_roundings,
     fill_first_waves,
     fill_rounding_errors,
-    liken_dead_bands,
-    liken_roundings,
 )
 from gateway.side_by_side import side_by_side
 from gateway.twin.elementwise import Real, smaller
@@ -57,13 +57,13 @@ def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) ->
     if _span_v(bench) == 0.0:
         return ()
     regulator, span = fitted.parameters.plant.regulator, model_span(fitted, whiten)
-    told = whiten.transposed(span.left) * bench.usable
-    likely_v = _BANDS_V[np.argsort(-_liken(liken_dead_bands, bench, fitted.parameters, told, _BANDS_V))]
+    target = _Target(bench, fitted.parameters, whiten.apply_adjoint(span.left) * bench.usable)
+    likely_v = _BANDS_V[np.argsort(-target.correlate(correlate_dead_bands, _BANDS_V))]
     bands_pa = likely_v[:_MOST_BANDS_IN_TWIN] * (regulator.full_scale_pa / regulator.full_scale_v)
     rigid = replace(fitted.parameters, plant=_with_rigid_friction(fitted.parameters.plant))
     dead_band = DEAD_BAND if bench.witnesses is None else ChangedValue(DEAD_BAND, bench.witnesses)
     simulated = bench.simulate([rigid, *(rigid.with_value(dead_band, band_pa) for band_pa in bands_pa)])
-    normal = NormalEquations(span, whiten.spectra(bench.reduced(simulated[1:] - simulated[0])))
+    normal = NormalEquations(span, whiten.spectra(bench.reduce(simulated[1:] - simulated[0])))
     return tuple(bands_pa[np.argsort(normal.power - 2.0 * normal.slope)[:_MOST_ANSWERS]].tolist())
 
 
@@ -92,43 +92,47 @@ def _spacing(step_v: Real, span_v: float) -> Real:
 
 def _most_likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floats) -> tuple[float, ...]:
     span_v, best = _span_v(bench), list[float]()
-    told = whiten.transposed(model_span(fitted, whiten).left) * bench.usable
-    for size in tried[np.argsort(-_liken(fill_first_waves, bench, fitted.parameters, told, tried, bunched=True))]:
+    left = whiten.apply_adjoint(model_span(fitted, whiten).left) * bench.usable
+    target = _Target(bench, fitted.parameters, left)
+    for size in tried[np.argsort(-target.correlate(fill_first_waves, tried, bunched=True))]:
         if all(abs(size / other - 1.0) > 1.5 * _spacing(size, span_v) for other in best):
             best.append(float(size))
         if len(best) == _MOST_STEPS_REFINED:
             break
     finer = np.array([size * (1.0 + _spacing(size, span_v) * _FINER_OFFSETS) for size in best])
-    alike = _liken(liken_roundings, bench, fitted.parameters, told, finer.ravel()).reshape(finer.shape)
+    alike = target.correlate(correlate_roundings, finer.ravel()).reshape(finer.shape)
     sharpest = finer[np.arange(len(best)), np.argmax(alike, axis=1)]
     gains = _chi2_gains(bench, fitted, whiten, sharpest)
     return tuple(sharpest[np.argsort(-gains)[:_MOST_ANSWERS]].tolist())
 
 
-def _liken(
-    fill: Callable[[Floats, Floats, Floats, ForceChain, tuple[Floats, Floats]], None],
-    bench: Bench,
-    parameters: ModelParameters,
-    told: Floats,
-    tried: Floats,
-    *,
-    bunched: bool = False,
-) -> Floats:
-    """How much what each size makes of the force is like `told` (rows,), in no unit. bunched: a lag is slow."""
+_Fill: TypeAlias = Callable[[Floats, Floats, Floats, ForceChain, tuple[Floats, Floats]], None]
 
-    def look(some: Floats) -> Floats:
-        slope, power = np.zeros(some.size), np.full(some.size, 1.0e-300)
-        for channel, command_v, row_s in _commanded_channels(bench):
-            bunch = max(round(_BUNCH_SHARE_OF_LAG * parameters.value(LAG) / row_s), 1) if bunched else 1
-            rows = np.arange(0, command_v.size, bunch)
-            sums = np.add.reduceat(told[channel.rows], np.maximum(rows - bunch // 2, 0))
-            alike, squares = np.empty(some.size), np.empty(some.size)
-            fill(command_v[rows], sums, some, _force_chain(parameters, bunch * row_s), (alike, squares))
-            slope += alike
-            power += bunch * squares
-        return np.asarray(np.maximum(slope, 0.0) ** 2 / power)
 
-    return np.concatenate(side_by_side(look, np.array_split(tried, 2)))
+@dataclass(frozen=True, slots=True, eq=False)
+class _Target:
+    """What sizes of steps and bands are compared with. left: of the residual, weighted as whitening does it twice, (rows,)."""
+
+    bench: Bench
+    parameters: ModelParameters
+    left: Floats
+
+    def correlate(self, fill: _Fill, tried: Floats, *, bunched: bool = False) -> Floats:
+        """Return how much what each size makes of the force goes with the target, in no unit. bunched: a lag is slow."""
+
+        def look(some: Floats) -> Floats:
+            slope, power = np.zeros(some.size), np.full(some.size, 1.0e-300)
+            for channel, command_v, row_s in _commanded_channels(self.bench):
+                bunch = max(round(_BUNCH_SHARE_OF_LAG * self.parameters.value(LAG) / row_s), 1) if bunched else 1
+                rows = np.arange(0, command_v.size, bunch)
+                sums = np.add.reduceat(self.left[channel.rows], np.maximum(rows - bunch // 2, 0))
+                alike, squares = np.empty(some.size), np.empty(some.size)
+                fill(command_v[rows], sums, some, _force_chain(self.parameters, bunch * row_s), (alike, squares))
+                slope += alike
+                power += bunch * squares
+            return np.asarray(np.maximum(slope, 0.0) ** 2 / power)
+
+        return np.concatenate(side_by_side(look, np.array_split(tried, 2)))
 
 
 def _column_parts(columns: int, rows: int) -> Iterator[slice]:
@@ -155,7 +159,7 @@ def _chi2_gains(bench: Bench, fitted: FittedModel, whiten: Whitener, tried: Floa
             columns_v = np.empty((tried[part].size, command_v.size))
             fill_rounding_errors(command_v, tried[part], _force_chain(fitted.parameters, row_s), columns_v)
             vectors[:, channel.rows] = columns_v
-        normal = NormalEquations(span, whiten.spectra(bench.reduced(vectors)))
+        normal = NormalEquations(span, whiten.spectra(bench.reduce(vectors)))
         power = np.maximum(normal.power, 1.0e-300)
         found[part] = np.where(normal.slope > _LEAST_WHOLE_STEP * power, normal.slope**2 / power, 0.0)
     return found

@@ -5,10 +5,10 @@ import pytest
 
 from gateway.diagnosis.search.command_loops import (
     ForceChain,
+    correlate_dead_bands,
+    correlate_roundings,
     fill_first_waves,
     fill_rounding_errors,
-    liken_dead_bands,
-    liken_roundings,
     sine_of_turns,
 )
 
@@ -57,7 +57,7 @@ def noticed(size_v):
 
 @pytest.mark.parametrize(
     ("fill", "given_v"),
-    [(fill_first_waves, first_wave), (liken_roundings, rounded), (liken_dead_bands, noticed)],
+    [(fill_first_waves, first_wave), (correlate_roundings, rounded), (correlate_dead_bands, noticed)],
     ids=["first wave", "rounding", "dead band"],
 )
 def test_what_a_size_makes_of_the_force_is_likened_about_its_mean(fill, given_v):

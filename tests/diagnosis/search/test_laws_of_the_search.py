@@ -64,8 +64,8 @@ def short(constant_n: float = 0.0, columns: tuple[str, ...] = (), *, seed: int =
 def linear_problem(rng: np.random.Generator) -> tuple[Bench, FittedModel]:
     """A bench with a model of three columns at its optimum, where a search always asks."""
     bench = bench_of([short()])
-    jacobian = bench.reduced(rng.normal(size=(3, bench.rows)) * np.array([[1.0e-3], [1.0], [1.0e4]]))
-    residual = bench.reduced(rng.normal(size=bench.rows))
+    jacobian = bench.reduce(rng.normal(size=(3, bench.rows)) * np.array([[1.0e-3], [1.0], [1.0e4]]))
+    residual = bench.reduce(rng.normal(size=bench.rows))
     residual -= jacobian.T @ np.linalg.lstsq(jacobian.T, residual, rcond=None)[0]
     return bench, FittedModel(ModelParameters(DEFAULT_PLANT, (0.0,)), (), residual, 0.0, jacobian)
 
@@ -252,13 +252,13 @@ def test_a_bench_is_a_value_that_no_step_of_a_search_changes() -> None:
     bench, fitted = linear_problem(rng)
     columns, rows = rng.normal(size=(2, bench.rows)), np.arange(bench.rows) == 1500
     whiten = white_whitener(bench, fitted.residual_n)
-    before = bench.usable.copy(), bench.reduced(columns), whiten(fitted.residual_n)
+    before = bench.usable.copy(), bench.reduce(columns), whiten(fitted.residual_n)
     fewer = bench.without_rows(rows).without_columns(columns)
     np.testing.assert_array_equal(bench.usable, before[0])
-    np.testing.assert_array_equal(bench.reduced(columns), before[1])
+    np.testing.assert_array_equal(bench.reduce(columns), before[1])
     np.testing.assert_array_equal(whiten(fitted.residual_n), before[2])
     assert int(bench.judged.sum()) == int(fewer.judged.sum()) + 1
-    assert float(np.abs(fewer.reduced(columns)).max()) < 1e-9 * float(np.abs(before[1]).max())
+    assert float(np.abs(fewer.reduce(columns)).max()) < 1e-9 * float(np.abs(before[1]).max())
     with pytest.raises(FrozenInstanceError):
         bench.usable = ~rows  # type: ignore[misc]
 
