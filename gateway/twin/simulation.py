@@ -45,7 +45,7 @@ class Twin:
         self._reading: float | None = None
 
     def press_and_vent(self) -> None:
-        """Be a machine that has worked before: pressed once and vented, time and noise as they were.
+        """Move on to a machine that has worked before: pressed once and vented, time and noise as they were.
 
         A new machine's friction holds nothing yet; one that was vented keeps its pad pressed by what friction holds, and
         needs less for the next force. A pad that hangs above the workpiece has nothing to keep.
