@@ -14,7 +14,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -40,6 +40,7 @@ _ANSWER_S: Final = 5.0
 _LONGEST_ANSWER: Final = 1 << 16
 _FIRST_AMONG_THE_KILLED: Final = "900"
 _LAST_NICE: Final = 19
+_ROOM_BYTES: Final = 2_000_000  # of a stage of a replay: forty series of a window
 
 
 def yield_to_others() -> None:
@@ -127,6 +128,17 @@ def diagnose_window(
     return diagnose(measurements, plant, Options(is_own=True, calibration_noise_n=calibration_noise_n))
 
 
+@contextlib.contextmanager
+def work_gently() -> Iterator[None]:
+    """Have what is done in this block done by one thread that keeps little, and give memory back between its stages and after
+    it."""
+    from gateway.twin.replay.cache import room_for_series
+
+    with progress.listen(_return_memory_between_stages), one_after_another(), room_for_series(_ROOM_BYTES):
+        yield
+    return_memory()
+
+
 def watch_forever(options: dict[str, Any]) -> None:
     """Look, tell, sleep; for ever. Begin anew where another plant has come into use. The look at the force is cheap, so it is
     told before the other begins, which may take long."""
@@ -134,7 +146,8 @@ def watch_forever(options: dict[str, Any]) -> None:
 
     ring, state, budget = RingReader(options["ring"]), Path(options["state"]), ProcessorBudget()
     time.sleep(options["window_s"])
-    watch, force = make_watch(ring, options)
+    with work_gently():
+        watch, force = make_watch(ring, options)
     last_plant: PlantSince | None = None
     reference, search = read_reference_recording(state), FirstGoodRecording(state)
     reported_s, spent_s = time.monotonic(), 0.0
@@ -143,21 +156,22 @@ def watch_forever(options: dict[str, Any]) -> None:
         if plant is not None and plant != last_plant:
             if last_plant is not None:  # rows from before the change were read and commanded otherwise
                 time.sleep(max(0.0, options["window_s"] - (time.monotonic() - plant.since_s)))
-                watch, force = make_watch(ring, options)
+                with work_gently():
+                    watch, force = make_watch(ring, options)
             last_plant = plant
             force.follow(plant)
         with contextlib.suppress(OSError):  # a full disk: the next look tries again
             search.keep(time.time())
         if (found := read_reference_recording(state)) != reference:
             reference = found
-            watch, _ = make_watch(ring, options)
+            with work_gently():
+                watch, _ = make_watch(ring, options)
         sentence_before = force.sentence
         force.look(ring.newest(_ALL_ROWS), ring.columns)
         if force.sentence != sentence_before:
             report_to_control(state, _report(watch, force, {}))
-        with progress.listen(_return_memory_between_stages), one_after_another():
+        with work_gently():
             watch.check_newest_window()
-        return_memory()
         now_s, total_s = time.monotonic(), time.process_time()
         rest_s = budget.pause_s(options["every_s"], now_s - reported_s, total_s - spent_s)
         reported_s, spent_s = now_s, total_s

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""What the residual watch takes of the machine: `tools/bench/watch.py [--hours 1] [--live SECONDS]`.
+"""What the residual watch takes of the machine: `tools/bench/watch.py [--hours 1] [--reference] [--live SECONDS]`.
 
 Without --live: the watch with its real search, in virtual time, beside a healthy demo machine that moves between random
-settings, 100 rows a second; processor and memory are those of this process, libraries included. With --live: the watch of a
+settings, 100 rows a second; processor and memory are those of this process, libraries included. With --reference: compared
+with a reference recording of that machine, whose friction grows after half of the time. With --live: the watch of a
 running demo gateway, as the kernel counts it; on a busy machine its idle class gets next to nothing.
 """
 
@@ -15,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -22,14 +24,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from running_gateway import running_gateway
 
-from gateway import progress
+import gateway.diagnosis  # noqa: F401  # all steps, before the first loop is compiled
 from gateway.profiles import load_rig
+from gateway.recording import Recorder
 from gateway.recording.ring import RingReader, SampleRing
 from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.twin.plant import with_value
 from gateway.twin.replay.replay import Drive, Replay
-from gateway.watch.memory import resident_mb, return_memory
+from gateway.watch.memory import resident_mb
 from gateway.watch.processor_budget import ProcessorBudget
-from gateway.watch.watch_process import make_watch
+from gateway.watch.reference_recording import keep_reference_recording
+from gateway.watch.watch_process import make_watch, work_gently
 
 SEED = 5
 ROW_S = 0.01
@@ -45,8 +50,20 @@ class Machine:
         self.plant = load_rig("demo", simulated=True).plant
         self.now_s = 0.0
 
-    def work(self, lasts_s: float) -> None:
-        """Go on for some seconds; every stretch begins and ends at rest, so that they fit together."""
+    def wear(self) -> None:
+        """Have three times the friction from now on."""
+        self.plant = with_value(self.plant, "friction", "coulomb_n", 3.0 * self.plant.friction.coulomb_n)
+
+    def record(self, lasts_s: float, state: Path) -> None:
+        """Keep so many seconds as the rig's reference."""
+        recorder = Recorder(state / "recordings", {"rig": "demo"}, COLUMNS)
+        self.work(lasts_s, recorder.append)
+        recorder.close()
+        keep_reference_recording(state, recorder.path)
+
+    def work(self, lasts_s: float, append: Callable[[tuple[float, ...]], None] | None = None) -> None:
+        """Go on for some seconds; every stretch begins and ends at rest, so that they fit together. append: takes the rows;
+        None: the ring."""
         time_s = np.arange(0.0, lasts_s, ROW_S)
         levels_v = self.rng.uniform(0.5, 4.5, math.ceil(lasts_s))
         is_at_rest = (time_s < 1.0) | (time_s > lasts_s - 2.0)
@@ -55,24 +72,30 @@ class Machine:
         force_n = force_n + self.rng.normal(0.0, self.plant.cell.noise_n, time_s.size)
         for at_s, volts, newtons in zip(self.now_s + time_s, command_v, force_n, strict=True):
             row = {"time_s": at_s, "command_v": volts, "force_n": newtons}
-            self.ring.append(tuple(float(row.get(name, 0.0)) for name in COLUMNS))
+            (append or self.ring.append)(tuple(float(row.get(name, 0.0)) for name in COLUMNS))
         self.now_s += lasts_s
 
 
-def run_virtual(hours: float, state: str) -> None:
+def run_virtual(hours: float, state: str, *, with_reference: bool) -> None:
     """Watch for some hours of virtual time; print what that took."""
     descriptor = os.memfd_create("ring")
     machine, budget = Machine(descriptor), ProcessorBudget()
-    watch, _ = make_watch(RingReader(descriptor), OPTIONS | {"state": state})
+    if with_reference:
+        machine.record(70.0, Path(state))
+    with work_gently():
+        watch, _ = make_watch(RingReader(descriptor), OPTIONS | {"state": state})
     watch._clock = lambda: machine.now_s
     machine.work(80.0)
     watched_s, first_s, last_s, told_s = 0.0, machine.now_s, machine.now_s, machine.now_s
     print(f"{'hours':>6} {'looks':>6} {'searches':>8} {'processor':>10} {'share':>7} {'memory':>8} {'peak':>8}")
+    half_s = first_s + hours * 1800.0 if with_reference else math.inf
     while machine.now_s < first_s + hours * 3600.0:
+        if machine.now_s >= half_s:
+            half_s = math.inf
+            machine.wear()
         began_s = time.process_time()
-        with progress.listen(lambda now: None if now.done else return_memory()):
+        with work_gently():
             watch.check_newest_window()
-        return_memory()
         spent_s = time.process_time() - began_s
         watched_s += spent_s
         rest_s = budget.pause_s(OPTIONS["every_s"], machine.now_s - last_s, spent_s)
@@ -127,13 +150,14 @@ def main() -> None:
     """Print processor share and memory."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hours", type=float, default=1.0, help="of virtual time")
+    parser.add_argument("--reference", action="store_true", help="compare with a reference recording")
     parser.add_argument("--live", type=float, metavar="SECONDS", help="a running gateway instead")
     options = parser.parse_args()
     if options.live:
         run_live(options.live)
         return
     with tempfile.TemporaryDirectory() as state:
-        run_virtual(options.hours, state)
+        run_virtual(options.hours, state, with_reference=options.reference)
 
 
 if __name__ == "__main__":

@@ -1,24 +1,36 @@
 """Results kept between calls: the least recently used go when there is no more room."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from typing import Final, TypeVar
 
 from gateway.side_by_side import side_by_side
 from gateway.twin.replay.drive import Floats
 
+_room: Final[ContextVar[int | None]] = ContextVar("room", default=None)
 _Key = TypeVar("_Key", bound=Hashable)
 ROOM_BYTES: Final = 12_000_000
 """Per stage: 125 series of a minute at 200 Hz, more than a wave shares; four times as much is no faster."""
 
 
+@contextmanager
+def room_for_series(room_bytes: int) -> Iterator[None]:
+    """Have each stage of replays made in this block keep so much at most: for whoever must not be felt."""
+    token = _room.set(room_bytes)
+    try:
+        yield
+    finally:
+        _room.reset(token)
+
+
 class Cache:
     """Series by what they depend on."""
 
-    def __init__(self, room_bytes: int = ROOM_BYTES) -> None:
+    def __init__(self, room_bytes: int | None = None) -> None:
         self._kept: OrderedDict[Hashable, Floats] = OrderedDict()
-        self._room_bytes, self._bytes = room_bytes, 0
+        self._room_bytes, self._bytes = room_bytes or _room.get() or ROOM_BYTES, 0
 
     def get(self, key: Hashable) -> Floats | None:
         """Return the series of a key; None where it is not kept (any more)."""
