@@ -78,8 +78,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
     """Return all effects that the recording shows, one after the other. `base` is the refitted base model."""
     base, whiten, comparison = compare_under_noise(bench, base, effects, whiten)
     first, fitted, accepted, usual = comparison, base, list[AcceptedEffect](), list[Effect]()
-    unnamed: list[Dependence] = []
-    is_newest_settled = False
+    unnamed, is_newest_settled = list[Dependence](), False
     while len(accepted) + len(usual) + len(unnamed) < MOST_EFFECTS:
         explained = explained_chi2(base, fitted, accepted)
         winner, saved = None, 0.0
@@ -101,9 +100,7 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
             fitted = refit(bench, fitted, whiten)
         elif winner is None or saved == 0.0:
             break
-        elif saves_enough(winner, saved) and is_noticeable(
-            (winner.effect, winner.form), winner.fitted, fitted, comparison.hints
-        ):
+        elif saves_enough(winner, saved) and _is_finding(winner, fitted, comparison):
             accepted.append(AcceptedEffect(winner.effect, winner.form, comparison))
             fitted = winner.fitted
         else:
@@ -117,6 +114,11 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
     if len(accepted) > 1:
         return _exchange_effects(found, effects, len(accepted) - is_newest_settled)
     return found
+
+
+def _is_finding(winner: RefinedEffect, before: FittedModel, comparison: ModelComparison) -> bool:
+    """Return whether the winner's size is more than every machine has."""
+    return is_noticeable((winner.effect, winner.form), winner.fitted, before, comparison.hints)
 
 
 def compare_under_noise(
