@@ -4,6 +4,7 @@ A look puts the window beside the reference, whose model and common error were f
 reference leaves, by more than matters to whoever holds the force, is searched for, among the changes of the machine's numbers.
 """
 
+from dataclasses import replace
 from math import sqrt
 from typing import Final
 
@@ -16,6 +17,7 @@ from gateway.registers.residual_cause import ResidualCause
 from gateway.twin.plant import Plant
 from gateway.watch.warning_filter import WindowVerdict
 from gateway.watch.window import Window
+from gateway.watch.window_verdict import plausible_name
 
 _WITHOUT_A_NAME: Final = 2.0
 """How many times as much must be off where no cause explains it: a busy machine delays samples by some milliseconds."""
@@ -54,6 +56,7 @@ class MachineComparison:
         found = compare_with_machine([window.measurement], self._machine, self._plant, _OPTIONS)
         best = max(found.causes, key=_saved_n, default=None)
         if best is not None and _saved_n(best) >= self._least_n:
+            best = replace(best, name=plausible_name(best.name, best.group))
             cause, sentence = ResidualCause.of_effect(best.name), self._sentence(best, found)
             return WindowVerdict(cause, sentence, window.excitation_v, best.group)
         excess_n = self._excess_n(found.baseline.rms_n)

@@ -22,7 +22,6 @@ from gateway.recording.reader import Recording, recording_paths
 
 _FOLDER: Final = "reference"
 _FACTS: Final = "reference.json"
-_COPY: Final = "recording"
 _LEAST_S: Final = 30.0
 _LEAST_EXCITATION_V: Final = 0.2
 _LEAST_MOVES: Final = 4
@@ -63,7 +62,7 @@ def keep_reference_recording(state: Path, recording: Path, calibration: int | No
     folder, digest = state / _FOLDER, sha256(recording.read_bytes()).hexdigest()
     make_directory(folder)
     kept = ReferenceRecording(
-        file=f"{_COPY}-{digest[:12]}{recording.suffix}",
+        file=recording.name,
         name=recording.name,
         sha256=digest,
         kept_utc=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
@@ -71,13 +70,12 @@ def keep_reference_recording(state: Path, recording: Path, calibration: int | No
         is_chosen=calibration is None,
     )
     with lock_directory(folder) as descriptor:
-        if not (folder / kept.file).exists():
-            beside = folder / f".{kept.file}"
-            try:
-                shutil.copyfile(recording, beside)
-                beside.replace(folder / kept.file)
-            finally:
-                beside.unlink(missing_ok=True)
+        beside = folder / f".{kept.file}"
+        try:
+            shutil.copyfile(recording, beside)
+            beside.replace(folder / kept.file)
+        finally:
+            beside.unlink(missing_ok=True)
         write_durably(descriptor, _FACTS, json.dumps(asdict(kept)).encode())
         _remove_all_but(folder, descriptor, kept.file)
     return kept

@@ -82,7 +82,7 @@ def weigh_changes(window: Window, diagnosis: Diagnosis, plant: Plant) -> list[Pl
     changes = [PlantChange(name, (parameter,)) for name, parameter in BASE.items()]
     for cause in diagnosis.causes:
         parameters = tuple((each.section, name, each.unit) for name, each in cause.parameters.items())
-        changes.append(PlantChange(_plausible_name(cause.name, cause.group), parameters, cause.group))
+        changes.append(PlantChange(plausible_name(cause.name, cause.group), parameters, cause.group))
     undone = [_undo_change(diagnosis.plant, plant, change) for change in changes]
     forces = residuals(window.measurement, [diagnosis.plant, *undone])
     refit_n = sqrt(max(rms_of(window.measurement, plant) ** 2 - rms_of(window.measurement, diagnosis.plant) ** 2, 0.0))
@@ -98,8 +98,8 @@ def _gain_n(gain: Gain) -> float:
     return sqrt(max(gain.held_out_rms_before_n**2 - gain.held_out_rms_after_n**2, 0.0))
 
 
-def _plausible_name(name: str, group: Sequence[str]) -> str:
-    """One clock stamps readings and commands here, so that a late reading is a late machine."""
+def plausible_name(name: str, group: Sequence[str]) -> str:
+    """Return the name to publish: one clock stamps readings and commands here, so that a late reading is a late machine."""
     others = [other for other in group if other not in _OF_TWO_CLOCKS]
     return others[0] if name in _OF_TWO_CLOCKS and others else name
 

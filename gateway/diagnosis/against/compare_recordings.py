@@ -25,6 +25,9 @@ from gateway.diagnosis.search.search import SearchResult, search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
 from gateway.twin.plant import Plant
 
+_MORE_THAN_BEFORE: Final = (
+    0.98  # what the old recordings leave is a floor where the new ones leave more, by more than chance
+)
 _LEAST_SHARE_OF_LEFT: Final = 0.05  # of the squared error that is left anyway; a quiet day showed 0.02
 
 
@@ -63,7 +66,9 @@ def compare_with_machine(
     found = search_effects(joint.bench, joint.fitted, effects, joint.whiten)
     left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     left = _without_old(joint, found, left) if left else left
-    floor_n = options.noise_floor_n or min(machine.error.left_n, joint.bench.rms_n(found.base.residual_n))
+    floor_n = options.noise_floor_n
+    if floor_n is None and machine.error.left_n < _MORE_THAN_BEFORE * joint.bench.rms_n(found.base.residual_n):
+        floor_n = machine.error.left_n  # else nothing is off, and nothing has to be explained
     result = compose_diagnosis(SearchFindings(joint.bench, found, evidence, left, effects), floor_n)
     result = _drop_trifles(result, machine.error.left_n)
     return replace(
