@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from judge.cases import Plan, cases, gate_sample
+from generator.recording import Wish
+from judge.cases import Case, Plan, cases, gate_sample
 from judge.engine import missing
 from judge.running import run_one
 from judge.table import HIDDEN, lied, table, with_failure
@@ -105,6 +106,13 @@ def test_nothing_is_found_in_nothing(sample: list[Row]) -> None:
 def test_a_cause_outside_the_catalogue_is_described_and_not_confirmed(sample: list[Row]) -> None:
     assert share(sample, ["outside"], lied) == 0.0, table(sample)
     assert share(sample, ["outside"], lambda row: row["described"]) >= 0.5, table(sample)
+
+
+def test_lost_motion_is_no_leak_where_friction_could_hold_a_force_at_the_first_row() -> None:
+    """Both show nothing in a rest; fitted as a start, lost motion gained nothing, and a leak was named without a doubt."""
+    wish = Wish(("backlash",), 1.0, 3, duration_s=25.0, colour="white", columns=(), jitter=False)
+    row = run_one(Case("alone", wish), "python")
+    assert row["right"] and not row["wrong"], row
 
 
 def test_the_tool_with_two_processes_writes_the_rows_of_one(tmp_path: Path) -> None:

@@ -183,15 +183,23 @@ def settle_known_rests(bench: Bench, fitted: FittedModel, whiten: Whitener) -> F
 
     A slide that nothing presses feels strains of one sign only: free, they would stop every later refinement at that kink.
     """
-    rests = {k for k, each in enumerate(bench.measurements) if begins_at_rest(each)}
-    free = tuple(each for each in fitted.free if not (isinstance(each, StartParameter) and each.recording in rests))
-    if len(free) == len(fitted.free):
+    at_rest = with_known_rests(bench, FitProblem(fitted.parameters, fitted.free))
+    if at_rest is None:
         return fitted
-    starts = [AT_REST if k in rests else fitted.parameters.start(k) for k in range(len(bench.measurements))]
-    at_rest = replace(fitted.parameters, starts=tuple(starts))
-    (known,) = refine(bench, [FitProblem(at_rest, free)], whiten, waves=_WAVES)
+    (known,) = refine(bench, [at_rest], whiten, waves=_WAVES)
     usual = max(known.chi2 / max(int(bench.usable.sum()), 1), 1.0)  # per row: no cause is found yet
-    return known if known.chi2 < fitted.chi2 + _LEAST_HELD_CHI2 * usual * len(rests) else fitted
+    rests = sum(map(begins_at_rest, bench.measurements))
+    return known if known.chi2 < fitted.chi2 + _LEAST_HELD_CHI2 * usual * rests else fitted
+
+
+def with_known_rests(bench: Bench, problem: FitProblem) -> FitProblem | None:
+    """Return the same problem with rest where recordings begin at rest; None where nothing of such a start is free."""
+    rests = {k for k, each in enumerate(bench.measurements) if begins_at_rest(each)}
+    free = tuple(each for each in problem.free if not (isinstance(each, StartParameter) and each.recording in rests))
+    if len(free) == len(problem.free):
+        return None
+    starts = [AT_REST if k in rests else problem.parameters.start(k) for k in range(len(bench.measurements))]
+    return FitProblem(replace(problem.parameters, starts=tuple(starts)), free)
 
 
 def _is_felt(parameter: StartParameter, column: Floats) -> bool:

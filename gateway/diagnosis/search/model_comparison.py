@@ -17,7 +17,7 @@ from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.bench.recording_drive import begins_at_rest
 from gateway.diagnosis.light_statistics import chi2_tail
 from gateway.diagnosis.measurement import Floats
-from gateway.diagnosis.model_fit.initial_state import with_start_of
+from gateway.diagnosis.model_fit.initial_state import with_known_rests, with_start_of
 from gateway.diagnosis.model_fit.levenberg_marquardt import Contest, FitProblem, FittedModel, refine
 from gateway.diagnosis.model_fit.normal_equations import block_sums
 from gateway.diagnosis.noise.whitening import Whitener
@@ -30,6 +30,7 @@ from gateway.diagnosis.search.candidates import (
 )
 
 MOST_REFINED: Final = 6  # effects; a wave of simulations serves all of them
+_MORE_BESIDE_A_HELD_START: Final = 4  # effects: beside a force that friction holds at first, promises mislead
 _RESAMPLES: Final = 500  # draws of blocks: a share of 95 % is then uncertain by 1 %
 _SURE_SHARE: Final = 0.95  # a name that wins this often stands alone
 _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
@@ -142,12 +143,14 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     found = competitors.columns or simulate_candidates(bench, fitted, competitors.effects, hints)
     promised = score_candidates(found, fitted, whiten)
     starts = _count_starts(found, hints)
-    best = best_scores(promised, competitors.most) if any(_is_hopeful(each, starts) for each in promised) else []
+    is_held = with_known_rests(bench, FitProblem(fitted.parameters, fitted.free)) is not None
+    most = competitors.most + (_MORE_BESIDE_A_HELD_START if is_held else 0)
+    best = best_scores(promised, most) if any(_is_hopeful(each, starts) for each in promised) else []
     problems = [FitProblem(each.parameters, joined_parameters(bench, fitted, each.candidate.form)) for each in best]
     if best:
         progress.report(f"refining {progress.few([each.candidate.effect.name for each in best])}")
     contest = Contest(incumbent.fitted.chi2) if incumbent else Contest()
-    refined = refine(bench, problems, whiten, _WAVES, contest)
+    refined = _refine_from_rests_too(bench, problems, whiten, contest)
     ranked = [
         refined_effect(bench, (score.candidate.effect, score.candidate.form), each, fitted, whiten)
         for score, each in zip(best, refined, strict=True)
@@ -155,6 +158,24 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     ranked += [replace(incumbent, incumbent_bonus=_incumbent_bonus(bench, incumbent))] if incumbent else []
     ranked.sort(key=lambda each: -each.penalised_gain)
     return ModelComparison(fitted, tuple(ranked), _winning_shares(ranked), hints, starts, tuple(promised))
+
+
+def _refine_from_rests_too(
+    bench: Bench, problems: Sequence[FitProblem], whiten: Whitener, contest: Contest
+) -> list[FittedModel]:
+    """Each problem at its optimum; where friction was found to hold a force in a rest at the beginning, the better one of that
+    and of a rest without.
+
+    Lost motion and a lost sign show nothing in a rest, as if a force were held there: the base model has taken that for the
+    start, and beside it they gain nothing.
+    """
+    rests = [with_known_rests(bench, each) for each in problems]
+    found = refine(bench, [*problems, *(each for each in rests if each)], whiten, _WAVES, contest)
+    others = iter(found[len(problems) :])
+    pairs = [
+        (each, *([next(others)] if rest else [])) for each, rest in zip(found[: len(problems)], rests, strict=True)
+    ]
+    return [min(pair, key=lambda each: each.chi2 + _PENALTY_PER_PARAMETER * len(each.free)) for pair in pairs]
 
 
 def _incumbent_bonus(bench: Bench, incumbent: RefinedEffect) -> float:

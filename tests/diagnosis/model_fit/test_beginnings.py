@@ -39,10 +39,10 @@ def test_a_quiet_recording_that_begins_amid_motion_is_quiet(beginning: str, seed
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("colour", "most"), [("white", 0), ("lorentzian", 1)])
-def test_no_beginning_is_a_cause(colour: str, most: int) -> None:
-    """Thirty recordings of each colour, the floor given for half of them. Half a minute of slow noise looks like a cause now
-    and then: measured on 66 of each colour, none white and two coloured (one of 63 where the first rows were left out)."""
+@pytest.mark.parametrize("colour", COLOURS)
+def test_no_beginning_is_a_cause(colour: str) -> None:
+    """Thirty recordings of each colour, the floor given for half of them. On 108 others of each colour one was named, a white
+    one: the ringing of a mass, which a replay leaves out, as slew-limit."""
     named = []
     for seed in range(10):
         for place, beginning in enumerate(BEGINNINGS):
@@ -50,4 +50,4 @@ def test_no_beginning_is_a_cause(colour: str, most: int) -> None:
                 options = Options(noise_floor_n=NOISE_N if (seed // 2 + place) % 2 else None)
                 found = diagnose([begun(beginning, seed, colour)], None, options)
                 named += [(beginning, seed, cause.name) for cause in found.causes]
-    assert len(named) <= most, named
+    assert named == []
