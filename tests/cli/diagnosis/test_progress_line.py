@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import gateway.diagnosis
@@ -143,7 +144,7 @@ def test_ctrl_c_while_files_are_written_leaves_none_and_a_later_one_all(
 @pytest.mark.parametrize("stage", ["preparing the simulation for this machine, once", "diagnosing, "])
 def test_ctrl_c_in_the_real_verb(stage: str, tmp_path: Path) -> None:
     """On a terminal, while loops are compiled and in the middle of the search; the line is gone afterwards."""
-    path = table(tmp_path / "run.csv", facts="")
+    path = long_table(tmp_path / "run.csv")
     ours, theirs = pty.openpty()
     command = [sys.executable, "-m", "gateway", "diagnose", path.name, "--report", "out.html", "--plan", "plan.yaml"]
     environment = os.environ | ({"NUMBA_CACHE_DIR": str(tmp_path / "kept")} if "once" in stage else {})
@@ -161,6 +162,18 @@ def test_ctrl_c_in_the_real_verb(stage: str, tmp_path: Path) -> None:
     assert "Traceback" not in said
     assert "\r\x1b[2K\r\nAborted!" in said
     assert {each.name for each in tmp_path.iterdir()} <= {path.name, "kept"}
+
+
+def long_table(path: Path) -> Path:
+    """A recording whose search is far from its end when it is first told of, after a second."""
+    rng = np.random.default_rng(1)
+    command_v = np.repeat(rng.uniform(0.5, 6.0, 300), 100)
+    force_n = 8.0 * command_v + 0.02 * command_v**3 + np.cumsum(rng.normal(0.0, 0.01, command_v.size))
+    columns = np.stack(
+        [np.arange(command_v.size) * 0.005, command_v, force_n + rng.normal(0.0, 0.1, force_n.size)], axis=1
+    )
+    np.savetxt(path, columns, fmt="%.4f", delimiter=",", header="time_s,command_v,force_n", comments="")
+    return path
 
 
 def read_until(descriptor: int, words: str) -> str:
