@@ -14,7 +14,7 @@ from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
 from gateway.recording.tables.column_mapping import EXAMPLE, join_names, quantity_of
-from gateway.recording.tables.columns import SENT
+from gateway.recording.tables.column_names import SENT
 from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
 from gateway.recording.tables.even_rows import resample_evenly
 from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality

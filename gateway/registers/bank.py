@@ -25,7 +25,7 @@ from gateway.modbus import Peer, RequestError, ServerId
 from gateway.modbus.bits import pack_bits
 from gateway.modbus.peer import NOBODY
 from gateway.registers.command import Command, Status
-from gateway.registers.identity import SERVER_ID, build_identity
+from gateway.registers.identity import build_identity, build_server_id
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.addresses import no_such_address
 from gateway.registers.map.register_map import Block, RegisterMap
@@ -91,7 +91,7 @@ class RegisterBank:
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
         is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
-        return ServerId(SERVER_ID, not is_fault, b" ".join(self.identity[number] for number in (0, 2, 6)))
+        return build_server_id(self.identity, is_running=not is_fault)
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Note the reason of what the framing has refused, as all others do."""

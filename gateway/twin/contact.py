@@ -2,7 +2,7 @@
 
 from gateway.twin.effects.contact import SLOW, SPINDLE
 from gateway.twin.effects.term import active_formulas
-from gateway.twin.lags import apply_play, follow_ramp, ramp_shares
+from gateway.twin.play_and_lags import apply_play, follow_ramp, ramp_shares
 from gateway.twin.sections import Contact
 from gateway.twin.surroundings import TwinConditions
 

@@ -12,7 +12,7 @@ from numpy.random import Generator
 from gateway.twin.effects.load_cell import TERMS, convert_reading, lose_sign
 from gateway.twin.effects.term import active_formulas, is_switched_on
 from gateway.twin.elementwise import Real
-from gateway.twin.lags import follow_ramp, ramp_shares
+from gateway.twin.play_and_lags import follow_ramp, ramp_shares
 from gateway.twin.sections import LoadCell
 from gateway.twin.surroundings import TwinConditions
 

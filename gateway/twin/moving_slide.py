@@ -1,8 +1,8 @@
 """The slide of the running twin: the step of slide.py with what changes while it moves - surface, side load, disturbance."""
 
 from gateway.defaults import UNLIMITED
-from gateway.twin.lags import follow_ramp, ramp_shares
 from gateway.twin.plant import Plant
+from gateway.twin.play_and_lags import follow_ramp, ramp_shares
 from gateway.twin.slide import SlideState, advance_slide, slide_of, with_gap, without_motion
 
 

@@ -18,7 +18,7 @@ from gateway.defaults import UNLIMITED
 from gateway.twin.effects.regulator import add_droop, add_hunting, apply_leak, bend_command
 from gateway.twin.effects.term import is_switched_on
 from gateway.twin.elementwise import Real, clip, quantise, smaller
-from gateway.twin.lags import apply_play
+from gateway.twin.play_and_lags import apply_play
 from gateway.twin.sections import Regulator
 
 

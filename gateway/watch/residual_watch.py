@@ -20,7 +20,7 @@ _FRESH_SHARE: Final = 0.6
 """Share of a window that must be younger than the last healthy one: half old and half new has a wrong name."""
 _ALL_ROWS: Final = 1 << 30
 _LONGEST_PAUSE_S: Final = 600.0  # between searches: a cause that has stood for long is looked at every ten minutes
-_WINDOWS_TO_BE_SURE: Final = 2
+_WINDOWS_BEFORE_PAUSES: Final = 2
 """Windows in a row that show the same cause, from which on the search pauses longer and longer: more add nothing."""
 TOLERANCE_SHARE: Final = 0.25
 """Share of the rig's band: a smaller change of the force does not matter to whoever holds it."""
@@ -121,6 +121,6 @@ class Watch:
         if finding.cause is ResidualCause.NONE:
             self._healthy_s = window.end_s
         self._filter.add(finding)
-        if self._filter.agreeing_windows > _WINDOWS_TO_BE_SURE:
-            pause_s = self._setup.every_s * 2.0 ** (self._filter.agreeing_windows - _WINDOWS_TO_BE_SURE)
+        if self._filter.agreeing_windows > _WINDOWS_BEFORE_PAUSES:
+            pause_s = self._setup.every_s * 2.0 ** (self._filter.agreeing_windows - _WINDOWS_BEFORE_PAUSES)
             self._search_s = self._clock() + min(_LONGEST_PAUSE_S, pause_s)

@@ -9,6 +9,8 @@ from typing import Final
 
 from gateway.registers.residual_cause import ResidualCause
 
+_WINDOWS_TO_AGREE: Final = 2
+"""Windows in a row that must show a cause before it is published, and the same one before it has a name."""
 _EXCITATION_TO_CLEAR: Final = (
     0.5  # share of the excitation of the window that named the cause, by which another may clear it
 )
@@ -38,25 +40,24 @@ class WarningFilter:
 
     published: WindowVerdict = NO_CHANGE
     agreeing_windows: int = 0
+    _showing_windows: int = 0
     _last: WindowVerdict = NO_CHANGE
 
     def add(self, finding: WindowVerdict) -> None:
-        """Take in the verdict of one window; `published` changes where two in a row agree or one clears it."""
+        """Take in the verdict of one window; `published` changes where enough in a row agree or one clears it."""
         if finding.cause is ResidualCause.NONE:
             self._clear_if_visible(finding)
             return
         last, self._last = self._last, finding
-        if last.cause is ResidualCause.NONE:
-            self.agreeing_windows = 1
-        elif finding.agrees_with(last):
-            self.agreeing_windows += 1
+        self._showing_windows += 1
+        self.agreeing_windows = self.agreeing_windows + 1 if finding.agrees_with(last) else 1
+        if self.agreeing_windows >= _WINDOWS_TO_AGREE:
             keeps = self.published.agrees_with(finding) and self.published.cause is not ResidualCause.UNKNOWN
             self.published = self.published if keeps else finding
-        else:
-            self.agreeing_windows = 1
-            if self.published.cause is ResidualCause.NONE:
-                self.published = WindowVerdict(ResidualCause.UNKNOWN, finding.sentence, finding.excitation_v)
+        elif self._showing_windows >= _WINDOWS_TO_AGREE and self.published.cause is ResidualCause.NONE:
+            self.published = WindowVerdict(ResidualCause.UNKNOWN, finding.sentence, finding.excitation_v)
 
     def _clear_if_visible(self, finding: WindowVerdict) -> None:
         if finding.excitation_v >= _EXCITATION_TO_CLEAR * self._last.excitation_v:
-            self.published, self._last, self.agreeing_windows = NO_CHANGE, NO_CHANGE, 0
+            self.published, self._last = NO_CHANGE, NO_CHANGE
+            self.agreeing_windows = self._showing_windows = 0

@@ -6,7 +6,7 @@ import pytest
 
 from gateway.recording import ColumnMapping, ColumnSource, RecordingError
 from gateway.recording.tables.column_mapping import quantity_of, select_columns
-from gateway.recording.tables.columns import CONTRACT, DERIVED
+from gateway.recording.tables.column_names import CONTRACT, DERIVED
 from gateway.recording.tables.mapping_file import column_mapping, read_mapping
 from gateway.twin.surroundings import COLUMNS
 from gateway.units import LINEAR, linear_conversion

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gateway.diagnosis.measurement import Measurement
 from gateway.recording import Recording, RecordingError, read_table
 from gateway.recording.measurement import measurement_of
-from gateway.recording.tables.columns import DERIVED
+from gateway.recording.tables.column_names import DERIVED
 from gateway.recording.tables.mapping_file import column_mapping
 from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality
 

@@ -1,6 +1,6 @@
 """C from a calibration: one header and one source, float32, for a controller that has no gateway beside it.
 
-The C text lies beside this file in c_templates, with ${...} where a calibration's numbers and names go; the inverse has a
+The C text lies beside this file in templates/, with ${...} where a calibration's numbers and names go; the inverse has a
 template per order (1, 2, above), the reversal one per policy (linear blend, slip stops). Decisions: coefficients are
 constants in the source, so that there is nothing to initialise; loops over a constant order and number of stops instead of
 unrolled formulas, so that order 15 stays readable; NaN is found by its bits, because -ffast-math deletes comparisons with

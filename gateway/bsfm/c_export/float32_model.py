@@ -1,8 +1,8 @@
 """The generated C, operation by operation, in numpy.float32: what tests compare it with bit for bit.
 
 Not a second curve for use in Python (gateway.bsfm.curve is faster and exact to 1e-11): it exists to prove the C and to
-measure, at export, how far float32 is from the double model. Each line here is a line of c_templates, in the same order
-of operations; change both or neither. It holds for compilers that round every operation to float32 (no fused
+measure, at export, how far float32 is from the double model. Each line here is a line of templates/, in the same order of
+operations; change both or neither. It holds for compilers that round every operation to float32 (no fused
 multiply-add, no x87).
 """
 

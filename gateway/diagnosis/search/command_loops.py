@@ -11,7 +11,7 @@ import numpy as np
 
 from gateway.compiled import loop, step
 from gateway.diagnosis.measurement import Floats
-from gateway.twin.lags import apply_play
+from gateway.twin.play_and_lags import apply_play
 
 _TURN = 2.0 * math.pi
 

@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from typing import Final
 
 from gateway.recording.errors import RecordingError
-from gateway.recording.tables.columns import CONTRACT
+from gateway.recording.tables.column_names import CONTRACT
 from gateway.units import LINEAR, linear_conversion
 
 EXAMPLE: Final = "--columns time_s=1:ms,command_v=2:mv,force_n=3:n"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gateway.bsfm.ladder.plan import LABELS
 from gateway.recording.tables.column_mapping import join_names
-from gateway.recording.tables.columns import CONTRACT, DERIVED, SENT
+from gateway.recording.tables.column_names import CONTRACT, DERIVED, SENT
 
 Floats = NDArray[np.float64]
 

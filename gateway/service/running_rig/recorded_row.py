@@ -8,7 +8,7 @@ this row.
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import Recorder
-from gateway.recording.tables.columns import DERIVED, SENT
+from gateway.recording.tables.column_names import DERIVED, SENT
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.units import kilopascal_from_pascal
 

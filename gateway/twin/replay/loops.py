@@ -5,7 +5,7 @@ Every loop fills its last argument. Series are contiguous, (points,); steps_s[i]
 
 from gateway.compiled import loop
 from gateway.twin.friction import age_stiction, relax_strain
-from gateway.twin.lags import apply_play, follow_ramp, ramp_shares
+from gateway.twin.play_and_lags import apply_play, follow_ramp, ramp_shares
 from gateway.twin.regulator import (
     HeldTarget,
     PressureLags,

@@ -6,7 +6,8 @@ Made for a search that tries hundreds of plants on one recording, so it differs 
       and rows at any times (the twin's second lag leads by half of its own step);
     - no noise; the null value of a random effect (repeats, outliers) is told apart by rows that the caller names.
 Work is shared: plants with equal regulators share a pressure, those with equal friction besides share a slide, within a
-call and between calls. The stages stand in replay_*.py: grid, regulator, slide (with play, elastic, measured), reading.
+call and between calls. The stages stand beside this file, each on the points of grid.py: regulator.py, slide.py, force.py,
+reading.py.
 The state before the first row is rest under the command `before_v`; what lags, friction and pad remember there may be given.
 """
 
