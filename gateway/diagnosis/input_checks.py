@@ -151,7 +151,7 @@ def _explanations(
                 yield fit.off(), Suspect(SWAPPED, "", column, 0.0, other=other)
     for column, quantity in (("force_n", "force"), ("command_v", "voltage"), ("pressure_kpa", "pressure")):
         own = column.rpartition("_")[2]
-        for unit in _UNITS[quantity]:
+        for unit in _other_units(quantity, own):
             factor = LINEAR[quantity][unit][0] / LINEAR[quantity][own][0]
             converted = _convert_column(measurement, column, factor)
             if converted is None or _beyond(converted, plant) or not _moves(converted, plant):
@@ -171,7 +171,7 @@ def _beside(measurement: Measurement, plant: Plant) -> Suspect | None:
         return None
     simulated_pa = Replay(drive_of(replace(measurement, position_m=None), "inferred")).run([plant]).pressure_pa[0]
     fit = _regression(simulated_pa, pressure_pa)
-    for unit in _UNITS["pressure"]:
+    for unit in _other_units("pressure", "kpa"):
         factor = LINEAR["pressure"][unit][0] / LINEAR["pressure"]["kpa"][0]
         if fit.alike > _ALIKE and fit.off(1.0 / factor) < _NEAR[False]:
             return Suspect(
@@ -181,12 +181,12 @@ def _beside(measurement: Measurement, plant: Plant) -> Suspect | None:
 
 
 _EXCHANGES: Final = (("command_v", "force_n"), ("pressure_kpa", "force_n"), ("command_v", "pressure_kpa"))
-_UNITS: Final = {
-    "force": ("kgf", "gf", "lbf", "mn", "kn"),
-    "voltage": ("mv", "percent"),
-    "pressure": ("pa", "bar", "mbar", "mpa", "psi"),
-}
 _COMMON: Final = ("kgf", "mn", "bar", "mv", "psi", "mpa", "pa")
+
+
+def _other_units(quantity: str, own: str) -> Iterator[str]:
+    """Every unit that a column may have been written in instead of its own."""
+    return (unit for unit in LINEAR[quantity] if unit != own)
 
 
 def _thin(measurement: Measurement) -> Measurement:

@@ -8,7 +8,8 @@ from gateway import VERSION, defaults
 from gateway.profiles import Rig
 
 _FORCE_N: Final = 12.0
-_USUAL_LEASE_S: Final = 0.15  # what `hold` keeps without knowing the lease
+_SHORTEST_KEPT_LEASE_S: Final = round(0.75 * defaults.LEASE_S, 3)
+"""`hold` keeps it without knowing the lease: it beats four times in the usual one, so three times in this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
         return (f"force-gateway monitor{where}        ({rig.network.owner} alone may command)",)
     force_n, lease_s = _force_to_try_n(rig), rig.control.supervision.lease_s
     if lease_s is not None or rig.network.require_byte_order_echo:
-        pace = "" if lease_s is None or lease_s >= _USUAL_LEASE_S else f" --rig {rig.file}"
+        pace = "" if lease_s is None or lease_s >= _SHORTEST_KEPT_LEASE_S else f" --rig {rig.file}"
         return (f"force-gateway hold {force_n:g}{where}{pace}        (enable, heartbeat; Ctrl-C ramps to 0)",)
     polled = f"{'' if unit == defaults.UNIT_ID else f' -a {unit}'} -p {port} -r 1 {host} 1 {round(100 * force_n)}"
     return (

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway import defaults
 from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import CliError
 from gateway.cli.options import Endpoint, gateway_options, json_option
+from gateway.units import format_ms
 
 if TYPE_CHECKING:
     from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
@@ -33,7 +35,12 @@ def _parse_time(context: click.Context, parameter: click.Parameter, text: str | 
 @click.argument("newton", type=float)
 @click.option("--for", "for_s", callback=_parse_time, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
 @click.option("--reset", "resets", is_flag=True, help="Reset a latched fault first.")
-@click.option("--rig", metavar="RIG", help="The rig that runs there; its lease sets the pace of the heartbeat.")
+@click.option(
+    "--rig",
+    metavar="RIG",
+    help="The rig that runs there; its lease sets the pace of the heartbeat. "
+    f"Where it is not known, {format_ms(defaults.LEASE_S)} is assumed.",
+)
 @gateway_options
 @json_option
 def command(
@@ -44,7 +51,7 @@ def command(
     Sets the force, enables, and keeps the heartbeat that a rig with a lease wants. A second Ctrl-C skips the ramp.
 
     The lease is read from a gateway on this machine (unless it runs with a --state of its own); for a remote one give
-    --rig, else 200 ms is assumed.
+    --rig.
 
     Example: force-gateway hold 12 --for 10s
     """

@@ -180,7 +180,8 @@ def check_real_rig(parts: Parts) -> Found:
     if parts.simulated:
         return
     if parts.supervision and parts.supervision.lease_s is None:
-        yield "supervision.lease_s", "there is no lease: when the master is lost, the last command lasts; 0.2 is usual"
+        observation = "there is no lease: when the master is lost, the last command lasts"
+        yield "supervision.lease_s", f"{observation}; {defaults.LEASE_S:g} is usual"
     if parts.calibration and parts.calibration.rig != parts.name:
         origin = f'was made on "{parts.calibration.rig}", not on {parts.name}'
         yield "calibration", f"{origin}: its forces are a guess until you run `force-gateway calibrate`"
