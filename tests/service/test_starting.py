@@ -62,6 +62,7 @@ def test_the_command_to_try_names_another_gateway() -> None:
     ("changes", "expected"),
     [
         ({}, "force-gateway hold 12        (enable"),
+        ({"lease_s": 0.15}, "force-gateway hold 12        (enable"),
         ({"lease_s": 0.05}, "force-gateway hold 12 --rig "),
     ],
 )
