@@ -27,6 +27,7 @@ _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
 _steps: Final[list[Callable[..., Any]]] = []
 _loops: Final[list[Callable[..., Any]]] = []
+_unregistered: Final[list[Callable[..., Any]]] = []  # steps that numba does not know yet
 _unkept: Final[set[Callable[..., Any]]] = set()
 _one_at_a_time: Final = Lock()
 _LINEAR_ALGEBRA: Final = ("scipy.linalg", "scipy.linalg.cython_blas")
@@ -37,6 +38,7 @@ PREPARING: Final = "preparing the simulation for this machine, once"
 def step(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
     """Let compiled loops call this function; for everybody else it stays the plain function that it is."""
     _steps.append(function)
+    _unregistered.append(function)
     return function
 
 
@@ -69,27 +71,26 @@ def _compile(function: Callable[_Parameters, _Result], is_kept: bool) -> Callabl
 
 @cache
 def _compiler_of(function: Callable[_Parameters, _Result], is_kept: bool) -> Callable[_Parameters, _Result]:
-    """Make it: what it compiles for the types of its arguments is kept on disk."""
-    numba, has_folder = _numba()
-    compiler = numba.njit(cache=is_kept and has_folder, nogil=True, error_model="numpy")
+    """Make it: what it compiles for the types of its arguments is kept on disk. All steps that it may call are known by now,
+    for its module has imported them; modules that come later bring more."""
+    numba, folder = _numba()
+    while _unregistered:
+        numba.extending.register_jitable(error_model="numpy")(_unregistered.pop())
+    if folder:
+        numba.config.CACHE_DIR = str(folder / f"compiled-{_fingerprint(len(_steps), len(_loops))}")
+    compiler = numba.njit(cache=is_kept and folder is not None, nogil=True, error_model="numpy")
     compiled: Callable[_Parameters, _Result] = compiler(function)
     return compiled
 
 
 @cache
-def _numba() -> tuple[Any, bool]:
-    """Return numba, with all steps made known to it, and whether there is a folder for what it compiles."""
+def _numba() -> tuple[Any, Path | None]:
+    """Return numba, and the folder of folders for what it compiles; None where there is none."""
     numba = _import_numba()
     from numba.core import event
-    from numba.extending import register_jitable
 
-    folder = find_folder(numba.config.CACHE_DIR, Path(__file__).parent)
-    if folder:
-        numba.config.CACHE_DIR = str(folder / f"compiled-{_fingerprint()}")
-    for function in _steps:
-        register_jitable(error_model="numpy")(function)
     _report_compilations(event)
-    return numba, folder is not None
+    return numba, find_folder(numba.config.CACHE_DIR, Path(__file__).parent)
 
 
 def _import_numba() -> Any:
@@ -99,7 +100,8 @@ def _import_numba() -> Any:
     try:
         sys.modules.update(dict.fromkeys(_LINEAR_ALGEBRA) if blocked else {})  # type: ignore[arg-type]  # None: not there
         numba = import_library("numba")
-        importlib.import_module("numba.np.arraymath")
+        for name in ("numba.np.arraymath", "numba.extending"):
+            importlib.import_module(name)
     finally:
         for name in _LINEAR_ALGEBRA if blocked else ():
             del sys.modules[name]
@@ -126,9 +128,11 @@ def _report_compilations(event: Any) -> None:
     event.register("numba:compile", Listener())
 
 
-def _fingerprint() -> str:
-    """Name the state of all steps and loops: the modules that they stand in, where a type that is renamed stands too, for what
-    is kept of it cannot be read under another name; and the numbers that steps have from elsewhere."""
+@cache
+def _fingerprint(steps: int, loops: int) -> str:
+    """Name the state of all steps and loops, of which there are so many by now: the modules that they stand in, where a type
+    that is renamed stands too, for what is kept of it cannot be read under another name; and the numbers that steps have from
+    elsewhere."""
     digest = hashlib.sha256()
     for name in sorted({function.__module__ for function in [*_steps, *_loops]}):
         digest.update(inspect.getsource(sys.modules[name]).encode())

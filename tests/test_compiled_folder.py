@@ -59,10 +59,10 @@ with progress.listen(print):
 """
 
 
-def run_with(package: Path, home: str) -> list[str]:
+def run_with(package: Path, home: str, script: str = RUN) -> list[str]:
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "XDG_CACHE"))}
     done = subprocess.run(
-        [sys.executable, "-c", RUN],
+        [sys.executable, "-c", script],
         cwd=package,
         env=environment | {"HOME": home, "PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
@@ -96,6 +96,30 @@ def test_what_another_version_has_compiled_is_left_alone(tmp_path: Path) -> None
     for name in ("Number", "Figure"):
         (tmp_path / "compiled_here.py").write_text(RENAMED.replace("Number", name))
         assert run_with(tmp_path, str(tmp_path))[-1] == "42.0"
+
+
+LATER = """
+from gateway.compiled import loop, step
+@step
+def thrice(value):
+    return 3.0 * value
+@loop
+def sixfold(value):
+    return 2.0 * thrice(value)
+"""
+
+
+def test_steps_of_a_module_that_comes_later_are_known_too_and_their_changes_seen(tmp_path: Path) -> None:
+    """numba does not look at what a loop calls: a step that has changed in another file must not run as it was."""
+    (copy_of_the_compiler(tmp_path) / "__pycache__").mkdir()
+    (tmp_path / "compiled_here.py").write_text(LOOP)
+    (tmp_path / "loop_later.py").write_text(
+        LATER.replace("def thrice", "def unused").replace("@loop", "from step_later import thrice\n@loop")
+    )
+    run = RUN + "from loop_later import sixfold\nprint(sixfold(7.0))\n"
+    for factor, expected in (("3.0", "42.0"), ("4.0", "56.0")):
+        (tmp_path / "step_later.py").write_text(LATER.partition("@loop")[0].replace("3.0", factor))
+        assert run_with(tmp_path, str(tmp_path), run)[-1] == expected
 
 
 def copy_of_the_compiler(folder: Path) -> Path:

@@ -33,7 +33,7 @@ def test_on_and_off_records_what_was_pressed(running):
     running.wait_until(lambda status: status["state"] == 3)
     assert "rows" in gateway_says("record", "off", "--state", state)
     rows = exported(state, 1)
-    assert len(rows) > 50
+    assert len(rows) > 20, "a step and its time in band at 100 Hz"
     assert {float(row["setpoint_n"]) for row in rows[-10:]} == {15.0}
     assert abs(float(rows[-1]["force_n"]) - 15.0) <= 1.0
     times_s = [float(row["time_s"]) for row in rows]
