@@ -251,8 +251,8 @@ class RegisterBank:
         self._commands.store(admitted.values, admitted.kept)
         self._admission.note_stored(admitted)
         self._settle_owner(admitted, write.host)
-        for name in self._commands.names(write.block, write.address, len(write.data) // 2):
-            self.last_writer[name] = peer, now_s
+        names = self._commands.names(write.block, write.address, len(write.data) // 2)
+        self.last_writer.update(dict.fromkeys(names, (peer, now_s)))
         self.command = admitted.command
         self.on_command(self.command)
         if self.on_accepted is not None:

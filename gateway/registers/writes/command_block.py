@@ -17,7 +17,7 @@ from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
-from gateway.registers.values import WordOrder, swap_words, words_swapped_from_little_endian
+from gateway.registers.values import WordOrder, swap_words
 from gateway.registers.words import ControlBit, Mode
 from gateway.registers.writes.command_field import CommandField, command_field
 
@@ -54,8 +54,6 @@ class CommandBlock:
         self._rules = rules
         self._first = block.first
         self._floats = [(b, b.repeats["command"]) for b in register_map.blocks if "command" in b.repeats]
-        self._words, self._high_first = _WORD_STRUCTS[block.words], _FLOAT_STRUCTS[block.words]
-        self._low_first = Struct(f"<{block.words}f")
 
     def allow_force(self, limits_n: Sequence[float], source: str) -> None:
         """Accept from now on setpoints of 0 or limits_n (lowest, highest), whose they are is told by source; forces up to the
@@ -117,7 +115,8 @@ class CommandBlock:
         for word in _WORD_STRUCTS[len(data) // 2].unpack(data):
             field = fields[offset]
             if field is not None:
-                candidate[offset] = field.of_word(word, self._first + offset)
+                if word or candidate[offset]:  # most are 0 and stay so
+                    candidate[offset] = field.of_word(word, self._first + offset)
             elif word:
                 raise reserved_word_refusal(self._first + offset, word)
             offset += 1
@@ -160,17 +159,18 @@ class CommandBlock:
     def store(self, candidate: Values, control_word: int) -> None:
         """Accept: from now on these are the values, in all three faces. control_word: without its edge bits."""
         candidate[CONTROL_WORD] = control_word
-        self.values = candidate
-        counts = [
-            round(value * count) & 0xFFFF if value else 0 for value, count in zip(candidate, self._counts, strict=True)
-        ]
-        data = self._image.data
-        self._words.pack_into(data, 2 * self._first, *counts)
+        before, self.values = self.values, candidate
+        for offset, value in enumerate(candidate):
+            if value != before[offset]:
+                self._show(offset, value)
+
+    def _show(self, offset: int, value: float) -> None:
+        count = round(value * self._counts[offset]) & 0xFFFF
+        self._image.write(self._first + offset, _WORD_STRUCTS[1].pack(count))
         for block, base in self._floats:
-            if block.word_order is WordOrder.ABCD:
-                self._high_first.pack_into(data, 2 * base, *candidate)
-            else:
-                self._image.write(base, words_swapped_from_little_endian(self._low_first.pack(*candidate)))
+            high_first = _FLOAT_STRUCTS[1].pack(value)
+            words = high_first if block.word_order is WordOrder.ABCD else swap_words(high_first)
+            self._image.write(base + 2 * offset, words)
 
     def command(self, values: Values, control_word: int, number: int, received_s: float, peer: str) -> Command:
         """Return these values in SI units. control_word: as written, edge bits included."""
