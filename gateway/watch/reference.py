@@ -17,7 +17,7 @@ import numpy as np
 
 from gateway.diagnosis import Diagnosis
 from gateway.diagnosis.bench.bench import bench_of
-from gateway.diagnosis.bench.recording_drive import replay_of
+from gateway.diagnosis.bench.recording_drive import replays_of
 from gateway.diagnosis.measurement import Floats, Measurement
 from gateway.diagnosis.model_fit.initial_state import fit_initial_states
 from gateway.twin.plant import Plant, with_value
@@ -82,7 +82,7 @@ def rms_of(measurement: Measurement, plant: Plant) -> float:
 
 def residuals(measurement: Measurement, plants: list[Plant]) -> Floats:
     """Return measured minus replayed at the judged rows; shape (plants, judged rows)."""
-    readings_n = replay_of(measurement, "inferred").run(plants).reading_n
+    readings_n = replays_of([measurement], "inferred")[0].run(plants).reading_n
     return np.asarray((measurement.force_n - readings_n)[:, measurement.usable])
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.bench.recording_drive import (
     begins_at_rest,
-    replay_of,
+    replays_of,
     rows_after_unseen_settings,
     settled_s,
 )
@@ -135,7 +135,7 @@ class Bench:
         return replace(
             self,
             measurements=tuple(measurements),
-            replays=tuple(replay_of(each, self.motion) for each in measurements),
+            replays=replays_of(measurements, self.motion),
         )
 
     def slope_n_per_s(self, simulated_n: Floats) -> Floats:
@@ -191,7 +191,7 @@ def bench_of(measurements: Sequence[Measurement], motion: Motion = "inferred") -
     return Bench(
         measurements=tuple(measurements),
         motion=motion,
-        replays=tuple(replay_of(each, motion) for each in measurements),
+        replays=replays_of(measurements, motion),
         channels=channels,
         raw_n=raw_n,
         usable=usable,

@@ -3,6 +3,7 @@
 The past before the first row is a parameter (initial_state.py). The coarse look that comes before any parameter is fitted is
 taken at rows that have forgotten it, and so is a fit to a measured motion."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.robust import noise_from_second_differences
+from gateway.twin.replay.cache import room_bytes_now, room_for_series
 from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Drive, Replay
 from gateway.twin.surroundings import COLUMNS, Surroundings
@@ -85,9 +87,11 @@ def begins_at_rest(measurement: Measurement) -> bool:
     return abs(float(np.mean(first) - np.mean(second))) < max(4.0 * error_n, slack_n) + 1.0e-9
 
 
-def replay_of(measurement: Measurement, motion: Motion) -> Replay:
-    """Return the twin over a recording; in steps as long as the rows where the reader has made them even."""
-    return Replay(drive_of(measurement, motion), measurement.even_s or None)
+def replays_of(measurements: Sequence[Measurement], motion: Motion) -> tuple[Replay, ...]:
+    """Return the twin over each recording; in steps as long as the rows where the reader has made them even. Several share the
+    room that one has for what it keeps."""
+    with room_for_series(room_bytes_now() // max(1, len(measurements))):
+        return tuple(Replay(drive_of(each, motion), each.even_s or None) for each in measurements)
 
 
 def drive_of(measurement: Measurement, motion: Motion) -> Drive:

@@ -25,12 +25,17 @@ def room_for_series(room_bytes: int) -> Iterator[None]:
         _room.reset(token)
 
 
+def room_bytes_now() -> int:
+    """Return how much each stage of a replay that is made now keeps at most."""
+    return _room.get() or ROOM_BYTES
+
+
 class Cache:
     """Series by what they depend on."""
 
     def __init__(self, room_bytes: int | None = None) -> None:
         self._kept: OrderedDict[Hashable, Floats] = OrderedDict()
-        self._room_bytes, self._bytes = room_bytes or _room.get() or ROOM_BYTES, 0
+        self._room_bytes, self._bytes = room_bytes or room_bytes_now(), 0
 
     def get(self, key: Hashable) -> Floats | None:
         """Return the series of a key; None where it is not kept (any more)."""
