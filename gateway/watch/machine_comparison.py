@@ -17,10 +17,8 @@ from gateway.registers.residual_cause import ResidualCause
 from gateway.twin.plant import Plant
 from gateway.watch.warning_filter import WindowVerdict
 from gateway.watch.window import Window
-from gateway.watch.window_verdict import plausible_name
+from gateway.watch.window_verdict import EXCESS_WITHOUT_A_NAME, describe_leftover, plausible_name
 
-_WITHOUT_A_NAME: Final = 2.0
-"""How many times as much must be off where no cause explains it: a busy machine delays samples by some milliseconds."""
 _OPTIONS: Final = Options(is_own=True)
 
 
@@ -60,8 +58,8 @@ class MachineComparison:
             cause, sentence = ResidualCause.of_effect(best.name), self._sentence(best, found)
             return WindowVerdict(cause, sentence, window.excitation_v, best.group)
         excess_n = self._excess_n(found.baseline.rms_n)
-        if excess_n >= _WITHOUT_A_NAME * self._least_n:
-            sentence = f"{self._differs(excess_n)}: {_describe_leftover(found)}"
+        if excess_n >= EXCESS_WITHOUT_A_NAME * self._least_n:
+            sentence = f"{self._differs(excess_n)}: {describe_leftover(found)}"
             return WindowVerdict(ResidualCause.UNKNOWN, sentence, window.excitation_v)
         return None if excess_n >= self._least_n else WindowVerdict(excitation_v=window.excitation_v)
 
@@ -85,13 +83,3 @@ class MachineComparison:
 def _saved_n(cause: Cause) -> float:
     """What it does to the force, N: what it saves in rows that its fit did not see."""
     return sqrt(max(cause.gain.held_out_rms_before_n**2 - cause.gain.held_out_rms_after_n**2, 0.0))
-
-
-def _describe_leftover(found: Diagnosis) -> str:
-    """Return what no change explains, in the words of the screen."""
-    if found.suspects:
-        return found.suspects[0].sentence
-    if not found.leftover:
-        return "no change of the catalogue explains it"
-    largest = max(found.leftover, key=lambda each: each.share)
-    return f"{largest.shape}, depending on {largest.depends_on}"

@@ -30,7 +30,7 @@ BASE: Final = {
     "gain": ("cylinder", "area_m2", "m2"),
 }
 """What the diagnosis fits anyway, by the name that a change of it has; a gain has none in the catalogue."""
-_WITHOUT_A_NAME: Final = 2.0
+EXCESS_WITHOUT_A_NAME: Final = 2.0
 """How many times as much must be off where no cause explains it: a busy machine delays samples by some milliseconds."""
 _OF_TWO_CLOCKS: Final = ("clock-offset", "clock-skew")
 
@@ -53,8 +53,8 @@ def judge_window(window: Window, diagnosis: Diagnosis, reference: WatchReference
         best = max(changes, key=lambda change: change.force_n)
         sentence = _sentence(best, diagnosis.plant, reference.plant)
         return WindowVerdict(ResidualCause.of_effect(best.name), sentence, window.excitation_v, best.others)
-    if excess_n >= _WITHOUT_A_NAME * least_n:
-        sentence = f"{_DIFFERS} {excess_n:.2f} N (rms): {_describe_leftover(diagnosis)}"
+    if excess_n >= EXCESS_WITHOUT_A_NAME * least_n:
+        sentence = f"{_DIFFERS} {excess_n:.2f} N (rms): {describe_leftover(diagnosis)}"
         return WindowVerdict(ResidualCause.UNKNOWN, sentence, window.excitation_v)
     return WindowVerdict(excitation_v=window.excitation_v)
 
@@ -67,12 +67,12 @@ def excess_of(window: Window, reference: WatchReference) -> float:
     return sqrt(max(rms_n**2 - max(noise_n, usual_n) ** 2, 0.0))
 
 
-def _describe_leftover(diagnosis: Diagnosis) -> str:
-    """Return what no effect explains, in the words of the screen."""
+def describe_leftover(diagnosis: Diagnosis) -> str:
+    """Return what no effect, or no change of one, explains, in the words of the screen."""
     if diagnosis.suspects:
         return diagnosis.suspects[0].sentence
     if not diagnosis.leftover:
-        return "no cause of the catalogue explains it"
+        return "nothing of the catalogue explains it"
     largest = max(diagnosis.leftover, key=lambda each: each.share)
     return f"{largest.shape}, depending on {largest.depends_on}"
 
