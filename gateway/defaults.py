@@ -27,6 +27,12 @@ PER_ADDRESS: Final = 4
 IDLE_S: Final = 60.0
 REQUESTS_PER_S: Final = 200.0
 
+TLS_PORT: Final = 802
+"""Modbus/TCP Security, as registered with IANA."""
+RTU_BAUD: Final = 19200
+RTU_PARITY: Final = "even"
+"""With 19200 baud what Modbus asks devices to come with ("MODBUS over Serial Line V1.02", section 2.5.1 and 3.3)."""
+
 OUTPUT_BAUD: Final = 9600
 CELL_BAUD: Final = 115200
 VOLTAGE_MAX_V: Final = 10.0

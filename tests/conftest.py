@@ -17,6 +17,24 @@ def pytest_configure(config: pytest.Config) -> None:
     """A shell's background job inherits an ignored SIGINT, and so would every process under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(GroupsStayTogether())
+    gc.disable()  # until all tests are collected, of which none is garbage
+    if hasattr(config, "workerinput") and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
+        config.args = places_from_another_one_on(config.workerinput)
+
+
+def places_from_another_one_on(worker: dict[str, Any]) -> list[str]:
+    """What is collected, from another place on in each worker: in a fresh checkout all of them compile every file that no
+    other has compiled yet, and they come to the same file at different times."""
+    places = [place for place in sorted(HERE.iterdir()) if place.is_dir() or place.name.startswith("test_")]
+    places = [place for place in places if place.name != "__pycache__"]
+    first = int(worker["workerid"].removeprefix("gw")) * len(places) // worker["workercount"]
+    return [str(place) for place in places[first:] + places[:first]]
+
+
+def pytest_collection_finish() -> None:
+    """The thousands of tests stay until the end: they are not walked through at each collection of garbage."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -24,6 +42,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--long", action="store_true", help="the same tests with a bigger budget: seeds, kills, fuzz, soak"
     )
 
+
+HERE = Path(__file__).parent
 
 BEHIND_REAL_TIME = 5
 """Nice value of the workers that run what waits for no clock."""
@@ -38,7 +58,7 @@ LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/
 SLOW = (
     "service/closed_loop/test_study.py",
     "service/fitting/test_interrupted_ladder.py",
-    "diagnosis/against/test_what_has_changed.py",
+    "diagnosis/changes/test_what_has_changed.py",
     "watch/test_watch_in_virtual_time.py",
     "paper/test_paper_report.py",
 )
@@ -103,7 +123,7 @@ class GroupsStayTogether:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if hasattr(config, "workerinput"):
-        items.sort(key=lambda item: begun_at(item.nodeid))  # stable: within a group nothing moves
+        items.sort(key=lambda item: (begun_at(item.nodeid), item.path))  # stable: within a file nothing moves
     if config.getoption("--long"):
         return
     skip = pytest.mark.skip(reason="needs the bigger budget: ./tools/test --long")

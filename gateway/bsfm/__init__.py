@@ -1,7 +1,7 @@
 """The method: rational Bezier branches from voltage to force, their inverse, what happens at reversals, and how to fit them.
 
 "The paper" in these modules is the one that presents the rational-Bezier-based state fitting method (BSFM) for calibrating
-a low-cost pneumatic constant-force system; README, "Beside the paper", and tools/paper say what of it is reproduced.
+a low-cost pneumatic constant-force system; README, "Compared with the paper", and tools/paper say what of it is reproduced.
 
 Public here, without numpy or scipy: the curve, the branches, the model and its calibration, the checks before activation.
 fit/, ladder/ and slip/ (but for its reversal policies) need numpy and are imported by their own names, never by control.

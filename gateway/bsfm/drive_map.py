@@ -4,7 +4,8 @@ A regulator whose command map bends makes its thrust of the bent command, and it
 way in volts is not 63 % of the way in newtons. The middle between a model's branches is the thrust but for the friction, away
 from the ends, where the branches meet. A parabola through three points of it tells the bow, and no more of it is believed: a
 push that is reckoned with too flat a map ends beyond its wish, and friction keeps the force there. It is scaled to volts by
-the mean slope, and goes on with that beyond the model's range, so that a wish that the range does not hold stays one.
+the mean slope, and goes on with that beyond the model's range, so that a wish that the range does not hold stays one. A map
+that is flatter at its upper end goes on as flat: pushes go there, and one reckoned with the mean slope falls short of its wish.
 """
 
 from bisect import bisect_right
@@ -15,9 +16,9 @@ from gateway.bsfm.model import Bsfm
 
 POINTS: Final = 32
 WITHIN: Final = (0.2, 0.5, 0.8)  # of the range: where the middle between the branches is the thrust
-FLATTEST: Final = 0.85  # of the mean slope, as far as a bow is believed: rather too steep a map than too flat a one
+FLATTEST: Final = 0.8  # of the mean slope, as far as a bow is believed: rather too steep a map than too flat a one
 STEEPEST: Final = 1.6
-BEYOND_V: Final = 1.0  # and on with the mean slope
+BEYOND_V: Final = 1.0  # with which it goes on beyond the range
 
 
 class DriveMap:
@@ -41,8 +42,12 @@ class DriveMap:
             away_v = 0.5 * (below_v + above_v) - (low_v + WITHIN[1] * range_v)
             slope = min(STEEPEST, max(FLATTEST, 1.0 + bend * away_v / self.n_per_v))
             self._linear.append(self._linear[-1] + slope * (above_v - below_v))
-        for places in (self._volts, self._linear):  # beyond the range
-            places[:0], places[len(places) :] = [places[0] - BEYOND_V], [places[-1] + BEYOND_V]
+        top_slope = (self._linear[-1] - self._linear[-2]) * POINTS / range_v
+        beyond = min(
+            1.0, top_slope
+        )  # a map that flattens goes on as flat, one that steepens no steeper than on average
+        self._volts = [low_v - BEYOND_V, *self._volts, high_v + BEYOND_V]
+        self._linear = [self._linear[0] - BEYOND_V, *self._linear, self._linear[-1] + beyond * BEYOND_V]
 
     def linear_v(self, volts: float) -> float:
         """Return the linearized volts of these, V."""

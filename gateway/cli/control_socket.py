@@ -1,6 +1,7 @@
 """Asks the running gateway on this machine something that Modbus has no register for: one JSON line, one answer."""
 
 import json
+import re
 import socket
 from pathlib import Path
 from typing import Any, Final
@@ -9,12 +10,13 @@ from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
 
 _TIMEOUT_S: Final = 2.0
+_HAS_CODE: Final = re.compile(r"E\d{3} ")
 _LONGEST_ANSWER: Final = 1 << 20
 
 
-def ask(state: Path, request: dict[str, Any]) -> dict[str, Any]:
+def ask(state: Path, request: dict[str, Any], socket_name: str = "control.sock") -> dict[str, Any]:
     """Return the answer of the gateway that runs on this state directory; CliError when there is none or it refuses."""
-    path = state / "control.sock"
+    path = state / socket_name
     try:
         answer = _exchange(path, json.dumps(request).encode() + b"\n")
     except PermissionError:
@@ -26,7 +28,8 @@ def ask(state: Path, request: dict[str, Any]) -> dict[str, Any]:
             exit_codes.DEVICE,
         ) from None
     if not answer.pop("ok", False):
-        raise CliError(f"E141 {answer.get('error', 'the gateway refused without a reason')}")
+        sentence = str(answer.get("error", "the gateway refused without a reason"))
+        raise CliError(sentence if _HAS_CODE.match(sentence) else f"E141 {sentence}")
     return answer
 
 

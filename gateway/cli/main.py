@@ -18,14 +18,18 @@ VERBS: Final = (
     "write",
     "hold",
     "calibrate",
+    "self-test",
     "fit",
     "registers",
+    "wiring",
     "check",
     "init",
     "ports",
     "schema",
     "explain",
     "events",
+    "audit",
+    "certs",
     "calibration",
     "plant",
     "upload",
@@ -33,6 +37,7 @@ VERBS: Final = (
     "recordings",
     "metrics",
     "diagnose",
+    "sim",
     "simulate",
     "effects",
     "backup",
@@ -57,7 +62,7 @@ class VerbGroup(click.Group):
         """Import a verb's module only when it is called."""
         if cmd_name not in VERBS:
             return None
-        command: click.Command = import_module(f"gateway.cli.verbs.{cmd_name}").command
+        command: click.Command = import_module(f"gateway.cli.verbs.{cmd_name.replace('-', '_')}").command
         return command
 
     def resolve_command(

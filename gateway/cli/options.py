@@ -4,15 +4,22 @@ from collections.abc import Callable, Sized
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, cast, get_args
 
 import click
 
 from gateway import defaults
 
+if TYPE_CHECKING:
+    from gateway.cli.master.wires import Wire
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 Endpoint = tuple[str, int]
 _LONGEST_NAME: Final = 60
+_LINE_OPTIONS: Final = ("baud", "parity", "stop_bits")
+_TLS_OPTIONS: Final = ("tls", "cert", "key")
+_FILE: Final = click.Path(path_type=Path, dir_okay=False)
+_PARITIES: Final = ("none", "even", "odd")  # gateway.devices.line_settings.Parity, without its imports
 DEFAULT_ENDPOINT: Final = f"{defaults.HOST}:{defaults.MODBUS_PORT}"
 
 
@@ -38,27 +45,116 @@ def _split(text: str) -> tuple[str, str]:
     return host, port
 
 
+def serial_port(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    """Return the path of a serial port, for an option's callback; empty where the option may stand alone."""
+    if value and not value.startswith("/"):
+        hint = "; RIG goes before --rtu" if context.info_name == "run" else ""
+        raise click.BadParameter(f"{value} is not the path of a port such as /dev/serial/by-id/...{hint}")
+    return value
+
+
+_WIRE_OPTIONS: Final = (
+    click.option(
+        "--unit", type=click.IntRange(0, 255), default=defaults.UNIT_ID, show_default=True, help="Modbus unit id."
+    ),
+    click.option("--stop-bits", type=click.Choice(["1", "2"]), help="Of the serial line  [default: 1]"),
+    click.option(
+        "--parity", type=click.Choice(_PARITIES), help=f"Of the serial line  [default: {defaults.RTU_PARITY}]"
+    ),
+    click.option("--baud", type=int, help=f"Of the serial line  [default: {defaults.RTU_BAUD}]"),
+    click.option("--key", type=_FILE, help="Of the client's certificate, PEM."),
+    click.option("--cert", type=_FILE, help="The client's certificate, PEM."),
+    click.option("--tls", type=_FILE, metavar="CA", help="By TLS: the CA of the gateway's certificate, PEM."),
+    click.option("--rtu", callback=serial_port, metavar="PORT", help="Modbus RTU on this serial port instead."),
+)
+
+
+def _gateway_option(default: str | None, gateway_help: str) -> Callable[[Any], Any]:
+    return click.option(
+        "--gateway",
+        "endpoint",
+        callback=endpoint,
+        metavar="HOST:PORT",
+        default=default,
+        show_default=default is not None,
+        help=gateway_help,
+    )
+
+
 def gateway_options(function: Function) -> Function:
-    """Add --gateway, --unit and --map: which server to speak to, and by which names."""
-    for option in (
-        click.option(
-            "--map", "map_name", default=defaults.REGISTER_MAP, metavar="NAME", help="Register map (name or file)."
-        ),
-        click.option(
-            "--unit", type=click.IntRange(0, 255), default=defaults.UNIT_ID, show_default=True, help="Modbus unit id."
-        ),
-        click.option(
-            "--gateway",
-            "endpoint",
-            callback=endpoint,
-            metavar="HOST:PORT",
-            default=DEFAULT_ENDPOINT,
-            show_default=True,
-            help="Where the gateway's Modbus TCP is.",
-        ),
-    ):
-        function = option(function)
-    return function
+    """Add --gateway, --rtu and what belongs to it, --unit and --map: which server to speak to, how, and by which names."""
+    option = click.option(
+        "--map", "map_name", default=defaults.REGISTER_MAP, metavar="NAME", help="Register map (name or file)."
+    )
+    return option(wire_options(DEFAULT_ENDPOINT, "Where the gateway's Modbus TCP is.")(function))
+
+
+def wire_options(default: str | None, gateway_help: str) -> Callable[[Function], Function]:
+    """Add --gateway, --rtu and its line, --tls and its files, --unit; the function receives `wire` and `unit`. default: of
+    --gateway; None: without any of them `wire` is None."""
+    options = (*_WIRE_OPTIONS, _gateway_option(default, gateway_help))
+
+    def add(function: Function) -> Function:
+        @wraps(function)
+        def with_wire(*, endpoint: Endpoint | None, rtu: str | None, unit: int, **others: Any) -> Any:
+            line = {name: others.pop(name) for name in _LINE_OPTIONS}
+            files = {name: others.pop(name) for name in _TLS_OPTIONS}
+            if any(files.values()):
+                wire: Wire | None = _tls_wire(endpoint, files, {"rtu": rtu, **line})
+            else:
+                wire = _wire(endpoint, rtu, unit, line)
+            return function(wire=wire, unit=unit, **others)
+
+        for option in options:
+            option(with_wire)
+        return cast("Function", with_wire)
+
+    return add
+
+
+def _wire(endpoint: Endpoint | None, rtu: str | None, unit: int, line: dict[str, Any]) -> "Wire | None":
+    """Return what the options lead to. UsageError where they do not fit together."""
+    from gateway.cli.master.wires import TcpWire
+
+    if rtu is None:
+        if given := [name for name, value in line.items() if value is not None]:
+            raise click.UsageError(f"--{given[0].replace('_', '-')} is of a serial line: give --rtu PORT too")
+        return TcpWire(*endpoint) if endpoint else None
+    if click.get_current_context().get_parameter_source("endpoint") is click.core.ParameterSource.COMMANDLINE:
+        raise click.UsageError("--gateway and --rtu are two ways to one gateway: give one of them")
+    return _rtu_wire(rtu, unit, line)
+
+
+def _tls_wire(endpoint: Endpoint | None, files: dict[str, Any], serial: dict[str, Any]) -> "Wire":
+    """Return Modbus/TCP Security; its port is 802 unless --gateway says another."""
+    from gateway.cli.master.tls_wire import TlsFiles, TlsWire
+
+    if missing := [name for name in _TLS_OPTIONS if files[name] is None]:
+        raise click.UsageError(f"--{missing[0]} is missing: TLS needs --tls CA, --cert FILE and --key FILE together")
+    if given := [name for name, value in serial.items() if value is not None]:
+        raise click.UsageError(
+            f"--{given[0].replace('_', '-')} is of a serial line, --tls of a network: give one of them"
+        )
+    is_given = click.get_current_context().get_parameter_source("endpoint") is click.core.ParameterSource.COMMANDLINE
+    host, port = endpoint if endpoint and is_given else (defaults.HOST, defaults.TLS_PORT)
+    return TlsWire(host, port, TlsFiles(files["tls"], files["cert"], files["key"]))
+
+
+def _rtu_wire(path: str, unit: int, line: dict[str, Any]) -> "Wire":
+    from gateway.cli.master.wires import RtuWire
+    from gateway.devices.line_settings import Baud, Parity, SerialSettings
+    from gateway.modbus.rtu import LARGEST_UNIT
+
+    if not 1 <= unit <= LARGEST_UNIT:
+        why = "0 is the broadcast, which nobody answers" if unit == 0 else f"{unit} is reserved"
+        raise click.UsageError(f"--unit: a server on a serial line has 1 to {LARGEST_UNIT}; {why}")
+    baud, bauds = line["baud"] or defaults.RTU_BAUD, get_args(Baud)
+    if baud not in bauds:
+        near = min(bauds, key=lambda one: abs(one - baud))
+        raise click.UsageError(f"--baud: {baud} is no speed of serial lines; did you mean {near}?")
+    parity = cast("Parity", line["parity"] or defaults.RTU_PARITY)
+    stop_bits: Literal[1, 2] = 2 if line["stop_bits"] == "2" else 1
+    return RtuWire(path, SerialSettings(baud=cast("Baud", baud), parity=parity, stop_bits=stop_bits))
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,9 +23,24 @@ def _rig(rig: "Rig") -> dict[str, str]:
         "rig": f"{rig.name}: {rig.description}" + (" (simulated)" if rig.simulated else ""),
         "output": f"{rig.output.device.name}, {rig.output.baud} baud, {rig.output.port or 'simulated'}",
         "load_cell": f"{rig.load_cell.device.name}, {rig.load_cell.baud} baud, {rig.load_cell.port or 'simulated'}",
+        **(
+            {"valve": f"{rig.valve.device.name}, {rig.valve.baud} baud, {rig.valve.port or 'simulated'}"}
+            if rig.valve
+            else {}
+        ),
         "calibration": f"{rig.calibration.name}, {rig.calibration.kind}",
         "limits": f"0 .. {limits.force_max_n:g} N, {limits.voltage_min_v:g} .. {limits.voltage_max_v:g} V",
-        "modbus tcp": f"{rig.network.bind}:{rig.network.port}",
+        "modbus tcp": f"{rig.network.bind}:{rig.network.port}" if rig.network.plain else "off (network.plain: false)",
+        **{
+            f"serial:{place}": f"modbus rtu, {face.port or 'pseudo-terminal'}, {face.settings}, unit {face.unit}"
+            for place, face in enumerate(rig.fieldbus, start=1)
+            if face.type == "rtu"
+        },
+        **{
+            f"fieldbus[{place}]": f"modbus tls, {face.bind}:{face.port}, {face.certificate}"
+            for place, face in enumerate(rig.fieldbus)
+            if face.type == "tls"
+        },
         "fingerprint": rig.fingerprint[:16],
     }
 

@@ -83,6 +83,30 @@ ALARMS: Final = (
         "take more.",
     ),
     Explanation(
+        "A351",
+        "audit not stored",
+        "The record of writes could not be put on the disk. It is kept in memory, 2 000 records at most; control goes on.",
+        "A full or read-only disk; what is lost beyond that is counted in the audit itself once the disk takes it again.",
+        "df -h of the state directory; free some space. force-gateway audit verify afterwards.",
+        is_warning=True,
+    ),
+    Explanation(
+        "A352",
+        "audit was altered",
+        "At its start the gateway found the end of its record of writes removed or changed. It goes on behind that place.",
+        "Somebody edited or deleted lines, restored an older copy of part of the directory, or the disk lost what it had kept.",
+        "force-gateway audit verify names the first place; compare with a backup, and find out who may write there.",
+        is_warning=True,
+    ),
+    Explanation(
+        "A354",
+        "self-test item failed",
+        "An item of a self-test is so far off that this machine should not press; the line has the numbers and the bounds.",
+        "noise, resolution, zero, cell_line: cell, amplifier or cable. sign, scale: wiring, unit or span. response, "
+        "leak: air. output_line: the regulator's cable.",
+        "Fix what the line names, then run the self-test again. Control itself refuses nothing because of it.",
+    ),
+    Explanation(
         "A346",
         "residual watch ended",
         "The process that compares measurements with the rig's plant died; the fourth time it stays off. Control "

@@ -1,8 +1,10 @@
-"""E: something around the gateway is not as it should be: ports, network, files. The verb that met it has ended."""
+"""E: something around the gateway is not as it should be: ports, files. The verb that met it has ended.
+
+Those between masters and a gateway are in face_errors.
+"""
 
 from typing import Final
 
-from gateway import defaults
 from gateway.codes.explanation import Explanation
 
 ERRORS: Final = (
@@ -64,40 +66,60 @@ ERRORS: Final = (
         "Check its power light, then swap RX and TX (pins 2 and 3); then look for `stream` in its menu.",
     ),
     Explanation(
-        "E120",
-        "the Modbus port needs a right",
-        "Listening on a port below 1024 (Modbus' own is 502) was refused.",
-        "Linux gives these ports to programs with the capability net_bind_service only.",
-        f"Use --bind HOST:{defaults.MODBUS_PORT}, or run it as a service with AmbientCapabilities=CAP_NET_BIND_SERVICE.",
+        "E112",
+        "nothing that is known answered the probe",
+        "Each profile's harmless questions were put at each usual speed, and no answer made sense.",
+        "No power, crossed wires, another address or parity than in the profile, or a device that no profile describes.",
+        "Read what was heard, if anything; set address and parity as the device has them; your own device: profiles/README.md.",
     ),
     Explanation(
-        "E121",
-        "the Modbus port cannot be opened",
-        "Listening on the wanted address failed.",
-        "Another program (an earlier gateway?) listens there, or the address is not one of this machine.",
-        "ss -ltnp shows who listens; --bind 127.0.0.1:0 takes any free port.",
+        "E113",
+        "another device answered than the rig names",
+        "The probe was answered, at another speed or in the words of another profile than the rig file says.",
+        "Two adapters exchanged, a device that is set to another speed, or a copied rig file.",
+        "Put what answered into the rig file, or exchange the two ports; then probe again.",
     ),
     Explanation(
-        "E122",
-        "an open address without an allow-list",
-        "The gateway is to listen on an address that others can reach, and nobody said who may connect.",
-        "`bind:` was changed and `allow:` was not; plain Modbus has no password, so the list is the only door.",
-        "Put the robot's network under network.allow in the rig file, e.g. 192.168.125.0/24.",
+        "E114",
+        "nothing to probe",
+        "check --probe asks the devices of a rig, or those behind a port; this file has neither.",
+        "A simulated rig, or a file of another kind.",
+        "Name a real rig's file; force-gateway ports --listen PORT listens at any port.",
     ),
     Explanation(
-        "E130",
-        "no gateway there",
-        "Nothing accepted the connection.",
-        "The gateway is not running, listens on another address or port, or a firewall is between.",
-        "Compare --gateway with the `modbus tcp` line of the gateway's banner.",
+        "E132",
+        "no such thing can be set on a simulated rig",
+        "`force-gateway sim` was given a name that is neither a fault, nor something around the tool, nor an effect.",
+        "A slip of the pen, or a parameter that this effect does not have.",
+        "force-gateway sim list --all shows every name with its unit and bounds.",
     ),
     Explanation(
-        "E131",
-        "connected, but no Modbus answer",
-        "The connection was accepted, and no answer came within a second, or one that is not Modbus.",
-        "Another program listens there, the allow-list of the gateway closes your connection, or its unit id is "
-        "another.",
-        "Check port and --unit; the rig's network.allow must contain this machine's address.",
+        "E133",
+        "a simulated rig does not take this value",
+        "The name is known; the value is not of its kind, out of range, or of a part that this rig does not have.",
+        "A word where a number is wanted, a number beyond the bounds in the message, or a valve fault on a rig without one.",
+        "Give a value within the bounds that the message names; on and off for a fault.",
+    ),
+    Explanation(
+        "E134",
+        "not a simulated rig",
+        "Faults and effects were to be set on a rig whose devices are real.",
+        "The running gateway drives the real machine, or --state or --rig names another gateway than you meant.",
+        "Rehearse beside it: force-gateway run RIG --sim --state DIR, and the same --state DIR for sim.",
+    ),
+    Explanation(
+        "E135",
+        "the simulated rig's process does not answer",
+        "Control answered, but not rig.sock in the state directory; the audit holds what was asked, and it may not be set.",
+        "The simulated rig's process has just died and is being started again, or it has ended for good (A409).",
+        "Wait a second and repeat; force-gateway events shows whether it came back.",
+    ),
+    Explanation(
+        "E136",
+        "no machine has such a plant",
+        "With the effects that were to be set the simulation does not come to a finite force; nothing was changed.",
+        "Several effects at the ends of their ranges, which no machine has together.",
+        "Set smaller values, or one effect after the other; sim clear begins anew.",
     ),
     Explanation(
         "E140",
@@ -144,12 +166,26 @@ ERRORS: Final = (
         "pip install 'force-gateway[analysis]' into the environment of the gateway; 250 MB more. CSV needs no extra.",
     ),
     Explanation(
+        "E170",
+        "audit does not hold",
+        "The chain of hashes over the record of writes breaks at the named line: it was altered, or one is missing.",
+        "Somebody changed, removed or moved a line; a power cut leaves at most an incomplete last line, which is told apart.",
+        "Compare the file with a backup (force-gateway backup packs it); what stands before that line still holds.",
+    ),
+    Explanation(
         "E180",
         "the gateway was lost while a force was held",
         "The connection to the gateway broke and could not be had again while a lease may run.",
         "The gateway was stopped, its machine went down, or the network between is broken.",
         "Look at the tool first: a rig with a lease has let go, one without may still press. Then read the "
         "gateway's log.",
+    ),
+    Explanation(
+        "E185",
+        "the map lacks registers that a client needs",
+        "A client for a robot or PLC is made from the register map, and names registers that this map does not have.",
+        "A map of your own in which registers were renamed or left out.",
+        "Take the missing ones over from profiles/registers/force-v1.yaml, or make the client from force-v1.",
     ),
     Explanation(
         "E402",

@@ -190,3 +190,54 @@ class FaultCode(IntEnum):
             "stall_s.",
         ),
     )
+    VALVE_SILENT = (
+        17,
+        Explanation(
+            "A355",
+            "the valve's device is silent",
+            "The relay that switches push and pull did not answer within valve.timeout_s, or its port went away.",
+            "No power, a cable, a wrong baud rate or address.",
+            "Check power, cable and address of the relay, then reset with setpoint 0.",
+        ),
+    )
+    VALVE_ALTERED = (
+        18,
+        Explanation(
+            "A356",
+            "the valve stands elsewhere",
+            "The relay reads back another direction than it was told, longer than valve.timeout_s.",
+            "Somebody else writes the relay, it was switched by hand, or it has lost power and come back.",
+            "Take the other master off the relay; the reset tells it its direction again.",
+        ),
+    )
+    WATCHDOG_TRIPPED = (
+        20,
+        Explanation(
+            "A332",
+            "the output device's own watchdog has tripped",
+            "The device heard nothing from here for its watchdog's time; it stands at its own safe value and obeys no setting.",
+            "The gateway or its machine stopped without an orderly end, or the wire to the device was cut.",
+            "Find out what stopped, look at the tool, then reset: the reset clears the device's watchdog and arms it again.",
+        ),
+    )
+    # the identity query of the device's profile got another answer
+    WRONG_DEVICE = (
+        21,
+        Explanation(
+            "A333",
+            "another device than the rig names",
+            "The device was asked what it is, and its profile is not for what it said; nothing but the safe voltage goes out.",
+            "Two adapters are exchanged, or the rig file names another profile, or another address, than the device has.",
+            "Compare what it says with `models` in its profile; force-gateway check RIG --probe asks every port.",
+        ),
+    )
+    WATCHDOG_NOT_ARMED = (
+        22,
+        Explanation(
+            "A334",
+            "the output device's watchdog cannot be armed",
+            "Arming was refused, or read back otherwise, three times; the device would hold its voltage without this machine.",
+            "Firmware that counts another tick, a time that it does not take, or a module without this command.",
+            "Set output.watchdog_s or watchdog_tick_s, then reset; or accept_no_device_watchdog: true, with an air dump valve.",
+        ),
+    )

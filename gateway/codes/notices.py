@@ -42,6 +42,70 @@ NOTICES: Final = (
         "Set a finer resolution, a faster rate or a weaker filter on the amplifier; or frozen_equal_samples in the rig file.",
     ),
     Explanation(
+        "W235",
+        "noise on a master's serial line",
+        "Bytes on a Modbus RTU face were no request: damaged ones, or what a line picks up. They were left out, at most once a "
+        "minute a line tells how many.",
+        "No termination or bias resistors on the RS-485 line, A and B swapped, its cable beside motors, two masters at once.",
+        "120 ohm at both ends of the line, bias at one, a twisted pair with ground; requests that came whole were answered.",
+    ),
+    Explanation(
+        "W236",
+        "no request can be read on a serial line",
+        "Bytes come in on a Modbus RTU face, and none of them make a request.",
+        "The master's baud, parity or stop bits are not the face's, A and B are swapped, or it speaks another protocol.",
+        "Set baud, parity and stop_bits of the face (fieldbus in the rig file) as they are in the master, such as 19200 8E1.",
+    ),
+    Explanation(
+        "W240",
+        "certificate of a client not accepted",
+        "A client connected by TLS without a certificate, with one of another CA, or did not accept the gateway's.",
+        "The CA in the rig file is not the one that signed it, or the client does not know the gateway's CA.",
+        "Make the client's certificate with the same CA: force-gateway certs DIR --client NAME:ROLE.",
+    ),
+    Explanation(
+        "W241",
+        "certificate of a client outside its days",
+        "A client's certificate has expired or is not yet valid; its connection was closed.",
+        "It is old, or a clock is wrong: this machine's, or that of the machine which made it.",
+        "date shows the clock; make the client a new certificate.",
+    ),
+    Explanation(
+        "W242",
+        "certificate without a known role",
+        "A client's certificate carries no role, or one that there is not; its connection was closed.",
+        "It was made without the extension 1.3.6.1.4.1.50316.802.1 (UTF8String: monitor, setpoint, calibration or admin).",
+        "Make it with force-gateway certs --client NAME:ROLE, or add the extension in your own CA.",
+    ),
+    Explanation(
+        "W243",
+        "TLS handshake not finished",
+        "A client did not finish its handshake in 5 s, or too many began at a time; it was cut.",
+        "A port scanner, a plain Modbus client that waits for an answer, or a very slow network.",
+        "Look at what runs at the address in the line; `allow` of the face keeps others out.",
+    ),
+    Explanation(
+        "W244",
+        "no TLS 1.2 or 1.3",
+        "A client spoke something else than TLS on the TLS port, or a version that is not accepted any more.",
+        "Plain Modbus TCP or a browser on the wrong port, or a client that knows TLS 1.0 and 1.1 only.",
+        "Choose Modbus/TCP Security in the client, or connect it to the plain port where the rig has one.",
+    ),
+    Explanation(
+        "W245",
+        "revoked certificate",
+        "A client showed a certificate whose serial number the rig file lists under `revoked`.",
+        "A device that was to be shut out is still connected somewhere, or somebody uses its files.",
+        "Find the machine at the address in the line; give it another certificate if it may connect after all.",
+    ),
+    Explanation(
+        "W246",
+        "server certificate is about to expire",
+        "The gateway's own certificate ends within 30 days; after that no client connects by TLS.",
+        "Certificates are made for a limited time.",
+        "Make a new one with the same CA, put it into the rig file and start anew; clients keep theirs.",
+    ),
+    Explanation(
         "W304",
         "force at the safe voltage",
         "The output is at the safe voltage and the load cell still measures a force.",
@@ -56,12 +120,27 @@ NOTICES: Final = (
         "Command a force that the calibration allows, or take the one before: calibration rollback.",
     ),
     Explanation(
+        "W316",
+        "self-test item warned",
+        "An item of a self-test is off its usual value, though not so far that the machine should not press; the line has "
+        "the numbers.",
+        "Wear, a drift since the calibration, a noisy cable, or other work on the machine while it was tested.",
+        "Look at the item the line names before it fails; calibrate again where the machine was changed.",
+    ),
+    Explanation(
         "W330",
         "a set without slip stops",
         "A commit had the length 140: the form of map version 1, which carries a linear blend and no measured "
         "response.",
         "A master's program that was written for map version 1. The set is in use as it was sent.",
         "Send the whole set, length 190: force-gateway upload FILE --print-frames shows how.",
+    ),
+    Explanation(
+        "W332",
+        "slow USB adapter",
+        "The adapter of a serial port waits up to 16 ms before it hands over what it received, and may not be set here.",
+        "An FTDI adapter as it comes; its latency timer may be written by root alone.",
+        "The message has the line that sets it to 1 ms; a udev rule makes it last.",
     ),
     Explanation(
         "W336",

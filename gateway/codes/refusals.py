@@ -138,8 +138,8 @@ class RefusalReason(IntEnum):
             "W211",
             "role too low",
             "A write to a block that this connection's role may not write.",
-            "Coefficients come over plain TCP only where the rig allows it.",
-            "Set network.allow_plain_upload in the rig file, or leave the upload to who may.",
+            "Coefficients come over plain TCP and RTU only where the rig allows it; by TLS the certificate names the role.",
+            "Set network.allow_plain_upload in the rig file, or connect with a certificate of the role that the line names.",
         ),
     )
     FAULT_LATCHED = (
@@ -205,8 +205,8 @@ class RefusalReason(IntEnum):
             "W217",
             "not supported by this rig",
             "A control bit that the rig does not support.",
-            "Valve, calibration ladder and self-test need hardware or a later version.",
-            "Leave the bit 0; `force-gateway registers` names the bits.",
+            "The rig file has no `self_test:` for bit 6, no `valve:` for bit 4, or nobody has named the bit yet.",
+            "Leave the bit 0, or give the rig what is behind it; `force-gateway registers` names the bits.",
         ),
     )
     BYTE_ORDER_UNPROVEN = (
@@ -320,10 +320,10 @@ class RefusalReason(IntEnum):
         Explanation(
             "W310",
             "busy: a calibration runs",
-            "A command came while a calibration or an experiment has the output (state calibrating).",
-            "What bit 5 or somebody at the gateway's machine has begun is not done; calibration_time_left says how "
+            "A command came while a calibration, an experiment or a self-test has the output (state calibrating).",
+            "What bit 5 or 6 or somebody at the gateway's machine has begun is not done; calibration_time_left says how "
             "long.",
-            "Wait for state off, or end the run: control_word 0 (clearing bit 5 alone takes the force to 0 along "
+            "Wait for state off, or end the run: control_word 0 (clearing bit 5 or 6 alone takes the force to 0 along "
             "the ramp).",
         ),
     )
@@ -339,16 +339,16 @@ class RefusalReason(IntEnum):
             "Wait until calibration_phase is stored or refused.",
         ),
     )
-    # bit 5 was kept at 1 beyond the end of the run that it began
+    # bit 5 or 6 was kept at 1 beyond the end of the run that it began
     CALIBRATION_HELD = (
         28,
         modbus.DEVICE_FAILURE,
         Explanation(
             "W313",
-            "bit 5 was held at 1",
-            "A run has ended, and the master that writes control_word in cycles still holds bit 5.",
+            "bit 5 or 6 was held at 1",
+            "A run has ended, and the master that writes control_word in cycles still holds the bit that began it.",
             "Another run would begin by itself, and the next after it.",
-            "Write control_word with bit 5 as 0 once; the next 1 begins a run.",
+            "Write control_word with the bit as 0 once; the next 1 begins a run.",
         ),
     )
     # the force is on its way to 0, and then the output is off
@@ -372,6 +372,53 @@ class RefusalReason(IntEnum):
             "slot_select named a slot that no commit has filled. The active set stays.",
             "Slots count from 0, and are filled by commits with that target_slot, on this gateway's state directory.",
             "force-gateway calibration list shows which slots are filled; upload the set with --slot.",
+        ),
+    )
+    # the state or the rig forbids it
+    SELF_TEST_REFUSED = (
+        31,
+        modbus.DEVICE_FAILURE,
+        Explanation(
+            "W306",
+            "self-test refused",
+            "A self-test was asked for (control_word bit 6, or self-test) and not begun; the force stays.",
+            "The output is enabled with a force, a setpoint is not 0, a fault is latched, or a calibration was asked for "
+            "in the same write.",
+            "Write control_word 0 and force_setpoint 0 (and reset a fault), wait for state off, then ask again.",
+        ),
+    )
+    # bit 4, or a run, where the valve cannot follow now
+    VALVE_REFUSED = (
+        32,
+        modbus.DEVICE_FAILURE,
+        Explanation(
+            "W307",
+            "the valve cannot follow",
+            "Bit 4 was written while a fault is latched, or a calibration or self-test asked for while the valve pulls.",
+            "The master repeats its command, or the rig's valve.safe is pull.",
+            "Reset the fault first; calibrate and self-test pushing: bit 4 0, enable, wait for bit 8 of status_word to fall.",
+        ),
+    )
+    VALVE_UNKNOWN = (
+        33,
+        modbus.TARGET_SILENT,
+        Explanation(
+            "W308",
+            "nobody knows where the valve stands",
+            "Enable was asked for before the valve's relay has read its direction back.",
+            "No power, a cable, a wrong baud rate or address of the relay.",
+            "Check the relay's power, cable and address.",
+        ),
+    )
+    PULL_RANGE = (
+        34,
+        modbus.ILLEGAL_VALUE,
+        Explanation(
+            "W309",
+            "more than pulling can do",
+            "force_setpoint with bit 4 is larger than the model of pulling reaches.",
+            "The rod takes a part of the piston's area: the same pressure pulls less than it pushes.",
+            "Command at most the force that the line names.",
         ),
     )
     UNIT = (

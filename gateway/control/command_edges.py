@@ -9,9 +9,9 @@ from gateway.control.limits import NotFiniteError, narrow_limits
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.lease import Lease
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit
+from gateway.registers.words import RUN_BITS, ControlBit
 
-_ENABLE, _CALIBRATE = int(ControlBit.ENABLE), int(ControlBit.START_CALIBRATION)
+_ENABLE = int(ControlBit.ENABLE)
 _MOMENTARY: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 
 
@@ -37,6 +37,12 @@ class CommandTracker:
         self._lease = Lease(settings.supervision.lease_s)
         self._settings = self._rig_settings = settings
         self._adopt_heartbeat = False
+        self._direction = 1.0
+
+    def turn(self, direction: float) -> None:
+        """Count forces along the tool's axis the other way (-1: it pulls): the payload's weight changes its sign."""
+        self._direction = direction
+        self._update_demand()
 
     def use(self, model: Bsfm) -> None:
         """Hold to the force limits of this calibration, too: the demand of the last command may become a smaller one."""
@@ -57,7 +63,7 @@ class CommandTracker:
         if command.number == self.command.number:
             word &= ~_MOMENTARY  # the bank's own change of a command that has acted
         rises, falls = word & ~self._word, self._word & ~word
-        return Edges(rises, falls, command.stops or bool(falls & _ENABLE and not rises & _CALIBRATE))
+        return Edges(rises, falls, command.stops or bool(falls & _ENABLE and not rises & RUN_BITS))
 
     def take(self, now_s: float, command: Command) -> Edges:
         """Take this as the command from now on; none of its edges act twice."""
@@ -80,7 +86,10 @@ class CommandTracker:
 
     def _update_demand(self) -> None:
         try:
-            self.demand, self.not_finite = demand_of(self.command, self._settings), ""
+            demand = demand_of(self.command, self._settings)
+            if self._direction < 0.0:
+                demand = replace(demand, gravity_n=-demand.gravity_n)
+            self.demand, self.not_finite = demand, ""
         except NotFiniteError as error:
             self.not_finite = str(error)
 

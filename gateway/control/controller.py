@@ -8,6 +8,7 @@ taken and comes all the same is an internal error: the safe voltage and a latche
 The controller asks its own parts and none of theirs: commands, conditioner, faults, contact, loop, run, machine.
 """
 
+from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
@@ -21,19 +22,23 @@ from gateway.control.messages import master_lost_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time
+from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.control.transitions import ControllerParts, Transitions
+from gateway.control.valve.turning import Turning
+from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import RUN_BITS, ControlBit, State
 from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
-_CALIBRATE, _RUNNING = int(ControlBit.START_CALIBRATION), State.CALIBRATING
+_CALIBRATE, _SELF_TEST = int(ControlBit.START_CALIBRATION), int(ControlBit.START_SELF_TEST)
+_PULL, _RUNNING = int(ControlBit.VALVE_PULL), State.CALIBRATING
 
 
 class Controller:
@@ -46,8 +51,12 @@ class Controller:
         *,
         unclean_restart: bool = False,
         compensation: Compensation = NO_COMPENSATION,
+        pull_model: Bsfm | None = None,
     ) -> None:
+        """pull_model: measured, in place of the one that follows from the calibration."""
         model = calibration.model
+        self._calibration = calibration
+        self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
         self._compensation, self._outside_n = compensation, 0.0
@@ -55,11 +64,13 @@ class Controller:
         self._commands = CommandTracker(settings)
         self._commands.use(model)
         self.active_run = ActiveRun(settings, model)
+        self._inform_runs(calibration)
         self._loop = ForceLoop(settings, model, compensation.timing)
         self._faults = FaultDetector(settings)
         self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
-        self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run)
+        self._turning = Turning(self._valve, self._commands, self._conditioner, pull_model)
+        self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self._most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
         self._reading = NO_READING
@@ -68,7 +79,7 @@ class Controller:
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
         self._readiness = Readiness(parts, self._machine)
-        self._composer = OutputComposer(parts, self._machine, self._readiness)
+        self._composer = OutputComposer(parts, self._machine, self._readiness, self._valve)
 
     # -- for the service
 
@@ -94,11 +105,28 @@ class Controller:
     def use(self, calibration: CalibrationInUse) -> None:
         """Swap the calibration; while enabled the voltage difference fades instead of jumping, and a force above the new
         set's limits is left by the ramp. What was measured with it sets the pace from now on."""
-        self._loop.use(calibration.model, self._given_n, timing_of(calibration.response, self._rig_settings))
-        self.active_run.use(calibration.model)
-        self._commands.use(calibration.model)
+        self._calibration = calibration
+        self._use_model()
+        self._inform_runs(calibration)
         self._faults.expect_noise(calibration.noise_n)
         self.calibration_id = calibration.number
+
+    def _use_model(self) -> None:
+        """Calculate with the calibration in use: its own model, or that of pulling."""
+        model, timed = (
+            self._turning.model_of(self._calibration),
+            timing_of(self._calibration.response, self._rig_settings),
+        )
+        self._loop.use(model, self._given_n, timed)
+        self._commands.use(model)
+
+    def _most_pull_n(self) -> float:
+        return self._turning.model_of_pull(self._calibration).force_range_n[1]
+
+    def _inform_runs(self, calibration: CalibrationInUse) -> None:
+        timed = timing_of(calibration.response, self._rig_settings)
+        lag_s = timed.supervision.response_lag_s
+        self.active_run.use(calibration.model, timed.timing, calibration.noise_n, lag_s)
 
     @property
     def can_compensate_anew(self) -> bool:
@@ -121,7 +149,8 @@ class Controller:
     def refusal_of(self, now_s: float, proposal: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
         is_busy = self._machine.state is _RUNNING or self._machine.is_ramping_down or self._machine.is_stopping
-        if not is_busy and not self._commands.edges_of(proposal.command).rises:
+        asks_pull = self._valve is not None and proposal.command.control_word & _PULL
+        if not is_busy and not asks_pull and not self._commands.edges_of(proposal.command).rises:
             return None  # most writes: a setpoint, a heartbeat
         return self._edge_check.refusal(proposal, self._situation(now_s, line))
 
@@ -154,6 +183,8 @@ class Controller:
         self._outside_n = self._compensation.outside_n(command.tilt_angle_rad, line.feed_mm_s)
         self._sense(now_s, sample, line)
         self._obey(now_s, edges)
+        if self._valve is not None and self._turning.follow(now_s, line.valve, self._machine):
+            self._use_model()
         if self._machine.is_enabled:
             self._supervise(now_s, line)
         if self._machine.is_enabled:
@@ -186,8 +217,9 @@ class Controller:
         """What the bank has let through, in the order in which it was judged."""
         if edges.stops and self._machine.is_enabled:
             self._machine.disable(f"disabled by {self._commands.who}")
-        elif edges.falls & _CALIBRATE and self.active_run.running:
-            self._machine.end_run(f"calibration stopped by {self._commands.who}", self._given_n)
+        elif edges.falls & RUN_BITS and self.active_run.running:
+            stopped = f"{self.active_run.kind} stopped by {self._commands.who}"
+            self._machine.end_run(stopped, self._given_n)
         if edges.rises & _RESET:
             self._machine.reset()
         if edges.rises & _TARE:
@@ -196,6 +228,8 @@ class Controller:
             self._machine.enable(now_s)
         if edges.rises & _CALIBRATE:
             self._machine.begin_run(now_s, CalibrationPlan(), self._commands.who)
+        if edges.rises & _SELF_TEST:
+            self._machine.begin_run(now_s, SelfTestPlan(), self._commands.who)
         self._obey_this_machine(now_s)
         self._machine.is_ramping_down = self._machine.is_ramping_down or self._machine.is_stopping
 
@@ -220,6 +254,8 @@ class Controller:
         name = self._commands.not_finite
         cause = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
         cause = cause or self._faults.first_cause(now_s, self._reading, line, self._loop.compute_expected_rise)
+        if self._valve and line.valve is not None:
+            cause = cause or self._valve.first_cause(now_s)
         if cause:
             self._machine.fail(now_s, cause)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
@@ -236,11 +272,12 @@ class Controller:
     def _target(self) -> Demand:
         """What to go for now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
         demand = self._commands.demand
-        return ramp_down_demand(demand, self._settings) if self._machine.is_ramping_down else demand
+        is_to_zero = self._machine.is_ramping_down or (self._valve is not None and self._valve.is_switching)
+        return ramp_down_demand(demand, self._settings) if is_to_zero else demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
         if self._machine.state is _RUNNING:
-            if not self.active_run.running or self._step_run(now_s):
+            if not self.active_run.running or self._step_run(now_s, self._line):
                 self._follow(now_s, self._loop.descend(self._target(), dt_s, self._given_n))
             return
         inputs = self._inputs(now_s, dt_s)
@@ -250,12 +287,12 @@ class Controller:
             self._one_shot.unreachable_event(self._loop, measured_n, inputs), self._one_shot.hunting_event(self._loop)
         )
 
-    def _step_run(self, now_s: float) -> bool:
+    def _step_run(self, now_s: float, line: LineStatus) -> bool:
         """One step of the run; True when it has just ended, and the ramp down begins."""
         if self._machine.is_ramping_down:
-            self._machine.end_run("calibration stopped: ramping down", self._given_n)
+            self._machine.end_run(f"{self.active_run.kind} stopped: ramping down", self._given_n)
             return True
-        stop = self.active_run.step(now_s, self._reading, self._loop)
+        stop = self.active_run.step(now_s, self._reading, self._loop, line)
         self._machine.tell(self.active_run.take_message())
         if stop is None:
             self._machine.fire(StateEvent.MOVE)

@@ -12,11 +12,13 @@ from gateway.control.inputs import LineStatus, Output
 from gateway.control.messages import fault_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.transitions import ControllerParts, Transitions
+from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 
 _ENABLED, _READY, _CONTACT, _IN_BAND = 1, 2, 4, 8  # StatusBit as plain integers: an IntFlag operation costs 0.5 us
 _FAULT, _WARNING, _LIMITED, _UNREACHABLE = 16, 32, 64, 128
-_STATUS_WORDS: Final = tuple(StatusBit(word) for word in range(256))
+_PULLING, _SWITCHING = 256, 512
+_STATUS_WORDS: Final = tuple(StatusBit(word) for word in range(1024))
 _RESTARTED, _MASTER_LOST = WarningBit.RESTARTED.value, WarningBit.MASTER_LOST.value
 _TARGET_UNREACHABLE, _TRIM_SATURATED = WarningBit.TARGET_UNREACHABLE.value, WarningBit.TRIM_SATURATED.value
 _warning_word = lru_cache(WarningBit)  # to make a flag of an integer costs as much as all of its bits
@@ -41,8 +43,10 @@ def safe_output(fault: FaultCode, safe_voltage_v: float = 0.0) -> Output:
 class OutputComposer:
     """Reads the parts of control and changes nothing of them."""
 
-    def __init__(self, parts: ControllerParts, machine: Transitions, readiness: Readiness) -> None:
-        self._parts, self._machine, self._readiness = parts, machine, readiness
+    def __init__(
+        self, parts: ControllerParts, machine: Transitions, readiness: Readiness, valve: ValveSwitch | None = None
+    ) -> None:
+        self._parts, self._machine, self._readiness, self._valve = parts, machine, readiness, valve
 
     def compose(self, now_s: float, reading: Reading, line: LineStatus, touching: bool, outside_n: float) -> Output:
         """Return the answer of a step. outside_n: contact force that neither slide nor payload gives.
@@ -63,11 +67,11 @@ class OutputComposer:
             self._status(touching, is_ready=not block, is_warning=bool(warnings)),
             machine.fault,
             _warning_word(warnings),
-            force_measured_n=reading.contact_n if believed else nan,
+            force_measured_n=self._as_read(reading.contact_n) if believed else nan,
             force_requested_n=command.force_requested_n,
             force_accepted_n=self._accepted_n if is_force else 0.0,
             force_applied_n=loop.applied_n if is_force else 0.0,
-            model_residual_n=reading.cell_n - (loop.expected_n + outside_n) if believed else nan,
+            model_residual_n=self._as_read(reading.cell_n - (loop.expected_n + outside_n)) if believed else nan,
             sample_age_s=reading.age_s,
             heartbeat_echo=command.heartbeat,
             sequence_echo=command.command_sequence,
@@ -75,10 +79,16 @@ class OutputComposer:
             calibration_progress=run.progress,
             calibration_time_left_s=run.eta_s,
             enable_block=block,
+            valve=self._valve.order if self._valve else None,
             clear_command=outcome.clear_command,
+            resets_device=outcome.resets_device,
             release_owner=outcome.release_owner,
             events=tuple(outcome.events),
         )
+
+    def _as_read(self, force_n: float) -> float:
+        """A force as the load cell shows it: negative where the tool pulls, for control calculates with positive ones."""
+        return -force_n if self._valve and self._valve.is_pulling else force_n
 
     @property
     def _accepted_n(self) -> float:
@@ -99,6 +109,8 @@ class OutputComposer:
             | (_WARNING if is_warning else 0)
             | (_LIMITED if loop.limited_by is not _NOT_LIMITED else 0)
             | (_UNREACHABLE if loop.unreachable else 0)
+            | (_PULLING if self._valve and self._valve.is_pulling else 0)
+            | (_SWITCHING if self._valve and self._valve.is_switching else 0)
         ]
 
     def _warnings(self, word: int) -> int:

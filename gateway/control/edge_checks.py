@@ -6,8 +6,9 @@ A stop alone is never refused. While a run has the output, or the force is on it
 heartbeat, a takeover, and the end of the run.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Final
 
 from gateway.codes.refusals import RefusalReason
@@ -16,14 +17,22 @@ from gateway.control.inputs import LineStatus
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading, SampleConditioner
+from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.state_table import ENABLED_STATES
+from gateway.control.supervision.fault_detection import line_words
 from gateway.control.transitions import ControllerParts, Transitions
+from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
-_CALIBRATE, _TAKE = int(ControlBit.START_CALIBRATION), int(ControlBit.TAKE_OWNERSHIP)
+_TAKE = int(ControlBit.TAKE_OWNERSHIP)
+_NAMES: Final = {
+    ControlBit.ENABLE: "enable",
+    ControlBit.START_CALIBRATION: "calibration",
+    ControlBit.START_SELF_TEST: "self-test",
+}
 _WHOLE: Final = ControlBit(0)
 _OFF: Final = State.OFF
 _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
@@ -35,7 +44,8 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 @dataclass(frozen=True, slots=True)
 class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
-    machine, where that is the cause of it; expected_n: force that the voltages of late still make, by the model;
+    machine, where that is the cause of it; line_fault: what the output line reports, with its code;
+    expected_n: force that the voltages of late still make, by the model;
     ramps_down: the force goes to 0, and then the output off."""
 
     now_s: float
@@ -44,6 +54,7 @@ class Situation:
     reading: Reading
     block: RefusalReason
     excuse: str
+    line_fault: str
     voltage_v: float
     applied_n: float
     expected_n: float
@@ -72,6 +83,7 @@ class Readiness:
             reading=reading,
             block=block,
             excuse=self._parts.faults.excuse(block, now_s, reading, line),
+            line_fault=f"{line.fault.code} {line_words(line)}" if line.fault else "",
             voltage_v=loop.voltage_v,
             applied_n=loop.applied_n,
             expected_n=loop.compute_expected_rise(),
@@ -87,10 +99,18 @@ class Readiness:
 class EdgeCheck:
     """Answers for the controller; changes nothing of what it is given."""
 
-    def __init__(self, commands: CommandTracker, conditioner: SampleConditioner, active_run: ActiveRun) -> None:
+    def __init__(
+        self,
+        commands: CommandTracker,
+        conditioner: SampleConditioner,
+        active_run: ActiveRun,
+        valve: ValveSwitch | None = None,
+        most_pull_n: Callable[[], float] = lambda: inf,
+    ) -> None:
         self._commands = commands
         self._conditioner = conditioner
         self._active_run = active_run
+        self._valve, self._most_pull_n = valve, most_pull_n
 
     def refusal(self, proposal: ProposedWrite, at: Situation) -> EdgeRefusal | None:
         """Return why this write cannot be taken now; None takes it."""
@@ -102,13 +122,13 @@ class EdgeCheck:
     def of_run(self, plan: AnyPlan, at: Situation) -> EdgeRefusal | None:
         """Return why a run cannot begin now, for whoever asks; None begins it."""
         if at.state is State.CALIBRATING:
-            return _no_run(RefusalReason.CALIBRATING, self._running())
+            return _no_run(RefusalReason.CALIBRATING, self._running(), plan)
         if self._active_run.is_busy:
             why = "the last ladder is being fitted: wait until calibration_phase is stored or refused"
-            return _no_run(RefusalReason.FITTING, why)
+            return _no_run(RefusalReason.FITTING, why, plan)
         if why := self._forbids_run(plan, at):
-            return _no_run(RefusalReason.CALIBRATION_REFUSED, why)
-        if at.state is State.OFF and (blocked := _refuse_blocked(at, ControlBit.START_CALIBRATION)):
+            return _no_run(_reason_of(plan), why, plan)
+        if at.state is State.OFF and (blocked := _refuse_blocked(at, _bit_of(plan))):
             return blocked
         return self._tare(self._commands.command, at.state, at) if plan.tare else None
 
@@ -140,6 +160,7 @@ class EdgeCheck:
 
     def _refusals(self, command: Command, edges: Edges, at: Situation) -> Iterator[EdgeRefusal]:
         state = State.OFF if edges.stops and at.state in ENABLED_STATES else at.state
+        yield from _some(self._pull(command, edges, at))
         if edges.rises & _RESET:
             yield from _some(self._reset(command, at))
             state = State.OFF
@@ -147,11 +168,27 @@ class EdgeCheck:
             yield from _some(self._tare(command, state, at))
         if edges.rises & _ENABLE and state not in ENABLED_STATES:
             yield from _some(_refuse_blocked(_in(state, at), ControlBit.ENABLE))
-        if edges.rises & _CALIBRATE:
-            yield from _some(self.of_run(CalibrationPlan(), _in(state, at)))
+        plans = [plan for plan in (CalibrationPlan(), SelfTestPlan()) if edges.rises & _bit_of(plan)]
+        for plan in plans:
+            yield from _some(self.of_run(plan, _in(state, at)))
             if held := _setpoints(command):
-                why = f"{' and '.join(held)}: a run begins with setpoint 0"
-                yield _no_run(RefusalReason.CALIBRATION_REFUSED, why)
+                yield _no_run(_reason_of(plan), f"{' and '.join(held)}: a run begins with setpoint 0", plan)
+        if len(plans) > 1:
+            yield _no_run(
+                _reason_of(plans[-1]), "a calibration is asked for in the same write: one at a time", plans[-1]
+            )
+
+    def _pull(self, command: Command, edges: Edges, at: Situation) -> EdgeRefusal | None:
+        if self._valve is None or edges.stops or not command.control_word & ControlBit.VALVE_PULL:
+            return None
+        bit = ControlBit.VALVE_PULL
+        if at.state is State.FAULT and edges.rises & bit and not edges.rises & _RESET:
+            return EdgeRefusal(RefusalReason.VALVE_REFUSED, bit, "valve refused: a fault is latched, reset it first")
+        most_n = self._most_pull_n()
+        if command.force_setpoint_n > most_n:
+            text = f"force_setpoint {command.force_setpoint_n:.2f} N with valve_pull: pulling reaches {most_n:.1f} N"
+            return EdgeRefusal(RefusalReason.PULL_RANGE, bit, text)
+        return None
 
     def _reset(self, command: Command, at: Situation) -> EdgeRefusal | None:
         if at.state in ENABLED_STATES:
@@ -188,6 +225,8 @@ class EdgeCheck:
             return f"state {at.state.name}, {begins}"
         if at.state is State.READY and at.applied_n > 0.0:
             return f"state READY with {at.applied_n:.1f} N applied, {begins}"
+        if self._valve is not None and (self._valve.is_pulling or self._valve.is_switching):
+            return "the valve pulls or is switching: a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
         try:
             self._active_run.build(plan)
         except ValueError as error:
@@ -204,18 +243,33 @@ def _refuse_blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
     reason = RefusalReason.FAULT_LATCHED if at.state is State.FAULT else at.block
     if not reason:
         return None
-    what = "enable" if bit is ControlBit.ENABLE else "calibration"
+    what = _NAMES[bit]
     late = f"a device was not heard in time; {at.excuse}" if at.excuse and reason is at.block else ""
-    return EdgeRefusal(reason, bit, f"{what} refused: {late or reason.explanation.sentence}")
+    line_fault = at.line_fault if reason is RefusalReason.OUTPUT_FAULT else ""
+    return EdgeRefusal(reason, bit, f"{what} refused: {late or line_fault or reason.explanation.sentence}")
 
 
-def _no_run(reason: RefusalReason, why: str) -> EdgeRefusal:
-    return EdgeRefusal(reason, ControlBit.START_CALIBRATION, f"calibration refused: {why}")
+def _no_run(reason: RefusalReason, why: str, plan: AnyPlan) -> EdgeRefusal:
+    bit = _bit_of(plan)
+    return EdgeRefusal(reason, bit, f"{_NAMES[bit]} refused: {why}")
+
+
+def _bit_of(plan: AnyPlan) -> ControlBit:
+    return ControlBit.START_SELF_TEST if isinstance(plan, SelfTestPlan) else ControlBit.START_CALIBRATION
+
+
+def _reason_of(plan: AnyPlan) -> RefusalReason:
+    is_self_test = isinstance(plan, SelfTestPlan)
+    return RefusalReason.SELF_TEST_REFUSED if is_self_test else RefusalReason.CALIBRATION_REFUSED
 
 
 def _list_held(command: Command) -> list[str]:
     """What a reset would let loose."""
-    bits = ((ControlBit.ENABLE, "enable is 1"), (ControlBit.START_CALIBRATION, "start_calibration is 1"))
+    bits = (
+        (ControlBit.ENABLE, "enable is 1"),
+        (ControlBit.START_CALIBRATION, "start_calibration is 1"),
+        (ControlBit.START_SELF_TEST, "start_self_test is 1"),
+    )
     return [words for bit, words in bits if command.control_word & bit] + _setpoints(command)
 
 

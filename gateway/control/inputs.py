@@ -11,6 +11,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control.blame_for_silence import NOT_HELD, Held
 from gateway.control.sample_conditioning import Reading
+from gateway.devices.valve_profile import ValveDirection
 from gateway.registers.words import LimitedBy, State, StatusBit
 
 _NO_WARNING: Final = WarningBit(0)
@@ -28,23 +29,49 @@ class CalibrationInUse:
     noise_n: float = 0.0
 
 
+@dataclass(slots=True)
+class WireCounts:
+    """Counts of one serial line since the start. asked: questions that went out, 0 of a device that talks by itself; heard:
+    answers or messages understood; garbled: what could not be read."""
+
+    asked: int = 0
+    heard: int = 0
+    garbled: int = 0
+
+    def since(self, before: "WireCounts") -> "WireCounts":
+        """Return what has been counted since then."""
+        return WireCounts(self.asked - before.asked, self.heard - before.heard, self.garbled - before.garbled)
+
+
+class ValveStatus(NamedTuple):
+    """What the valve's line knows. stands: direction by the last readback, None before the first; unanswered_since_s: time of
+    the oldest question without an answer, None if all are answered; lost: its port is away."""
+
+    stands: ValveDirection | None = None
+    unanswered_since_s: float | None = None
+    lost: bool = False
+
+
 class LineStatus(NamedTuple):
     """What the output line and the process know, at the time of a step.
 
     acknowledged_v: voltage that the device confirmed last, None before the first; sent_v: voltage that went out last on the
     wire, which carries one at a time, None where nobody knows; wire_s: how long one setting keeps it, nan if not known;
     unanswered_since_s: monotonic time of the
-    oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered, lost);
+    oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered, lost),
+    said: in the device's own words, where it has said something to it;
     pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning master's last
     connection has closed; late_s: how late this step runs; waited_s: so much of it the process could have run and was not
     let, None where the machine does not count that; cell_held, output_held: what kept us from hearing a
     device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under the tool, for
-    compensation; nan: nobody knows.
+    compensation; nan: nobody knows. output_counts, cell_counts: of the two lines, growing; None where nobody counts. valve: of
+    the directional valve, None on a rig without one.
     """
 
     acknowledged_v: float | None = None
     unanswered_since_s: float | None = None
     fault: FaultCode = FaultCode.NONE
+    said: str = ""
     cell_lost: bool = False
     pressure_pa: float = nan
     pressure_pa_per_v: float = nan
@@ -58,6 +85,9 @@ class LineStatus(NamedTuple):
     wire_s: float = nan
     cell_held: Held = NOT_HELD
     output_held: Held = NOT_HELD
+    output_counts: WireCounts | None = None
+    cell_counts: WireCounts | None = None
+    valve: ValveStatus | None = None
 
 
 class LoopInputs(NamedTuple):
@@ -96,6 +126,8 @@ class Output(NamedTuple):
     calibration_progress: float = 0.0
     calibration_time_left_s: float = 0.0
     enable_block: RefusalReason = RefusalReason.NONE  # why an enable would be refused now
+    valve: ValveDirection | None = None  # what the valve's device is to be told; None: nothing, or no valve
     clear_command: bool = False  # service: bank.clear_command(): the output went off
+    resets_device: bool = False  # service: clear what the output device has latched: somebody has reset
     release_owner: bool = False  # service: bank.release_owner(): the lease is over
     events: tuple[str, ...] = ()  # sentences for the log, each starting with its code where it has one

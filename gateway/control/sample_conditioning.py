@@ -38,7 +38,8 @@ def at_time(reading: Reading, later_s: float, supervision: Supervision) -> Readi
 
 
 class SampleConditioner:
-    """Turns samples into readings; a sample given twice is not new the second time."""
+    """Turns samples into readings; a sample given twice is not new the second time. direction: -1 where the tool pulls, so that
+    a pull is a positive force in all that follows."""
 
     def __init__(self, supervision: Supervision, cell: CellMap | None = None) -> None:
         """cell: its known defects; None: the reading is the force."""
@@ -47,6 +48,7 @@ class SampleConditioner:
         self._saturation_n = supervision.saturation_n
         self._timeout_s = supervision.sample_timeout_s
         self._last_s = nan
+        self.direction = 1.0
 
     def use(self, cell: CellMap | None) -> None:
         """Take other defects of the cell. The tare stays the force that was zero then; recent samples are no zero any more."""
@@ -72,7 +74,7 @@ class SampleConditioner:
         if interval_s > 0.0 and usable:
             self._zero.observe(force_n)
         age_s = max(0.0, now_s - sample.time_s)
-        cell_n = force_n - self._zero.zero_n if usable else nan
+        cell_n = self.direction * (force_n - self._zero.zero_n) if usable else nan
         fresh = age_s <= self._timeout_s
         return Reading(
             cell_n, cell_n + gravity_n, age_s, interval_s, interval_s > 0.0, fresh, usable, overload, sample.force_n

@@ -108,6 +108,34 @@ class Supervision:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SelfTestSettings:
+    """What the self-test (control_word bit 6) may do."""
+
+    __pydantic_config__ = STRICT
+    force_n: Annotated[float, Ge(0), Le(300)] = 5.0  # largest force, as the load cell feels it; 0: nothing moves
+    zero_n: Annotated[float, Gt(0), Le(20)] = 1.0  # rest force beyond what friction keeps that fails; half of it warns
+
+
+class SafeDirection(StrEnum):
+    """Where the valve goes while the output is off: after a start, a disable, a fault."""
+
+    PUSH = "push"
+    PULL = "pull"
+    KEEP = "keep"  # where it is
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveControl:
+    """How the directional valve (control_word bit 4) is switched, and what pulling is calculated with."""
+
+    __pydantic_config__ = STRICT
+    dwell_s: Annotated[float, Ge(0), Le(10)] = 0.3  # without pressure before it switches, and after its readback
+    timeout_s: Annotated[float, Gt(0), Le(5)] = 0.5  # for its answer and its readback, then a fault
+    safe: SafeDirection = SafeDirection.PUSH  # while the output is off: push, pull, or keep where it is
+    pull_area_share: Annotated[float, Gt(0), Le(1)] = 0.75  # of the piston that the rod leaves free: 1 - (rod / bore)^2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ControlSettings:
     """All that a rig file says about control, and the timing that a calibration has measured."""
 
@@ -117,4 +145,6 @@ class ControlSettings:
     supervision: Supervision = Supervision()
     lead: LeadSettings = LeadSettings()
     response: ResponseSource = ResponseSource.MEASURED
+    self_test: SelfTestSettings | None = None  # None: the rig offers none
+    valve: ValveControl | None = None  # None: the rig has none
     timing: LoopTiming | None = None  # of the calibration in use, None where nothing was measured or the rig file rules

@@ -36,11 +36,12 @@ class StepOutcome:
     events: list[str] = field(default_factory=list)
     clear_command: bool = False
     release_owner: bool = False
+    resets_device: bool = False
 
     @property
     def is_empty(self) -> bool:
         """Decide whether there is nothing to say and nothing to do."""
-        return not (self.events or self.clear_command or self.release_owner)
+        return not (self.events or self.clear_command or self.release_owner or self.resets_device)
 
 
 class Transitions:
@@ -55,7 +56,7 @@ class Transitions:
         self.is_ramping_down = self.is_master_lost = self.is_stopping = False
         self.is_restarted = is_restarted
         self.outcome = StepOutcome()
-        self._parts = parts
+        self.parts = self._parts = parts
 
     def begin_step(self) -> None:
         """Begin a step with an empty outcome."""
@@ -80,7 +81,7 @@ class Transitions:
         """Begin a calibration or an experiment. ValueError for a plan that the rig does not allow."""
         self.fire(StateEvent.CALIBRATE)
         self._parts.run.begin(plan, is_local=is_local)
-        self._start(now_s, f"calibration begun by {asked_by}")
+        self._start(now_s, f"{self._parts.run.kind} begun by {asked_by}")
 
     def _start(self, now_s: float, sentence: str) -> None:
         self.is_restarted = False
@@ -94,7 +95,7 @@ class Transitions:
         However the run ended, but by a fault or a disable. given_n: contact force that the slide need not give."""
         self._parts.run.leave(self._parts.loop, given_n)
         self.is_ramping_down = True
-        self.tell(sentence)
+        self.tell(sentence, *self._parts.run.take_report())
 
     def disable(self, sentence: str) -> None:
         """Switch the output off: the safe voltage at once, and the command with it."""
@@ -114,7 +115,8 @@ class Transitions:
         self._parts.commands.expect_clearing()
 
     def reset(self) -> None:
-        """Leave FAULT; nothing to do in OFF."""
+        """Leave FAULT, and have the output device's own latched faults cleared; in OFF only those."""
+        self.outcome.resets_device = True
         if self.state is State.OFF:
             return
         self.fire(StateEvent.RESET)
@@ -140,11 +142,11 @@ class Transitions:
         self._rest()
         self._parts.one_shot.forget_unreachable()
         self.is_ramping_down = self.is_master_lost = False
-        self.tell(sentence)
+        self.tell(sentence, *self._parts.run.take_report())
         self.outcome.clear_command = True
         self._parts.commands.expect_clearing()
 
     def _rest(self) -> None:
         """The safe voltage at once; a run ends with it."""
         self._parts.loop.rest()
-        self._parts.run.rest()
+        self._parts.run.rest(self.fault)

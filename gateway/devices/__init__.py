@@ -8,8 +8,10 @@ is in `messages`.
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
 from gateway.devices.fields import TemplateError, ValueRefused
 from gateway.devices.line_settings import SerialSettings
-from gateway.devices.profile import Certainty, DeviceProfile, Role
+from gateway.devices.profile import Certainty, DeviceProfile, DeviceRole
 from gateway.devices.roles import CellDevice, CellHost, OutputDevice, OutputHost
+from gateway.devices.valve import ValveDevice, ValveHost
+from gateway.devices.valve_profile import ValveDirection
 from gateway.devices.wire import PacedWire, resample_at_baud
 
 __all__ = [
@@ -17,13 +19,16 @@ __all__ = [
     "CellHost",
     "Certainty",
     "DeviceProfile",
+    "DeviceRole",
     "OutputDevice",
     "OutputHost",
     "PacedWire",
-    "Role",
     "SerialSettings",
     "TemplateError",
     "ValueRefused",
+    "ValveDevice",
+    "ValveDirection",
+    "ValveHost",
     "cell_device",
     "cell_host",
     "output_device",

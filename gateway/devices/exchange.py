@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from math import ceil, floor
 from typing import Annotated, Final, Literal
 
-from annotated_types import Ge, Le, MinLen
+from annotated_types import Ge, Gt, Le, MinLen
 
 from gateway.defaults import STRICT
-from gateway.devices.fields import Choice, Decimals, TemplateError, WholeNumber
+from gateway.devices.binary.register_access import RegisterAccess, check_direction, templates_of
+from gateway.devices.binary.weight_registers import WeightRegisters
+from gateway.devices.fields import Choice, Decimals, RegisterNumber, TemplateError, WholeNumber
 from gateway.devices.messages import Quality
 from gateway.devices.template import Template, compile_template
 from gateway.units import NEWTON_PER_UNIT
@@ -99,21 +101,26 @@ class PressureRange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VoltageExchange:
-    """Set or read the output voltage. ask, answer: templates; the one number in them is scaled by range.
+    """Set or read the output voltage. ask, answer: templates; the one number in them is scaled by range. Where a sentence
+    carries several numbers, {value:...} is the one. modbus: registers, in place of ask and answer.
 
     The answer is how the gateway knows that the device has obeyed: an echo of the number, or a word. A device that says
     nothing to a setting (no `answer`) is asked with `read_voltage` after each; one that has neither is refused.
     """
 
     __pydantic_config__ = STRICT
-    ask: Annotated[str, MinLen(1)]  # template of the question, without terminator
+    ask: str = ""  # template of the question, without terminator
     answer: str = ""  # template of the answer, without terminator; empty in set_voltage: the device says nothing
+    modbus: RegisterAccess | None = None  # of a Modbus device, instead of ask and answer
     range: VoltageRange  # what the number means
 
     def __post_init__(self) -> None:
-        compile_template(self.ask)
-        if self.answer:
-            compile_template(self.answer)
+        ask, answer = templates_of(self.modbus, self.ask, self.answer)
+        object.__setattr__(self, "ask", ask)
+        object.__setattr__(self, "answer", answer)
+        compile_template(ask)
+        if answer:
+            compile_template(answer)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,13 +128,20 @@ class PressureExchange:
     """Read the measured pressure."""
 
     __pydantic_config__ = STRICT
-    ask: Annotated[str, MinLen(1)]  # template of the question, without terminator
-    answer: Annotated[str, MinLen(1)]  # template of the answer, without terminator
+    ask: str = ""  # template of the question, without terminator
+    answer: str = ""  # template of the answer, without terminator
+    modbus: RegisterAccess | None = None  # of a Modbus device, instead of ask and answer
     range: PressureRange  # what the number means
 
     def __post_init__(self) -> None:
-        compile_template(self.ask)
-        compile_template(self.answer)
+        check_direction(self.modbus, reads=True)
+        ask, answer = templates_of(self.modbus, self.ask, self.answer)
+        if not answer:
+            raise ValueError("`answer` is missing: the sentence that carries the pressure")
+        object.__setattr__(self, "ask", ask)
+        object.__setattr__(self, "answer", answer)
+        compile_template(ask)
+        compile_template(answer)
 
 
 Exchange = VoltageExchange | PressureExchange
@@ -157,7 +171,7 @@ class OutOfRange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refusals:
-    """The device's words for no. Empty or absent: it stays silent."""
+    """The device's words for no, with its address in them where it says one. Empty or absent: it stays silent."""
 
     __pydantic_config__ = STRICT
     unknown: str = ""  # to what it does not understand; empty: silence
@@ -167,6 +181,7 @@ class Refusals:
         for text in self.texts():
             if not text.isascii():
                 raise ValueError(f"refusals are ASCII text, {text!r} is not")
+            compile_template(text)
 
     def texts(self) -> tuple[str, ...]:
         """Return the texts by which the device refuses."""
@@ -179,13 +194,20 @@ class ForceReading:
     """One reading of a load cell: streamed, or the answer to `ask`.
 
     frame: template with the number {force:...}, perhaps a word {status:...} and a word {unit:...}. Where the frame says its
-    unit, that unit counts; `unit` is what the simulated device is set to, and what a frame without one means.
+    unit, that unit counts; `unit` is what the simulated device is set to, and what a frame without one means. Raw counts
+    of a converter have no unit but newton_per_count and zero_count, which a rig has measured. before: a sentence that is
+    sent ahead of each question and not answered. modbus: registers, in place of frame and ask.
     """
 
     __pydantic_config__ = STRICT
-    frame: Annotated[str, MinLen(1)]
+    frame: str = ""  # template of the reading, with the number {force:...}
     ask: str = ""  # empty for a stream
+    before: str = ""  # sent ahead of ask, unanswered: such as the command to all devices to sample
+    modbus: WeightRegisters | None = None  # of a Modbus device, instead of frame and ask
     unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
+    newton_per_count: Annotated[float, Gt(0)] | None = None  # of raw counts: one count in newtons, usually the rig's
+    zero_count: float = 0.0  # of raw counts: reading without a force
+    end_count: Annotated[float, Gt(0)] | None = None  # of raw counts: where the converter ends; counts as an overload
     quality: Mapping[str, Quality] = field(
         default_factory=dict
     )  # word of {status:...} -> how far to believe the reading
@@ -193,9 +215,34 @@ class ForceReading:
     rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second; with ask: the most, 0: as the wire allows
 
     def __post_init__(self) -> None:
-        if self.ask:
-            compile_template(self.ask)
+        if self.modbus:
+            if (self.ask, self.frame) not in (("", ""), self.modbus.templates()):
+                raise ValueError("`modbus` stands for question and answer: leave `ask` and `frame` out")
+            object.__setattr__(self, "ask", self.modbus.templates()[0])
+            object.__setattr__(self, "frame", self.modbus.templates()[1])
+        elif not self.frame:
+            raise ValueError("`frame` is missing: the sentence with {force:...}, or `modbus` with the registers")
+        if self.before and not self.ask:
+            raise ValueError("`before` is sent ahead of a question: there is no `ask`")
+        if self.unit and self.newton_per_count:
+            raise ValueError(f"unit {self.unit} and newton_per_count are two units for one number: leave one out")
+        for text in filter(None, (self.ask, self.before)):
+            compile_template(text)
         _check_reading(compile_template(self.frame), self)
+
+    @property
+    def newton_per_unit(self) -> float | None:
+        """Force of one unit of the device's number, N; None where neither unit nor counts say it."""
+        return NEWTON_PER_UNIT[self.unit] if self.unit else self.newton_per_count
+
+    @property
+    def says_overload(self) -> bool:
+        """Decide whether the device tells by itself that it is beyond its range."""
+        return (
+            self.blank_is_overload
+            or Quality.OVERLOAD in self.quality.values()
+            or bool(self.modbus and self.modbus.overload)
+        )
 
     @property
     def template(self) -> Template:
@@ -211,6 +258,8 @@ class ForceReading:
     def decimals(self) -> int:
         """Number of digits behind the point of the cell's force, 0 for whole numbers."""
         number = self.template.field(FORCE)
+        if self.modbus:
+            return self.modbus.decimals
         return number.decimals if isinstance(number, Decimals) else 0
 
     @property
@@ -221,6 +270,10 @@ class ForceReading:
     @property
     def largest_shown(self) -> float:
         """The largest number that the display has digits for, with room for a sign, in the device's unit."""
+        if self.end_count:
+            return self.end_count
+        if self.modbus:
+            return self.modbus.largest_shown
         number = self.template.field(FORCE)
         width = number.width if isinstance(number, Decimals | WholeNumber) else 0
         if not width:
@@ -236,9 +289,9 @@ class ForceReading:
 
 def _check_reading(template: Template, reading: ForceReading) -> None:
     number = template.field(FORCE)
-    if not isinstance(number, Decimals | WholeNumber):
+    if not isinstance(number, Decimals | WholeNumber | RegisterNumber):
         raise TemplateError(f"{template.text!r} has no number {{force:...}}")
-    if reading.blank_is_overload and (number.is_open or isinstance(number, WholeNumber)):
+    if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
         raise TemplateError(f"{template.text!r}: blank_is_overload needs decimals of fixed width")
     unit = template.field(UNIT)
     if unit and not (isinstance(unit, Choice) and set(unit.words) <= set(NEWTON_PER_UNIT)):
@@ -248,5 +301,5 @@ def _check_reading(template: Template, reading: ForceReading) -> None:
     status = template.field(STATUS)
     if set(status.words if isinstance(status, Choice) else ()) != set(reading.quality):
         raise TemplateError(f"{template.text!r}: quality must name each word of {{status:...}}, and no other")
-    if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD}:
+    if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD, Quality.REPEATED}:
         raise TemplateError(f"{template.text!r}: quality has no word for a good reading (ok, unstable)")

@@ -9,10 +9,15 @@
 Each shape is both ways: it encodes a value or refuses it (nan, inf, too wide), and decodes its own text. A shape with a
 width reads blanks where zeros could stand, as displays that suppress leading zeros send them, and nothing else leniently:
 a missing decimal point is no number.
+
+A sixth shape is not for people: {force:int32} and its like are Modbus registers as hexadecimal digits, in templates that
+`modbus:` of a profile stands for (binary/register_access.py).
 """
 
 import re
+import struct
 from dataclasses import dataclass
+from functools import cache
 from math import isfinite, nan
 from typing import Final, Protocol
 
@@ -56,7 +61,9 @@ def _refuse(name: str, value: Value, why: str) -> ValueRefused:
 
 
 def _finite(name: str, value: Value) -> float:
-    if isinstance(value, str) or not isfinite(value):
+    if isinstance(value, str):
+        raise _refuse(name, value, "not a number")
+    if not isfinite(value):
         raise _refuse(name, value, "not a finite number")
     return value
 
@@ -68,6 +75,14 @@ def _of_width(name: str, text: str, width: int) -> str:
 
 
 _PADDED_NUMBER = r"(?:[+-] *| *[+-]?)"  # "+  12" and "  +12": both orders are sent by real indicators
+
+
+_WHOLE_NUMBER: Final = re.compile(rf"{_PADDED_NUMBER}\d+")
+
+
+@cache
+def _number_with_decimals(decimals: int) -> re.Pattern[str]:
+    return re.compile(rf"{_PADDED_NUMBER}\d+\.\d{{{decimals}}}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +115,7 @@ class WholeNumber:
 
     def decode(self, text: str) -> Value | None:
         """Return the whole number, None for blanks between digits or signs alone."""
-        return int(text.replace(" ", "")) if re.fullmatch(rf"{_PADDED_NUMBER}\d+", text) else None
+        return int(text.replace(" ", "")) if _WHOLE_NUMBER.fullmatch(text) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,9 +186,56 @@ class Decimals:
         """Return the number, NaN for a blank display, None for anything else."""
         if not self.is_open and not text.strip(" +-"):
             return nan
-        if re.fullmatch(rf"{_PADDED_NUMBER}\d+\.\d{{{self.decimals}}}", text):
+        if _number_with_decimals(self.decimals).fullmatch(text):
             return float(text.replace(" ", ""))
         return None
+
+
+_WORD_FORMATS: Final = {"uint16": ">H", "int16": ">h", "uint32": ">I", "int32": ">i", "float32": ">f"}
+_FLOAT_DECIMALS: Final = 4  # of a float32 setting: a tenth of a millivolt, which a float32 of 10 V still tells apart
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterNumber:
+    """{counts:int32}, or {counts:int32-cdab} with the low word first: a number in Modbus registers, as hexadecimal digits."""
+
+    name: str
+    kind: str
+    is_low_first: bool = False
+
+    @property
+    def is_open(self) -> bool:
+        """Return False: a register has four digits."""
+        return False
+
+    @property
+    def decimals(self) -> int:
+        """Decimals that such a number is rounded to before it is sent."""
+        return _FLOAT_DECIMALS if self.kind == "float32" else 0
+
+    @property
+    def pattern(self) -> str:
+        """Regular expression of the registers' digits."""
+        return rf"[0-9A-F]{{{2 * struct.calcsize(_WORD_FORMATS[self.kind])}}}"
+
+    def encode(self, value: Value) -> str:
+        """Return the digits. ValueRefused for what the registers cannot hold."""
+        number = _finite(self.name, value)
+        if self.kind != "float32" and number != int(number):
+            raise _refuse(self.name, value, "not a whole number")
+        try:
+            data = struct.pack(_WORD_FORMATS[self.kind], number if self.kind == "float32" else int(number))
+        except (struct.error, OverflowError):
+            raise _refuse(self.name, value, f"does not fit into {self.kind}") from None
+        return self._ordered(data).hex().upper()
+
+    def decode(self, text: str) -> Value | None:
+        """Return the number, None for a float that is none."""
+        (number,) = struct.unpack(_WORD_FORMATS[self.kind], self._ordered(bytes.fromhex(text)))
+        return number if isfinite(number) else None
+
+    def _ordered(self, data: bytes) -> bytes:
+        return data[2:] + data[:2] if self.is_low_first else data
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +299,7 @@ _WHOLE = re.compile(r"(\+?)(0?)(\d{0,2})d")
 _HEX = re.compile(r"0([1-8])X")
 _DECIMALS = re.compile(r"(\+?)(0?)(\d{0,2})\.([1-9])f")
 _TEXT = re.compile(r"(\d{0,2})s")
+_REGISTERS = re.compile(r"(u?int16|u?int32|float32)(-cdab)?")
 _WORD = re.compile(r"[!-~]+")
 
 
@@ -250,6 +313,8 @@ def field_from(name: str, spec: str) -> Field:
         return Decimals(name, match[1], match[2], int(match[3] or 0), int(match[4]))
     if match := _TEXT.fullmatch(spec):
         return Text(name, int(match[1] or 0))
+    if match := _REGISTERS.fullmatch(spec):
+        return RegisterNumber(name, match[1], bool(match[2]))
     words = tuple(spec.split("|"))
     if len(words) > 1 and len(set(words)) == len(words) and all(_WORD.fullmatch(word) for word in words):
         return Choice(name, words)

@@ -3,10 +3,11 @@
 from dataclasses import dataclass, field
 from math import isfinite
 
+from gateway.devices.binary.rtu_framing import RtuSplitter, answers, requests, rtu_frame
 from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.exchange import Exchange, VoltageExchange
-from gateway.devices.fields import Field, Value, ValueRefused
-from gateway.devices.framing import Line
+from gateway.devices.fields import Choice, Field, Text, Value, ValueRefused
+from gateway.devices.framing import Line, LineSplitter
 from gateway.devices.messages import OutputRequest, ReadPressure, ReadVoltage, SetVoltage
 from gateway.devices.profile import DeviceProfile
 from gateway.devices.template import compile_template
@@ -18,6 +19,7 @@ class Grammar:
 
     profile: DeviceProfile
     _numbers: dict[str, tuple[Field | None, int]] = field(default_factory=dict, compare=False)
+    _around: dict[str, dict[str, Value]] = field(default_factory=dict, compare=False)
 
     @property
     def set_voltage(self) -> VoltageExchange:
@@ -27,7 +29,7 @@ class Grammar:
 
     def exchange(self, message: OutputRequest) -> Exchange:
         """Return how this is asked and answered; ValueRefused when the device has no words for it."""
-        exchange: Exchange | None
+        exchange: Exchange | None = None
         match message:
             case SetVoltage():
                 exchange = self.profile.set_voltage
@@ -45,21 +47,63 @@ class Grammar:
             self._numbers[template] = self.profile.number_in(template), self.profile.decimals_in(template)
         return self._numbers[template]
 
+    def answers(self) -> LineSplitter | RtuSplitter:
+        """Return what cuts the device's bytes into sentences."""
+        profile = self.profile
+        return answers(profile.unit_id) if profile.is_modbus else LineSplitter(profile.terminator_bytes)
+
+    def questions(self) -> LineSplitter | RtuSplitter:
+        """Return what cuts the gateway's bytes into sentences, at the device's end."""
+        profile = self.profile
+        return requests(profile.unit_id) if profile.is_modbus else LineSplitter(profile.question_terminator_bytes)
+
     def line(self, body: bytes) -> bytes:
-        """Return a sentence with its checksum and terminator: what goes on the wire."""
-        return add_checksum(body, self.profile.checksum) + self.profile.terminator_bytes
+        """Return a sentence of the device with its checksum and terminator: what goes on the wire."""
+        return self._framed(body, self.profile.terminator_bytes)
+
+    def question_line(self, body: bytes) -> bytes:
+        """Return a sentence to the device with its checksum and terminator."""
+        return self._framed(body, self.profile.question_terminator_bytes)
+
+    def _framed(self, body: bytes, terminator: bytes) -> bytes:
+        if self.profile.is_modbus:
+            return rtu_frame(self.profile.unit_id, body)
+        return add_checksum(body, self.profile.checksum) + terminator
 
     def body(self, line: Line) -> bytes | None:
         """Return the sentence in a line that arrived, None when it is overlong or its checksum is wrong."""
         return strip_checksum(line.body, self.profile.checksum) if line.is_whole else None
 
-    def number_line(self, template: str, number: float) -> bytes:
-        """Return the line with this number in it, nearest on the template's own grid."""
-        values: dict[str, Value] = dict(self.profile.constants)
+    def number_body(self, template: str, number: float) -> bytes:
+        """Return the sentence with this number in it, nearest on the template's own grid; others in it are 0."""
+        if template not in self._around:
+            self._around[template] = _fill(template) | dict(self.profile.constants)
+        values = self._around[template]
         number_field, decimals = self._number_in(template)
         if number_field is not None:
-            values[number_field.name] = round(number, decimals)
-        return self.line(compile_template(template).encode(values))
+            values = {**values, number_field.name: round(number, decimals)}
+        return compile_template(template).encode(values)
+
+    def number_line(self, template: str, number: float) -> bytes:
+        """Return the device's line with this number in it."""
+        return self.line(self.number_body(template, number))
+
+    def words(self, template: str) -> str:
+        """Return a sentence that carries nothing but the profile's constants, as text; an empty one is none."""
+        return self.encode(template).decode("ascii") if template else ""
+
+    def refusals(self) -> dict[bytes, str]:
+        """Return the sentences by which the device refuses, as they are on the wire and in words."""
+        words = map(self.words, self.profile.refusals.texts())
+        return {one.encode("ascii"): one for one in words}
+
+    def encode_filled(self, template: str, values: dict[str, Value]) -> bytes:
+        """Return the sentence with these values; what else it carries is nothing in particular, as a simulated device says."""
+        return self.encode(template, _fill(template) | values)
+
+    def encode(self, template: str, values: dict[str, Value] | None = None) -> bytes:
+        """Return the sentence with these values and the profile's constants."""
+        return compile_template(template).encode({**(values or {}), **self.profile.constants})
 
     def answer_line(self, exchange: Exchange, value: float) -> bytes:
         """Return the answer with this physical value in it; a sensor or a setting stops at the ends of its range."""
@@ -95,3 +139,9 @@ class Grammar:
         """Return half of what the template's number counts in: a reading beyond its range by less than that was only
         rounded."""
         return 0.5 * float(10.0 ** -self._number_in(template)[1])
+
+
+def _fill(template: str) -> dict[str, Value]:
+    """What the simulated device says in the fields that nobody asks about."""
+    fields = compile_template(template).fields
+    return {one.name: "-" if isinstance(one, Text) else 0 for one in fields if not isinstance(one, Choice)}

@@ -21,6 +21,39 @@ class ReadVoltage:
     """Host -> output device: what is your present setting?"""
 
 
+class DeviceStep(StrEnum):
+    """Question to an output device that is no part of its work."""
+
+    IDENTITY = "identity"
+    STATUS = "watchdog status"
+    VERIFY = "watchdog verification"
+    ARM = "watchdog arming"
+    DISARM = "watchdog disarming"
+    CLEAR = "watchdog clearing"
+
+
+@dataclass(frozen=True, slots=True)
+class AskDevice:
+    """Host -> output device: what are you, and does your watchdog watch?"""
+
+    step: DeviceStep
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceAnswer:
+    """Output device -> host: is_right tells whether the answer is the wanted one; text is what the device said: its model,
+    or the state of its watchdog."""
+
+    step: DeviceStep
+    is_right: bool
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class WatchdogTripped:
+    """Output device -> host: its watchdog has tripped, it stands at its own safe value and obeys no setting."""
+
+
 @dataclass(frozen=True, slots=True)
 class Accepted:
     """Output device -> host: this voltage stands, V, in the device's own resolution."""
@@ -55,6 +88,7 @@ class Quality(StrEnum):
     OK = "ok"
     UNSTABLE = "unstable"  # the device's own motion flag; normal under moving force
     OVERLOAD = "overload"  # beyond the cell's or the converter's range: counts as over-force
+    REPEATED = "repeated"  # the device says that it has measured nothing since its last answer: no sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,5 +105,10 @@ class ForceSample:
     time_s: float
 
 
-OutputRequest = SetVoltage | ReadPressure | ReadVoltage
-OutputReply = Accepted | Pressure | Refused | Garbage
+@dataclass(frozen=True, slots=True)
+class RepeatedSample:
+    """Load cell -> host: an answer that repeats the reading before: the device has measured nothing since."""
+
+
+OutputRequest = SetVoltage | ReadPressure | ReadVoltage | AskDevice
+OutputReply = Accepted | Pressure | Refused | Garbage | DeviceAnswer | WatchdogTripped

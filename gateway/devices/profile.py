@@ -1,19 +1,22 @@
 """A device profile: how one serial device speaks, as data. gateway.profiles builds it from YAML with these annotations.
 
-One of two roles: an output (DAC or regulator) or a load cell (amplifier). Everything the device says is a template; what
-templates cannot say is done by a Python codec, named by `codec`.
+One of three roles: an output (DAC or regulator), a load cell (amplifier) or a valve (relay). Everything the device says is a
+template, or a register of a Modbus device; what neither can say is done by a Python codec, named by `codec`.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import nan
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from annotated_types import Gt, MinLen
 
 from gateway.defaults import STRICT
+from gateway.devices.binary.register_access import VALUE, check_direction
 from gateway.devices.checksum import ChecksumName
+from gateway.devices.device_checks.identity import Identity
+from gateway.devices.device_checks.watchdog import Watchdog
 from gateway.devices.exchange import (
     ForceReading,
     PressureExchange,
@@ -22,9 +25,19 @@ from gateway.devices.exchange import (
     Step,
     VoltageExchange,
 )
-from gateway.devices.fields import Choice, Decimals, Field, TemplateError, WholeNumber
+from gateway.devices.fields import Choice, Decimals, Field, RegisterNumber, TemplateError, WholeNumber
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.template import compile_template
+from gateway.devices.valve_profile import ValveReading, ValveSettings
+
+MODBUS_RTU: Final = "modbus-rtu"
+TEMPLATE: Final = "template"
+ADDRESS: Final = "address"
+"""Name of the constant that tells devices on one bus apart: of a Modbus device its unit."""
+
+_LONGEST_MODBUS_S: Final = 0.1  # later than this a Modbus answer is no use to a force loop
+_LARGEST_UNIT: Final = 255  # 247 by the specification; some devices take all that fit into a byte
+Terminator = Literal["", "\r\n", "\r", "\n"]
 
 
 class Certainty(StrEnum):
@@ -35,11 +48,12 @@ class Certainty(StrEnum):
     COMPOSED = "composed"  # put together from fragments
 
 
-class Role(StrEnum):
+class DeviceRole(StrEnum):
     """Purpose of a device."""
 
     OUTPUT = "output"
     LOAD_CELL = "load cell"
+    VALVE = "valve"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,18 +63,21 @@ class DeviceProfile:
     __pydantic_config__ = STRICT
     name: Annotated[str, MinLen(1)]  # the file's name without .yaml
     description: str  # one line for people
-    role: Role  # output: a DAC or regulator; load cell: an amplifier
+    role: DeviceRole  # output: a DAC or regulator; load cell: an amplifier; valve: a relay that switches push and pull
     source: Annotated[str, MinLen(1)]  # where the grammar was taken from: manual and page, driver
     certainty: Certainty  # how good that source is
     hardware: Annotated[str, MinLen(1)]  # "never run on hardware", or who ran it on what, and when
-    codec: str = "template"  # template, or the name of a Python codec in gateway/devices/codecs.py
+    codec: str = TEMPLATE  # template, modbus-rtu, or the name of a Python codec in gateway/devices/codecs.py
     serial: SerialSettings  # the line as the device comes; a rig may set another baud
-    terminator: Literal["\r\n", "\r", "\n"]  # end of every line, both ways
+    terminator: Terminator = ""  # end of every line, both ways; a Modbus device has none
+    question_terminator: Literal["", "\r\n", "\r", "\n", ";"] = ""  # end of what the gateway says, where it is another
     checksum: ChecksumName = "none"  # appended before the terminator
-    constants: Mapping[str, int | str] = field(default_factory=dict)  # fields with one fixed value, such as an address
+    constants: Mapping[str, int | str] = field(
+        default_factory=dict
+    )  # fields with one fixed value, such as an address; a rig may say another address and channel
     reply_timeout_s: Annotated[float, Gt(0)] = 0.1  # an answer later than this is overdue
-    watchdog: Literal["none"] = "none"  # none: the device holds its last output when nobody talks to it
-    identity: Literal["none"] = "none"  # none: the device cannot be asked what it is
+    watchdog: Literal["none"] | Watchdog = "none"  # none: the device holds its last output when nobody talks to it
+    identity: Literal["none"] | Identity = "none"  # none: the device cannot be asked what it is
     refusals: Refusals = field(default_factory=Refusals)  # the device's words for no
     set_voltage: VoltageExchange | None = None  # output: drive this voltage; without an answer, read_voltage is needed
     read_voltage: VoltageExchange | None = None  # output: what is the present setting? may be absent
@@ -69,8 +86,16 @@ class DeviceProfile:
     stream: ForceReading | None = None  # load cell that talks by itself
     read_force: ForceReading | None = None  # load cell that is asked
 
+    set_valve: ValveSettings | None = None  # valve: how each direction is set
+    read_valve: ValveReading | None = None  # valve: which direction stands?
+
     def __post_init__(self) -> None:
-        if self.role is Role.OUTPUT:
+        _check_codec(self)
+        if self.role is DeviceRole.VALVE:
+            _check_valve(self)
+        elif self.set_valve or self.read_valve:
+            raise ValueError("set_valve and read_valve belong to a valve")
+        elif self.role is DeviceRole.OUTPUT:
             _check_output(self)
         else:
             _check_load_cell(self)
@@ -101,21 +126,49 @@ class DeviceProfile:
 
     @property
     def terminator_bytes(self) -> bytes:
-        """The bytes that end a line."""
+        """The bytes that end a line of the device."""
         return self.terminator.encode("ascii")
 
+    @property
+    def question_terminator_bytes(self) -> bytes:
+        """The bytes that end a line to the device."""
+        return (self.question_terminator or self.terminator).encode("ascii")
+
+    @property
+    def is_modbus(self) -> bool:
+        """Decide whether the device speaks Modbus RTU."""
+        return self.codec == MODBUS_RTU
+
+    @property
+    def unit_id(self) -> int:
+        """Unit of a Modbus device: its address, 1 where the profile says none."""
+        return int(self.constants.get(ADDRESS, 1))
+
+    @property
+    def own_watchdog(self) -> Watchdog | None:
+        """The device's watchdog, None where it has none."""
+        return None if self.watchdog == "none" else self.watchdog
+
+    @property
+    def own_identity(self) -> Identity | None:
+        """Question for what the device is, None where it cannot be asked."""
+        return None if self.identity == "none" else self.identity
+
     def number_in(self, template_text: str) -> Field | None:
-        """Return the field that carries the number: the only one that is neither a constant nor a word."""
+        """Return the field that carries the number: the only one that is neither a constant nor a word, or {value:...}."""
         fields = compile_template(template_text).fields
         numbers = [one for one in fields if one.name not in self.constants and not isinstance(one, Choice)]
-        if len(numbers) > 1 or any(not isinstance(one, WholeNumber | Decimals) for one in numbers):
-            raise TemplateError(f"{template_text!r} must carry one number beside constants and words")
+        numbers = [one for one in numbers if one.name == VALUE] or numbers
+        if len(numbers) > 1 or any(not isinstance(one, WholeNumber | Decimals | RegisterNumber) for one in numbers):
+            raise TemplateError(
+                f"{template_text!r} must carry one number beside constants and words; of several, call the one {{value:...}}"
+            )
         return numbers[0] if numbers else None
 
     def decimals_in(self, template_text: str) -> int:
         """Return the decimals of the number that a template carries; 0 for a whole number, or none."""
         number = self.number_in(template_text)
-        return number.decimals if isinstance(number, Decimals) else 0
+        return number.decimals if isinstance(number, Decimals | RegisterNumber) else 0
 
     @property
     def reading(self) -> ForceReading:
@@ -126,9 +179,39 @@ class DeviceProfile:
         return reading
 
 
+def _check_codec(profile: DeviceProfile) -> None:
+    """The codec and what the profile says in its language: templates with a line's end, or registers."""
+    exchanges = (profile.set_voltage, profile.read_voltage, profile.read_pressure, profile.read_force, profile.stream)
+    for name, exchange in zip(_EXCHANGES, exchanges, strict=True):
+        if exchange and profile.is_modbus is (exchange.modbus is None):
+            wanted = (
+                "needs `modbus` with its registers" if profile.is_modbus else f"has `modbus`: say `codec: {MODBUS_RTU}`"
+            )
+            raise ValueError(f"{name} of codec {profile.codec} {wanted}")
+    if not profile.is_modbus:
+        if not profile.terminator:
+            raise ValueError('terminator is missing: what ends a line, such as "\\r\\n"')
+        return
+    if profile.terminator or profile.question_terminator or profile.checksum != "none":
+        raise ValueError("a Modbus RTU frame has its own end and checksum: leave terminator and checksum out")
+    if profile.reply_timeout_s > _LONGEST_MODBUS_S:
+        raise ValueError(
+            f"reply_timeout_s of a Modbus device is at most {_LONGEST_MODBUS_S} s: the force loop waits for it"
+        )
+    if not 1 <= profile.unit_id <= _LARGEST_UNIT:
+        raise ValueError(f"address {profile.unit_id}: a Modbus unit is 1 to {_LARGEST_UNIT}")
+    if profile.watchdog != "none":
+        raise ValueError("the watchdog of a Modbus device cannot be said yet: watchdog: none")
+
+
+_EXCHANGES: Final = ("set_voltage", "read_voltage", "read_pressure", "read_force", "stream")
+
+
 def _check_output(profile: DeviceProfile) -> None:
     if profile.set_voltage is None:
         raise ValueError("an output needs set_voltage")
+    check_direction(profile.set_voltage.modbus, reads=False)
+    check_direction(profile.read_voltage.modbus if profile.read_voltage else None, reads=True)
     if profile.stream or profile.read_force:
         raise ValueError("stream and read_force belong to a load cell")
     if profile.number_in(profile.set_voltage.ask) is None:
@@ -147,11 +230,22 @@ def _check_output(profile: DeviceProfile) -> None:
             raise TemplateError(f"{exchange.answer!r} carries no number")
 
 
+def _check_valve(profile: DeviceProfile) -> None:
+    if profile.set_valve is None or profile.read_valve is None:
+        raise ValueError("a valve needs set_valve and read_valve: a direction that nobody reads back is not known")
+    if any(getattr(profile, name) for name in _EXCHANGES) or profile.steps:
+        raise ValueError("set_voltage, read_voltage, read_pressure, read_force, stream and steps belong to other roles")
+    if profile.watchdog != "none":
+        raise ValueError("watchdog belongs to an output")
+
+
 def _check_load_cell(profile: DeviceProfile) -> None:
     if (profile.stream is None) == (profile.read_force is None):
         raise ValueError("a load cell has either stream or read_force")
     if profile.set_voltage or profile.read_voltage or profile.read_pressure or profile.steps:
         raise ValueError("set_voltage, read_voltage, read_pressure and steps belong to an output")
+    if profile.watchdog != "none":
+        raise ValueError("watchdog belongs to an output: a load cell drives nothing")
     if profile.stream and (profile.stream.ask or profile.stream.rate_hz <= 0):
         raise ValueError("stream has a rate_hz and no ask")
     if profile.read_force and not profile.read_force.ask:

@@ -12,8 +12,12 @@ from gateway.devices.codecs import cell_device, cell_host, output_device, output
 from gateway.devices.exchange import UNIT
 from gateway.devices.fields import ValueRefused
 from gateway.devices.framing import LONGEST_LINE_BYTES
+from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
     Accepted,
+    AskDevice,
+    DeviceAnswer,
+    DeviceStep,
     ForceSample,
     Garbage,
     OutputReply,
@@ -25,7 +29,9 @@ from gateway.devices.messages import (
     Refused,
     SetVoltage,
 )
-from gateway.devices.profile import DeviceProfile, Role
+from gateway.devices.profile import DeviceProfile, DeviceRole
+from gateway.devices.valve import ValveDevice, ValveHost
+from gateway.devices.valve_profile import ValveDirection
 
 Found = Iterator[tuple[tuple[str, ...], str]]
 """(place in the profile, sentence)."""
@@ -36,7 +42,18 @@ _LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
 def rehearse(profile: DeviceProfile) -> Found:
     """Return what keeps the two ends of this profile from understanding each other; nothing when they do."""
-    yield from _output(profile) if profile.role is Role.OUTPUT else _cell(profile)
+    talk = {DeviceRole.OUTPUT: _output, DeviceRole.LOAD_CELL: _cell, DeviceRole.VALVE: _valve}
+    yield from talk[profile.role](profile)
+
+
+def _valve(profile: DeviceProfile) -> Found:
+    host, device = ValveHost(profile), ValveDevice(profile)
+    for direction in ValveDirection:
+        for place, question in (("set_valve", direction), ("read_valve", None)):
+            if device.receive(host.request(question)) != [question]:
+                yield (place,), f"{direction}: the device's end takes our question for another"
+            elif host.receive(device.reply(question, direction)) != [direction]:
+                yield (place,), f"{direction}: our end does not understand the answer"
 
 
 def _output(profile: DeviceProfile) -> Found:
@@ -50,6 +67,7 @@ def _output(profile: DeviceProfile) -> Found:
         if complaint:
             yield (place,), complaint
     yield from _refusals(profile)
+    yield from _checks(profile)
 
 
 def _readings(profile: DeviceProfile) -> Iterator[tuple[str, OutputRequest, tuple[OutputReply, ...]]]:
@@ -58,6 +76,15 @@ def _readings(profile: DeviceProfile) -> Iterator[tuple[str, OutputRequest, tupl
         yield "read_voltage", ReadVoltage(), tuple(map(Accepted, profile.read_voltage.range.voltage_v))
     if profile.read_pressure:
         yield "read_pressure", ReadPressure(), tuple(map(Pressure, profile.read_pressure.range.pressure_pa))
+
+
+def _checks(profile: DeviceProfile) -> Found:
+    """Identity and watchdog: each question must be known at the far end, and its answer here."""
+    for step in output_host(profile).checks:
+        place = "identity" if step is DeviceStep.IDENTITY else "watchdog"
+        if complaint := _talk(profile, AskDevice(step), DeviceAnswer(step, is_right=True)):
+            yield (place,), f"{step}: {complaint}"
+            return
 
 
 def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -> str:
@@ -91,9 +118,10 @@ def _means(reply: OutputReply, meaning: OutputReply) -> bool:
 
 
 def _refusals(profile: DeviceProfile) -> Found:
-    for text in profile.refusals.texts():
-        host = output_host(profile)
+    for template in profile.refusals.texts():
+        host, text = output_host(profile), template
         try:
+            text = Grammar(profile).words(template)
             host.request(SetVoltage(profile.voltage_range_v[0]))
             replies = host.receive(output_device(profile).reply(Refused(text)), _NOW_S)
         except (ValueRefused, UnicodeEncodeError) as error:
@@ -154,4 +182,8 @@ def _name(message: object) -> str:
         "Pressure": "a pressure",
         "Refused": "a refusal",
         "ForceSample": "a force",
+        "AskDevice": "a question about the device",
+        "DeviceAnswer": "an answer about the device",
+        "WatchdogTripped": "a tripped watchdog",
+        "RepeatedSample": "a reading that is no new one",
     }[type(message).__name__]

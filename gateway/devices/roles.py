@@ -7,12 +7,14 @@ from typing import Protocol
 
 from gateway.devices.messages import (
     Accepted,
+    DeviceStep,
     ForceSample,
     Garbage,
     OutputReply,
     OutputRequest,
     Quality,
     Refused,
+    RepeatedSample,
 )
 
 
@@ -30,6 +32,26 @@ class OutputHost(Protocol):
     def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
         """Return whether this answer to `question` says that the setting stands, up to the rounding of the numbers on the
         wire."""
+
+    @property
+    def checks(self) -> tuple[DeviceStep, ...]:
+        """Questions that this device can be asked besides its work: what it is, and of its watchdog."""
+
+    @property
+    def sign_of_life(self) -> bytes:
+        """The sentence that feeds the device's watchdog, unanswered; empty where any sentence does, or there is none."""
+
+    @property
+    def feed_period_s(self) -> float:
+        """Time between two signs of life, s; 0 without a watchdog."""
+
+    @property
+    def gap_s(self) -> float:
+        """Silence that the wire needs between an answer and the next question, s."""
+
+    @property
+    def last_frame(self) -> bytes:
+        """Return what follows the last safe frame when the gateway ends in order: the device's watchdog is switched off."""
 
     @property
     def safe_reply(self) -> bytes:
@@ -57,6 +79,9 @@ class OutputDevice(Protocol):
     def reply(self, reply: OutputReply, to: OutputRequest | None = None) -> bytes:
         """Return the bytes of an answer; `to` says the question where Accepted answers a ReadVoltage."""
 
+    def elapse(self, now_s: float) -> bool:
+        """Let time pass; return whether the device's own watchdog trips now, and the output goes to its safe value."""
+
     def refusal(self, garbage: Garbage) -> Refused:
         """Return the device's own word for bytes that it does not obey; no text: it stays silent."""
 
@@ -71,7 +96,11 @@ class CellHost(Protocol):
     def poll(self) -> bytes:
         """Return the bytes that ask for one reading; empty for a stream."""
 
-    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
+    @property
+    def gap_s(self) -> float:
+        """Silence that the wire needs between an answer and the next question, s."""
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return what these bytes complete. Never raises."""
 
     def forget(self) -> None:
@@ -83,6 +112,9 @@ class CellDevice(Protocol):
 
     def receive(self, chunk: bytes, now_s: float) -> int:
         """Return how many readings these bytes ask for; 0 for a stream."""
+
+    def take_answers(self) -> bytes:
+        """Return the answers to what else was asked, such as what it is; each once."""
 
     def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
         """Return one reading, in the rig's unit where the frame says none. What does not fit the display is an overload, as on

@@ -87,7 +87,8 @@ class Connection(asyncio.BufferedProtocol):
         if peername is None or shared.closing:  # it has left already, or we are leaving
             self._transport.abort()
             return
-        self.peer = Peer(str(address_of(peername[0])), peername[1])
+        shown: Peer | None = transport.get_extra_info("modbus_peer")  # by its certificate
+        self.peer = shown or Peer(str(address_of(peername[0])), peername[1], role=shared.settings.role)
         if (refusal := shared.peers.refusal(self.peer.host)) is not None:
             shared.log("refused", f"W230 {self.peer}: {refusal}", now_s)
             self._transport.abort()
@@ -239,7 +240,8 @@ class Connection(asyncio.BufferedProtocol):
             return
         self._stop()
         self._shared.connections.discard(self)
-        if self._shared.peers.leave(self.peer.host):
+        self._shared.peers.leave(self.peer.host)
+        if not any(other.peer.identity == self.peer.identity for other in self._shared.connections):
             self._shared.on_peer_closed(self.peer)
         if not self._shared.connections:
             self._shared.on_last_gone()

@@ -55,13 +55,11 @@ class Peers:
         """Count one more connection of this host."""
         self._open[host] = self._open.get(host, 0) + 1
 
-    def leave(self, host: str) -> bool:
-        """Count a closed connection; return whether it was the last of its address."""
+    def leave(self, host: str) -> None:
+        """Count a closed connection."""
         self._open[host] -= 1
-        if self._open[host]:
-            return False
-        del self._open[host]
-        return True
+        if not self._open[host]:
+            del self._open[host]
 
     def rate(self, host: str, now_s: float) -> RequestRate | None:
         """Return the bucket that all connections of an address share; None: unlimited."""

@@ -65,7 +65,7 @@ class ModbusTcpServer:
         clock: Clock = self._clock or loop
         peers = Peers(self._settings, guarded=not loopback)
         shared = ServerState(self._bank, self._settings, clock, self._log, peers, self._on_peer_closed)
-        self._listener = await loop.create_server(lambda: Connection(shared), host, port)
+        self._listener = await loop.create_server(self._make_protocol(shared), host, port)
         self._shared = shared
         self._sweep()
         bound_host, bound_port = self._listener.sockets[0].getsockname()[:2]
@@ -84,6 +84,12 @@ class ModbusTcpServer:
             await self._end_connections(self._shared)
         await listener.wait_closed()
 
+    def _make_protocol(self, shared: ServerState) -> Callable[[], asyncio.BaseProtocol]:
+        return lambda: Connection(shared)
+
+    def _sweep_handshakes(self, now_s: float) -> None:
+        """Plain Modbus TCP has none."""
+
     async def _end_connections(self, shared: ServerState) -> None:
         gone = asyncio.get_running_loop().create_future()
         shared.on_last_gone = lambda: None if gone.done() else gone.set_result(None)
@@ -101,6 +107,7 @@ class ModbusTcpServer:
         now_s = clock.time()
         for connection in tuple(self._shared.connections):
             connection.sweep(now_s)
+        self._sweep_handshakes(now_s)
         self._shared.peers.forget(now_s)
         period_s = min(2.0, self._settings.partial_s, self._settings.idle_s) / 4
         self._sweep_timer = clock.call_later(period_s, self._sweep)

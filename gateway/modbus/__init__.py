@@ -1,13 +1,14 @@
-"""Modbus TCP as bytes in and bytes out: framing (MBAP), requests of both roles, answers; no socket, no clock.
+"""Modbus as bytes in and bytes out: framing of TCP (MBAP) and of RTU, requests of both roles, answers; no port, no clock.
 
-The server in gateway.fieldbus uses it. Addresses and values belong to the bank in gateway.registers. Sources: MODBUS
-Application Protocol Specification V1.1b3, and MODBUS Messaging on TCP/IP Implementation Guide V1.0b.
+The servers in gateway.fieldbus use it. Addresses and values belong to the bank in gateway.registers. Sources: MODBUS
+Application Protocol Specification V1.1b3, MODBUS Messaging on TCP/IP Implementation Guide V1.0b, and MODBUS over Serial Line
+Specification and Implementation Guide V1.02.
 """
 
 from gateway.modbus.diagnostics import ServerId
 from gateway.modbus.errors import ModbusError, RequestError, RequestFault
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer
-from gateway.modbus.peer import Peer
+from gateway.modbus.peer import Peer, Role
 from gateway.modbus.server import DataBank, answer
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Peer",
     "RequestError",
     "RequestFault",
+    "Role",
     "ServerId",
     "answer",
 ]

@@ -22,20 +22,34 @@ def open_descriptor(path: str, settings: SerialSettings) -> int:
     which pyserial tolerates.
     """
     try:
-        return _open_quietly(path, settings)
+        return _take_descriptor(_open_quietly(path, settings))
     except (*SERIAL_FAILURES, ValueError) as error:  # ValueError: a baud rate that termios does not know
         raise explain_open_failure(path, error, present_paths()) from error
 
 
-def _open_quietly(path: str, settings: SerialSettings) -> int:
+def open_serial(path: str, settings: SerialSettings, timeout_s: float) -> serial.Serial:
+    """Return pyserial's own object of the port, locked, for whoever reads and writes without a loop. PortError as above.
+
+    timeout_s is given now, because a pty takes no settings a second time once it was told of a parity.
+    """
     try:
-        port = _open_configured(path, settings)
+        return _open_quietly(path, settings, timeout_s)
+    except (*SERIAL_FAILURES, ValueError) as error:
+        raise explain_open_failure(path, error, present_paths()) from error
+
+
+def _open_quietly(path: str, settings: SerialSettings, timeout_s: float = 0.0) -> serial.Serial:
+    try:
+        return _open_configured(path, settings, timeout_s)
     except termios.error as error:
         if error.args[0] != errno.EINVAL or not os.path.realpath(path).startswith("/dev/pts/"):
             raise
-        port = _open_configured(
-            path, SerialSettings(baud=settings.baud)
+        return _open_configured(
+            path, SerialSettings(baud=settings.baud), timeout_s
         )  # a pty has no frame, and refuses to be told of one
+
+
+def _take_descriptor(port: serial.Serial) -> int:
     try:
         descriptor = os.dup(port.fileno())  # the same open file: lock and settings stay, pyserial's four pipes go
     finally:
@@ -48,14 +62,15 @@ def _open_quietly(path: str, settings: SerialSettings) -> int:
     return descriptor
 
 
-def _open_configured(path: str, settings: SerialSettings) -> serial.Serial:
+def _open_configured(path: str, settings: SerialSettings, timeout_s: float) -> serial.Serial:
     return serial.Serial(
         path,
         settings.baud,
         bytesize=settings.data_bits,
         parity=_PARITY[settings.parity],
         stopbits=settings.stop_bits,
-        timeout=0,
+        timeout=timeout_s,
+        write_timeout=timeout_s or None,
         exclusive=True,
     )
 

@@ -35,6 +35,11 @@ class PacedPty:
         return self._open_pty.path
 
     @property
+    def is_open(self) -> bool:
+        """Decide whether the plug is in."""
+        return self._pty is not None
+
+    @property
     def _open_pty(self) -> Pty:
         assert self._pty, "open() comes first"
         return self._pty
@@ -48,7 +53,9 @@ class PacedPty:
         asyncio.get_running_loop().add_reader(self._pty.fd, self._on_readable)
 
     def send(self, data: bytes) -> None:
-        """Put bytes on the wire to the client, behind those that are still on it."""
+        """Put bytes on the wire to the client, behind those that are still on it; nowhere, while the plug is out."""
+        if self._pty is None:
+            return
         self._outward.put(resample_at_baud(data, self._baud, self._open_pty.client_baud()))
 
     @property

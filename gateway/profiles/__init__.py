@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from gateway.profiles.kinds.any_file import Checked, check_file
     from gateway.profiles.kinds.file_kind import CALLED
     from gateway.profiles.kinds.plants import Origin, PlantProfile
-    from gateway.profiles.load import load_calibration, load_plant, load_register_map
+    from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
     from gateway.profiles.rigs.assembly import Report, check_report, load_rig
     from gateway.profiles.rigs.rig import CellLine, OutputLine, Rig
     from gateway.profiles.rigs.rig_file import Network, ResidualWatch
@@ -39,6 +39,7 @@ __all__ = [
     "check_report",
     "list_shipped",
     "load_calibration",
+    "load_device",
     "load_plant",
     "load_register_map",
     "load_rig",
@@ -53,6 +54,7 @@ _HOMES: Final = {
     "Origin": "kinds.plants",
     "PlantProfile": "kinds.plants",
     "load_calibration": "load",
+    "load_device": "load",
     "load_plant": "load",
     "load_register_map": "load",
     "Report": "rigs.assembly",

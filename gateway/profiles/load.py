@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from gateway.bsfm.model import Calibration
+from gateway.devices import DeviceProfile
 from gateway.profiles.find import display, locate
 from gateway.profiles.kinds.calibrations import read_calibration
+from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.file_kind import CALLED, kind_of
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
@@ -98,8 +100,13 @@ def _load(kind: str, name: str | Path, read: Read[T]) -> T:
 
 
 def load_plant(name: str | Path) -> PlantProfile:
-    """Return a plant profile by shipped name or path; ProfileError with every fault. So the two below."""
+    """Return a plant profile by shipped name or path; ProfileError with every fault. So the three below."""
     return _load("plant", name, read_plant)
+
+
+def load_device(name: str | Path) -> DeviceProfile:
+    """Return the device profile of a name or path. ProfileError with every fault of the file."""
+    return _load("device", name, read_device)
 
 
 def load_calibration(name: str | Path) -> Calibration:

@@ -1,8 +1,9 @@
 """The register bank: what a Modbus server asks for and writes to, and the one place where commands are accepted or
 refused.
 
-Checks run in this order: address (02), whole values (03), values (03), owner (06), then what the state allows.
-Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal registers. One accepted
+Checks run in this order: address (02), role (01, gateway.registers.roles), whole values (03), values (03), owner (06), then
+what the state allows. Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal
+registers. One accepted
 write is one Command, handed on inside the write, so that a setpoint acts before its answer is sent. The Command carries
 the edge bits as written, each write with a new number; in the registers they read back as 0. Whether an edge can be taken
 now control says, asked before anything is stored (`on_asked`): what is accepted here is done there.
@@ -31,10 +32,12 @@ from gateway.registers.map.addresses import no_such_address
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal, request_refusal
 from gateway.registers.rig_rules import BankRules
+from gateway.registers.roles import role_refusal, write_roles
+from gateway.registers.self_test_words import SelfTestWords
 from gateway.registers.status_block import StatusBlock
 from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, State, StatusBit
-from gateway.registers.writes.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, AdmittedWrite, Write
+from gateway.registers.writes.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, AdmittedWrite, OnWrite, Write
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -53,8 +56,8 @@ class RegisterBank:
     """Implements gateway.modbus.DataBank. Single-threaded; callbacks run inside the write or read that causes them.
 
     on_command: each accepted command write; on_refusal: each refusal; on_accepted: a sentence for each write that changed
-    something besides heartbeat and sequence. last_writer: register name ("staging" for its whole block) -> (peer, time in s).
-    now: monotonic clock in s.
+    something besides heartbeat and sequence; on_write, on_refused_write: each, for the audit. last_writer:
+    register name ("staging" for its whole block) -> (peer, time in s). now: monotonic clock in s.
     """
 
     def __init__(self, register_map: RegisterMap, rules: BankRules, *, now: Callable[[], float]) -> None:
@@ -62,34 +65,42 @@ class RegisterBank:
         self.on_command: Callable[[Command], None] = lambda command: None
         self.on_refusal: Callable[[Refusal, Peer], None] = lambda refusal, peer: None
         self.on_accepted: Callable[[str, Peer], None] | None = None
+        self.on_write: OnWrite | None = None
+        self.on_refused_write: Callable[[Refusal, Peer], None] = lambda refusal, peer: None
         self.last_writer: dict[str, tuple[Peer, float]] = {}
         self.last_refusal: Refusal | None = None
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
         self._now = now
         self._blocks = register_map.blocks
         self._image = RegisterImage(register_map)
+        self._roles = write_roles(register_map.blocks)
         self._data, self._room = self._image.data, self._image.room
         self._commands = CommandBlock(register_map, rules, self._image)
         self._status = StatusBlock(register_map, self._image)
+        self._unpacked: Status | None = None
+        self.self_test = SelfTestWords(register_map, self._image)
         self._ownership = Ownership(rules.owner)
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
-        self.staging = StagingBlock(register_map, rules, self._image)
+        self.staging = StagingBlock(register_map, self._image)
         self._image.put(register_map.find("map_version"), register_map.version)
+        self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
         self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
         self._shown_owner: str | None = None
+        self._owner_peer = NOBODY
         self._show_owner()
         self.publish(Status())
 
     @property
     def owner(self) -> str | None:
-        """The host that may command, None for nobody yet."""
+        """Identity of who may command: an address, or `certificate NAME`; None for nobody yet."""
         return self._ownership.owner
 
     @property
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
+        self._pack_status()
         is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
         return build_server_id(self.identity, is_running=not is_fault)
 
@@ -101,6 +112,8 @@ class RegisterBank:
         """Return big-endian words of one block. Refusal (02) for a range that no block holds."""
         if not 0 < count <= self._room[address]:
             raise self._note_refusal(no_such_address(self._blocks, address, count), peer)
+        if self._unpacked is not None:
+            self._pack_status()
         return bytes(self._data[2 * address : 2 * (address + count)])
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
@@ -113,6 +126,7 @@ class RegisterBank:
             first = self._bit_word(address, count)
         except Refusal as refusal:
             raise self._note_refusal(refusal, peer) from None
+        self._pack_status()
         word = self._image.word(first)
         return pack_bits([bool(word >> (address - first + k) & 1) for k in range(count)])
 
@@ -121,7 +135,7 @@ class RegisterBank:
         try:
             self._write(address, data, peer)
         except Refusal as refusal:
-            raise self._note_refusal(refusal, peer) from None
+            raise self._note_refused_write(refusal, peer) from None
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
         """Write coils 0-15: the control word is read, changed and written under the same checks as by register."""
@@ -135,7 +149,7 @@ class RegisterBank:
             bits = sum(bool(value) << (address - first + k) for k, value in enumerate(values))
             self._write(first, (self._image.word(first) & ~mask | bits).to_bytes(2, "big"), peer, mask)
         except Refusal as refusal:
-            raise self._note_refusal(refusal, peer) from None
+            raise self._note_refused_write(refusal, peer) from None
 
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
         """Write some bits of one word, under the same checks as any write."""
@@ -143,7 +157,7 @@ class RegisterBank:
         try:
             self._write(address, (word & and_mask | or_mask & touched).to_bytes(2, "big"), peer, touched)
         except Refusal as refusal:
-            raise self._note_refusal(refusal, peer) from None
+            raise self._note_refused_write(refusal, peer) from None
 
     @property
     def on_asked(self) -> Decide:
@@ -155,9 +169,14 @@ class RegisterBank:
         self._admission.decide = decide
 
     def publish(self, status: Status) -> None:
-        """Show what control and service know."""
+        """Show what control and service know, from the next read on: most that is published, nobody reads."""
         self._admission.is_calibrating = status.state is State.CALIBRATING
-        self._status.publish(status)
+        self._unpacked = status
+
+    def _pack_status(self) -> None:
+        if self._unpacked is not None:
+            self._status.publish(self._unpacked)
+            self._unpacked = None
 
     def clear_command(self) -> None:
         """Clear control_word and the setpoints, because control has switched the output off. The Command keeps its number."""
@@ -201,6 +220,10 @@ class RegisterBank:
         self.on_refusal(refusal, peer)
         return refusal
 
+    def _note_refused_write(self, refusal: Refusal, peer: Peer) -> Refusal:
+        self.on_refused_write(refusal, peer)
+        return self._note_refusal(refusal, peer)
+
     def _bit_word(self, address: int, count: int) -> int:
         """Return the first address of the word that holds all of these bits."""
         for first in self._bits:
@@ -217,6 +240,8 @@ class RegisterBank:
         if count > self._image.writable[address]:
             raise self._read_only(address + self._image.writable[address])
         block = self._image.block_at[address]
+        if peer.role < (needed := self._roles[block.name]):
+            raise role_refusal(peer, block, needed, address)
         if block.name == "staging":
             self.staging.write(address, data, peer)
             self.last_writer["staging"] = peer, self._now()
@@ -225,7 +250,7 @@ class RegisterBank:
             text = f"{cut.name}@{cut.block} is the registers {cut.address} and {cut.address + 1}: write both in one request"
             raise Refusal(RefusalReason.HALF_VALUE, address, text)
         if self._commands.holds(block, address):
-            self._write_command(Write(block, address, data, peer.host, touched), peer)
+            self._write_command(Write(block, address, data, peer.identity, touched), peer)
         elif block.name == "proof":
             self._write_echo(address, data, peer)
         else:
@@ -236,8 +261,13 @@ class RegisterBank:
         text = f"{register.name}@{register.block} at {register.address} is read only"
         return Refusal(RefusalReason.READ_ONLY, address, text)
 
+    def show_watchdogs(self, word: int) -> None:
+        """Show which watchdogs watch the output (WatchdogBit); a map of one's own may leave the register out."""
+        if self._watchdogs is not None:
+            self._image.put(self._watchdogs, word)
+
     def _write_echo(self, address: int, data: bytes, peer: Peer) -> None:
-        order = self._echo.write(address, data, peer.host)
+        order = self._echo.write(address, data, peer.identity)
         if order is not None:
             self.last_writer["byte_order_echo"] = peer, self._now()
             self._tell(f"byte_order_echo {order.upper()}: use block {'200' if order == 'abcd' else '300'}", peer)
@@ -250,16 +280,18 @@ class RegisterBank:
         before, owner = self._commands.values, self._ownership.owner
         self._commands.store(admitted.values, admitted.kept)
         self._admission.note_stored(admitted)
-        self._settle_owner(admitted, write.host)
+        self._settle_owner(admitted, peer)
         names = self._commands.names(write.block, write.address, len(write.data) // 2)
         self.last_writer.update(dict.fromkeys(names, (peer, now_s)))
         self.command = admitted.command
         self.on_command(self.command)
+        if self.on_write is not None:
+            self.on_write(peer, before, admitted, (owner, self._ownership.owner))
         if self.on_accepted is not None:
             self._tell(self._sentence(before, owner, admitted), peer)
 
-    def _settle_owner(self, admitted: AdmittedWrite, host: str) -> None:
-        ownership, values = self._ownership, admitted.values
+    def _settle_owner(self, admitted: AdmittedWrite, peer: Peer) -> None:
+        ownership, values, host = self._ownership, admitted.values, peer.identity
         if admitted.is_taken_over:
             ownership.take(host, explicitly=True)
         elif admitted.is_stop:
@@ -269,12 +301,17 @@ class RegisterBank:
                 ownership.take(host)
         else:
             ownership.rest()
+        if ownership.owner == host:
+            self._owner_peer = peer
         self._show_owner()
 
     def _show_owner(self) -> None:
         if self._ownership.owner != self._shown_owner:
             self._shown_owner = self._ownership.owner
-            self._status.show_owner(ip_number(self._shown_owner))
+            is_known = (
+                self._owner_peer.identity == self._shown_owner
+            )  # else the rig names it, and it has not yet commanded
+            self._status.show_owner(ip_number(self._owner_peer.host if is_known else self._shown_owner))
 
     def _sentence(self, before: list[float], owner: str | None, admitted: AdmittedWrite) -> str:
         """Return what an accepted write changed; empty when nothing that people want to know."""

@@ -28,4 +28,3 @@ class BankRules:
     supported_bits: ControlBit = BASIC_BITS
     require_byte_order_echo: bool = False
     owner: str | None = None
-    allow_plain_upload: bool = False

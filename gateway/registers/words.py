@@ -36,6 +36,10 @@ class ControlBit(IntFlag):
     START_SELF_TEST = 1 << 6
 
 
+RUN_BITS: Final = int(ControlBit.START_CALIBRATION | ControlBit.START_SELF_TEST)
+"""Bits that begin a run on their rise and end it on their fall."""
+
+
 class StatusBit(IntFlag):
     """Bits of register status_word, which a master reads."""
 
@@ -47,6 +51,18 @@ class StatusBit(IntFlag):
     WARNING = 1 << 5
     LIMITED = 1 << 6
     TARGET_UNREACHABLE = 1 << 7
+    PULLING = 1 << 8  # the valve's readback says pull, and control calculates with it
+    SWITCHING = 1 << 9  # the valve is on its way: the force is 0 until its readback
+
+
+class WatchdogBit(IntFlag):
+    """Bits of register watchdogs: the two levels below control. The first is the guardian, the second the output device's
+    own watchdog, for when this machine itself is gone."""
+
+    GUARDIAN_WATCHES = 1 << 0  # it has the output's line, and writes the safe voltage when control stalls or dies
+    DEVICE_ARMED = 1 << 1  # the device's watchdog runs: armed by the gateway, and read back
+    DEVICE_TRIPPED = 1 << 2  # latched: reset_fault clears it
+    DEVICE_HAS_NONE = 1 << 3  # the rig file accepts that
 
 
 class LimitedBy(IntEnum):
@@ -75,6 +91,28 @@ class CalibrationPhase(IntEnum):
     REFUSED = 8  # the fit was refused: see the log
     EXPERIMENT = 9  # an experiment of this machine: no calibration comes of it
     RECORDED = 10  # the experiment is done and recorded
+    SELF_TEST = 11  # the self-test that control_word bit 6 starts
+    TESTED = 12  # the self-test is done: self_test_result
+
+
+class SelfTestVerdict(IntEnum):
+    """Verdict on one item of a self-test."""
+
+    NOT_TESTED = 0
+    PASSED = 1
+    WARNED = 2
+    FAILED = 3
+
+
+class SelfTestResult(IntEnum):
+    """Result of the last self-test since the start, or that one runs; the worst verdict of its items."""
+
+    NONE = 0
+    PASSED = 1
+    WARNED = 2  # or an item could not be tested for which the rig states a force
+    FAILED = 3
+    RUNNING = 4
+    STOPPED = 5  # before its end, by a master
 
 
 class CommitAction(IntEnum):

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from gateway import VERSION, defaults
 from gateway.profiles import Rig
+from gateway.registers.writes.ownership import serial_place
 
 _FORCE_N: Final = 12.0
 _SHORTEST_KEPT_LEASE_S: Final = round(0.75 * defaults.LEASE_S, 3)
@@ -13,16 +14,42 @@ _SHORTEST_KEPT_LEASE_S: Final = round(0.75 * defaults.LEASE_S, 3)
 
 
 @dataclass(frozen=True, slots=True)
+class ServedFace:
+    """A face that masters can reach. type: tcp, rtu, ...; where: address or port; note: what else the banner says of it;
+    facts: the rest of its JSON."""
+
+    type: str
+    where: str
+    note: str
+    facts: dict[str, Any]
+
+
+def tcp_face(host: str, port: int, units: tuple[int, ...]) -> ServedFace:
+    """Return plain Modbus TCP as it is told of."""
+    note = f"units {', '.join(map(str, units))}      register table: force-gateway registers"
+    return ServedFace("tcp", f"{host}:{port}", note, {"host": host, "port": port})
+
+
+def tls_face(host: str, port: int, units: tuple[int, ...]) -> ServedFace:
+    """Return Modbus/TCP Security as it is told of."""
+    note = f"units {', '.join(map(str, units))}      by certificate, which names the role: force-gateway certs"
+    return ServedFace("tls", f"{host}:{port}", note, {"host": host, "port": port})
+
+
+@dataclass(frozen=True, slots=True)
 class Ready:
-    """Facts of a rig that is ready: where Modbus listens, where the devices are and what they last said."""
+    """Facts of a rig that is ready: where plain Modbus TCP listens (None: nowhere), every face, where the devices are and
+    what they last said."""
 
     rig: Rig
-    modbus: tuple[str, int]
+    modbus: tuple[str, int] | None
     output_port: str
     cell_port: str
     voltage_v: float | None
     force_n: float | None
     notes: tuple[str, ...] = ()
+    faces: tuple[ServedFace, ...] = ()
+    valve_port: str = ""
 
 
 def ready_fields(ready: Ready) -> dict[str, Any]:
@@ -30,31 +57,59 @@ def ready_fields(ready: Ready) -> dict[str, Any]:
     return {
         "ready": True,
         "rig": ready.rig.name,
-        "modbus": list(ready.modbus),
+        "modbus": list(ready.modbus) if ready.modbus else None,
+        "faces": [{"type": face.type, **face.facts} for face in ready.faces],
         "web": None,
-        "ptys": {"output": ready.output_port, "load_cell": ready.cell_port} if ready.rig.simulated else {},
+        "ptys": _ptys(ready) if ready.rig.simulated else {},
         "notes": list(ready.notes),
     }
 
 
+def _ptys(ready: Ready) -> dict[str, str]:
+    ptys = {"output": ready.output_port, "load_cell": ready.cell_port}
+    return ptys | ({"valve": ready.valve_port} if ready.valve_port else {})
+
+
 def format_banner(ready: Ready) -> str:
     """Return what a person reads when the gateway is ready."""
-    rig, (host, port) = ready.rig, ready.modbus
+    rig = ready.rig
     calibration = rig.calibration
     what = f"simulated, seed {rig.seed}" if rig.simulated else "real devices"
-    units = ", ".join(map(str, rig.network.units))
     output, cell = rig.output, rig.load_cell
     lines = [
         f"force-gateway {VERSION} · rig {rig.name} ({what}) · calibration {calibration.name}: {calibration.kind}",
-        f"  modbus tcp   {host}:{port}   units {units}      register table: force-gateway registers",
+        *(f"  modbus {face.type:<5} {face.where}   {face.note}" for face in ready.faces),
         f"  output       {ready.output_port:<16} {output.device.name} {output.baud}  {_reading(ready.voltage_v, 'V', 3)}",
         f"  load cell    {ready.cell_port:<16} {cell.device.name} {cell.baud}  {_reading(ready.force_n, 'N', 2)}",
+        *([f"  valve        {ready.valve_port:<16} {rig.valve.device.name} {rig.valve.baud}"] if rig.valve else []),
         f"  lease        {_lease(rig)}",
-        *(f"  {'' if index else 'try':<12} {line}" for index, line in enumerate(try_lines(rig, host, port))),
+        *(f"  {'' if index else 'try':<12} {line}" for index, line in enumerate(_all_lines_to_try(ready))),
         *(f"  note         {note}" for note in ready.notes),
         f"READY  loop {rig.loop_hz:g} Hz · Ctrl-C ramps the force to 0 and stops · not a safety device",
     ]
     return "\n".join(lines)
+
+
+def _all_lines_to_try(ready: Ready) -> tuple[str, ...]:
+    """Return what can be tried: over plain Modbus TCP where there is it, and on the terminals of serial faces."""
+    lines = try_lines(ready.rig, *ready.modbus) if ready.modbus else ()
+    return lines + tuple(
+        line for face in ready.faces if face.facts.get("is_terminal") for line in _try_rtu(ready.rig, face)
+    )
+
+
+def _try_rtu(rig: Rig, face: ServedFace) -> tuple[str, ...]:
+    """Return a command line for a serial face's terminal. A terminal has no parity: mbpoll is told so."""
+    force_n, unit = _force_to_try_n(rig), face.facts["unit"]
+    if rig.network.owner not in (None, face.facts["host"]):
+        return ()
+    if rig.control.supervision.lease_s is not None or rig.network.require_byte_order_echo:
+        options = "" if unit == defaults.UNIT_ID else f" --unit {unit}"
+        return (
+            f"force-gateway hold {force_n:g} --rtu {face.where}{options} --rig {rig.file}        (over Modbus RTU)",
+        )
+    line = f"-b {face.facts['baud']} -P none -a {unit}"
+    return (f"mbpoll -m rtu {line} -1 -r 1 {face.where} 1 {round(100 * force_n)}        (over Modbus RTU)",)
 
 
 def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
@@ -66,7 +121,7 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
     unit = defaults.UNIT_ID if defaults.UNIT_ID in rig.network.units else rig.network.units[0]
     where = "" if (host, port) == (defaults.HOST, defaults.MODBUS_PORT) else f" --gateway {_in_url(host)}:{port}"
     where += "" if unit == defaults.UNIT_ID else f" --unit {unit}"
-    if rig.network.owner and not ip_address(rig.network.owner).is_loopback:
+    if rig.network.owner and not _is_this_machine(rig.network.owner):
         return (f"force-gateway monitor{where}        ({rig.network.owner} alone may command)",)
     force_n, lease_s = _force_to_try_n(rig), rig.control.supervision.lease_s
     if lease_s is not None or rig.network.require_byte_order_echo:
@@ -86,6 +141,11 @@ def _reachable_host(host: str, rig: Rig) -> str:
     if loopback is None:
         return host
     return loopback if any(ip_address(loopback) in network for network in rig.network.allow) else "THIS-MACHINE"
+
+
+def _is_this_machine(owner: str) -> bool:
+    """Decide whether the master that a rig names connects from here over TCP."""
+    return serial_place(owner) is None and ip_address(owner).is_loopback
 
 
 def _in_url(host: str) -> str:

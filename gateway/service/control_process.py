@@ -25,6 +25,7 @@ from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig.faces import with_rtu_face
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
 from gateway.service.running_rig.starting import StartError
@@ -39,6 +40,8 @@ def main(arguments: list[str]) -> int:
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
             rig = load(options)
+            if options["rtu"] is not None:
+                rig = with_rtu_face(rig, options["rtu"])
             notes = use_realtime() if options["realtime"] else ()
             with asyncio.Runner(loop_factory=_loop_factory()) as runner:
                 return runner.run(run(rig, options, link, log, notes))

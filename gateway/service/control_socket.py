@@ -1,9 +1,9 @@
 """`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
 
-record on|off|status, calibration runs, the calibration and the plant in use and their change, last writers of each register
-and the sentence of the last refusal, which rig runs and its lease, what the residual watch has found (its process tells it
-here, others may read it), the loop's health, and faults of a simulated rig (passed on to the rig's own socket by the tools
-themselves).
+record on|off|status, calibration runs, the last self-test's findings, the calibration and the plant in use and their change,
+last writers of each register and the sentence of the last refusal, which rig runs and its lease, what the residual watch has
+found (its process tells it here, others may read it), the loop's health, and whether something may be set on a simulated rig
+(judged and audited here, passed on to the rig's own socket by the tools themselves).
 Mode 0600: whoever may write the state directory may ask. What each verb takes stands in gateway.service.socket_requests.
 """
 
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gateway.audit.rig_audit import RigAudit
 from gateway.calibrations.upload import UploadService
 from gateway.processes.json_socket import Handler, JsonLineServer
 from gateway.registers import RegisterBank
@@ -19,6 +20,7 @@ from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.published_status import LoopHealth
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
+from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.socket_requests import CalibrationRequest, EmptyRequest, RecordRequest, parse_request
 from gateway.service.watch_reports import WatchReports
 
@@ -34,6 +36,8 @@ class RunningParts:
     calibration_runs: CalibrationRuns
     watch: WatchReports
     plants: RigPlants
+    audit: RigAudit
+    simulation: SimulationRequests
     running: dict[str, Any] = field(default_factory=dict)
     """What does not change while it runs: rig, port of Modbus TCP, lease_s (null: none), lease_action."""
 
@@ -47,13 +51,15 @@ class ControlSocket(JsonLineServer):
             "calibration": self._calibration,
             "plant": parts.plants.answer,
             "calibrate": parts.calibration_runs.answer,
+            "self-test": parts.calibration_runs.answer_self_test,
             "last-writer": self._last_writer,
             "last-refusal": self._last_refusal,
             "health": self._health_figures,
             "running": self._running,
+            "sim": parts.simulation.answer,
             "residual": parts.watch.answer,
         }
-        super().__init__(state / "control.sock", handlers, log)
+        super().__init__(state / "control.sock", parts.audit.watch_handlers(handlers), log)
         self._asked = parts
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:

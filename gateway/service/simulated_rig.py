@@ -1,34 +1,23 @@
-"""The simulated rig: a process of its own with two ptys, the device role of each codec, and the twin behind them.
+"""The simulated rig: a process of its own with a pty for each line, the device role of each codec, and the twin behind them.
 
 It is a child of the guardian in its own session, so it outlives a kill of control as a real rig does, and ends when the
 guardian does (its link closes). The wires take the time that their baud rates take. A socket in the state directory
-(`rig.sock`) takes faults for tests and demonstrations: no air, no contact, a cut wire, an inverted sign, an amplifier that
-repeats its last value, or a plant that is no longer the one in the rig's file.
+(`rig.sock`) takes what `force-gateway sim` sets, and faults for tests. What is set is kept in the state directory for as long
+as this gateway runs: a rig process that died is started again as it was set.
 """
 
 import asyncio
+import contextlib
 import json
 import os
 import socket
 import sys
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
-from math import isfinite
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from gateway.devices import DeviceProfile, cell_device, output_device
-from gateway.devices.messages import (
-    Accepted,
-    Garbage,
-    OutputRequest,
-    Pressure,
-    Quality,
-    ReadPressure,
-    ReadVoltage,
-    SetVoltage,
-)
+from gateway.devices import DeviceProfile
 from gateway.ports import PacedPty
 from gateway.processes import message_link as guardian_link
 from gateway.processes import priority
@@ -37,148 +26,72 @@ from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.json_socket import JsonLineServer
 from gateway.profiles import Rig, load_rig
-from gateway.profiles.strict_yaml.text import Document
-from gateway.profiles.strict_yaml.typed import build
-from gateway.service.socket_requests import FaultRequest, parse_request
-from gateway.twin import Plant, Twin
-from gateway.twin.plant import with_value
+from gateway.service.simulation.kept_settings import KeptSettings
+from gateway.service.simulation.settings import SimulationSettings
+from gateway.service.simulation.world import SimulatedRig
 
-_LONGEST_LEAP_S = 1.0  # a rig process that was stopped does not replay the hours it missed
-_SETTLED_S = 1.0  # until a changed plant has come to what is commanded
+_UNPLUGS: Final = {"output": "output.unplug", "load_cell": "cell.unplug"}
 
 
-class SimulatedRig:
-    """The twin behind the device ends of both wires. Bytes in through `on_output_bytes`, out through the two `send`s.
+class SimulatedLines:
+    """The ptys of one simulated rig, by line: output, load_cell and, where the rig has one, valve."""
 
-    It begins as a calibration leaves a rig and as any later vent does: pressed before, and vented.
-    """
+    def __init__(self, rig: Rig) -> None:
+        self.world = SimulatedRig(
+            rig,
+            send_output=lambda data: self._ptys["output"].send(data),
+            send_cell=lambda data: self._ptys["load_cell"].send(data),
+            now_s=time.monotonic(),
+        )
+        self._ptys = {
+            "output": _make_pty(rig.output.device, self.world.on_output_bytes),
+            "load_cell": _make_pty(rig.load_cell.device, self.world.on_cell_bytes),
+        }
+        if rig.valve:
+            self._ptys["valve"] = _make_pty(rig.valve.device, self._on_valve_bytes)
+        self._paths: dict[str, str] = {}
+        self._rate_hz = rig.load_cell.device.rate_hz
+        self._tick = ClockTick(1.0 / self._rate_hz, self._on_tick) if self._rate_hz else None
 
-    def __init__(
-        self, rig: Rig, *, send_output: Callable[[bytes], None], send_cell: Callable[[bytes], None], now_s: float
-    ) -> None:
-        assert rig.plant
-        self.twin = Twin(rig.plant, rig.seed)
-        self.twin.press_and_vent()
-        self.is_cell_cut = False
-        self.is_output_cut = False
-        self._output = output_device(rig.output.device)
-        self._cell = cell_device(rig.load_cell.device, rig.load_cell.unit)
-        self._wiring = rig.load_cell.sign  # the simulated cell is wired as the rig says that the real one is
-        self._send_output = send_output
-        self._send_cell = send_cell
-        self._setting_v = 0.0
-        self._now_s = now_s
-        self._range_n = rig.plant.cell.range_n
-        self._plant = rig.plant
-        self._seed = rig.seed
-        self._twin_faults: dict[str, bool] = {}
-        self.is_cell_frozen, self._shown_n = False, 0.0
+    def open(self) -> None:
+        """Open all ports, and begin to stream."""
+        for pty in self._ptys.values():
+            pty.open()
+        if self._tick:
+            self._tick.start()
 
-    def advance(self, now_s: float) -> None:
-        """Advance the twin to now_s; after a long pause by a limited time only."""
-        self.twin.advance(min(max(0.0, now_s - self._now_s), _LONGEST_LEAP_S))
-        self._now_s = now_s
+    def close(self) -> None:
+        """Close all ports."""
+        if self._tick:
+            self._tick.close()
+        for pty in self._ptys.values():
+            pty.close()
 
-    def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
-        """Answer requests to the output device, unless its wire is cut."""
-        self.advance(now_s)
-        for request in self._output.receive(chunk, now_s):
-            answer = self._answer(request)
-            if not self.is_output_cut:
-                self._send_output(answer)
+    def paths(self) -> dict[str, str]:
+        """Return where the ports are; of an unplugged one, where it was last."""
+        self._paths |= {name: pty.path for name, pty in self._ptys.items() if pty.is_open}
+        return dict(self._paths)
 
-    def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
-        """Answer questions to a load cell that speaks only when asked."""
-        for _ in range(self._cell.receive(chunk, now_s)):
-            self.stream(now_s)
+    def plug(self, settings: SimulationSettings) -> bool:
+        """Pull and put back plugs as the settings say; return whether there are other ports now."""
+        has_moved = False
+        for name, setting in _UNPLUGS.items():
+            pty, is_wanted = self._ptys[name], not settings.is_on(setting)
+            if pty.is_open and not is_wanted:
+                pty.close()
+            elif is_wanted and not pty.is_open:
+                pty.open()
+                has_moved = True
+        return has_moved
 
-    def stream(self, now_s: float) -> None:
-        """Send one frame of the load-cell amplifier."""
-        self.advance(now_s)
-        if not self.is_cell_cut:
-            measured_n = self._wiring * float(self.twin.measured_n)
-            force_n = self._shown_n = self._shown_n if self.is_cell_frozen else measured_n
-            overload = abs(force_n) >= self._range_n
-            self._send_cell(self._cell.frame(force_n, Quality.OVERLOAD if overload else Quality.OK))
+    def _on_valve_bytes(self, chunk: bytes, now_s: float) -> None:
+        self._ptys["valve"].send(self.world.on_valve_bytes(chunk, now_s))
 
-    def _answer(self, request: OutputRequest | Garbage) -> bytes:
-        match request:
-            case SetVoltage(voltage_v):
-                self._setting_v = voltage_v
-                self.twin.command(voltage_v)
-                return self._output.reply(Accepted(voltage_v), to=request)
-            case ReadVoltage():
-                return self._output.reply(Accepted(self._setting_v), to=request)
-            case ReadPressure():
-                return self._output.reply(Pressure(float(self.twin.pressure_pa)), to=request)
-            case Garbage():
-                return self._output.reply(self._output.refusal(request))
-
-    def fault(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Switch a simulated fault on or off.
-
-        {"do": "fault", "name": NAME, "on": bool}; NAME plant takes {"values": {"friction.coulomb_n": 2.5}} besides.
-        ValueError on an unknown name, or a value that no plant has.
-        """
-        query = parse_request(FaultRequest, request)
-        name, is_on = query.name, query.on
-        match name:
-            case "no-air" | "no-contact" | "sign-inverted":
-                self._twin_faults[name] = is_on
-                self._set_twin_faults()
-            case "cell-cut":
-                self.is_cell_cut = is_on
-            case "cell-frozen":
-                self.is_cell_frozen = is_on
-            case "output-cut":
-                self.is_output_cut = is_on
-            case "plant":
-                self._change_plant(_change_plant(self._plant, query.values) if is_on else self._plant)
-            case _:
-                raise ValueError(
-                    f"fault {name!r} is not one of no-air, no-contact, sign-inverted, cell-cut, cell-frozen, "
-                    "output-cut, plant"
-                )
-        return {"fault": name, "on": is_on}
-
-    def _set_twin_faults(self) -> None:
-        self.twin.set_air(not self._twin_faults.get("no-air", False))
-        self.twin.set_contact(not self._twin_faults.get("no-contact", False))
-        self.twin.set_sign(-1 if self._twin_faults.get("sign-inverted", False) else 1)
-
-    def _change_plant(self, plant: Plant) -> None:
-        """Another machine in the place of this one, which has come to the standing command already. ValueError, and nothing has
-        changed, where its physics do not compute."""
-        twin = Twin(plant, self._seed + 1)
-        try:
-            twin.press_and_vent()
-            twin.command(self._setting_v)
-            twin.advance(_SETTLED_S)
-            measured_n = float(twin.measured_n)
-        except ArithmeticError as error:
-            raise ValueError(f"no machine has such a plant: {error}") from None
-        if not isfinite(measured_n):
-            raise ValueError(f"no machine has such a plant: it measures {measured_n} N")
-        self._seed += 1
-        self.twin = twin
-        self._set_twin_faults()
-
-
-def _change_plant(plant: Plant, values: Mapping[str, float]) -> Plant:
-    """Return the plant with some numbers changed, by `section.field`; ValueError for what it does not have, or cannot be."""
-    for path, value in values.items():
-        section, _, field = path.partition(".")
-        try:
-            known = getattr(getattr(plant, section), field)
-            plant = with_value(plant, section, field, value)
-        except (AttributeError, TypeError):
-            raise ValueError(f"{path} = {value}: no number of a plant, such as friction.coulomb_n = 2.5") from None
-        if not isinstance(known, float):
-            raise ValueError(f"{path} is no number of a plant")
-    _, faults = build(Plant, Document("plant", asdict(plant), {}))
-    if faults:
-        raise ValueError(f"{faults[0].path} {faults[0].message}")
-    return plant
+    def _on_tick(self, expirations: int, late_s: float) -> None:
+        """A stream, whose amplifier leaves out what its wire has no time for."""
+        pty = self._ptys["load_cell"]
+        if pty.is_open and pty.backlog_s * self._rate_hz < 1.0:
+            self.world.stream(time.monotonic())
 
 
 def _make_pty(device: DeviceProfile, on_bytes: Callable[[bytes, float], None]) -> PacedPty:
@@ -186,39 +99,74 @@ def _make_pty(device: DeviceProfile, on_bytes: Callable[[bytes, float], None]) -
     return PacedPty(serial.baud, on_bytes=on_bytes, bits_per_character=serial.bits_per_character)
 
 
-async def serve(rig: Rig, link: socket.socket, state: Path, log: EventLog) -> None:
+class SimulationSocket:
+    """What rig.sock answers: sim and fault. tell_ports: to the guardian, whenever they have moved."""
+
+    def __init__(
+        self, lines: SimulatedLines, kept: KeptSettings, tell_ports: Callable[[], None], log: EventLog
+    ) -> None:
+        self._lines, self._kept, self._tell_ports, self._log = lines, kept, tell_ports, log
+
+    def restore(self) -> None:
+        """Set what was set before this process was started again."""
+        settings = self._kept.read()
+        if settings.values:
+            self._lines.world.use_settings(settings)
+            self._log("simulation", f"the simulated rig is set as it was before: {_in_words(settings)}")
+
+    def simulate(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Answer the verb sim, see `SimulatedRig.simulate`."""
+        world = self._lines.world
+        before, answer = world.settings, world.simulate(request)
+        if world.settings != before:
+            self._log("simulation", f"the simulated rig is set: {_in_words(world.settings)}")
+            self._follow()
+        return answer
+
+    def fault(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Answer the verb fault, see `SimulatedRig.fault`."""
+        answer = self._lines.world.fault(request)
+        self._follow()
+        return answer
+
+    def _follow(self) -> None:
+        settings = self._lines.world.settings
+        if self._lines.plug(settings):
+            self._tell_ports()
+        try:
+            self._kept.write(settings)
+        except OSError as error:
+            self._log("simulation", f"what is set does not outlive the simulated rig's process: {error}")
+
+
+def _in_words(settings: SimulationSettings) -> str:
+    told = (f"{name}={'on' if value is True else f'{value:g}'}" for name, value in settings.values.items())
+    return ", ".join(told) or "nothing, it is as its files say"
+
+
+async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:
     """Run until the guardian's end of the link closes."""
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
-    output_pty = _make_pty(rig.output.device, lambda chunk, now_s: simulated.on_output_bytes(chunk, now_s))
-    cell_pty = _make_pty(rig.load_cell.device, lambda chunk, now_s: simulated.on_cell_bytes(chunk, now_s))
-    simulated = SimulatedRig(rig, send_output=output_pty.send, send_cell=cell_pty.send, now_s=time.monotonic())
-    faults = JsonLineServer(state / "rig.sock", {"fault": simulated.fault}, log)
+    lines = SimulatedLines(rig)
 
-    rate_hz = rig.load_cell.device.rate_hz
+    def tell_ports() -> None:
+        with contextlib.suppress(OSError):  # it has gone: so do we
+            guardian_link.send(link, guardian_link.PTYS, {"ptys": lines.paths(), "pid": os.getpid()})
 
-    def on_tick(expirations: int, late_s: float) -> None:
-        """A stream, whose amplifier leaves out what its wire has no time for."""
-        if cell_pty.backlog_s * rate_hz < 1.0:
-            simulated.stream(time.monotonic())
-
-    tick = ClockTick(1.0 / rate_hz, on_tick) if rate_hz else None
-    output_pty.open()
-    cell_pty.open()
-    if unserved := await faults.start():
+    answers = SimulationSocket(lines, kept, tell_ports, log)
+    server = JsonLineServer(kept.state / "rig.sock", {"fault": answers.fault, "sim": answers.simulate}, log)
+    lines.open()
+    answers.restore()
+    if unserved := await server.start():
         log("socket", f"E152 {unserved}")
-    if tick:
-        tick.start()
     loop.add_reader(link.fileno(), ended.set)
-    ptys = {"output": output_pty.path, "load_cell": cell_pty.path}
-    guardian_link.send(link, guardian_link.PTYS, {"ptys": ptys, "pid": os.getpid()})
+    tell_ports()
+    lines.plug(lines.world.settings)
     await ended.wait()
     loop.remove_reader(link.fileno())
-    if tick:
-        tick.close()
-    await faults.close()
-    output_pty.close()
-    cell_pty.close()
+    await server.close()
+    lines.close()
 
 
 def main(arguments: list[str]) -> int:
@@ -228,7 +176,8 @@ def main(arguments: list[str]) -> int:
     state = Path(options["state"])
     priority.set_nice(priority.RIG_NICE)
     with EventLog(source="rig", file=EventFile(state)) as log:
-        asyncio.run(serve(load_rig(options["rig"], simulated=True), link, state, log))
+        kept = KeptSettings(state, options.get("run", ""))
+        asyncio.run(serve(load_rig(options["rig"], simulated=True), link, kept, log))
     return 0
 
 

@@ -91,6 +91,16 @@ class FaultRequest:
     values: dict[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationRequest:
+    """What is set on the simulated rig, by name, and what is cleared before that. Neither: what is set."""
+
+    __pydantic_config__ = _STRICT
+    set: dict[Annotated[str, MaxLen(100)], bool | float | Annotated[str, MaxLen(100)]] = field(default_factory=dict)
+    clear: Annotated[tuple[Annotated[str, MaxLen(100)], ...], MaxLen(200)] = ()
+    clear_all: bool = False
+
+
 for _shape in (
     EmptyRequest,
     RecordRequest,
@@ -99,6 +109,7 @@ for _shape in (
     CalibrateRequest,
     ResidualRequest,
     FaultRequest,
+    SimulationRequest,
     CalibrationPlan,
     ExperimentPlan,
 ):

@@ -2,7 +2,7 @@
 
 from gateway.twin.effects.contact import SLOW, SPINDLE
 from gateway.twin.effects.term import active_formulas
-from gateway.twin.play_and_lags import apply_play, follow_ramp, ramp_shares
+from gateway.twin.play_and_lags import RampShares, apply_play, follow_ramp, ramp_shares
 from gateway.twin.sections import Contact
 from gateway.twin.surroundings import TwinConditions
 
@@ -11,12 +11,24 @@ class ContactState:
     """`step` takes the slide's force and returns the contact force, N. is_on: is there anything to do at all?"""
 
     def __init__(self, contact: Contact, step_s: float, conditions: TwinConditions) -> None:
-        self._contact, self._conditions = contact, conditions
-        self._creep = ramp_shares(contact.creep_s, step_s) if contact.creep_share != 0.0 else None
+        self._contact, self._conditions, self._step_s = contact, conditions, step_s
+        self._creep = self._lag_of(contact)
         self._play_n = self._late_n = self._passed_n = 0.0
         self.force_n = 0.0
         self.is_on = False
         self.select_active_effects(0.0)
+
+    def _lag_of(self, contact: Contact) -> RampShares | None:
+        return ramp_shares(contact.creep_s, self._step_s) if contact.creep_share != 0.0 else None
+
+    def change_contact(self, contact: Contact, force_n: float) -> None:
+        """Go on as another contact under the slide's force_n: a play that is new is closed, and nothing has crept yet."""
+        if self._contact.backlash_n == 0.0:
+            self._play_n = force_n
+        if self._creep is None:
+            self._late_n, self._passed_n = 0.0, force_n
+        self._contact, self._creep = contact, self._lag_of(contact)
+        self.select_active_effects(force_n)
 
     def select_active_effects(self, force_n: float) -> None:
         """Choose the effects that act, from what is known of the surroundings now. force_n: of the slide."""

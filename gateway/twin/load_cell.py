@@ -27,8 +27,8 @@ def shown_time_s(cell: LoadCell, time_s: Real) -> Real:
 class History:
     """The force of past steps, as far back as the reading looks."""
 
-    def __init__(self, step_s: float) -> None:
-        self._values = [0.0]
+    def __init__(self, step_s: float, force_n: float = 0.0) -> None:
+        self._values = [force_n]
         self._step_s, self._first = step_s, 0
 
     def put(self, value: float) -> None:
@@ -51,15 +51,26 @@ class LoadCellState:
     """What the amplifier makes of the contact force."""
 
     def __init__(self, cell: LoadCell, step_s: float) -> None:
-        self._cell = cell
-        self._shares = ramp_shares(cell.filter_s, step_s) if cell.filter_s != 0.0 else None
-        shifted = is_switched_on(cell, ("clock_offset_s", "clock_skew"))
-        self._history = History(step_s) if shifted else None
-        self._terms = active_formulas(TERMS, cell, TwinConditions())
+        self._step_s = step_s
         self._force_n = 0.0
         self._last_n: float | None = None
         self.filtered_n = 0.0
         self.sign = 1.0
+        self._take(cell, begins=True)
+
+    def _take(self, cell: LoadCell, *, begins: bool) -> None:
+        self._cell = cell
+        self._shares = ramp_shares(cell.filter_s, self._step_s) if cell.filter_s != 0.0 else None
+        self._terms = active_formulas(TERMS, cell, TwinConditions())
+        if begins:
+            shifted = is_switched_on(cell, ("clock_offset_s", "clock_skew"))
+            self._history = History(self._step_s, self.filtered_n) if shifted else None
+
+    def change_cell(self, cell: LoadCell, *, begins: bool) -> None:
+        """Go on as another load cell. begins: its time begins now."""
+        if self._shares is None:
+            self._force_n = self.filtered_n
+        self._take(cell, begins=begins)
 
     def select_active_effects(self, conditions: TwinConditions) -> None:
         """Choose the effects that act, from what is known of the surroundings now."""

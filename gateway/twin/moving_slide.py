@@ -1,9 +1,14 @@
 """The slide of the running twin: the step of slide.py with what changes while it moves - surface, side load, disturbance."""
 
+from typing import Final
+
 from gateway.defaults import UNLIMITED
+from gateway.twin.friction import stribeck_limit_n, two_sided_limit
 from gateway.twin.plant import Plant
-from gateway.twin.play_and_lags import follow_ramp, ramp_shares
+from gateway.twin.play_and_lags import RampShares, follow_ramp, ramp_shares
 from gateway.twin.slide import SlideState, advance_slide, slide_of, with_gap, without_motion
+
+_ROUNDING: Final = 1.0e-9  # of a strain: the same friction again is left alone
 
 
 class MovingSlide:
@@ -15,10 +20,42 @@ class MovingSlide:
         self._surface_gap_m = self._contact_gap_m = self._slide.gap_m
         self._touching = True
         self._side_n = self._side_share = self._more_out_n = self._disturbance_n = 0.0
-        lag_s = plant.cylinder.chamber_lag_s
-        self._chamber = ramp_shares(lag_s, step_s) if lag_s != 0.0 else None
+        self._chamber = self._lag_of(plant)
         self._gauge_pa = self._chamber_pa = 0.0
         self.state = SlideState()
+
+    def _lag_of(self, plant: Plant) -> RampShares | None:
+        lag_s = plant.cylinder.chamber_lag_s
+        return ramp_shares(lag_s, self._step_s) if lag_s != 0.0 else None
+
+    def change_plant(self, plant: Plant) -> None:
+        """Go on as another plant's slide, from where it stands; `hold_friction` comes when its side load is known."""
+        height_m, self._slide = self._contact_gap_m - self._surface_gap_m, slide_of(plant)
+        if self._chamber is None:
+            self._chamber_pa = self._gauge_pa
+        self._chamber = self._lag_of(plant)
+        if self._slide.stiction_n == 0.0:
+            self.state = self.state._replace(stiction_n=0.0)
+        self._contact_gap_m = self._slide.gap_m
+        self.set_surface(height_m)
+
+    def hold_friction(self) -> None:
+        """Let friction that has become another one hold what it held, as far as it can: one that grows does not push."""
+        slide, state = self._slide, self.state
+        thrust_n = slide.area_m2 * (self._gauge_pa if self._chamber is None else self._chamber_pa)
+        limit_n = slide.coulomb_n + slide.load_dependent_n_per_n * thrust_n + state.stiction_n
+        limit_n += self._side_n + self._side_share * thrust_n
+        if slide.stribeck_n != 0.0:
+            limit_n += stribeck_limit_n(slide.stribeck_n, state.travel_m / (slide.stribeck_m_per_s * self._step_s))
+        limit_n, centre_n = two_sided_limit(limit_n, slide.asymmetry_n + self._more_out_n)
+        carried_n = limit_n * sum(state.strains) / len(state.strains)
+        most = max(abs(strain) for strain in state.strains)
+        if carried_n == 0.0:
+            return
+        one, two, three = state.strains
+        scale = min(max((state.friction_n - centre_n) / carried_n, 0.0), 1.0 / most)
+        if abs(scale - 1.0) > _ROUNDING:
+            self.state = state._replace(strains=(one * scale, two * scale, three * scale))
 
     @property
     def force_n(self) -> float:
@@ -66,6 +103,8 @@ class MovingSlide:
         if self._chamber is not None:
             self._chamber_pa = follow_ramp(self._chamber_pa, self._chamber, self._gauge_pa, pressure_pa)
             self._gauge_pa, pressure_pa = pressure_pa, self._chamber_pa
+        else:
+            self._gauge_pa = pressure_pa
         thrust_n = self._slide.area_m2 * pressure_pa
         loads_n = (thrust_n, self._side_n + self._side_share * thrust_n, self._more_out_n, self._disturbance_n)
         self.state = state = advance_slide(self._slide, self.state, loads_n, self._step_s, self._step_s)

@@ -132,23 +132,38 @@ class RegulatorState:
     """The moving part: `command` when a voltage arrives, `step` every step."""
 
     def __init__(self, regulator: Regulator, step_s: float) -> None:
-        self._regulator, self._step_s = regulator, step_s
-        self._lags = lags_of(regulator)
-        self._shares = lag_shares(self._lags, step_s)
+        self._step_s, self._voltage_v = step_s, 0.0
+        self._take(regulator)
         self._target, self._state = HeldTarget(), PressureState()
         self._since_s = 0.0
-        self._delay = round(regulator.delay_s / step_s, 9)  # in steps, as all moments here
         self._now, self._seen_pa = 0, 0.0
         self._arriving: deque[tuple[float, float]] = deque()
-        self._droops = is_switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa"))
-        self._changes = self._droops or regulator.leak_per_s != 0.0
         self.pressure_pa = 0.0
         self.air = True
         self.supply_kpa: float | None = None
 
+    def _take(self, regulator: Regulator) -> None:
+        self._regulator = regulator
+        self._lags = lags_of(regulator)
+        self._shares = lag_shares(self._lags, self._step_s)
+        self._delay = round(regulator.delay_s / self._step_s, 9)  # in steps, as all moments here
+        self._droops = is_switched_on(regulator, ("droop_pa_per_pa", "droop_share_per_pa"))
+        self._changes = self._droops or regulator.leak_per_s != 0.0
+
+    def change_regulator(self, regulator: Regulator) -> None:
+        """Go on as another regulator under the same command; what is on its way arrives no later than what comes after it."""
+        self._take(regulator)
+        latest = self._now + self._delay
+        self._arriving = deque((min(moment, latest), target) for moment, target in self._arriving)
+        if not self._delay and self._arriving:
+            self._seen_pa = self._arriving[-1][1]
+            self._arriving.clear()
+        self.command(self._voltage_v)
+
     def command(self, voltage_v: float) -> None:
         """Take a new command, V."""
         regulator, before = self._regulator, self._target
+        self._voltage_v = voltage_v
         self._target = notice_target(
             before,
             target_pa(regulator, voltage_v),

@@ -19,6 +19,8 @@ from gateway.twin.surroundings import Surroundings, TwinConditions
 
 STEP_S: Final = 1.0e-3
 _ROUNDING: Final = 1.0e-6  # of a step: ten times 0.001 s are ten steps
+_FROM_TIME_0: Final = ("drift_n_per_s", "warm_up_n", "warm_up_s", "clock_offset_s", "clock_skew")
+"""Of the load cell: what acts by the time that it has been there."""
 _STROKE_SHARE: Final = 0.5  # of the full scale: presses every friction element over, whatever the plant
 
 
@@ -40,7 +42,7 @@ class Twin:
         self._cell = LoadCellState(self.plant.cell, STEP_S)
         self._cell.select_active_effects(self._conditions)
         self._rng = default_rng(self._seed)
-        self._steps = 0
+        self._steps = self._began = 0
         self._owed_steps = 0.0
         self._reading: float | None = None
 
@@ -52,6 +54,25 @@ class Twin:
         """
         if self.plant.contact.gap_m <= 0.0:
             self._slide.press_and_vent(_STROKE_SHARE * self.plant.regulator.full_scale_pa)
+
+    def change_plant(self, plant: Plant) -> None:
+        """Go on as another plant from now on: what moves goes on from where it is, and remembers what it did.
+
+        Friction that grows does not push, a pad that begins to creep has not crept yet, and where a drift, the warm-up or the
+        cell's clock is changed, these three begin now.
+        """
+        before, self.plant = self.plant.cell, plain(plant)
+        begins = any(getattr(before, name) != getattr(self.plant.cell, name) for name in _FROM_TIME_0)
+        if begins:
+            self._began = self._steps
+        self._conditions.time_s = (self._steps - self._began) * STEP_S
+        self._regulator.change_regulator(self.plant.regulator)
+        self._slide.change_plant(self.plant)
+        self._contact.change_contact(self.plant.contact, self._slide.force_n)
+        self._cell.change_cell(self.plant.cell, begins=begins)
+        self._feel_surroundings()
+        self._slide.hold_friction()
+        self._reading = None
 
     def command(self, voltage_v: float) -> None:
         """Apply a command voltage, V; it holds until the next one. ValueError when it is not finite."""
@@ -82,14 +103,15 @@ class Twin:
         regulator, slide, contact, cell = self._regulator.step, self._slide.step, self._contact.step, self._cell.step
         conditions = self._conditions
         turn_rad = 0.0 if conditions.spindle_rpm is None else conditions.spindle_rpm * (2.0 * math.pi / 60.0 * STEP_S)
-        for step in range(self._steps + 1, self._steps + steps + 1):
+        passed = self._steps - self._began
+        for step in range(passed + 1, passed + steps + 1):
             conditions.time_s = step * STEP_S
             conditions.spindle_rad = conditions.spindle_rad + turn_rad
             cell(contact(slide(regulator())))
 
     def read(self) -> float:
         """Return a reading of the load cell now, N: each call draws new noise."""
-        self._conditions.time_s = self._steps * STEP_S
+        self._conditions.time_s = (self._steps - self._began) * STEP_S
         self._reading = reading = self._cell.read(self._rng, self._conditions)
         return reading
 
@@ -143,6 +165,9 @@ class Twin:
         The position is taken from where its effects are nothing. ValueError when a value is not finite.
         """
         self._conditions.update(around)
+        self._feel_surroundings()
+
+    def _feel_surroundings(self) -> None:
         self._regulator.supply_kpa = self._conditions.supply_kpa
         friction = self.plant.friction
         load_n = side_load_n(friction, self._conditions) + place_limit_n(friction, self._conditions)

@@ -12,8 +12,8 @@ from typing import Final
 
 from gateway import VERSION
 from gateway.control.compensation.cell_map import CellMap
-from gateway.diagnosis.against.machine import MachineModel, describe_machine
-from gateway.diagnosis.against.machine_document import machine_document, read_machine
+from gateway.diagnosis.changes.machine import MachineModel, describe_machine
+from gateway.diagnosis.changes.machine_document import machine_document, read_machine
 from gateway.diagnosis.diagnose import Options
 from gateway.diagnosis.excerpt import take_excerpt
 from gateway.diagnosis.measurement import Measurement

@@ -9,8 +9,8 @@ from math import sqrt
 from typing import Final
 
 from gateway.diagnosis import Diagnosis
-from gateway.diagnosis.against.compare_recordings import compare_with_machine
-from gateway.diagnosis.against.machine import MachineModel, join_recordings
+from gateway.diagnosis.changes.compare_recordings import compare_with_machine
+from gateway.diagnosis.changes.machine import MachineModel, join_recordings
 from gateway.diagnosis.diagnose import Options
 from gateway.diagnosis.result import Cause
 from gateway.registers.residual_cause import ResidualCause

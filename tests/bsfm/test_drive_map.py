@@ -38,6 +38,20 @@ def test_a_bent_map_becomes_a_straight_one_where_its_bow_is_believed():
     assert np.abs(np.polyval(np.polyfit(volts, thrust_n, 1), volts) - thrust_n).max() > 0.4
 
 
+@pytest.mark.parametrize("bow", [0.05, 0.2])
+def test_a_map_that_flattens_goes_on_as_flat_beyond_its_range(bow):
+    """A push to 8.5 V on a model that ends at 6 V was reckoned 3 N too strong, and the force came short of its wish."""
+    scale = DriveMap(model(bow))
+    within, beyond = (scale.linear_v(at + 0.2) - scale.linear_v(at) for at in (7.8, 9.0))
+    assert beyond == pytest.approx(within)
+    assert beyond < 0.19
+
+
+def test_a_map_that_steepens_goes_on_with_its_mean_slope():
+    scale = DriveMap(model(-0.1))
+    assert scale.linear_v(9.2) - scale.linear_v(9.0) == pytest.approx(0.2)
+
+
 def test_without_a_model_volts_stay_what_they_are():
     assert [DriveMap().linear_v(volts) for volts in (-1.0, 0.0, 3.7, 9.0)] == [-1.0, 0.0, 3.7, 9.0]
 

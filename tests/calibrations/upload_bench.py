@@ -12,13 +12,13 @@ from gateway.bsfm import Calibration, CoefficientLimits
 from gateway.calibrations.activation import Activation, ActiveCalibration
 from gateway.calibrations.store import CalibrationStore
 from gateway.calibrations.upload import UploadRules, UploadService
-from gateway.modbus import Peer
+from gateway.modbus import Peer, Role
 from gateway.registers import BankRules, Refusal, RegisterBank, RegisterMap
 from gateway.registers.upload.coefficients import CoefficientSet, words_of_block
 from gateway.registers.words import CommitNotice, CommitStatus
 from tests.calibrations.coefficients import calibration, requests_of, staged
 
-PEER = Peer("10.0.0.1", 40000)
+PEER = Peer("10.0.0.1", 40000, role=Role.CALIBRATION)
 OWN = calibration(8, number=1)
 COMMIT, DRY_RUN = 1, 2
 
@@ -37,7 +37,7 @@ class Bench:
 
     def __post_init__(self) -> None:
         self.store = CalibrationStore(self.state, self.own)
-        rules = BankRules(rig_name="demo", force_max_n=60.0, allow_plain_upload=True)
+        rules = BankRules(rig_name="demo", force_max_n=60.0)
         self.bank = RegisterBank(self.register_map, rules, now=lambda: 0.0)
         activation = Activation(self.store, CoefficientLimits(cell_range_n=100.0))
         self.selected = self.store.find_selected(activation.why_unusable)

@@ -13,8 +13,9 @@ from click.testing import CliRunner, Result
 from gateway.cli.diagnosis import progress_line
 from gateway.cli.main import command
 from gateway.codes.refusals import RefusalReason
-from gateway.fieldbus import ModbusTcpServer, ServerSettings
-from gateway.modbus import ModbusError, Peer, RequestError
+from gateway.devices import SerialSettings
+from gateway.fieldbus import ModbusRtuServer, ModbusTcpServer, RtuSettings, ServerSettings
+from gateway.modbus import ModbusError, Peer, RequestError, Role
 from gateway.modbus.peer import NOBODY
 from gateway.profiles import load_register_map
 from gateway.registers import RegisterMap
@@ -79,12 +80,14 @@ class PlainBank:
 
 
 class Server(threading.Thread):
-    """Runs the server until stop() is called; `bound` is set when it listens."""
+    """Runs the server until stop() is called; `bound` is set when it listens: on TCP, and as unit 3 on a terminal of its own
+    (`serial_path`)."""
 
-    def __init__(self, bank: PlainBank, port: int = 0) -> None:
+    def __init__(self, bank: PlainBank, port: int = 0, role: Role = Role.CALIBRATION) -> None:
         super().__init__(daemon=True)
         self.bank = bank
         self.port = port
+        self.role = role
         self.bound = threading.Event()
 
     def run(self) -> None:
@@ -93,12 +96,24 @@ class Server(threading.Thread):
     async def _serve(self) -> None:
         self._running_loop, self._asked_to_end = asyncio.get_running_loop(), asyncio.Event()
         server = ModbusTcpServer(
-            self.bank, ServerSettings(), on_peer_closed=lambda peer: None, log=lambda cause, sentence: None
+            self.bank,
+            ServerSettings(role=self.role),
+            on_peer_closed=lambda peer: None,
+            log=lambda cause, sentence: None,
         )
         _, self.port = await server.start("127.0.0.1", self.port)
+        serial = ModbusRtuServer(
+            self.bank,
+            RtuSettings(None, SerialSettings(baud=115200), 3, Peer("serial:1", role=self.role)),
+            on_peer_closed=lambda peer: None,
+            log=lambda cause, sentence: None,
+        )
+        await serial.start()
+        self.serial_path = serial.path
         self.bound.set()
         await self._asked_to_end.wait()
         await server.close()
+        await serial.close()
 
     @property
     def address(self) -> str:
@@ -122,8 +137,8 @@ def serve() -> Iterator[Callable[..., Server]]:
     """serve(bank, port=0) starts a server; whatever still runs at the end is stopped."""
     servers: list[Server] = []
 
-    def start(bank: PlainBank, port: int = 0) -> Server:
-        servers.append(Server(bank, port))
+    def start(bank: PlainBank, port: int = 0, role: Role = Role.CALIBRATION) -> Server:
+        servers.append(Server(bank, port, role))
         servers[-1].start()
         assert servers[-1].bound.wait(10)
         return servers[-1]

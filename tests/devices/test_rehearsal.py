@@ -42,7 +42,7 @@ def loaded(folder: Path, name: str, **changes: Any) -> list[str]:
         ({"set_voltage__answer": "OK", "refusals__unknown": "OK"}, "is read as a refusal"),
         ({"refusals__unknown": "512"}, "5 V: the answer '512\\r\\n' to 'SET 512\\r\\n' is read as a refusal"),
         ({"refusals__unknown": "nö"}, "refusals are ASCII text, 'nö' is not"),
-        ({"refusals__unknown": "NO\r\nWAY"}, "refusals: 'NO\\r\\nWAY' as an answer is read as nothing that it knows"),
+        ({"refusals__unknown": "NO\r\nWAY"}, "refusals: 'NO\\r\\nWAY' is not printable text"),
         (
             {"set_voltage__ask": "SET {a:02X}{counts:d}", "constants": {"a": 300}},
             "set_voltage: 0 V: a = 12C: does not fit in 2 characters",

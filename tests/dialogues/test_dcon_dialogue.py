@@ -1,31 +1,29 @@
-"""DCON bytes from the ICP DAS 7000 series manuals, spoken by templates alone: no profile is shipped yet, the
-language must carry it."""
+"""DCON bytes from the ICP DAS 7000 series manuals: settings, readings, checksum, and the host watchdog."""
 
 from dataclasses import replace
 
 import pytest
 
-from gateway.devices import Certainty, DeviceProfile, Role, SerialSettings, ValueRefused, output_device, output_host
+from gateway.devices import ValueRefused, output_device, output_host
 from gateway.devices.checksum import add_checksum, strip_checksum
-from gateway.devices.exchange import Refusals, VoltageExchange, VoltageRange
-from gateway.devices.messages import Accepted, Garbage, ReadVoltage, Refused, SetVoltage
-
-RANGE = VoltageRange(device=(0.0, 10.0), voltage_v=(0.0, 10.0))
-I7021 = DeviceProfile(
-    name="i-7021",
-    description="one voltage output",
-    role=Role.OUTPUT,
-    source="ICP DAS 7000 manual",
-    certainty=Certainty.MANUAL,
-    hardware="never run on hardware",
-    serial=SerialSettings(baud=9600),
-    terminator="\r",
-    constants={"address": 1},
-    refusals=Refusals(unknown=""),
-    set_voltage=VoltageExchange(ask="#{address:02X}{voltage_v:06.3f}", answer=">", range=RANGE),
-    read_voltage=VoltageExchange(ask="${address:02X}6", answer="!{address:02X}{voltage_v:06.3f}", range=RANGE),
+from gateway.devices.messages import (
+    Accepted,
+    AskDevice,
+    DeviceAnswer,
+    DeviceStep,
+    Garbage,
+    ReadVoltage,
+    Refused,
+    SetVoltage,
+    WatchdogTripped,
 )
+from tests.profile_files import load_device
+
+I7021 = load_device("icpdas-702x")
 I7021_SUM = replace(I7021, checksum="dcon-sum")
+_WATCHDOG = I7021.own_watchdog
+assert _WATCHDOG
+I7021_TEN = replace(I7021, watchdog=replace(_WATCHDOG, time_s=10.0))
 
 
 def test_a_setting_is_acknowledged_without_an_echo() -> None:
@@ -73,5 +71,101 @@ def test_answers_differ_by_question() -> None:
 
 @pytest.mark.parametrize("voltage_v", [float("nan"), float("inf"), -float("inf"), -0.01, 10.01])
 def test_what_the_range_does_not_carry_is_refused(voltage_v: float) -> None:
-    with pytest.raises(ValueRefused, match=r"i-7021 takes 0 .. 10 V"):
+    with pytest.raises(ValueRefused, match=r"icpdas-702x takes 0 .. 10 V"):
         output_host(I7021).request(SetVoltage(voltage_v))
+
+
+@pytest.mark.parametrize(
+    ("step", "asked", "answered", "is_right", "text"),
+    [
+        (DeviceStep.IDENTITY, b"$01M\r", b"!017021\r", True, "7021"),
+        (DeviceStep.IDENTITY, b"$01M\r", b"!017060\r", False, "7060"),
+        (DeviceStep.ARM, b"~013164\r", b"!01\r", True, ""),
+        (DeviceStep.VERIFY, b"~012\r", b"!01164\r", True, "100"),
+        (DeviceStep.VERIFY, b"~012\r", b"!0164\r", True, "100"),  # firmware that does not say whether it is enabled
+        (DeviceStep.VERIFY, b"~012\r", b"!011FF\r", False, "255"),
+        (DeviceStep.STATUS, b"~010\r", b"!0180\r", True, "armed"),
+        (DeviceStep.STATUS, b"~010\r", b"!0104\r", False, "tripped"),
+        (DeviceStep.STATUS, b"~010\r", b"!0100\r", False, "off"),
+        (DeviceStep.CLEAR, b"~011\r", b"!01\r", True, ""),
+        (DeviceStep.DISARM, b"~013064\r", b"!01\r", True, ""),
+    ],
+)
+def test_identity_and_watchdog_as_the_manuals_print_them(
+    step: DeviceStep, asked: bytes, answered: bytes, is_right: bool, text: str
+) -> None:
+    host = output_host(I7021_TEN)
+    assert host.request(AskDevice(step)) == asked
+    assert host.receive(answered, 0.0) == [DeviceAnswer(step, is_right, text)]
+
+
+def test_a_disabled_watchdog_reads_back_as_nothing_to_rely_on() -> None:
+    host = output_host(I7021_TEN)
+    host.request(AskDevice(DeviceStep.VERIFY))
+    assert host.receive(b"!01064\r", 0.0) == [Garbage(b"!01064\r")]
+    host.request(AskDevice(DeviceStep.ARM))
+    assert host.receive(b"?01\r", 0.0) == [Refused("?01")]
+
+
+def test_firmware_with_another_tick_gets_other_counts() -> None:
+    slow = replace(_WATCHDOG, time_s=0.96, tick_s=0.0533)
+    assert output_host(replace(I7021, watchdog=slow)).request(AskDevice(DeviceStep.ARM)) == b"~013112\r"
+
+
+def test_the_host_is_alive_for_all_and_nobody_answers() -> None:
+    assert output_host(I7021).sign_of_life == b"~**\r"
+    assert output_host(I7021_SUM).sign_of_life == add_checksum(b"~**", "dcon-sum") + b"\r"
+    assert output_host(I7021_TEN).feed_period_s == 2.5
+    assert output_device(I7021).receive(b"~**\r", 0.0) == []
+
+
+def test_a_tripped_module_answers_a_setting_with_a_bang() -> None:
+    host = output_host(I7021)
+    host.request(SetVoltage(5.0))
+    assert host.receive(b"!\r", 0.0) == [WatchdogTripped()]
+
+
+def test_a_number_out_of_range_is_refused_with_the_address() -> None:
+    host, device = output_host(I7021), output_device(I7021)
+    host.request(SetVoltage(5.0))
+    assert host.receive(b"?01\r", 0.0) == [Refused("?01")]
+    (garbage,) = device.receive(b"#0112.000\r", 0.0)
+    assert isinstance(garbage, Garbage)
+    assert device.reply(device.refusal(garbage)) == b"?01\r"
+
+
+def test_the_simulated_module_trips_latches_and_is_cleared() -> None:
+    device = output_device(I7021)
+
+    def says(data: bytes, now_s: float) -> bytes:
+        answer = b""
+        for request in device.receive(data, now_s):
+            match request:
+                case Garbage():
+                    answer += device.reply(device.refusal(request))
+                case AskDevice(step):
+                    answer += device.reply(DeviceAnswer(step, is_right=True), to=request)
+                case SetVoltage(voltage_v):
+                    answer += device.reply(Accepted(voltage_v), to=request)
+        return answer
+
+    assert says(b"~010\r", 0.0) == b"!0100\r"
+    assert says(b"~01310A\r", 0.0) == b"!01\r"  # 1 s
+    assert says(b"~010\r~012\r", 0.5) == b"!0180\r!0110A\r"
+    assert says(b"#0105.000\r", 0.9) == b">\r"
+    assert says(b"~**\r", 0.9) == b""
+    assert not device.elapse(1.8)
+    assert device.elapse(2.0), "only ~** feeds it"
+    assert says(b"#0105.000\r", 2.1) == b"!\r"
+    assert says(b"~010\r", 2.1) == b"!0104\r"
+    assert says(b"~013114\r#0105.000\r", 2.2) == b"!01\r!\r", "arming does not clear it"
+    assert says(b"~011\r#0105.000\r", 2.3) == b"!01\r>\r"
+
+
+def test_a_module_with_several_outputs_names_one() -> None:
+    module = load_device("icpdas-7024")
+    host = output_host(replace(module, constants={"address": 1, "channel": 2}))
+    assert output_host(module).request(SetVoltage(5.0)) == b"#010+05.000\r"
+    assert host.request(SetVoltage(5.0)) == b"#012+05.000\r"
+    assert host.request(ReadVoltage()) == b"$0162\r"
+    assert host.receive(b">\r!01+05.000\r", 0.0) == [Accepted(5.0), Accepted(5.0)]

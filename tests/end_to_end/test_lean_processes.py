@@ -9,7 +9,7 @@ import pytest
 from tests.cli.lean import lean_environment
 from tests.end_to_end.conftest import start, stop
 
-HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "pyarrow", "numba", "llvmlite")
+HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "pyarrow", "numba", "llvmlite", "cryptography")
 
 
 def mapped(pid: int) -> set[str]:

@@ -53,13 +53,19 @@ def watched_rig(directory: Path, watch: str) -> Path:
     return rig
 
 
-@pytest.fixture
-def watched(tmp_path: Path) -> Iterator[RunningGateway]:
+@pytest.fixture(scope="module")
+def watched_gateway(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGateway]:
     """A watch that looks often at little."""
-    rig = watched_rig(tmp_path, "{window_s: 5, every_s: 1}")
-    gateway = start(tmp_path / "state", "--sim", rig=str(rig))
+    folder = tmp_path_factory.mktemp("watched")
+    gateway = start(folder / "state", "--sim", rig=str(watched_rig(folder, "{window_s: 5, every_s: 1}")))
     yield gateway
     stop(gateway)
+
+
+@pytest.fixture
+def watched(watched_gateway: RunningGateway) -> RunningGateway:
+    watched_gateway.rest()
+    return watched_gateway
 
 
 def test_the_watch_stands_behind_everybody_and_loads_nothing_before_it_must(rested):
@@ -84,6 +90,16 @@ def test_it_looks_says_so_and_leaves_an_idle_machine_alone(watched):
     assert shown(watched) == (False, ResidualCause.NONE)
 
 
+def test_a_control_that_is_killed_writes_on_in_the_same_ring_and_the_watch_stays(watched):
+    watch = watched.ready["pids"]["watch"]
+    os.kill(watched.ready["pids"]["control"], signal.SIGKILL)
+    assert watched.next_ready()["pids"]["watch"] == watch
+    deadline_s = time.monotonic() + 60.0
+    while health(watched)["residual"].get("looks", 0) < 1:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.2)
+
+
 def test_a_dead_watch_is_started_again_and_control_does_not_notice(watched):
     watched.write(0, 1, 1500)
     watched.wait_until(lambda status: status["state"] == 3)
@@ -98,16 +114,6 @@ def test_a_dead_watch_is_started_again_and_control_does_not_notice(watched):
         time.sleep(0.1)
     assert watched.status()["state"] == 3
     assert health(watched)["missed_ticks"] < 20
-
-
-def test_a_control_that_is_killed_writes_on_in_the_same_ring_and_the_watch_stays(watched):
-    watch = watched.ready["pids"]["watch"]
-    os.kill(watched.ready["pids"]["control"], signal.SIGKILL)
-    assert watched.next_ready()["pids"]["watch"] == watch
-    deadline_s = time.monotonic() + 60.0
-    while health(watched)["residual"].get("looks", 0) < 1:
-        assert time.monotonic() < deadline_s
-        time.sleep(0.2)
 
 
 def test_a_rig_that_wants_no_watch_gets_none(tmp_path):

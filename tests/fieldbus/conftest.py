@@ -68,8 +68,8 @@ class HandTransport:
     high_bytes: int = 0
     connection: Any = None
 
-    def get_extra_info(self, _name: str) -> tuple[str, int]:
-        return self.host, self.port
+    def get_extra_info(self, name: str) -> tuple[str, int] | None:
+        return (self.host, self.port) if name == "peername" else None
 
     def set_write_buffer_limits(self, high: int) -> None:
         self.high_bytes = high

@@ -37,7 +37,8 @@ SMALL = """
 import runpy, sys
 sys.path.insert(0, sys.argv[1])
 from paper.experiments import exercises
-exercises.QUICK_RECIPROCATING_S, exercises.QUICK_HOLDS, exercises.TRAVEL_M, exercises.UNLOADED_S = 10.0, 3, 0.01, 0.5
+exercises.PACE_N_PER_S, exercises.QUICK_RECIPROCATING_S, exercises.FIRST_S = 10.0, 6.0, 1.0
+exercises.STEP_S, exercises.UNLOADED_S, exercises.QUICK_HOLDS, exercises.TRAVEL_M = 1.2, 0.4, 3, 0.005
 sys.exit(runpy.run_path(sys.argv[1] + "/paper/reproduce", run_name="small")["main"](sys.argv[2:]))
 """
 

@@ -34,7 +34,7 @@ def test_an_installed_wheel_carries_its_profiles_a_checkout_has_them_beside(
 
 def test_a_name_that_is_neither_shipped_nor_a_file_is_told_with_what_is_there() -> None:
     (fault,) = check_report("dmeo").faults
-    assert str(fault) == "dmeo: is neither a shipped rig (demo, irc5-cell) nor a file; did you mean demo?"
+    assert str(fault) == "dmeo: is neither a shipped rig (demo, irc5-cell, paper-pull) nor a file; did you mean demo?"
     with pytest.raises(ProfileError, match="is neither a shipped device"):
         load_device("no-such-thing")
 

@@ -7,7 +7,7 @@ from time import process_time
 from gateway.profiles import check_report
 from gateway.profiles.strict_yaml.typed import adapter
 
-HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "pyarrow", "numba", "pymodbus", "serial", "asyncio")
+HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "pyarrow", "numba", "pymodbus", "serial", "asyncio", "cryptography")
 
 
 def test_loading_a_rig_imports_nothing_heavy() -> None:

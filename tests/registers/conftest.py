@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gateway.modbus import Peer
+from gateway.modbus import Peer, Role
 from gateway.registers import BankRules, Command, Refusal, RegisterBank, RegisterMap
 from gateway.registers.map.map_reader import read_map
 
@@ -17,9 +17,9 @@ MAP_FILE = Path(__file__).parents[2] / "profiles" / "registers" / "force-v1.yaml
 class Master:
     """One host; `accepted` and `refused` are what the bank told about everybody's writes."""
 
-    def __init__(self, bank: RegisterBank, host: str) -> None:
+    def __init__(self, bank: RegisterBank, host: str, role: Role = Role.SETPOINT, name: str = "") -> None:
         self.bank = bank
-        self.peer = Peer(host, 40000)
+        self.peer = Peer(host, 40000, name, role)
 
     def write(self, address: int, *words: int) -> None:
         self.bank.write_registers(

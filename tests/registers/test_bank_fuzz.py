@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gateway.codes.refusals import RefusalReason
-from gateway.modbus import ModbusError, Peer
+from gateway.modbus import ModbusError, Peer, Role
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
 from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
-PEERS = [Peer("10.0.0.1", 1), Peer("10.0.0.2", 2), Peer("fe80::1", 3)]
+PEERS = [Peer("10.0.0.1", 1, role=Role.CALIBRATION), Peer("10.0.0.2", 2), Peer("fe80::1", 3, "press", Role.ADMIN)]
 ADDRESSES = st.one_of(
     st.integers(0, 20),
     st.integers(98, 135),
@@ -51,7 +51,8 @@ STEPS = st.one_of(
 
 
 def memory(bank: RegisterBank) -> bytes:
-    """The whole image, without the last-refusal registers."""
+    """The whole image, as it is read, without the last-refusal registers."""
+    bank.read_registers(100, 1)
     data = bytearray(bank._image.data)
     for first, count in ((118, 4), (268, 8), (368, 8)):
         data[2 * first : 2 * (first + count)] = bytes(2 * count)
@@ -84,7 +85,7 @@ def perform(bank: RegisterBank, step: tuple, peer: Peer) -> None:
 @settings(deadline=None, max_examples=300)
 @given(steps=st.lists(st.tuples(STEPS, st.sampled_from(PEERS)), max_size=25))
 def test_no_sequence_of_requests_breaks_the_bank(register_map, steps):
-    rules = BankRules(rig_name="demo", force_max_n=60.0, allow_plain_upload=True)
+    rules = BankRules(rig_name="demo", force_max_n=60.0)
     bank = RegisterBank(register_map, rules, now=lambda: 1.0)
     bank.on_accepted = lambda sentence, peer: None
     handed = []
@@ -110,5 +111,5 @@ def check(bank: RegisterBank, handed: list, seen: int, peer: Peer) -> None:
     assert command.control_word & ControlBit.ENABLE or bank._commands.values[0] == 0
     if len(handed) > seen:
         assert len(handed) == seen + 1
-        assert handed[-1].peer == peer.host
-        assert bank.owner in (None, peer.host)
+        assert handed[-1].peer == peer.identity
+        assert bank.owner in (None, peer.identity)

@@ -46,7 +46,14 @@ BAD_WORDS = [
     ((416, 0x7FC0, 0), 3, R.NOT_FINITE, 416, NAN, "W207 byte_order_echo"),
     ((16, 1), 2, R.ADDRESS, 16, NAN, "W203"),
     ((40001, 1), 2, R.ADDRESS, 40001, NAN, "W202"),
-    ((1000, 3), 1, R.ROLE, 1000, NAN, "W211 rig demo takes no coefficients over plain TCP"),
+    (
+        (1000, 3),
+        1,
+        R.ROLE,
+        1000,
+        NAN,
+        "W211 the role of 10.0.0.1:40000 is setpoint, block staging (1000",
+    ),
 ]
 
 

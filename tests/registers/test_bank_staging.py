@@ -4,11 +4,13 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
+from gateway.modbus import Role
 from gateway.registers import Refusal, RegisterBank
 from gateway.registers.upload.coefficients import SET_BYTES, CoefficientSet
 from gateway.registers.words import CommitAction, CommitStatus, UploadReason
@@ -34,8 +36,13 @@ CALIBRATION = Calibration(
 
 
 @pytest.fixture
-def bank(make_bank: Callable[..., RegisterBank]) -> RegisterBank:
-    return make_bank(allow_plain_upload=True)
+def master(bank: RegisterBank, master_of: Callable[..., Any]) -> Any:
+    return master_of(bank, "10.0.0.1", Role.CALIBRATION)
+
+
+@pytest.fixture
+def other(bank: RegisterBank, master_of: Callable[..., Any]) -> Any:
+    return master_of(bank, "10.0.0.2", Role.CALIBRATION)
 
 
 def test_single_words_are_stored_and_read_back(bank, master, register_map):

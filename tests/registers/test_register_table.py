@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from gateway.modbus import Role
 from gateway.registers import render_block, render_registers
 from gateway.registers.image import RegisterImage
 from gateway.registers.words import State
@@ -114,7 +115,7 @@ def test_the_s7_rows_write_all_that_may_be_written_and_what_acts_alone(make_bank
     assert {r.address for r in register_map.registers if r.is_writable} <= set(written)
     assert max(words for _, words in rows) <= 123
     assert rows[-2:] == [(1145, 1), (1149, 1)], "after the set that they act on"
-    master = master_of(make_bank(allow_plain_upload=True), "10.0.0.1")
+    master = master_of(make_bank(), "10.0.0.1", Role.CALIBRATION)
     for first, words in rows:
         if first != 1149 and first != 416:  # would select a slot; takes 1234.5 only
             master.write(first, *(0,) * words)

@@ -18,7 +18,9 @@ def choices(owner: str, key: str) -> list[Any]:
     described = group["properties"][key]
     if "$ref" in described:
         described = SCHEMA["$defs"][described["$ref"].rpartition("/")[2]]
-    return list(described["enum"]) if "enum" in described else [described["const"]]
+    if "anyOf" in described:  # none, or a group of its own
+        described = next(one for one in described["anyOf"] if "const" in one)
+    return [one for one in described["enum"] if one] if "enum" in described else [described["const"]]
 
 
 def _about(rng: Random, role: str) -> Profile:
@@ -118,3 +120,40 @@ def drawn_cell(rng: Random) -> Profile:
         _maybe(rng, reading, "rate_hz", rng.choice([1.0, 10.0, 40.0, 100.0, 400.0]), 0.95)
     profile["read_force" if is_asked else "stream"] = reading
     return profile
+
+
+def _as_modbus(rng: Random, profile: Profile) -> Profile:
+    """The same device on Modbus RTU: no words, no line's end."""
+    left = {key: value for key, value in profile.items() if key not in ("terminator", "checksum", "steps", "refusals")}
+    return left | {"codec": "modbus-rtu", "reply_timeout_s": 0.1, "constants": {"address": rng.choice([1, 17])}}
+
+
+_REGISTER_SPANS = {"uint16": [0, 10000], "int16": [-32000, 32000], "uint32": [0, 100000], "float32": [0.0, 10.0]}
+
+
+def drawn_modbus_output(rng: Random) -> Profile:
+    profile, kind = _as_modbus(rng, _about(rng, "output")), rng.choice(list(_REGISTER_SPANS))
+    ranges = {"device": _REGISTER_SPANS[kind], "voltage_v": [0.0, 10.0]}
+    access = {"register": rng.choice([0, 4096]), "type": kind, "word_order": rng.choice(["abcd", "cdab"])}
+    writes = 6 if kind.endswith("16") and rng.random() < 0.5 else 16
+    profile["set_voltage"] = {"modbus": {"function": writes, **access}, "range": ranges}
+    _maybe(rng, profile, "read_voltage", {"modbus": {"function": rng.choice([3, 4]), **access}, "range": ranges})
+    return profile
+
+
+def drawn_modbus_cell(rng: Random) -> Profile:
+    profile, kind = _as_modbus(rng, _about(rng, "load cell")), rng.choice(["uint32", "int32", "int16", "float32"])
+    registers: Profile = {"first": 6, "last": 10, "weight": 7, "type": kind, "decimals": 0 if kind == "float32" else 2}
+    if kind == "uint32" or rng.random() < 0.3:
+        registers["negative"] = {"register": 6, "bit": 7}
+    registers["overload"] = [{"register": 6, "bit": bit} for bit in (0, 3)]
+    profile["read_force"] = {"modbus": registers, "unit": rng.choice(["N", "kg"]), "rate_hz": 100.0}
+    return profile
+
+
+def drawn_counts(rng: Random) -> Profile:
+    """Raw counts of a converter, and a device whose sentences have other ends than the gateway's."""
+    profile = _about(rng, "load cell") | {"terminator": "\r\n", "question_terminator": ";", "checksum": "none"}
+    reading = {"frame": "{force:d}", "ask": "MSV?", "before": "STP", "newton_per_count": 0.01, "zero_count": 840.0}
+    reading["end_count"] = 8388607
+    return profile | {"read_force": reading}

@@ -16,7 +16,14 @@ from gateway.profiles import Report, check_report, shipped_profiles_folder
 from gateway.profiles.schema import schema
 from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.words import State
-from tests.service.drawn_devices import Profile, drawn_cell, drawn_output
+from tests.service.drawn_devices import (
+    Profile,
+    drawn_cell,
+    drawn_counts,
+    drawn_modbus_cell,
+    drawn_modbus_output,
+    drawn_output,
+)
 from tests.service.wired import Wired
 
 SEEDS = range(48)
@@ -61,7 +68,11 @@ def rig_for(rng: Random, output: Profile, cell: Profile) -> dict[str, Any]:
     reading = cell.get("stream") or cell["read_force"]
     rig["output"]["baud"], rig["load_cell"]["baud"] = output["serial"]["baud"], cell["serial"]["baud"]
     rig["load_cell"]["sign"] = rng.choice([1, 1, -1])
-    if "{unit" not in reading["frame"] and rng.random() < (0.3 if "unit" in reading else 0.9):
+    if (
+        "{unit" not in reading.get("frame", "{unit")
+        and "newton_per_count" not in reading
+        and rng.random() < (0.3 if "unit" in reading else 0.9)
+    ):
         rig["load_cell"]["unit"] = rng.choice(["N", "N", "kg"])
     if output["set_voltage"]["range"]["voltage_v"][1] < 8:
         rig["limits"] |= {"voltage_max_v": 5, "force_max_n": 30}
@@ -84,6 +95,9 @@ def all_drawn(tmp_path_factory: pytest.TempPathFactory) -> list[Drawn]:
         output, cell = drawn_output(rng), drawn_cell(rng)
         output = shipped_device("smc-itv-rc") if seed % 3 == 1 else output
         cell = shipped_device("stream-st-gs") if seed % 3 == 0 else cell
+        output = drawn_modbus_output(rng) if seed % 8 == 5 else output
+        if draw := {6: drawn_modbus_cell, 7: drawn_counts}.get(seed % 8):
+            cell = draw(rng)
         folder = tmp_path_factory.mktemp("rig")
         found.append(Drawn(output, cell, written(folder, rig_for(rng, output, cell), output, cell)))
     return found
@@ -121,7 +135,8 @@ def test_the_draws_cover_the_schema_and_enough_of_them_are_accepted(all_drawn: l
         "a test that refuses or accepts everything shows nothing"
     )
     keys = {key for drawn in all_drawn for profile in (drawn.output, drawn.cell) for key in profile}
-    assert keys == set(schema("device")["properties"]), "a new key of the schema must be drawn, too"
+    valves = {"set_valve", "read_valve"}  # of the third role, which presses nothing
+    assert keys | valves == set(schema("device")["properties"]), "a new key of the schema must be drawn, too"
     readings = [drawn.cell.get("stream") or drawn.cell["read_force"] for drawn in all_drawn]
     assert {key for reading in readings for key in reading} == set(
         schema("device")["$defs"]["ForceReading"]["properties"]
@@ -135,5 +150,5 @@ def test_the_draws_cover_the_schema_and_enough_of_them_are_accepted(all_drawn: l
     assert seen(lambda drawn: "read_pressure" in drawn.output) == {True, False}
     assert seen(lambda drawn: bool(drawn.output["set_voltage"].get("answer"))) == {True, False}
     for owner in ("output", "cell"):
-        assert seen(lambda drawn, owner=owner: getattr(drawn, owner)["terminator"]) == {"\r\n", "\r", "\n"}
-        assert seen(lambda drawn, owner=owner: getattr(drawn, owner)["checksum"]) == {"none", "dcon-sum", "xor"}
+        assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("terminator")) >= {"\r\n", "\r", "\n"}
+        assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("checksum")) >= {"none", "dcon-sum", "xor"}

@@ -6,8 +6,29 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.devices import DeviceProfile, PacedWire, Role, cell_device, cell_host, output_device, output_host
-from gateway.devices.messages import Accepted, ForceSample, Garbage, Pressure, ReadPressure, ReadVoltage, SetVoltage
+from gateway.devices import (
+    DeviceProfile,
+    DeviceRole,
+    PacedWire,
+    ValveDevice,
+    ValveDirection,
+    ValveHost,
+    cell_device,
+    cell_host,
+    output_device,
+    output_host,
+)
+from gateway.devices.messages import (
+    Accepted,
+    AskDevice,
+    DeviceAnswer,
+    ForceSample,
+    Garbage,
+    Pressure,
+    ReadPressure,
+    ReadVoltage,
+    SetVoltage,
+)
 from gateway.ports import Pty
 from gateway.profiles import list_shipped, load_rig
 from gateway.registers.words import State
@@ -17,8 +38,14 @@ from tests.service.wired import Wired
 
 STEP_S, DURATION_S = 0.001, 5.0
 PROFILES = {name: load_device(name) for name in list_shipped("device")}
-OUTPUTS = [name for name, profile in PROFILES.items() if profile.role is Role.OUTPUT]
-CELLS = [name for name in PROFILES if name not in OUTPUTS]
+OUTPUTS = [name for name, profile in PROFILES.items() if profile.role is DeviceRole.OUTPUT]
+CELLS = [name for name, profile in PROFILES.items() if profile.role is DeviceRole.LOAD_CELL]
+
+
+def unit_of(profile: DeviceProfile) -> str | None:
+    """What a rig says of a cell that does not say its unit."""
+    reading = profile.reading
+    return None if reading.newton_per_unit or reading.template.field("unit") else "N"
 
 
 def milliseconds() -> Iterator[float]:
@@ -42,6 +69,8 @@ class Device:
                     self.send(self.codec.reply(Accepted(self.setting_v), to=request))
                 case ReadPressure():
                     self.send(self.codec.reply(Pressure(self.setting_v * 0.5e5), to=request))
+                case AskDevice(step):
+                    self.send(self.codec.reply(DeviceAnswer(step, is_right=True), to=request))
                 case Garbage():
                     self.garbage += 1
 
@@ -66,7 +95,8 @@ def test_an_output_follows_a_moving_setpoint_for_five_seconds_at_its_own_speed(n
             line.on_bytes(heard, now_s)
         if round(now_s * 1000) % 10 == 0:
             line.tick(now_s)
-            line.set_voltage(low_v + (high_v - low_v) * 0.9 * abs((now_s / 2.0) % 2.0 - 1.0), now_s)
+            moving_s = min(now_s, DURATION_S - 0.3)  # it stands at the end, so that the last answer is here
+            line.set_voltage(low_v + (high_v - low_v) * 0.9 * abs((moving_s / 2.0) % 2.0 - 1.0), now_s)
         assert line.fault is FaultCode.NONE
     assert line.garbage_bytes == device.garbage == 0
     assert line.acknowledged_v == pytest.approx(device.setting_v, abs=line._host.resolution_v)
@@ -76,8 +106,12 @@ def test_an_output_follows_a_moving_setpoint_for_five_seconds_at_its_own_speed(n
 @pytest.mark.parametrize("name", CELLS)
 def test_a_cell_is_read_for_five_seconds_at_its_own_speed(name: str) -> None:
     profile = PROFILES[name]
-    wire, device, host = PacedWire(profile.serial.baud), cell_device(profile), cell_host(profile)
-    found: list[ForceSample | Garbage] = []
+    wire, device, host = (
+        PacedWire(profile.serial.baud),
+        cell_device(profile, unit_of(profile)),
+        cell_host(profile, unit=unit_of(profile)),
+    )
+    found: list[object] = []
     sent_n: list[float] = []
     period = round(1.0 / profile.rate_hz / STEP_S) if profile.rate_hz else 50
     for index, now_s in enumerate(milliseconds()):
@@ -115,14 +149,26 @@ def test_both_ends_understand_each_other_over_a_pty(name: str, pty: Pty) -> None
     try:
         if name in OUTPUTS:
             converse(profile, pty.fd, client)
+        elif profile.role is DeviceRole.VALVE:
+            switch(profile, pty.fd, client)
         else:
-            device, host = cell_device(profile), cell_host(profile)
+            device, host = cell_device(profile, unit_of(profile)), cell_host(profile, unit=unit_of(profile))
             for tenths in range(-200, 300):
                 (sample,) = host.receive(carry(pty.fd, client, device.frame(0.1 * tenths)), 0.0)
                 assert isinstance(sample, ForceSample)
                 assert sample.force_n == pytest.approx(0.1 * tenths, abs=0.5001 * host.resolution_n)
     finally:
         os.close(client)
+
+
+def switch(profile: DeviceProfile, far: int, near: int) -> None:
+    host, device = ValveHost(profile), ValveDevice(profile)
+    for direction in tuple(ValveDirection) * 10:
+        for question in (direction, None):
+            (asked,) = device.receive(carry(near, far, host.request(question)))
+            assert asked == question
+            (told,) = host.receive(carry(far, near, device.reply(asked, direction)))
+            assert told == direction
 
 
 def converse(profile: DeviceProfile, far: int, near: int) -> None:
@@ -137,7 +183,11 @@ def converse(profile: DeviceProfile, far: int, near: int) -> None:
         assert reply.voltage_v == pytest.approx(wanted_v, abs=0.5001 * host.resolution_v)
 
 
-@pytest.mark.parametrize("name", list_shipped("rig"))
+PRESSING_RIGS = [name for name in list_shipped("rig") if load_rig(name, simulated=True).valve is None]
+"""Those without a third line: a rig that pulls as well has tests of its own, with its valve."""
+
+
+@pytest.mark.parametrize("name", PRESSING_RIGS)
 def test_every_shipped_rig_presses_for_five_seconds_when_it_is_simulated(name: str) -> None:
     """Its own lease kept, its own limits, its own devices."""
     wired = Wired(load_rig(name).as_simulated()).ready()

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from gateway.audit.rig_audit import RigAudit
 from gateway.codes.faults import FaultCode
 from gateway.processes.json_socket import JsonLineServer
 from gateway.registers.words import State
@@ -19,7 +20,8 @@ from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
-from gateway.service.simulated_rig import SimulatedRig
+from gateway.service.simulation.requests import SimulationRequests
+from gateway.service.simulation.world import SimulatedRig
 from gateway.service.watch_reports import WatchReports
 from tests.service.hostile import garbage, mutants
 from tests.service.wired import ENABLE, Wired
@@ -47,6 +49,8 @@ CONTROL: list[dict[str, Any]] = [
     {"do": "last-refusal"},
     {"do": "health"},
     {"do": "running"},
+    {"do": "sim"},
+    {"do": "sim", "set": {"cell.silent": True, "creep": 0.05}, "clear": ["leak"], "clear_all": True},
     {"do": "residual"},
     {"do": "residual", "cause": 12, "sentence": "friction", "counters": {"looks": 3, "rms_n": 0.2}},
 ]
@@ -55,6 +59,10 @@ RIG: list[dict[str, Any]] = [
     {"do": "fault", "name": "cell-cut", "on": False},
     {"do": "fault", "name": "plant", "values": {"friction.coulomb_n": 2.5, "regulator.hunting_hz": 3.0}},
     {"do": "fault", "name": "plant", "on": False},
+    {"do": "sim"},
+    {"do": "sim", "set": {"leak": "on", "output.alter": 0.5, "wire.noise": 0.01}},
+    {"do": "sim", "clear": ["leak", "output.alter"]},
+    {"do": "sim", "clear_all": True},
 ]
 
 
@@ -85,6 +93,8 @@ class Stage:
             upload=self.upload,
             plants=self.plants,
             calibration_runs=self.calibration_runs,
+            audit=RigAudit(self.state, log),
+            simulation=SimulationRequests(wired.rig),
             watch=WatchReports(wired.loop, lambda: wired.now_s, log),
             running={"rig": "demo", "port": 5020, "lease_s": None, "lease_action": "fault"},
         )
@@ -205,7 +215,7 @@ class RigStage:
     wired: Wired = field(default_factory=lambda: Wired().ready())
 
     def __post_init__(self) -> None:
-        self.server = JsonLineServer(Path("rig.sock"), {"fault": self.rig.fault})
+        self.server = JsonLineServer(Path("rig.sock"), {"fault": self.rig.fault, "sim": self.rig.simulate})
 
     @property
     def rig(self) -> SimulatedRig:

@@ -9,10 +9,11 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.control.settings import LeaseAction
+from gateway.modbus import Role
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.service.banner import Ready, format_banner, ready_fields, try_lines
+from gateway.service.banner import Ready, format_banner, ready_fields, tcp_face, try_lines
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
-from gateway.service.running_rig.bank_rules import bank_rules, server_settings
+from gateway.service.running_rig.bank_rules import bank_rules, plain_role, server_settings
 from gateway.service.running_rig.starting import cause_of_restart
 from tests.service.rigs import demo, with_supervision
 
@@ -26,7 +27,8 @@ def ready(**changes: object) -> Ready:
         "voltage_v": 0.0,
         "force_n": 0.004,
     }
-    return Ready(**(facts | changes))  # type: ignore[arg-type]
+    facts |= changes
+    return Ready(**({"faces": (tcp_face(*facts["modbus"], facts["rig"].network.units),)} | facts))  # type: ignore[arg-type,misc,attr-defined]
 
 
 def test_the_banner_says_where_and_what_and_how_to_try() -> None:
@@ -144,7 +146,6 @@ def test_the_bank_holds_to_the_rigs_limits() -> None:
     assert rules.cell_range_n == rig.load_cell.range_n
     assert rules.supported_bits == rig.supported_bits
     assert (rules.owner, rules.require_byte_order_echo) == ("10.0.0.7", True)
-    assert rules.allow_plain_upload == rig.network.allow_plain_upload
 
 
 def test_the_server_holds_to_the_rigs_network() -> None:
@@ -153,3 +154,10 @@ def test_the_server_holds_to_the_rigs_network() -> None:
     settings = server_settings(replace(rig, network=network))
     assert (settings.units, settings.connections, settings.per_address) == ((7,), 3, 2)
     assert (settings.idle_s, settings.requests_per_s, settings.allow) == (9.0, 11.0, network.allow)
+
+
+@pytest.mark.parametrize(("is_allowed", "role"), [(True, Role.CALIBRATION), (False, Role.SETPOINT)])
+def test_a_plain_face_has_the_role_that_the_rig_gives_it(is_allowed: bool, role: Role) -> None:
+    rig = demo()
+    rig = replace(rig, network=replace(rig.network, allow_plain_upload=is_allowed))
+    assert (plain_role(rig), server_settings(rig).role) == (role, role)

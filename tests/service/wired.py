@@ -24,7 +24,7 @@ from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
-from gateway.service.simulated_rig import SimulatedRig
+from gateway.service.simulation.world import SimulatedRig
 from tests.service.rigs import demo
 
 STEP_S = 0.001

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.diagnosis.against.machine_document import read_machine
+from gateway.diagnosis.changes.machine_document import read_machine
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT
 from gateway.registers.residual_cause import ResidualCause
@@ -20,7 +20,7 @@ from gateway.watch.reference_recording import keep_reference_recording
 from gateway.watch.residual_watch import Watch, WatchSettings
 from gateway.watch.warning_filter import WindowVerdict
 from gateway.watch.window import Window
-from tests.diagnosis.against.foreign_rig import Wish
+from tests.diagnosis.changes.foreign_rig import Wish
 from tests.watch.foreign_course import CourseRing, recorded
 
 LEAST_N = 0.1  # a quarter of a band of 0.4 N

@@ -12,11 +12,12 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class RunningGateway:
-    """Where a running gateway is reached, and its state directory."""
+    """Where a running gateway is reached, its state directory, and the process of its control loop."""
 
     host: str
     port: int
     state: Path
+    control_pid: int
 
 
 @contextlib.contextmanager
@@ -32,8 +33,8 @@ def running_gateway(rig: str, *, quiet: bool = False) -> Iterator[RunningGateway
         )
         assert process.stdout
         try:
-            host, port = json.loads(process.stdout.readline())["modbus"]
-            yield RunningGateway(host, port, Path(state))
+            ready = json.loads(process.stdout.readline())
+            yield RunningGateway(*ready["modbus"], Path(state), ready["pids"]["control"])
         finally:
             process.terminate()
             process.wait()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
-from gateway.bsfm.ladder.plan import LABELS
+from gateway.bsfm.ladder.plan import LABELS, RESPONSE_GROUP
 from gateway.bsfm.ladder.settled_points import Points
 
 CHECK, WALK, DONE = 2, 4, 5  # of CalibrationPhase, which this room cannot import; a test compares
@@ -75,9 +75,15 @@ class Labels:
         return bool((self.phase == DONE).any())
 
     @property
+    def walk_stairs(self) -> Integers:
+        """Stairs of the reversal part that are points of the fit, if it is whole; empty otherwise."""
+        whole = self.stairs_of(self.phase == WALK)
+        return whole[~np.isin(whole, self.stair[self.group == RESPONSE_GROUP])]
+
+    @property
     def has_walk(self) -> bool:
         """The reversal part is whole."""
-        return len(self.stairs_of(self.phase == WALK)) > 0
+        return len(self.walk_stairs) > 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +102,7 @@ def split_by_labels(points: Points, labels: Labels, *, by_check: bool = False) -
     at = {int(labels.stair[row]): k for k, row in enumerate(points.row.tolist())}  # the last point of a stair counts
     masks = [labels.phase == CHECK] if by_check else [labels.group == group for group in labels.whole_groups]
     groups = [[at[stair] for stair in labels.stairs_of(mask).tolist() if stair in at] for mask in masks]
-    walk = [at[stair] for stair in labels.stairs_of(labels.phase == WALK).tolist() if stair in at]
+    walk = [at[stair] for stair in labels.walk_stairs.tolist() if stair in at]
     walk = (
         [*range(walk[0] - 1, walk[0]), *walk] if walk and walk[0] > 0 else walk
     )  # its first point says where it began

@@ -8,6 +8,9 @@ from math import ceil, isfinite
 from typing import Final
 
 RISING, FALLING = 1, -1
+RESPONSE_GROUP: Final = -2
+"""Group of a large step that tells the response alone: on a plant that rings its settled force is no point of the fit, for
+friction has kept a part of the overshoot."""
 LABELS: Final = ("phase", "group", "stair")
 """Columns in which a run records where it is: CalibrationPhase, group from 0 (-1 outside the ladder), and stair from 0 of
 this run; the row after the last stair has the number of stairs. Read by gateway.bsfm.ladder.labels."""

@@ -25,13 +25,15 @@ class Shape(NamedTuple):
 Shapes = tuple[Shape, ...]
 ONE_LAG: Final[Shapes] = (Shape(0.0),)
 TWO_LAGS: Final[Shapes] = tuple(Shape(ratio) for ratio in (0.1, 0.2, 0.35, 0.5, 0.7, 1.0))
-RINGING: Final[Shapes] = tuple(Shape(1.0, damping) for damping in (0.3, 0.5, 0.7, 0.85))
+RINGING: Final[Shapes] = tuple(Shape(1.0, damping) for damping in (0.2, 0.3, 0.5, 0.7, 0.85))
 STARTS: Final = (0.15, 0.45, 0.75)  # dead time as a share of the whole, from which the fit starts besides its guess
 HUBER: Final = 1.5  # of the noise, beyond which an error counts linearly
 ROUNDS: Final = 12
 BETTER: Final = 0.985  # held-out error of two lags over one, from which the second is believed
 NEARLY_EQUAL: Final = 0.8  # ratio of two lags, from which the poles may be complex
 MUCH_BETTER: Final = 0.9  # the same of a pair over lags: friction at a turn looks a little like ringing
+RINGS_BEYOND: Final = 0.05  # of a step, passed at its peak: a damping below 0.7
+PEAK_ROWS: Final = 3  # whose mean tells a peak from noise
 LEAST_SCALE_N: Final = 0.05  # what any model is off on the way
 
 
@@ -66,13 +68,23 @@ def fit_lags(steps: Sequence[StepResponse], shapes: Shapes) -> LagFit:
 
 def choose_shapes(steps: Sequence[StepResponse]) -> Shapes:
     """Return the shapes to fit: those that predict steps best that the fit has not seen. The simpler ones first: two lags
-    have to be better than one, and a pair of complex poles, asked for where the best lags are equal, much better than both."""
+    have to be better than one, and a pair of complex poles, asked for where the best lags are equal or the force passes its
+    end, much better than both."""
     one, two = (_compute_held_out_loss(steps, shapes) for shapes in (ONE_LAG, TWO_LAGS))
-    if two.loss >= BETTER * one.loss:
-        return ONE_LAG
-    if two.are_equal and _compute_held_out_loss(steps, RINGING).loss < MUCH_BETTER * two.loss:
+    may_ring = two.are_equal or _share_beyond_end(steps) > RINGS_BEYOND
+    if may_ring and _compute_held_out_loss(steps, RINGING).loss < MUCH_BETTER * min(one.loss, two.loss):
         return RINGING
-    return TWO_LAGS
+    return TWO_LAGS if two.loss < BETTER * one.loss else ONE_LAG
+
+
+def _share_beyond_end(steps: Sequence[StepResponse]) -> float:
+    """Median share of a step by which the force passes its settled end, noise averaged out."""
+    shares = []
+    for step in steps:
+        beyond_n = step.way * (step.force_n - step.path_n[-1 if step.way > 0.0 else 0])
+        mean_n = np.convolve(beyond_n, np.full(PEAK_ROWS, 1.0 / PEAK_ROWS), mode="valid")
+        shares.append(float(mean_n.max(initial=0.0)) / float(np.ptp(step.path_n)))
+    return float(np.median(shares))
 
 
 class _HeldOut(NamedTuple):

@@ -147,11 +147,13 @@ def step_responses_of(run: RecordedRun, model: Bsfm, lags: Lags | None = None) -
     for k in range(1, len(plateaus)):
         before, now = plateaus[k - 1], plateaus[k]
         from_v, to_v = float(run.command_v[before.last]), float(run.command_v[now.last])
-        changes = _changes(float(run.time_s[now.first]), from_v, to_v, run.slew_v_per_s)
+        is_ramp = _is_ramp(run, now)
+        at_s = float(run.time_s[now.first])
+        changes = _row_changes(run, now) if is_ramp else _changes(at_s, from_v, to_v, run.slew_v_per_s)
         way = _way(model, memory, (from_v, to_v), (settled_n[k - 1], settled_n[k]))
         memory = model.memory_after(memory, settled_n[k - 1], settled_n[k])
         rows = slice(now.first + 1, now.end + 1)
-        if way is not None and _stands_out(run.force_n[rows], settled_n[k - 1], settled_n[k]):
+        if way is not None and not is_ramp and _stands_out(run.force_n[rows], settled_n[k - 1], settled_n[k]):
             lasting = tuple(change for change in earlier if change[0] > run.time_s[now.first] - LONGEST_S)
             step = StepResponse(run.time_s[rows], run.force_n[rows], (*lasting, *changes), to_v, *way)
             steps.append(_linearize(step, scale))
@@ -206,6 +208,23 @@ def _stands_out(force_n: Floats, from_n: float, to_n: float) -> bool:
     """Whether the step has enough readings, and is far larger than their noise."""
     noise_n = float(np.std(force_n[-tail_rows(len(force_n)) :])) if len(force_n) >= FEWEST_ROWS else inf
     return abs(to_n - from_n) >= max(LEAST_STEP_N, NOISE_AT * noise_n) and len(force_n) >= FEWEST_ROWS
+
+
+def _is_ramp(run: RecordedRun, plateau: _Plateau) -> bool:
+    """Whether the command took its time, more than the slew asks for: such a way tells little of the lags."""
+    volts = run.command_v[plateau.first : plateau.last + 1]
+    moving = np.flatnonzero(np.abs(np.diff(volts)) > SAME_V)
+    took_s = float(run.time_s[plateau.first + moving[-1] + 1] - run.time_s[plateau.first]) if len(moving) else 0.0
+    before_v = float(run.command_v[plateau.first - 1])
+    return took_s > max(0.0, float(volts[-1]) - before_v) / run.slew_v_per_s + SHORTEST_HOLD_S
+
+
+def _row_changes(run: RecordedRun, plateau: _Plateau) -> tuple[tuple[float, float], ...]:
+    """The way to a plateau, as the rows have it."""
+    rows = slice(plateau.first - 1, plateau.last + 1)
+    moved_v = np.diff(run.command_v[rows])
+    at_s = run.time_s[plateau.first : plateau.last + 1]
+    return tuple((float(when_s), float(by_v)) for when_s, by_v in zip(at_s, moved_v, strict=True) if by_v)
 
 
 def _changes(at_s: float, from_v: float, to_v: float, slew_v_per_s: float) -> tuple[tuple[float, float], ...]:

@@ -14,6 +14,7 @@ from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explain_refusals
+from gateway.cli.master.wires import Wire
 from gateway.profiles import load_register_map
 from gateway.registers.words import CalibrationPhase, ControlBit
 
@@ -83,9 +84,9 @@ class LocalRun:
 class RemoteRun:
     """A gateway elsewhere; the recording and the report are there, too."""
 
-    def __init__(self, gateway: tuple[str, int]) -> None:
+    def __init__(self, wire: Wire, unit: int) -> None:
         self._map = load_register_map(defaults.REGISTER_MAP)
-        self._client = GatewayClient(*gateway, 1, self._map)
+        self._client = GatewayClient(wire, unit, self._map)
         self._registers = [self._map.find(name) for name in _WORDS]
         self._values: list[float] = []
         self._before = ""

@@ -30,6 +30,8 @@ _SHOWN_BITS: Final = {
     StatusBit.IN_BAND: "green",
     StatusBit.LIMITED: "yellow",
     StatusBit.TARGET_UNREACHABLE: "red",
+    StatusBit.PULLING: "cyan",
+    StatusBit.SWITCHING: "yellow",
 }
 
 

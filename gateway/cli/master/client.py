@@ -1,26 +1,23 @@
 """A Modbus master that speaks register names and engineering units, for `read`, `write` and `monitor`.
 
 Decisions
-- pymodbus does framing and sockets; timeout one second, no retries: a repeated write is a second write.
+- pymodbus does the framing; timeout one second, no retries: a repeated write is a second write. The wire is in wires.py.
 - Assignments go out as one FC16, because the gateway takes one request as one command: setpoint and enable together or not
   at all. Registers between them are read just before and written back as they were.
 """
 
 import logging
-import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from gateway.cli.errors import CliError
-from gateway.processes import exit_codes
+from gateway.cli.master.wires import Wire
 from gateway.registers import Register, RegisterMap
 
 if TYPE_CHECKING:
-    from pymodbus.client import ModbusTcpClient
+    from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
-TIMEOUT_S: Final = 1.0
 _MOST_READ: Final = 125
 _MOST_WRITTEN: Final = 123
 
@@ -67,12 +64,12 @@ class Frame:
 class GatewayClient:
     """One connection to a gateway. Methods raise CliError (no answer; exit 69) and RefusedError (a Modbus exception)."""
 
-    def __init__(self, host: str, port: int, unit: int, register_map: RegisterMap) -> None:
-        self.where = f"{host}:{port}"
+    def __init__(self, wire: Wire, unit: int, register_map: RegisterMap) -> None:
+        self.wire = wire
+        self.where = wire.where
         self.register_map = register_map
-        self._address = (host, port)
         self._unit = unit
-        self._client: ModbusTcpClient | None = None
+        self._client: ModbusTcpClient | ModbusSerialClient | None = None
 
     def __enter__(self) -> "GatewayClient":
         return self
@@ -159,50 +156,17 @@ class GatewayClient:
             answer = getattr(client, method)(*arguments, device_id=self._unit, **options)
         except (ModbusException, OSError) as error:
             self.close()
-            raise _no_answer(self.where, self._unit, error) from None
+            raise self.wire.no_answer(self._unit, error) from None
         if answer.isError():
             raise RefusedError(int(answer.exception_code), request)
         return answer
 
-    def _connect(self) -> "ModbusTcpClient":
-        """Return the client with an open socket. The socket is opened here, for pymodbus does not tell why it could not."""
+    def _connect(self) -> "ModbusTcpClient | ModbusSerialClient":
+        """Return the client with its wire open."""
         if self._client is None or not self._client.connected:
-            from pymodbus.client import ModbusTcpClient
-
             logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # its errors reach the user as ours
-            host, port = self._address
-            try:
-                link = socket.create_connection(self._address, TIMEOUT_S)
-            except OSError as error:
-                raise _no_connection(self.where, error) from None
-            self._client = ModbusTcpClient(host, port=port, timeout=TIMEOUT_S, retries=0)
-            self._client.socket = link
+            self._client = self.wire.connect()
         return self._client
-
-
-def _no_connection(where: str, error: OSError) -> CliError:
-    if isinstance(error, TimeoutError):
-        symptom, probably = f"no answer within {TIMEOUT_S:g} s", "wrong address, or a firewall"
-    elif isinstance(error, socket.gaierror):
-        symptom, probably = "no such host name", "a typo in --gateway"
-    else:
-        symptom, probably = error.strerror or str(error), "not running, or on another port"
-    return CliError(
-        f"E130 no gateway at {where}: {symptom}; {probably}. Start one (force-gateway run demo --sim) or give "
-        "--gateway HOST:PORT",
-        exit_codes.DEVICE,
-    )
-
-
-def _no_answer(where: str, unit: int, error: Exception) -> CliError:
-    from pymodbus.exceptions import ConnectionException
-
-    reset = isinstance(error, (OSError, ConnectionException))
-    cause = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
-    return CliError(
-        f"E131 {where} {cause}: not a Modbus server, another unit id, or this machine is not on its allow-list",
-        exit_codes.DEVICE,
-    )
 
 
 def _reading(register: Register, words: Sequence[int], first: int) -> RegisterReading:

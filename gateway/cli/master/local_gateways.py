@@ -1,28 +1,22 @@
 """The gateways of this machine: whoever has reached one over Modbus may ask its control socket for what no register has."""
 
-from ipaddress import ip_address
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from gateway.cli import control_socket
 from gateway.cli.errors import CliError
-
-_LOCAL: Final = "localhost"
-
-
-def sockets_near(host: str, root: Path) -> list[Path]:
-    """Find state directories below root with a control socket, none where host is another machine."""
-    try:
-        is_here = host == _LOCAL or ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        is_here = False
-    return sorted(path.parent for path in root.glob("*/control.sock")) if is_here else []
+from gateway.cli.master.wires import Wire
 
 
-def running_at(host: str, port: int, root: Path) -> dict[str, Any] | None:
-    """Return what the gateway that serves this port says of itself (`running`); None where it is elsewhere, nobody
-    says, or two do."""
-    answer = [one for directory in sockets_near(host, root) if (one := _ask_what_runs(directory)).get("port") == port]
+def sockets_near(wire: Wire, root: Path) -> list[Path]:
+    """Find state directories below root with a control socket, none where the wire leads to another machine."""
+    return sorted(path.parent for path in root.glob("*/control.sock")) if wire.is_near else []
+
+
+def running_behind(wire: Wire, root: Path) -> dict[str, Any] | None:
+    """Return what the gateway behind this wire says of itself (`running`); None where it is elsewhere, nobody says, or two
+    do."""
+    answer = [one for directory in sockets_near(wire, root) if wire.is_served_by(one := _ask_what_runs(directory))]
     return answer[0] if len(answer) == 1 else None
 
 

@@ -46,7 +46,7 @@ def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, st
     from gateway.cli.master.local_gateways import sockets_near
     from gateway.service.supervisor.run_options import default_state_root
 
-    states = [state] if state else sockets_near(client.where.rpartition(":")[0], default_state_root())
+    states = [state] if state else sockets_near(client.wire, default_state_root())
     for directory in states:
         try:
             sentence = ask(directory, {"do": "last-refusal"})

@@ -6,6 +6,7 @@ from math import isnan
 
 from gateway.cli.master.client import RegisterReading
 from gateway.registers import Register
+from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_host
 
 
 def parse_value(register: Register, text: str) -> bytes:
@@ -30,10 +31,16 @@ def format_value(reading: RegisterReading) -> str:
     if register.values:
         return register.values.get(int(value), f"{int(value)} (no name)")
     if register.name == "owner_ip":
-        return str(IPv4Address(int(value))) if value else "nobody"
+        return _owner(int(value))
     is_plain = register.type == "float32" and not register.unit  # a share, a weight, a constant
     number = f"{value:.6g}" if is_plain else f"{value:.{register.decimals}f}"
     return f"{number} {register.unit}" if register.unit else number
+
+
+def _owner(number: int) -> str:
+    if number == 0:
+        return "nobody"
+    return serial_host(number) if number <= LARGEST_SERIAL_PLACE else str(IPv4Address(number))
 
 
 def bit_names(reading: RegisterReading) -> list[str]:

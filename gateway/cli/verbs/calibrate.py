@@ -6,14 +6,17 @@ With an experiment as its plan (`diagnose --plan` writes them) it records what t
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from gateway import defaults
 from gateway.cli.errors import CliError
-from gateway.cli.options import StateChoice, endpoint, json_option, name_option, state_options
+from gateway.cli.options import StateChoice, json_option, name_option, state_options, wire_options
 from gateway.processes import exit_codes
+
+if TYPE_CHECKING:
+    from gateway.cli.master.wires import Wire
 
 _QUESTIONS: Final = (
     "Does the tool press on the workpiece, or on a stop, that takes {force:.0f} N?",
@@ -64,13 +67,11 @@ _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 @click.option("--resume", is_flag=True, help="Go on with the groups that the last stopped run did not climb.")
 @name_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
-@click.option(
-    "--gateway", callback=endpoint, metavar="HOST:PORT", help="By Modbus (the rig's own plan), not on this machine."
-)
+@wire_options(None, "By Modbus TCP (the rig's own plan), not on this machine.")
 @state_options
 @json_option
 def command(
-    *, state: StateChoice, gateway: tuple[str, int] | None, yes: bool, as_json: bool, **plan_options: Any
+    *, state: StateChoice, wire: "Wire | None", unit: int, yes: bool, as_json: bool, **plan_options: Any
 ) -> None:
     """Measure a ladder and make a numbered calibration of it, or run and record an experiment (--plan).
 
@@ -82,10 +83,12 @@ def command(
     from gateway.cli.calibration.runs import LocalRun, RemoteRun
 
     resumes = True
-    if gateway:
+    if wire:
         if any(plan_options.values()):
-            raise click.UsageError("by Modbus (--gateway) the gateway runs its own plan: leave the plan's options out")
-        run: LocalRun | RemoteRun = RemoteRun(gateway)
+            raise click.UsageError(
+                "by Modbus (--gateway, --rtu) the gateway runs its own plan: leave the plan's options out"
+            )
+        run: LocalRun | RemoteRun = RemoteRun(wire, unit)
     else:
         directory = state.directory
         run_request = _plan_wanted(directory, plan_options)
@@ -95,7 +98,7 @@ def command(
         run = LocalRun(directory, run_request.plan, run_request.earlier, run_request.name)
         resumes = not is_experiment(run_request.plan)
     preview = run.preview()
-    if gateway is None:
+    if wire is None:
         _warn_of_another_rig(run_request, preview)
     _ask(preview, yes)
     _tell(follow(run), as_json, resumes=resumes)

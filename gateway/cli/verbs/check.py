@@ -7,31 +7,71 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway import defaults
+from gateway.cli.errors import CliError
 from gateway.cli.options import count_of, json_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from gateway.profiles import Checked, ProfileFault, Rig
 
 
 @click.command()
 @click.argument("file", metavar="RIG", default=defaults.RIG)
+@click.option(
+    "--probe", is_flag=True, help="Ask the devices too: which answers, at which speed, how fast. Moves nothing."
+)
+@click.option("--port", metavar="PORT", help="With --probe and a device's file: the port that it is behind.")
 @json_option
 @click.pass_context
-def command(context: click.Context, *, file: str, as_json: bool) -> None:
+def command(context: click.Context, *, file: str, probe: bool, port: str | None, as_json: bool) -> None:
     """Check a rig and every profile that it names.
 
     RIG is a shipped name or a file (default: demo). A device, plant, calibration, map or plan of its own is checked as what
-    it is. Opens no port.
+    it is. Opens no port, but with --probe: then each device is asked what changes nothing, in its own words at its own speed,
+    then at others, then in the words of every shipped profile; no voltage is written.
     """
     from gateway.profiles import check_file
 
     checked = check_file(file)
-    if as_json:
-        click.echo(json.dumps(_document(checked), indent=2))
-    else:
+    document = _document(checked)
+    if not as_json:
         _print(file, checked)
-    context.exit(exit_codes.CONFIGURATION if checked.faults else exit_codes.OK)
+    is_answered = True
+    if probe and not checked.faults:
+        is_answered, document["probe"] = _probe(checked, port, is_quiet=as_json)
+    if as_json:
+        click.echo(json.dumps(document, indent=2))
+    failed = exit_codes.OK if is_answered else exit_codes.DEVICE
+    context.exit(exit_codes.CONFIGURATION if checked.faults else failed)
+
+
+def _probe(checked: "Checked", port: str | None, *, is_quiet: bool) -> tuple[bool, dict[str, Any]]:
+    """Ask what is behind the ports; whether each device is the one that was named, and the probes as JSON."""
+    from gateway.cli import port_probing as probing
+
+    if not is_quiet:
+        click.echo(f"{'probe':<12} {probing.HARMLESS}")
+    if checked.kind == "device" and port:
+        report = probing.probe_path(port, [checked.value], probing.PATIENCE_S)
+        _tell("device", probing.tell_report(report), is_quiet=is_quiet)
+        return bool(report.answers), {"device": probing.report_fields(report)}
+    if checked.kind != "rig":
+        raise CliError(
+            "E114 --probe asks the devices of a rig; for a device's own file say --port PORT", exit_codes.USAGE
+        )
+    is_right, found = True, {}
+    for name, line, report in probing.probe_rig(checked.value):
+        _tell(name, probing.tell_report(report, line), is_quiet=is_quiet)
+        found[name] = probing.report_fields(report)
+        is_right = is_right and probing.is_as_named(line, report)
+    return is_right, found
+
+
+def _tell(name: str, lines: "Iterator[str]", *, is_quiet: bool) -> None:
+    for index, line in enumerate(() if is_quiet else lines):
+        click.echo(f"{'' if index else name:<12} {line}")
 
 
 def _print(file: str, checked: "Checked") -> None:

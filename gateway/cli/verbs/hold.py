@@ -14,11 +14,12 @@ import click
 from gateway import defaults
 from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import CliError
-from gateway.cli.options import Endpoint, gateway_options, json_option
+from gateway.cli.options import gateway_options, json_option
 from gateway.units import format_ms
 
 if TYPE_CHECKING:
     from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
+    from gateway.cli.master.wires import Wire
 
 _SHOW_S: Final = 0.1
 
@@ -44,7 +45,7 @@ def _parse_time(context: click.Context, parameter: click.Parameter, text: str | 
 @gateway_options
 @json_option
 def command(
-    *, newton: float, rig: str | None, for_s: float | None, endpoint: Endpoint, as_json: bool, **options: Any
+    *, newton: float, rig: str | None, for_s: float | None, wire: "Wire", as_json: bool, **options: Any
 ) -> None:
     """Hold NEWTON until Ctrl-C, which ramps the force to 0.
 
@@ -63,9 +64,9 @@ def command(
 
     if not (isfinite(newton) and newton >= 0.0):
         raise click.UsageError(f"{newton:g} N is no force to hold")
-    lease = _read_rig_lease(rig) if rig is not None else _find_gateway_lease(*endpoint)
+    lease = _read_rig_lease(rig) if rig is not None else _find_gateway_lease(wire)
     register_map = load_register_map(options["map_name"])
-    with GatewayClient(*endpoint, options["unit"], register_map) as client:
+    with GatewayClient(wire, options["unit"], register_map) as client:
         with explain_refusals(client):
             (heartbeat,) = client.read_values([register_map.find("heartbeat")])
         run = HoldRun(_check_force(register_map, newton), heartbeat=int(heartbeat.value), resets=options["resets"])
@@ -83,13 +84,13 @@ def _read_rig_lease(rig: str) -> "KnownLease":
     return KnownLease(supervision.lease_s, supervision.lease_action.value)
 
 
-def _find_gateway_lease(host: str, port: int) -> "KnownLease | None":
-    """Return the lease of the gateway that serves this port, where it runs on this machine; None where it is not known."""
+def _find_gateway_lease(wire: "Wire") -> "KnownLease | None":
+    """Return the lease of the gateway behind this wire, where it runs on this machine; None where it is not known."""
     from gateway.cli.force_hold.heartbeat import KnownLease
-    from gateway.cli.master.local_gateways import running_at
+    from gateway.cli.master.local_gateways import running_behind
     from gateway.service.supervisor.run_options import default_state_root
 
-    answer = running_at(host, port, default_state_root())
+    answer = running_behind(wire, default_state_root())
     if answer is None or not {"lease_s", "lease_action"} <= answer.keys():
         return None
     return KnownLease(answer["lease_s"], str(answer["lease_action"]))

@@ -1,6 +1,8 @@
-"""`init`: a commented rig file to start from. Asks nothing and overwrites nothing."""
+"""`init`: a commented rig file to start from. At a terminal it asks for the devices, and the devices; else it asks nothing.
+Overwrites nothing."""
 
 import re
+import sys
 from pathlib import Path
 
 import click
@@ -10,10 +12,16 @@ from gateway.cli.errors import already_exists
 
 @click.command()
 @click.argument("name", default="my-cell")
-def command(*, name: str) -> None:
+@click.option(
+    "--guided/--no-guided",
+    default=None,
+    help="Ask for ports, devices and forces, and ask the devices which they are. Default: at a terminal.",
+)
+def command(*, name: str, guided: bool | None) -> None:
     """Write a commented rig file to start from.
 
-    NAME.yaml, in the current directory (default: my-cell).
+    NAME.yaml, in the current directory (default: my-cell). At a terminal it asks first: which ports, which devices (they are
+    asked, too, what changes nothing), which forces; the file is one that `check` accepts.
     """
     from gateway.cli.starter_rig import starter_rig
     from gateway.profiles import list_shipped
@@ -25,9 +33,13 @@ def command(*, name: str) -> None:
         raise click.UsageError(f"{target.stem} is no name for a rig: small letters, digits, . _ -, such as my-cell")
     if target.stem in list_shipped("rig"):
         raise click.UsageError(f"{target.stem} is the name of a shipped rig; choose another")
+    if target.exists():
+        raise already_exists(target, "choose another name")
+    is_guided = sys.stdin.isatty() and sys.stdout.isatty() if guided is None else guided
+    text = _ask(target.stem) if is_guided else starter_rig(target.stem)
     try:
         with target.open("x", encoding="utf-8") as file:
-            file.write(starter_rig(target.stem))
+            file.write(text)
     except FileExistsError:
         raise already_exists(target, "choose another name") from None
     click.echo(f"wrote {target}; next:")
@@ -39,3 +51,9 @@ def command(*, name: str) -> None:
         ("hold 12", "in another terminal: holds 12 N, with the heartbeat that the rig's lease wants"),
     ):
         click.echo(f"  force-gateway {line:<28} {why}")
+
+
+def _ask(name: str) -> str:
+    from gateway.cli.guided_rig import ask_rig
+
+    return ask_rig(name)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from gateway.cli.options import Endpoint, gateway_options
+from gateway.cli.options import gateway_options
 
 if TYPE_CHECKING:
     from gateway.cli.live_monitor.poll import Poller
+    from gateway.cli.master.wires import Wire
 
 _PICTURE_SIZE: Final = (112, 34)
 _TEXT_SIZE: Final = (80, 24)
@@ -23,7 +24,7 @@ _TEXT_SIZE: Final = (80, 24)
 )
 @click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory: shows last writers.")
 @gateway_options
-def command(*, svg: Path | None, seconds: float | None, endpoint: Endpoint, **options: Any) -> None:
+def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options: Any) -> None:
     """Show a gateway live: state, force, alarms.
 
     Ctrl-C ends. Works against any gateway that speaks the register map, at 80x24 and larger.
@@ -36,7 +37,7 @@ def command(*, svg: Path | None, seconds: float | None, endpoint: Endpoint, **op
     from gateway.profiles import load_register_map
 
     register_map = load_register_map(options["map_name"])
-    with GatewayClient(*endpoint, options["unit"], register_map) as client:
+    with GatewayClient(wire, options["unit"], register_map) as client:
         poller = Poller(client, options["state"], time.monotonic)
         with explain_refusals(client):
             poller.poll()  # the first one fails loudly: a wrong address is no reason to wait

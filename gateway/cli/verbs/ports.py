@@ -1,4 +1,4 @@
-"""`ports`: which serial ports this machine has, by the names that survive a replug."""
+"""`ports`: which serial ports this machine has, by the names that survive a replug; --listen: what comes through them."""
 
 import json
 from dataclasses import asdict
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from gateway.cli.errors import CliError
 from gateway.cli.options import json_option
 
 if TYPE_CHECKING:
@@ -15,11 +16,23 @@ _SLOW_LATENCY_MS: Final = 16  # what FTDI adapters start with: at 9600 baud it c
 
 
 @click.command()
+@click.argument("paths", metavar="[PORT]...", nargs=-1)
+@click.option("--listen", is_flag=True, help="Listen at each port, without sending a byte: what comes, at which speed.")
+@click.option(
+    "--seconds", type=click.FloatRange(0.1, 60.0), default=0.5, show_default=True, help="Listen so long at each speed."
+)
 @json_option
-def command(*, as_json: bool) -> None:
-    """List serial ports, by id as rig files want them."""
+def command(*, paths: tuple[str, ...], listen: bool, seconds: float, as_json: bool) -> None:
+    """List serial ports, by id as rig files want them.
+
+    With --listen: what each device says by itself (or only those at the PORTs named), at 9600 to 115200 baud, and which
+    shipped profile reads it. Nothing is sent. A device that waits to be asked stays silent: `check RIG --probe` asks.
+    """
     from gateway.ports import list_ports
 
+    if listen or paths:
+        _listen(paths or tuple(port.path for port in list_ports()), seconds, as_json=as_json)
+        return
     ports = list_ports()
     if as_json:
         click.echo(json.dumps([{"path": port.path} | asdict(port) for port in ports], indent=2))
@@ -29,6 +42,30 @@ def command(*, as_json: bool) -> None:
     for port in ports:
         click.echo(port.path)
         click.echo(f"  {_line(port)}")
+
+
+def _listen(paths: tuple[str, ...], seconds: float, *, as_json: bool) -> None:
+    from gateway.cli import port_probing as probing
+
+    found = []
+    for path in paths:
+        if not as_json:
+            click.echo(path)
+        try:
+            heard = probing.listen_at(path, seconds)
+        except CliError as error:
+            if as_json:
+                found.append({"port": path, "error": error.message})
+                continue
+            click.echo(f"  {error.message}")
+            continue
+        found.append(heard.fields)
+        for line in () if as_json else heard.lines:
+            click.echo(f"  {line}")
+    if as_json:
+        click.echo(json.dumps(found, indent=2))
+    elif not paths:
+        click.echo("no serial port of a device found; name one: force-gateway ports --listen /dev/ttyUSB0")
 
 
 def _line(port: "PortInfo") -> str:

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gateway.cli.options import Endpoint, gateway_options, json_option
+from gateway.cli.options import gateway_options, json_option
 
 if TYPE_CHECKING:
     from gateway.cli.master.client import RegisterReading
+    from gateway.cli.master.wires import Wire
     from gateway.registers import Register, RegisterMap
 
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 @click.argument("names", metavar="NAME...", nargs=-1, required=True)
 @gateway_options
 @json_option
-def command(*, names: tuple[str, ...], endpoint: Endpoint, unit: int, map_name: str, as_json: bool) -> None:
+def command(*, names: tuple[str, ...], wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
     """Read registers by name, in engineering units.
 
     NAME, NAME@BLOCK, or a whole BLOCK (command, status, float_abcd, ...).
@@ -30,7 +31,7 @@ def command(*, names: tuple[str, ...], endpoint: Endpoint, unit: int, map_name: 
 
     register_map = load_register_map(map_name)
     registers = _find_registers(register_map, names)
-    with GatewayClient(*endpoint, unit, register_map) as client, explain_refusals(client):
+    with GatewayClient(wire, unit, register_map) as client, explain_refusals(client):
         readings = client.read_values(registers)
     if as_json:
         click.echo(json.dumps({label(reading.register): _facts(reading) for reading in readings}, indent=2))

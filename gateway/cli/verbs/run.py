@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from gateway import defaults
-from gateway.cli.options import endpoint
+from gateway.cli.options import endpoint, serial_port
 
 
 @click.command()
@@ -17,6 +17,14 @@ from gateway.cli.options import endpoint
     callback=endpoint,
     metavar="HOST:PORT",
     help="Listen here instead of where the rig says; port 0: any free one.",
+)
+@click.option(
+    "--rtu",
+    is_flag=False,
+    flag_value="",
+    callback=serial_port,
+    metavar="[PORT]",
+    help="Serve Modbus RTU too, 19200 8E1, unit 1: on PORT, without it on a pseudo-terminal.",
 )
 @click.option(
     "--state",

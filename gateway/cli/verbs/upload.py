@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.errors import CliError
-from gateway.cli.options import Endpoint, gateway_options, json_option
+from gateway.cli.options import gateway_options, json_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -77,8 +77,7 @@ def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str
     """Stage, commit, wait, read back; what to tell. CliError when it did not come to that."""
     from gateway.cli.master.upload import UploadClient
 
-    endpoint: Endpoint = options["endpoint"]
-    master = UploadClient(*endpoint, options["unit"], register_map)
+    master = UploadClient(options["wire"], options["unit"], register_map)
     with master:
         master.send(upload.requests)
         master.outcome(upload)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gateway.cli.options import Endpoint, gateway_options, json_option
+from gateway.cli.options import gateway_options, json_option
 
 if TYPE_CHECKING:
     from gateway.cli.master.client import Assignment, Frame
+    from gateway.cli.master.wires import Wire
     from gateway.registers import RegisterMap
 
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 )
 @gateway_options
 @json_option
-def command(*, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, as_json: bool, **options: Any) -> None:
+def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_json: bool, **options: Any) -> None:
     """Write registers by name, in engineering units.
 
     NAME=VALUE in the register's unit; modes and bits by name. Those of one block go out in one request. A request that the
@@ -36,7 +37,7 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, endpoint: Endpoint, 
     register_map = load_register_map(options["map_name"])
     writes = [_assignment(register_map, text) for text in assignments]
     _refuse_doubles(writes)
-    with GatewayClient(*endpoint, options["unit"], register_map) as client:
+    with GatewayClient(wire, options["unit"], register_map) as client:
         with explain_refusals(client):
             frames = client.frames(writes)
         with explain_refusals(client, frames, options["state"]):

@@ -22,6 +22,9 @@ LAMBDA_SHARE: Final = 1.0  # of dead time and landing
 HELD_S: Final = 0.01  # by which tick and sample are late, on average
 UNREACHABLE: Final = 5.0  # times the whole response
 SHORTEST_LAG_S: Final = 0.01
+SHORT_S: Final = 0.012  # a second lag that cell, wire and ticks alone may look like
+SHORT_SHARE: Final = 0.3  # of the first lag: so short a second one ends before the setting that would brake it
+SHORT_AT_MOST_S: Final = 0.04  # if it is no longer than one setting and its answer
 LONGEST_LAG_S: Final = 2.0
 
 
@@ -30,6 +33,7 @@ def timing_of(response: Response | None, settings: ControlSettings) -> ControlSe
     rules."""
     if response is None or settings.response is ResponseSource.RIG:
         return replace(settings, timing=None)
+    response = _without_short_lag(response)
     lags_s = response.lag_s + response.second_lag_s
     lead = LeadSettings(lag_s=_within(response.lag_s), second_lag_s=min(LONGEST_LAG_S, response.second_lag_s))
     lags = SecondOrder(lead.lag_s, lead.second_lag_s, response.damping)
@@ -48,6 +52,16 @@ def timing_of(response: Response | None, settings: ControlSettings) -> ControlSe
         unreachable_s=max(settings.supervision.unreachable_s, UNREACHABLE * whole_s),
     )
     return replace(settings, lead=lead, supervision=supervision, timing=timing)
+
+
+def _without_short_lag(response: Response) -> Response:
+    """A second lag that is short beside the output's wire counts as dead time: whoever inverts it pushes and brakes in settings
+    that last longer than it does, and goes beyond the wish on the way down."""
+    longer_s, shorter_s = sorted((response.lag_s, response.second_lag_s), reverse=True)
+    is_short = shorter_s < SHORT_S or shorter_s < min(SHORT_AT_MOST_S, SHORT_SHARE * longer_s)
+    if response.damping or not is_short:
+        return response
+    return replace(response, dead_time_s=response.dead_time_s + shorter_s, lag_s=longer_s, second_lag_s=0.0)
 
 
 def _within(lag_s: float) -> float:

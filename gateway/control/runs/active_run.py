@@ -1,36 +1,46 @@
-"""The calibration run or experiment that the controller conducts, if any, and what remains to be said about the last one.
+"""The calibration run, experiment or self-test that the controller conducts, if any, and what remains to be said about the
+last one.
 
-Asked for by control_word bit 5 with the rig's own plan, or by a person at this machine with a plan of theirs. A local run
+Asked for by control_word bit 5 or 6 with the rig's own plan, or by a person at this machine with a plan of theirs. A local run
 does not depend on the master's lease: nobody on the fieldbus has asked for it; the service ends it when the person is gone.
-A run never takes the force beyond the rig's force_max_n (`ceiling`): a ladder leaves out what would, an experiment ends.
+A run never takes the force beyond the rig's force_max_n (`ceiling`): a ladder leaves out what would, any other run ends.
 """
 
+from dataclasses import replace
 from math import nan
 from typing import Final, TypeAlias
 
 from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.force_loop.force_loop import ForceLoop
+from gateway.control.inputs import LineStatus
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.control.runs.ladder_run import LadderRow, LadderRun, RunStep
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading
-from gateway.control.settings import ControlSettings
+from gateway.control.self_test.items import SelfTestPlan, SelfTestReport
+from gateway.control.self_test.judgement import Known
+from gateway.control.self_test.self_test_run import SelfTestRun
+from gateway.control.settings import ControlSettings, LoopTiming
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.supervision.force_ceiling import ForceCeiling
-from gateway.registers.words import CalibrationPhase
+from gateway.registers.words import CalibrationPhase, SelfTestResult
 
-AnyPlan: TypeAlias = CalibrationPlan | ExperimentPlan
-AnyRun: TypeAlias = LadderRun | ExperimentRun
+RecordedPlan: TypeAlias = CalibrationPlan | ExperimentPlan
+RecordedRun: TypeAlias = LadderRun | ExperimentRun
+AnyPlan: TypeAlias = RecordedPlan | SelfTestPlan
+AnyRun: TypeAlias = RecordedRun | SelfTestRun
 
+_OF_SELF_TEST: Final = (CalibrationPhase.SELF_TEST, CalibrationPhase.TESTED)
 _PHASES: Final = {phase: phase.name.lower().replace("_", " ") for phase in CalibrationPhase}
 
 
 class ActiveRun:
     """phase and progress stay after the end. model: what the check of the next run compares with; cell_n: cell force of the
     last step, without the payload's weight; target_n: what the model expects of the voltage that the run wants; is_local
-    stays until the output is off; said: a sentence for the log; refused: why the last plan asked for was not begun."""
+    stays until the output is off; said: a sentence for the log; refused: why the last plan asked for was not begun;
+    self_test: the last one's report, or that one runs."""
 
     def __init__(self, settings: ControlSettings, model: Bsfm) -> None:
         self.phase = CalibrationPhase.IDLE
@@ -42,9 +52,12 @@ class ActiveRun:
         self.is_local = False
         self.run: AnyRun | None = None
         self.last_row: LadderRow | None = None
+        self.self_test = SelfTestReport()
         self._settings = settings
+        self._cell_noise_n = 0.0
+        self._is_report_told = True
         self.model = model
-        self._asked: AnyPlan | None = None
+        self._asked: RecordedPlan | None = None
         self._stop_asked = ""
         self._ceiling = self._new_ceiling()
 
@@ -54,6 +67,11 @@ class ActiveRun:
         return self.run is not None
 
     @property
+    def recorded(self) -> RecordedRun | None:
+        """The run under way, if it is one that is recorded: a self-test is not, its figures are in the log."""
+        return None if isinstance(self.run, SelfTestRun) else self.run
+
+    @property
     def is_busy(self) -> bool:
         """Decide whether a run, or the fit of one, is under way."""
         return self.running or self.phase is CalibrationPhase.FITTING
@@ -61,22 +79,40 @@ class ActiveRun:
     @property
     def what(self) -> str:
         """The run in words: `calibration (ladder, 43 %)`."""
+        if isinstance(self.run, SelfTestRun):
+            return f"a self-test ({self.progress:.0%})"
         name = f"experiment {self.run.plan.name}" if isinstance(self.run, ExperimentRun) else "a calibration"
         return f"{name} ({_PHASES[self.phase]}, {self.progress:.0%})"
 
-    def use(self, model: Bsfm) -> None:
-        """Set the model of later runs; one that is under way keeps its own."""
-        self.model = model
+    @property
+    def kind(self) -> str:
+        """Word for what runs, or ran last."""
+        return "self-test" if self.phase in _OF_SELF_TEST or isinstance(self.run, SelfTestRun) else "calibration"
 
-    def ask(self, plan: AnyPlan) -> AnyRun:
+    def use(self, model: Bsfm, timing: LoopTiming | None = None, cell_noise_n: float = 0.0, lag_s: float = 0.0) -> None:
+        """Set what later runs compare with: the model, and what its calibration has measured of response and noise; lag_s:
+        from voltage to force, 0 as it was. A run that is under way keeps its own."""
+        supervision = self._settings.supervision
+        if lag_s > 0.0:
+            supervision = replace(supervision, response_lag_s=lag_s)
+        self._settings = replace(self._settings, timing=timing, supervision=supervision)
+        self.model, self._cell_noise_n = model, cell_noise_n
+
+    def ask(self, plan: RecordedPlan) -> RecordedRun:
         """Ask for a local run for the next step to begin. ValueError with a sentence for a plan that the rig does not allow."""
-        run = self.build(plan)
+        run = self.build_recorded(plan)
         self._asked, self.refused = plan, ""
         self.phase = CalibrationPhase.IDLE
         return run
 
     def build(self, plan: AnyPlan) -> AnyRun:
         """Return the run that a plan makes. ValueError with a sentence for one that the rig does not allow."""
+        if isinstance(plan, SelfTestPlan):
+            return SelfTestRun(plan, Known(self._settings, self.model, self._cell_noise_n))
+        return self.build_recorded(plan)
+
+    def build_recorded(self, plan: RecordedPlan) -> RecordedRun:
+        """Return the calibration or experiment that a plan makes; ValueError as `build`."""
         if isinstance(plan, ExperimentPlan):
             return ExperimentRun(plan, self._settings, self.model)
         return LadderRun(plan, self._settings, self.model)
@@ -85,7 +121,7 @@ class ActiveRun:
         """Ask the next step to end the run: the force goes to 0 along the rig's ramp."""
         self._stop_asked = sentence
 
-    def take_asked(self) -> AnyPlan | None:
+    def take_asked(self) -> RecordedPlan | None:
         """Return the plan that was asked for, once."""
         plan, self._asked = self._asked, None
         return plan
@@ -96,13 +132,18 @@ class ActiveRun:
         self.is_local, self._stop_asked = is_local, ""
         self.phase, self.progress, self.last_row = CalibrationPhase.ZERO, 0.0, None
         self.eta_s, self.target_n = self.run.eta_s, 0.0
+        if isinstance(self.run, SelfTestRun):
+            self.phase = CalibrationPhase.SELF_TEST
+            self.self_test = SelfTestReport(self.self_test.number + 1, SelfTestResult.RUNNING)
         self._ceiling = self._new_ceiling()
 
-    def step(self, now_s: float, reading: Reading, loop: ForceLoop) -> StopCause | None:
+    def step(self, now_s: float, reading: Reading, loop: ForceLoop, line: LineStatus) -> StopCause | None:
         """Make one step of the run, through the limits of the force loop; return what ended it (a fault, or a sentence), None
         while it goes on."""
         run = self.run
         assert run
+        if isinstance(run, SelfTestRun):
+            run.observe_line(line)
         self.cell_n = reading.cell_n
         if self._stop_asked:
             return StopCause(FaultCode.NONE, self._stop_asked)
@@ -115,7 +156,7 @@ class ActiveRun:
             return StopCause(FaultCode.NONE, run.end_sentence)
         voltage_v = self._below_ceiling(now_s, reading, step, loop.voltage_v)
         if voltage_v is None:
-            return StopCause(FaultCode.NONE, self._too_high(step.voltage_v, "the run is stopped"))
+            return StopCause(FaultCode.NONE, self._too_high(step.highest_v, "the run is stopped"))
         self.target_n = max(0.0, run.model.force_n(voltage_v, run.branch_share))
         loop.drive_run(voltage_v, run.branch_share)
         return None
@@ -126,16 +167,23 @@ class ActiveRun:
             loop.leave_run(run.model.force_n(loop.voltage_v, run.branch_share), run.branch_share, given_n)
         self.end()
 
-    def end(self) -> None:
-        """End the run, for whatever reason; the run itself knows whether it is complete."""
+    def end(self, fault: FaultCode = FaultCode.NONE) -> None:
+        """End the run, for whatever reason; the run itself knows whether it is complete. fault: that ended it."""
         if self.run:
             self.phase = self.run.end_phase if self.run.is_done else CalibrationPhase.STOPPED
+        if isinstance(self.run, SelfTestRun):
+            self.self_test, self._is_report_told = self.run.report(self.self_test.number, fault), False
         self.run, self.eta_s, self.target_n = None, 0.0, 0.0
 
-    def rest(self) -> None:
-        """End what a run has left behind: the output is off."""
-        self.end()
+    def rest(self, fault: FaultCode = FaultCode.NONE) -> None:
+        """End what a run has left behind: the output is off, for this fault."""
+        self.end(fault)
         self.is_local = False
+
+    def take_report(self) -> tuple[str, ...]:
+        """Return the sentences of a self-test that has ended, once."""
+        is_told, self._is_report_told = self._is_report_told, True
+        return () if is_told else self.self_test.sentences
 
     def take_refused(self) -> str:
         """Return why the last plan asked for was not begun, once; empty for nothing."""
@@ -162,13 +210,13 @@ class ActiveRun:
         if step.row:
             ceiling.observe_row(step.row)
         was_reached = run.branch_share > 0.0 and ceiling.is_reached(run.noise_n)
-        if not was_reached and not (step.row and ceiling.is_beyond(step.voltage_v, run.noise_n)):
+        if not was_reached and not (step.row and ceiling.is_beyond(step.highest_v, run.noise_n)):
             return step.voltage_v
-        if isinstance(run, ExperimentRun):
+        if not isinstance(run, LadderRun):
             return None
-        if not run.leave_out(now_s, step.voltage_v, was_there=was_reached):
+        if not run.leave_out(now_s, step.highest_v, was_there=was_reached):
             return None
-        self.message = self._too_high(step.voltage_v, "the run goes on with the stairs below")
+        self.message = self._too_high(step.highest_v, "the run goes on with the stairs below")
         return min(present_v, step.voltage_v)
 
     def _too_high(self, voltage_v: float, what_now: str) -> str:

@@ -3,21 +3,26 @@
 A stair is left when the data say that it has settled: the means of the two halves of a window differ by no more than the
 noise, measured before the first stair, explains. The window begins when, by the pace of the check's stairs (blind_time),
 the transient of a step of this size is over: no transport delay can look like rest, nor the slow end of a lag. A stair that
-never settles is left after MOST_DWELL_S and counted. The voltage changes with a reading only: the recording's rows say when.
+never settles is left after MOST_DWELL_S and counted. Where the check's stairs ring, the others are approached along a ramp
+(stair_approach), but for the steps that tell the response. The voltage changes with a reading only: the recording's rows say
+when.
 Supervision is not here: the controller watches as always. Only what a ladder alone can see is judged: each settled stair
 of the check against the model, for sign and scale.
 """
 
 from collections import deque
+from dataclasses import replace
 from itertools import pairwise
 from math import sqrt
 from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
+from gateway.bsfm.ladder.plan import RESPONSE_GROUP
 from gateway.codes.faults import FaultCode
 from gateway.control.messages import gain_sentence, ladder_silent_sentence, sign_sentence
 from gateway.control.runs.blind_time import BlindTime, Trace
 from gateway.control.runs.ladder_stairs import CalibrationPlan, PlannedStair, stairs_of
+from gateway.control.runs.stair_approach import StairApproach
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.fault_detection import StopCause
@@ -49,13 +54,19 @@ class LadderRow(NamedTuple):
 
 
 class RunStep(NamedTuple):
-    """What one step answers. progress: 0 .. 1; row: of a stair that has just ended."""
+    """What one step answers. progress: 0 .. 1; row: of a stair that has just ended; stair_v: where a ramp leads, V."""
 
     voltage_v: float
     phase: CalibrationPhase
     progress: float
     eta_s: float
     row: LadderRow | None = None
+    stair_v: float | None = None
+
+    @property
+    def highest_v(self) -> float:
+        """Voltage of the stair that this step belongs to, V."""
+        return self.voltage_v if self.stair_v is None else max(self.voltage_v, self.stair_v)
 
 
 class LadderRun:
@@ -82,8 +93,9 @@ class LadderRun:
         self._stair_s: float | None = None
         self._window: deque[tuple[float, float]] = deque()
         self._dwelt_s = 0.0
-        self._pace, self._trace = BlindTime(), Trace()
+        self._pace, self._trace, self._approach = BlindTime(), Trace(), StairApproach()
         self._last_n = 0.0
+        self._from_v = self._out_v = self._rest_v
 
     @property
     def is_done(self) -> bool:
@@ -129,7 +141,7 @@ class LadderRun:
         if not was_there and left and left[0].direction < 0 and left[0].voltage_v >= last_v:
             left = left[1:]
         self.stairs = (*self.stairs[: self.done], *left)
-        self._stair_s = now_s
+        self._stair_s, self._from_v = now_s, self._out_v
         self._window.clear()
         self._trace.clear()
         return bool(left)
@@ -145,24 +157,47 @@ class LadderRun:
             self._began_s = now_s
         if not (reading.is_new and reading.is_usable):
             return self._answer(None)
+        row = self._advance(now_s, reading)
+        self._out_v = self._voltage_v(now_s)
+        return self._answer(row)
+
+    def _advance(self, now_s: float, reading: Reading) -> LadderRow | None:
         self._window.append((now_s, reading.cell_n))
         if self._stair_s is None:
-            return self._measure_zero(now_s)
+            self._measure_zero(now_s)
+            return None
         self._trace.append((now_s - self._stair_s, reading.cell_n))
         row = self._row_if_settled(now_s, self._stair_s)
         if row:
             self._check_against_model(row)
             self._begin_next(now_s, row.force_n)
-        return self._answer(row)
+        return row
+
+    def _voltage_v(self, now_s: float) -> float:
+        """On the way to the stair, or at it."""
+        if self._stair_s is None or not self.stairs or self.is_done:
+            return self._rest_v
+        stair_v = self._stair.voltage_v
+        share = self._approach.share(now_s - self._stair_s) if self._ramp_s else 1.0
+        return self._from_v + (stair_v - self._from_v) * share
+
+    @property
+    def _ramp_s(self) -> float:
+        return 0.0 if self._stair.is_step else self._approach.ramp_s
 
     def _begin_next(self, now_s: float, settled_n: float) -> None:
         if not self._pace.is_known:
             self._pace.observe(self._trace, self._last_n, settled_n, self.noise_n)
-        self._stair_s, self._last_n = now_s, settled_n
+            self._approach.observe(self._trace, self._last_n, settled_n, self.noise_n)
+            if self._pace.is_known and self._approach.ramp_s:
+                self.stairs = tuple(
+                    replace(stair, group=RESPONSE_GROUP) if stair.is_step else stair for stair in self.stairs
+                )
+        self._stair_s, self._last_n, self._from_v = now_s, settled_n, self._out_v
         self._window.clear()
         self._trace.clear()
 
-    def _measure_zero(self, now_s: float) -> RunStep:
+    def _measure_zero(self, now_s: float) -> None:
         """Rest force and noise, once the force of before has left: else its way down would count as both."""
         assert self._began_s is not None
         window, waited_s = self._window, now_s - self._began_s
@@ -173,7 +208,6 @@ class LadderRun:
             self.rest_n = sum(forces) / len(forces)
             self.noise_n = sqrt(sum((force - self.rest_n) ** 2 for force in forces) / (len(forces) - 1))
             self._begin_next(now_s, self.rest_n)
-        return self._answer(None)
 
     def _is_still(self) -> bool:
         """No drift beyond the noise, which neighbouring readings tell: a drift counts little between them."""
@@ -194,8 +228,10 @@ class LadderRun:
         return self._row(dwell_s, settled=False) if dwell_s >= MOST_DWELL_S else None
 
     def _blind_s(self) -> float:
-        """After a step, until its window may begin: half of that lies behind the transient's end."""
-        return self._pace.blind_s(self._step_n(), self.noise_n) - (0.5 * WINDOW_S if self._pace.is_known else 0.0)
+        """After a step, until its window may begin: half of that lies behind the transient's end. Where the plant rings, the
+        ramp comes before; behind a step the ringing takes as long."""
+        blind_s = self._pace.blind_s(self._step_n(), self.noise_n) - (0.5 * WINDOW_S if self._pace.is_known else 0.0)
+        return blind_s + (self._approach.ramp_s if self._pace.is_known else 0.0)
 
     def _step_n(self) -> float:
         """Size of this stair's step by the model."""
@@ -246,5 +282,5 @@ class LadderRun:
         if self._stair_s is None or not self.stairs:
             return RunStep(self._rest_v, CalibrationPhase.ZERO, 0.0, self.eta_s)
         progress = self.done / len(self.stairs)
-        volts = self._rest_v if self.is_done else self._stair.voltage_v
-        return RunStep(volts, self._stair.phase, progress, self.eta_s, row)
+        stair_v = self._rest_v if self.is_done else self._stair.voltage_v
+        return RunStep(self._out_v, self._stair.phase, progress, self.eta_s, row, stair_v)

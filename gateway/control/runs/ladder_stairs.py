@@ -49,12 +49,14 @@ QUICK: Final = CalibrationPlan(step_v=defaults.QUICK_LADDER_STEP_V, groups=1, mi
 
 @dataclass(frozen=True, slots=True)
 class PlannedStair:
-    """Where to go, from which side, and what for. group: -1 outside the ladder."""
+    """Where to go, from which side, and what for. group: -1 outside the ladder; is_step: gone to at once in any case, for the
+    response."""
 
     voltage_v: float
     direction: int
     group: int
     phase: CalibrationPhase
+    is_step: bool = False
 
 
 def stairs_of(plan: CalibrationPlan, limits: Limits, model: Bsfm) -> tuple[PlannedStair, ...]:
@@ -152,6 +154,6 @@ def _response_stairs(top_v: float, plan: CalibrationPlan) -> tuple[PlannedStair,
         return ()
     shares = [TURNS[-1], *(RESPONSE_SHARES[k % len(RESPONSE_SHARES)] for k in range(plan.response_steps))]
     return tuple(
-        PlannedStair(share * top_v, RISING if share > before else FALLING, -1, CalibrationPhase.MINOR_LOOPS)
+        PlannedStair(share * top_v, RISING if share > before else FALLING, -1, CalibrationPhase.MINOR_LOOPS, True)
         for before, share in pairwise(shares)
     )

@@ -37,7 +37,16 @@ _LINE_WORDS: Final = {
     FaultCode.OUTPUT_REFUSED: "the output device refused a voltage: check its range and its profile",
     FaultCode.OUTPUT_ALTERED: "the output device accepted another voltage than asked: check wire and profile",
     FaultCode.OUTPUT_LOST: "the output's port went away: check the plug; it reopens by itself",
+    FaultCode.WATCHDOG_TRIPPED: "the output device's own watchdog has tripped, it obeys nothing: look at the tool, then reset",
+    FaultCode.WRONG_DEVICE: "another device answers than the rig names: check the plug and the profile",
+    FaultCode.WATCHDOG_NOT_ARMED: "the output device's watchdog does not arm: check its profile, or accept it in the rig",
 }
+
+
+def line_words(line: LineStatus) -> str:
+    """Return what the output line reports, and what the device said to it."""
+    words = _LINE_WORDS.get(line.fault, "reported by the output line")
+    return f"{words} (it says: {line.said})" if line.said else words
 
 
 def stop_cause(fault: FaultCode, detail: str) -> StopCause:
@@ -126,6 +135,8 @@ class FaultDetector:
             return RefusalReason.OUTPUT_FAULT
         if line.cell_lost or not reading.is_fresh:
             return RefusalReason.CELL_SILENT
+        if line.valve is not None and (line.valve.stands is None or line.valve.lost):
+            return RefusalReason.VALVE_UNKNOWN
         if line.acknowledged_v is None or not reading.is_usable or self.is_stuck:
             return RefusalReason.NOT_READY
         return RefusalReason.NONE
@@ -153,7 +164,7 @@ class FaultDetector:
         if line.late_s > self._bounds.stall_s:
             return _lateness(line, self._bounds.stall_s)
         if line.fault:
-            return stop_cause(line.fault, _LINE_WORDS.get(line.fault, "reported by the output line"))
+            return stop_cause(line.fault, line_words(line))
         if self._is_silent(now_s, line):
             return self._no_answer(now_s, line)
         return None

@@ -6,7 +6,8 @@ as long as the output is enabled, with or without contact (a cell with swapped w
 in contact, under 30 % of the expected rise beyond friction, or over 300 % of it and off by more than friction explains, until
 one rise has passed;
 later the same signature means lost air, which only warns, and so does a force that stays where it was: friction keeps a vented
-tool pressed. While the first rise is too high the target is held back
+tool pressed. A force that is still rising is not too low yet: on a rig that has not been calibrated nobody knows how slow the
+plant is. While the first rise is too high the target is held back
 (`is_too_high`), so that a wrong gain is named before it becomes over-force. Below the contact threshold a cell that
 reads ten times too little looks like air: the tool waits, and the warning A301 tells.
 """
@@ -26,6 +27,8 @@ _HIGHEST_SHARE: Final = 3.0  # of it: N read as kgf is ten times
 _MOVED_SHARE: Final = (
     0.05  # of the expected rise, from the force at rest: a force that has not moved has no wrong unit but no air
 )
+_TREND_S: Final = 0.2  # over which a force that still rises is told from one that has come to rest
+_UNKNOWN_LAG_S: Final = 0.6  # for which it goes on: two lags of 0.3 s
 _SLACK_N: Final = 1.0  # beside what friction explains: zero and noise
 
 
@@ -85,7 +88,8 @@ class RiseCheck:
     def __init__(self, contact_threshold_n: float) -> None:
         """smooth_n: the cell force behind a low-pass, for judgement and sentences."""
         self._threshold_n = contact_threshold_n
-        self.smooth_n = 0.0
+        self.smooth_n = self._behind_n = 0.0
+        self._readings = 0
         self.start()
 
     def start(self) -> None:
@@ -102,13 +106,17 @@ class RiseCheck:
         return self.smooth_n - self._base_n
 
     def smooth(self, reading: Reading) -> None:
-        """Smooth a new sample, enabled or not."""
+        """Smooth a new sample, enabled or not. The first ones are averaged: an enable right after the start has a rest too."""
         if reading.is_usable:
-            self.smooth_n += (reading.cell_n - self.smooth_n) * reading.interval_s / (_SMOOTHING_S + reading.interval_s)
+            self._readings += 1
+            weight = max(1.0 / self._readings, reading.interval_s / (_SMOOTHING_S + reading.interval_s))
+            self.smooth_n += (reading.cell_n - self.smooth_n) * weight
+            self._behind_n += (self.smooth_n - self._behind_n) * reading.interval_s / (_TREND_S + reading.interval_s)
 
     def shift(self, moved_n: float) -> None:
         """Take over a zero that has moved: what was measured before reads that much less now."""
         self.smooth_n -= moved_n
+        self._behind_n -= moved_n
         self._at_rest_n -= moved_n
 
     def judge(self, response: "ExpectedForce", branch_share: float, touching: bool, interval_s: float) -> FaultCode:
@@ -127,7 +135,8 @@ class RiseCheck:
     def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
         off_n = self.measured_rise_n - expected_n
         self.is_too_high = off_n > slack_n + kept_n and self.measured_rise_n > _HIGHEST_SHARE * expected_n
-        too_low = -off_n > slack_n and self.measured_rise_n < _LOWEST_SHARE * (expected_n - slack_n)
+        coming_n = max(0.0, self.smooth_n - self._behind_n) * _UNKNOWN_LAG_S / _TREND_S
+        too_low = -off_n > slack_n and self.measured_rise_n + coming_n < _LOWEST_SHARE * (expected_n - slack_n)
         has_moved = self.smooth_n - self._at_rest_n > _MOVED_SHARE * expected_n
         wrong = self.is_too_high or (too_low and has_moved)
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0

@@ -3,14 +3,18 @@
 from collections.abc import Callable
 from typing import Final
 
-from gateway.devices import DeviceProfile, Role, cell_device, output_host
+from gateway.devices import DeviceProfile, DeviceRole, ValveHost, cell_device, output_host
 from gateway.devices.codecs import UnknownCodecError
 from gateway.devices.rehearsal import rehearse
 from gateway.profiles.strict_yaml.faults import ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
-_MAKE: Final[dict[Role, Callable[[DeviceProfile], object]]] = {Role.OUTPUT: output_host, Role.LOAD_CELL: cell_device}
+_MAKE: Final[dict[DeviceRole, Callable[[DeviceProfile], object]]] = {
+    DeviceRole.OUTPUT: output_host,
+    DeviceRole.LOAD_CELL: cell_device,
+    DeviceRole.VALVE: ValveHost,
+}
 
 
 def read_device(document: Document) -> tuple[DeviceProfile | None, list[ProfileFault]]:

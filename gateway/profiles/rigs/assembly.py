@@ -2,21 +2,38 @@
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
 from gateway import defaults
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
-from gateway.control.settings import ControlSettings, Defaults, Limits, Supervision, Trim
+from gateway.control.settings import (
+    ControlSettings,
+    Defaults,
+    Limits,
+    SelfTestSettings,
+    Supervision,
+    Trim,
+    ValveControl,
+)
 from gateway.devices import DeviceProfile
+from gateway.devices.profile import ADDRESS
 from gateway.profiles.find import display, shipped_profiles_folder
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
 from gateway.profiles.load import load_plant, open_profile, read_named, refer_at, refer_to
-from gateway.profiles.rigs import checks, line_checks, network_checks, wire_checks
+from gateway.profiles.rigs import (
+    checks,
+    face_checks,
+    line_checks,
+    network_checks,
+    tls_checks,
+    valve_checks,
+    wire_checks,
+)
 from gateway.profiles.rigs.checks import Check, Parts
 from gateway.profiles.rigs.compensated_effects import (
     compensation_of,
@@ -24,21 +41,40 @@ from gateway.profiles.rigs.compensated_effects import (
     in_simulation,
     without_compensable,
 )
+from gateway.profiles.rigs.device_settings import find_unfit_settings, set_device
 from gateway.profiles.rigs.edit_marks import find_edit_marks
-from gateway.profiles.rigs.rig import SUPPORTED_BITS, CellLine, OutputLine, Rig
-from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, RigFile
+from gateway.profiles.rigs.faces import Face, TlsFace
+from gateway.profiles.rigs.rig import ALWAYS_SUPPORTED, CellLine, OutputLine, Rig, ValveLine
+from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, RigFile, ValveFile
 from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build, build_known
 from gateway.registers.map.register_map import RegisterMap
+from gateway.registers.words import ControlBit
 
 T = TypeVar("T")
 
 FALLBACK_PLANT: Final = defaults.PLANT
 """What `run --sim` simulates for a real rig that names no plant."""
 
-FAULTS: Final = (*checks.FAULTS, *line_checks.FAULTS, *wire_checks.FAULTS, *network_checks.FAULTS)
-WARNINGS: Final = (*checks.WARNINGS, *line_checks.WARNINGS, *wire_checks.WARNINGS, *network_checks.WARNINGS)
+FAULTS: Final = (
+    *checks.FAULTS,
+    *line_checks.FAULTS,
+    *valve_checks.FAULTS,
+    *wire_checks.FAULTS,
+    *network_checks.FAULTS,
+    *face_checks.FAULTS,
+    *tls_checks.FAULTS,
+)
+WARNINGS: Final = (
+    *checks.WARNINGS,
+    *line_checks.WARNINGS,
+    *wire_checks.WARNINGS,
+    *network_checks.WARNINGS,
+    *face_checks.WARNINGS,
+    *tls_checks.WARNINGS,
+)
+HARDWARE: Final = (*line_checks.HARDWARE, *face_checks.HARDWARE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +130,7 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     )
     parts = _parts(document, path.parent, findings)
     findings.faults += _first_of_each_path(_run_checks(document, FAULTS, parts))
-    findings.hardware += _first_of_each_path(_run_checks(document, line_checks.HARDWARE, parts))
+    findings.hardware += _first_of_each_path(_run_checks(document, HARDWARE, parts))
     findings.warnings += _run_checks(document, WARNINGS, parts)
     marks = _marks(document, path, findings)
     findings.warnings += marks
@@ -140,6 +176,9 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     ) -> T | None:
         return read_named(kind, refer_at(document, path, folder), read, findings)
 
+    output, load_cell = _part(document, "output", OutputFile), _part(document, "load_cell", CellFile)
+    output_device = read_part("device", ("output", "device"), read_device)
+    cell_device = read_part("device", ("load_cell", "device"), read_device)
     plant = read_part("plant", ("plant",), read_plant)
     extended = read_part("plant", ("compensation",), read_plant)
     loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else defaults.LOOP_HZ
@@ -149,20 +188,32 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         names_plant=("plant",) in document.marks,
         accept_no_device_watchdog=document.at("accept_no_device_watchdog") is True,
         loop_hz=float(loop_hz) if isinstance(loop_hz, (int, float)) else None,
-        output=_part(document, "output", OutputFile),
-        load_cell=_part(document, "load_cell", CellFile),
+        output=output,
+        load_cell=load_cell,
         limits=_part(document, "limits", Limits),
         defaults=_part(document, "defaults", Defaults),
         trim=_part(document, "trim", Trim),
         supervision=_part(document, "supervision", Supervision),
+        valve=_optional_part(document, "valve", ValveFile),
+        valve_device=read_part("device", ("valve", "device"), read_device),
+        valve_calibration=read_part("calibration", ("valve", "calibration"), read_calibration),
+        self_test=_optional_part(document, "self_test", SelfTestSettings),
         network=_part(document, "network", Network),
+        fieldbus=_faces(document, folder),
         calibration=read_part("calibration", ("calibration",), read_calibration),
-        output_device=read_part("device", ("output", "device"), read_device),
-        cell_device=read_part("device", ("load_cell", "device"), read_device),
+        output_device=_as_set(output_device, output),
+        cell_device=_as_set(cell_device, load_cell),
         plant=plant,
         extended=extended,
         compensation=_compensation(plant, extended),
     )
+
+
+def _as_set(device: DeviceProfile | None, line: OutputFile | CellFile | None) -> DeviceProfile | None:
+    """The device with the rig's settings; as it is where they do not fit, which check_device_settings tells."""
+    if device is None or line is None or list(find_unfit_settings(device, line)):
+        return device
+    return set_device(device, line)
 
 
 def _compensation(plant: PlantProfile | None, extended: PlantProfile | None) -> Compensation | None:
@@ -173,6 +224,11 @@ def _compensation(plant: PlantProfile | None, extended: PlantProfile | None) -> 
     return compensation_of(without_compensable(base), extended.plant)
 
 
+def _optional_part(document: Document, key: str, kind: type[T]) -> T | None:
+    """Return one group of the file by itself; None where the file leaves it out, or says null."""
+    return _part(document, key, kind) if document.at(key) is not None else None
+
+
 def _part(document: Document, key: str, kind: type[T]) -> T | None:
     """Return one group of the file by itself; its defaults where the file leaves it out."""
     if (key,) in document.marks:
@@ -181,6 +237,14 @@ def _part(document: Document, key: str, kind: type[T]) -> T | None:
         return kind()
     except TypeError:  # it has keys without a default
         return None
+
+
+def _faces(document: Document, folder: Path) -> tuple[Face | None, ...]:
+    """Return the rig's faces in their order, each None where it has a fault of its own."""
+    listed = document.at("fieldbus") if ("fieldbus",) in document.marks else ()
+    count = len(listed) if isinstance(listed, list) else 0
+    faces = (build_known(Face, document, ("fieldbus", index)) for index in range(count))  # type: ignore[arg-type]
+    return tuple(face.within(folder) if isinstance(face, TlsFace) else face for face in faces)
 
 
 def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: Path, findings: Findings) -> Rig:
@@ -207,16 +271,41 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
             lead=file.lead,
             response=file.response,
             supervision=file.supervision,
+            self_test=file.self_test,
+            valve=_valve_control(file.valve) if file.valve else None,
         ),
+        valve=_valve_line(file.valve, parts.valve_device) if file.valve and parts.valve_device else None,
+        pull_calibration=parts.valve_calibration,
         network=file.network,
+        fieldbus=tuple(face for face in parts.fieldbus if face),
         residual_watch=file.residual_watch,
-        supported_bits=SUPPORTED_BITS,
+        supported_bits=_supported_bits(file),
         accept_no_device_watchdog=file.accept_no_device_watchdog,
         texts={name: text.decode("utf-8-sig") for name, text in findings.texts.items()},
         fingerprint=_fingerprint(findings.texts.values()),
-        notes=compensation_words(compensation) if parts.compensation else (),
+        notes=_notes(parts, compensation),
         compensation=compensation,
     )
+
+
+def _notes(parts: Parts, compensation: Compensation) -> tuple[str, ...]:
+    days = (sentence for _, sentence in tls_checks.check_tls_days(parts))
+    return (*(compensation_words(compensation) if parts.compensation else ()), *days)
+
+
+def _supported_bits(file: RigFile) -> ControlBit:
+    self_test = ControlBit.START_SELF_TEST if file.self_test else ControlBit(0)
+    return ALWAYS_SUPPORTED | self_test | (ControlBit.VALVE_PULL if file.valve else ControlBit(0))
+
+
+def _valve_control(valve: ValveFile) -> ValveControl:
+    return ValveControl(**{field.name: getattr(valve, field.name) for field in fields(ValveControl)})
+
+
+def _valve_line(valve: ValveFile, device: DeviceProfile) -> ValveLine:
+    if valve.address is not None:
+        device = replace(device, constants={**device.constants, ADDRESS: valve.address})
+    return ValveLine(device=device, port=valve.port, baud=valve.baud)
 
 
 def _cell_line(cell: CellFile, device: DeviceProfile) -> CellLine:

@@ -2,7 +2,7 @@
 
 Each check is a generator of (path, sentence) and looks at the parts that were read; a part with a fault of its own is None,
 and its checks wait until it is fixed. FAULTS keep a rig from starting, WARNINGS do not. The checks of the two serial
-lines are in line_checks and wire_checks, those of the Modbus server in network_checks.
+lines are in line_checks and wire_checks, those of the Modbus server in network_checks, of its other faces in face_checks.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,10 +12,11 @@ from typing import Final
 from gateway import defaults
 from gateway.bsfm.model import Calibration
 from gateway.control.compensation.compensation import Compensation
-from gateway.control.settings import Defaults, Limits, Supervision, Trim
+from gateway.control.settings import Defaults, Limits, SelfTestSettings, Supervision, Trim
 from gateway.devices import DeviceProfile
 from gateway.profiles.kinds.plants import PlantProfile
-from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile
+from gateway.profiles.rigs.faces import Face
+from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, ValveFile
 from gateway.profiles.strict_yaml.fault_sentences import newton, number, second, volt
 
 Found = Iterator[tuple[str, str]]
@@ -37,7 +38,12 @@ class Parts:
     defaults: Defaults | None = None
     trim: Trim | None = None
     supervision: Supervision | None = None
+    self_test: SelfTestSettings | None = None
+    valve: ValveFile | None = None
+    valve_device: DeviceProfile | None = None
+    valve_calibration: Calibration | None = None
     network: Network | None = None
+    fieldbus: tuple[Face | None, ...] = ()
     output_device: DeviceProfile | None = None
     cell_device: DeviceProfile | None = None
     plant: PlantProfile | None = None
@@ -109,6 +115,18 @@ def check_defaults(parts: Parts) -> Found:
         yield (
             "defaults.precontact_force_n",
             f"{newton(precontact)} is below {floor}: the output stays 0 V, the tool would not move",
+        )
+
+
+def check_self_test(parts: Parts) -> Found:
+    """Yield a fault for a self-test that states more force than the rig allows."""
+    if (self_test := parts.self_test) is None or (limits := parts.limits) is None:
+        return
+    if self_test.force_n > limits.force_max_n:
+        most = f"limits.force_max_n = {newton(limits.force_max_n)}"
+        yield (
+            "self_test.force_n",
+            f"{newton(self_test.force_n)} is above {most}: a self-test never presses harder than work",
         )
 
 
@@ -223,6 +241,7 @@ FAULTS: Final[tuple[Check, ...]] = (
     check_forces,
     check_saturation,
     check_defaults,
+    check_self_test,
     check_calibration_range,
     check_calibration_against_cell,
     check_times,

@@ -3,15 +3,20 @@
 from collections.abc import Iterator
 from typing import Final
 
-from gateway.devices import DeviceProfile, Role, cell_host
+from gateway.devices import DeviceProfile, DeviceRole, cell_host
+from gateway.devices.device_checks.watchdog import FEEDS_PER_TIME
 from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.device_settings import find_unfit_settings
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.rig_file import CellFile, OutputFile
-from gateway.profiles.strict_yaml.fault_sentences import number, volt
+from gateway.profiles.strict_yaml.fault_sentences import number, second, volt
 
-_UNSTABLE_PATHS: Final = ("/dev/ttyUSB", "/dev/ttyACM")  # numbered in the order of plugging
-_ROLES: Final = {"output": Role.OUTPUT, "load_cell": Role.LOAD_CELL}
-_ARTICLE: Final = {Role.OUTPUT: "an output", Role.LOAD_CELL: "a load cell"}
+UNSTABLE_PATHS: Final = ("/dev/ttyUSB", "/dev/ttyACM")
+"""Ports that are numbered in the order of plugging."""
+
+_POLLED_S: Final = 0.3  # three questions of an idle line: what a watchdog that any sentence feeds must outlast
+_ROLES: Final = {"output": DeviceRole.OUTPUT, "load_cell": DeviceRole.LOAD_CELL}
+_ARTICLE: Final = {DeviceRole.OUTPUT: "an output", DeviceRole.LOAD_CELL: "a load cell"}
 
 
 def lines_of(parts: Parts) -> Iterator[tuple[str, OutputFile | CellFile, DeviceProfile | None]]:
@@ -22,7 +27,7 @@ def lines_of(parts: Parts) -> Iterator[tuple[str, OutputFile | CellFile, DeviceP
         yield "load_cell", parts.load_cell, parts.cell_device
 
 
-def of_role(device: DeviceProfile | None, role: Role) -> DeviceProfile | None:
+def of_role(device: DeviceProfile | None, role: DeviceRole) -> DeviceProfile | None:
     """Return the device where it has this role; one at the wrong end is told once, and other checks leave it alone."""
     return device if device and device.role is role else None
 
@@ -67,7 +72,7 @@ def check_ports_differ(parts: Parts) -> Found:
 
 def check_unit(parts: Parts) -> Found:
     """Yield a fault for a frame without a unit where the rig names none, and for one that gets a second."""
-    device, line = of_role(parts.cell_device, Role.LOAD_CELL), parts.load_cell
+    device, line = of_role(parts.cell_device, DeviceRole.LOAD_CELL), parts.load_cell
     if device and line:
         try:
             cell_host(device, line.sign, line.unit)
@@ -75,9 +80,17 @@ def check_unit(parts: Parts) -> Found:
             yield "load_cell.unit", str(error)
 
 
+def check_device_settings(parts: Parts) -> Found:
+    """Yield a fault for a setting that the device does not have, or cannot be set to."""
+    for key, line, device in lines_of(parts):
+        if device and device.role is _ROLES[key]:
+            for name, sentence in find_unfit_settings(device, line):
+                yield f"{key}.{name}", sentence
+
+
 def check_output_range(parts: Parts) -> Found:
     """Yield a fault for a voltage limit outside the output's range."""
-    device, limits = of_role(parts.output_device, Role.OUTPUT), parts.limits
+    device, limits = of_role(parts.output_device, DeviceRole.OUTPUT), parts.limits
     if not device or not limits:
         return
     low, high = device.voltage_range_v
@@ -89,7 +102,7 @@ def check_output_range(parts: Parts) -> Found:
 
 def check_device_watchdog(parts: Parts) -> Found:
     """Yield a fault for an output without a watchdog, until the rig accepts that it has none."""
-    device = of_role(parts.output_device, Role.OUTPUT)
+    device = of_role(parts.output_device, DeviceRole.OUTPUT)
     if device and device.watchdog == "none" and not parts.accept_no_device_watchdog:
         risk = f"{device.name} has no watchdog and keeps its last output when this machine loses power"
         yield (
@@ -98,10 +111,24 @@ def check_device_watchdog(parts: Parts) -> Found:
         )
 
 
+def check_watchdog_time(parts: Parts) -> Found:
+    """Yield a fault for a device watchdog that the gateway could not keep from tripping while all is well."""
+    device = of_role(parts.output_device, DeviceRole.OUTPUT)
+    watchdog = device.own_watchdog if device else None
+    if watchdog is None or device is None or not parts.loop_hz:
+        return
+    period_s = FEEDS_PER_TIME / parts.loop_hz if watchdog.feed else _POLLED_S
+    time_s = watchdog.ticks * watchdog.tick_s
+    if time_s < period_s:
+        feeds = "signs of life" if watchdog.feed else "questions"
+        least = f"{second(period_s)} is the least at {number(parts.loop_hz)} Hz with the {feeds} that feed it"
+        yield "output.watchdog_s", f"{second(time_s)} of {device.name}'s watchdog would trip in normal work: {least}"
+
+
 def check_ports_stable(parts: Parts) -> Found:
     """Yield a warning for a port whose name depends on the order of plugging."""
     for key, line, _ in lines_of(parts):
-        if line.port is not None and line.port.startswith(_UNSTABLE_PATHS):
+        if line.port is not None and line.port.startswith(UNSTABLE_PATHS):
             reason = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
             yield f"{key}.port", f"{line.port} {reason}"
 
@@ -120,9 +147,11 @@ HARDWARE: Final[tuple[Check, ...]] = (check_ports_given, check_ports_differ)
 FAULTS: Final[tuple[Check, ...]] = (
     check_device_roles,
     check_simulated_ports,
+    check_device_settings,
     check_unit,
     check_output_range,
     check_device_watchdog,
+    check_watchdog_time,
 )
 WARNINGS: Final[tuple[Check, ...]] = (
     check_ports_stable,

@@ -4,7 +4,9 @@ from ipaddress import ip_address
 from typing import Final
 
 from gateway import defaults
+from gateway.profiles.rigs.addresses import is_certificate
 from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.registers.writes.ownership import serial_place
 
 
 def check_allow_list(parts: Parts) -> Found:
@@ -14,7 +16,9 @@ def check_allow_list(parts: Parts) -> Found:
     if not is_loopback(network.bind) and not network.allow:
         reason = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
         yield "network.bind", f"{network.bind} {reason}"
-    if network.owner and network.allow and not any(ip_address(network.owner) in allowed for allowed in network.allow):
+    if network.owner is None or serial_place(network.owner) is not None or is_certificate(network.owner):
+        return
+    if network.allow and not any(ip_address(network.owner) in allowed for allowed in network.allow):
         yield "network.owner", f"{network.owner} is in none of the networks of network.allow: it could not connect"
 
 

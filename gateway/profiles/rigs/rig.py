@@ -17,20 +17,21 @@ from gateway.devices import DeviceProfile, SerialSettings
 from gateway.extras import is_installed, missing_note
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.compensated_effects import in_simulation
+from gateway.profiles.rigs.faces import Face, RtuFace
 from gateway.profiles.rigs.rig_file import Network, ResidualWatch
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.words import ControlBit
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 
-SUPPORTED_BITS: Final = (
+ALWAYS_SUPPORTED: Final = (
     ControlBit.ENABLE
     | ControlBit.RESET_FAULT
     | ControlBit.TARE
     | ControlBit.TAKE_OWNERSHIP
     | ControlBit.START_CALIBRATION
 )
-"""Control bits that act; the others are refused (no rig has a valve or a self-test behind them yet)."""
+"""Control bits that act on every rig; a self-test and a valve act where the rig file has them, else they are refused."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +62,11 @@ class CellLine(_SerialLine):
     range_n: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveLine(_SerialLine):
+    """The wire to the relay of the directional valve."""
+
+
 @dataclass(frozen=True, slots=True)
 class PlantInUse:
     """A numbered plant that was taken into use on a rig: what control compensates comes from it."""
@@ -88,12 +94,15 @@ class Rig:
     calibration: Calibration
     control: ControlSettings
     network: Network
+    fieldbus: tuple[Face, ...]
     residual_watch: ResidualWatch
     supported_bits: ControlBit
     accept_no_device_watchdog: bool
     texts: Mapping[str, str]
     fingerprint: str
     notes: tuple[str, ...] = ()
+    valve: ValveLine | None = None
+    pull_calibration: Calibration | None = None  # measured pulling, None: derived from the one of pushing
     compensation: Compensation = NO_COMPENSATION
     plant_in_use: PlantInUse | None = None
 
@@ -156,6 +165,7 @@ class Rig:
     def ports(self) -> dict[str, str]:
         """Return the serial ports of a real rig, by line; empty for a simulated one."""
         ports = {"output": self.output.port, "load_cell": self.load_cell.port}
+        ports |= {"valve": self.valve.port} if self.valve else {}
         return {name: port for name, port in ports.items() if port is not None}
 
     def as_simulated(self) -> "Rig":
@@ -175,16 +185,29 @@ class Rig:
                 f"bound to {defaults.HOST}: a simulated rig does not take the cell's address {network.bind}",
             )
             network = replace(network, bind=defaults.HOST)
+        if any(isinstance(face, RtuFace) for face in self.fieldbus):
+            notes = (*notes, "serial faces are pseudo-terminals: a simulated rig does not take the cell's ports")
         return replace(
             self,
             simulated=True,
             output=replace(self.output, port=None, device=_with_baud(self.output.device, self.output.baud)),
             load_cell=replace(self.load_cell, port=None, device=_with_baud(self.load_cell.device, self.load_cell.baud)),
+            valve=replace(self.valve, port=None, device=_with_baud(self.valve.device, self.valve.baud))
+            if self.valve
+            else None,
             plant_profile=self.plant_profile or self.fallback_plant,
             network=network,
+            fieldbus=tuple(_simulated_face(face) for face in self.fieldbus),
             notes=notes,
             compensation=compensation,
         )
+
+
+def _simulated_face(face: Face) -> Face:
+    """Return the face on this machine alone: a pseudo-terminal, or the loopback address."""
+    if isinstance(face, RtuFace):
+        return replace(face, port=None)
+    return face if ip_address(face.bind).is_loopback else replace(face, bind=defaults.HOST)
 
 
 def _with_baud(device: DeviceProfile, baud: int) -> DeviceProfile:

@@ -4,48 +4,27 @@ Each field's comment is also its help in editors: gateway.profiles.schema carrie
 """
 
 from dataclasses import dataclass, field
-from ipaddress import IPv4Network, IPv6Network, ip_address, ip_network
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, MinLen
-from pydantic import AfterValidator, Field, PlainValidator, WithJsonSchema
+from pydantic import Field
 
 from gateway import defaults
-from gateway.control.settings import Defaults, LeadSettings, Limits, ResponseSource, Supervision, Trim
+from gateway.control.settings import (
+    Defaults,
+    LeadSettings,
+    Limits,
+    ResponseSource,
+    SelfTestSettings,
+    Supervision,
+    Trim,
+    ValveControl,
+)
 from gateway.defaults import STRICT
+from gateway.devices.checksum import ChecksumName
 from gateway.devices.line_settings import Baud
-
-
-def _address(text: str) -> str:
-    try:
-        return "127.0.0.1" if text == "localhost" else str(ip_address(text))
-    except ValueError:
-        raise ValueError(f'"{text}" is not an IP address such as 127.0.0.1 or 192.168.125.10') from None
-
-
-def _network(text: Any) -> IPv4Network | IPv6Network:
-    if not isinstance(text, str):
-        raise ValueError(f"{text} is not a network such as 192.168.125.0/24")
-    try:
-        return ip_network(text)
-    except ValueError:
-        raise ValueError(f'"{text}" is not a network such as 192.168.125.0/24{_suggest_network(text)}') from None
-
-
-def _suggest_network(text: str) -> str:
-    """Return the network that the address is in, as a suggestion: host bits set are the usual slip."""
-    try:
-        return f"; did you mean {ip_network(text, strict=False)}?"
-    except ValueError:
-        return ""
-
-
-Address = Annotated[str, AfterValidator(_address)]
-Network4Or6 = Annotated[
-    IPv4Network | IPv6Network,
-    PlainValidator(_network, json_schema_input_type=str),
-    WithJsonSchema({"type": "string", "examples": ["192.168.125.0/24"]}),
-]
+from gateway.profiles.rigs.addresses import Address, Network4Or6, Owner
+from gateway.profiles.rigs.faces import Face
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +35,13 @@ class OutputFile:
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
     baud: Baud = defaults.OUTPUT_BAUD  # as set in the device
+    address: int | str | None = None  # of the device on its bus, its Modbus unit; null: the profile's
+    channel: Annotated[int, Ge(0), Le(15)] | None = None  # of a device with several outputs; null: the profile's
+    checksum: ChecksumName | None = None  # as set in a device that can have one; null: the profile's
+    watchdog_s: Annotated[float, Gt(0), Le(60)] | None = (
+        None  # silence that trips the device's watchdog; null: the profile's
+    )
+    watchdog_tick_s: Annotated[float, Gt(0), Le(1)] | None = None  # one count of its time, where firmware differs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,9 +52,27 @@ class CellFile:
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
     baud: Baud = defaults.CELL_BAUD  # as set in the amplifier
+    address: int | str | None = None  # of the device on its bus, its Modbus unit; null: the profile's
+    checksum: ChecksumName | None = None  # as set in a device that can have one; null: the profile's
     sign: Literal[1, -1] = 1  # -1 where the wiring shows a push as a negative force
     unit: Literal["N", "kg", "g", "lb"] | None = None  # only where the amplifier's own text leaves the unit out
+    newton_per_count: Annotated[float, Gt(0)] | None = None  # of raw counts: one count in newtons, as you measured it
+    zero_count: float | None = None  # of raw counts: the reading without a force
     range_n: Annotated[float, Gt(0), Le(defaults.LARGEST_CELL_N)] = defaults.CELL_RANGE_N  # the cell's rated force, N
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveFile(ValveControl):
+    """The directional valve that control_word bit 4 switches, and the serial line to its relay."""
+
+    __pydantic_config__ = STRICT
+    device: Annotated[
+        str, MinLen(1)
+    ]  # name of a shipped device profile of role valve, or the path of one from this file
+    port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
+    baud: Baud = defaults.OUTPUT_BAUD  # as set in the device
+    address: int | str | None = None  # of the device on its bus, its Modbus unit; null: the profile's
+    calibration: Annotated[str, MinLen(1)] | None = None  # measured pulling; null: that of pushing by pull_area_share
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +86,9 @@ class Network:
         defaults.UNIT_IDS
     )  # unit ids that are answered
     allow: tuple[Network4Or6, ...] = ()  # networks that may connect, such as 192.168.125.0/24
-    owner: Address | None = None  # the one master that may command; null: the first that does
+    owner: Owner | None = (
+        None  # the one master that may command: address, serial:N (the Nth of `fieldbus`) or certificate NAME; null: the first
+    )
     require_byte_order_echo: bool = False  # the master must prove its word order before it may enable
     allow_plain_upload: bool = False  # coefficients may be uploaded without TLS
     connections: Annotated[int, Ge(1), Le(256)] = defaults.CONNECTIONS  # most connections at a time
@@ -93,6 +99,7 @@ class Network:
     requests_per_s: Annotated[float, Gt(0)] = (
         defaults.REQUESTS_PER_S
     )  # of a client; above it reading waits; loopback is exempt
+    plain: bool = True  # false: no plain Modbus TCP, the faces of `fieldbus` only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,6 +132,7 @@ class RigFile:
     compensation: Annotated[str, MinLen(1)] | None = None  # an extended plant, of which control takes back what it can
     output: OutputFile
     load_cell: CellFile
+    valve: ValveFile | None = None  # switches push and pull; null: there is none, and bit 4 is refused
     limits: Limits
     defaults: Defaults = field(default_factory=Defaults)
     trim: Trim = field(default_factory=Trim)
@@ -133,6 +141,10 @@ class RigFile:
         ResponseSource.MEASURED
     )  # measured: trim's pace, lead and lag by the calibration, once it has measured them; rig: by this file
     supervision: Supervision = field(default_factory=Supervision)
+    self_test: SelfTestSettings | None = (
+        None  # what a master's self-test (control_word bit 6) may do; null: there is none
+    )
     network: Network = field(default_factory=Network)
+    fieldbus: tuple[Face, ...] = ()  # faces beside plain Modbus TCP: serial ports with Modbus RTU, Modbus TCP by TLS
     residual_watch: ResidualWatch = field(default_factory=ResidualWatch)
     accept_no_device_watchdog: bool = False  # true: enable although the output device has no watchdog of its own

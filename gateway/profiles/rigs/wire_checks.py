@@ -11,7 +11,17 @@ from typing import Final
 
 from gateway.control.supervision.repeat_law import counts_found_within
 from gateway.control.supervision.stuck_sensor import SLOW_S
-from gateway.devices import CellHost, DeviceProfile, Role, cell_device, cell_host, output_device, output_host
+from gateway.devices import (
+    CellHost,
+    DeviceProfile,
+    DeviceRole,
+    SerialSettings,
+    cell_device,
+    cell_host,
+    output_device,
+    output_host,
+)
+from gateway.devices.exchange import UNIT
 from gateway.devices.messages import (
     Accepted,
     OutputReply,
@@ -50,6 +60,17 @@ def _characters(device: DeviceProfile, question: OutputRequest, answer: OutputRe
     return len(frame) + sum(len(far.reply(answer, to=one)) for one in understood)
 
 
+def wire_cycle_s(device: DeviceProfile, settings: SerialSettings) -> float:
+    """Return what one cycle of a device takes on the wire alone, s: of an output a setting with the reading after it, of a
+    load cell a reading with its question."""
+    if device.role is DeviceRole.OUTPUT:
+        took_s = _output_talks_s(device, settings.character_s)
+        return took_s["set_voltage"] + took_s.get("read_pressure", took_s.get("read_voltage", 0.0))
+    unit = None if device.reading.newton_per_unit or device.reading.template.field(UNIT) else "N"
+    characters = len(cell_host(device, unit=unit).poll()) + len(cell_device(device, unit).frame(0.0))
+    return characters * settings.character_s
+
+
 @dataclass(frozen=True, slots=True)
 class _Readings:
     """A load cell on its wire. period_s: between two readings; wire_s: what one takes, its question with it."""
@@ -71,7 +92,7 @@ class _Readings:
 
 def _readings(parts: Parts) -> Iterator[_Readings]:
     """Yield the rig's load cell, where it can be read at all (else told by the_unit_is_known)."""
-    device, line = of_role(parts.cell_device, Role.LOAD_CELL), parts.load_cell
+    device, line = of_role(parts.cell_device, DeviceRole.LOAD_CELL), parts.load_cell
     if not device or not line:
         return
     try:
@@ -84,7 +105,7 @@ def _readings(parts: Parts) -> Iterator[_Readings]:
 
 def _talks(parts: Parts) -> Iterator[tuple[str, float]]:
     """Yield (exchange, time on the wire in s) of the rig's output."""
-    device, line = of_role(parts.output_device, Role.OUTPUT), parts.output
+    device, line = of_role(parts.output_device, DeviceRole.OUTPUT), parts.output
     if device and line:
         yield from _output_talks_s(device, device.serial.at(line.baud).character_s).items()
 
@@ -156,8 +177,7 @@ def check_display_range(parts: Parts) -> Found:
     for reading in _readings(parts):
         message = reading.device.reading
         per_count = reading.host.resolution_n / message.step
-        says_overload = message.blank_is_overload or "overload" in message.quality.values()
-        key = "force_max_n" if says_overload else "over_force_n"
+        key = "force_max_n" if message.says_overload else "over_force_n"
         wanted_n, end_n = getattr(limits, key), message.largest_shown * per_count
         if wanted_n > end_n:
             yield f"limits.{key}", f"{newton(wanted_n)} is beyond what {reading.device.name} can show: {end_n:.4g} N"
@@ -209,7 +229,7 @@ def check_output_resolution(parts: Parts) -> Found:
 
     Half a step, as the calibration's mean slope makes newtons of it, must fit into the band.
     """
-    device, calibration, defaults = of_role(parts.output_device, Role.OUTPUT), parts.calibration, parts.defaults
+    device, calibration, defaults = of_role(parts.output_device, DeviceRole.OUTPUT), parts.calibration, parts.defaults
     if not device or not calibration or not defaults:
         return
     low_n, high_n = calibration.model().force_range_n

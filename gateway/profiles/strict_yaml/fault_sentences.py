@@ -149,9 +149,20 @@ def _number_hint(text: str) -> str:
     return next((f": write {new} ({reason})" for new, reason in repairs if _DECIMAL.fullmatch(new)), "")
 
 
+def _choices(listed: object) -> list[str]:
+    """Return the choices in a list of pydantic's: `'fault', 'hold' or 'ramp'`."""
+    return [word.strip(" '") for word in str(listed).replace(" or ", ",").split(",")]
+
+
+def _kind_choice(value: Any, context: dict[str, Any], unit: str) -> str:
+    """Return the sentence about a group whose `type` is not there, or none of the known."""
+    if "tag" not in context:
+        return "has no type: it says what this is"
+    return f"type {_choice(context['tag'], {'expected': context['expected_tags']}, unit)}"
+
+
 def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
-    """Return the choices in pydantic's list `expected`: `'fault', 'hold' or 'ramp'`."""
-    choices = [word.strip(" '") for word in str(context["expected"]).replace(" or ", ",").split(",")]
+    choices = _choices(context["expected"])
     value_text = value if isinstance(value, str) else quote_value(value)
     near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
     if len(choices) == 1:
@@ -170,6 +181,8 @@ def _nearest(value: Any, choices: list[str]) -> str | None:
 _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
     "literal_error": _choice,
     "enum": _choice,
+    "union_tag_invalid": _kind_choice,
+    "union_tag_not_found": _kind_choice,
     "float_type": _describe_expected("a number"),
     "float_parsing": _describe_expected("a number"),
     "int_type": _describe_expected("a whole number"),

@@ -75,7 +75,7 @@ def _fault(kind: type, document: Document, path: Path, finding: Mapping[str, Any
         missing = f"is missing{_what_it_is(kind, place[len(path) :])}"
         return replace(document.fault(place, missing, at_key=True), kind=FaultKind.MISSING)
     if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        known = names(kind_at(kind, place[len(path) : -1]) or kind)
+        known = names(kind_at(kind, place[len(path) : -1], document.at(*place[:-1])) or kind)
         sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
     return document.fault(place, type_sentence(finding, document.at(*place), key))
@@ -106,20 +106,29 @@ def names(kind: type) -> list[str]:
     return [field.name for field in fields(kind)] if is_dataclass(kind) else []
 
 
-def kind_at(kind: type, path: Path) -> type | None:
-    """Return the dataclass that describes the group at `path` below `kind`, None when it is no dataclass."""
+def kind_at(kind: type, path: Path, group: Any = None) -> type | None:
+    """Return the dataclass that describes the group at `path` below `kind`, None when it is no dataclass. group: what
+    stands there; where there are several kinds of group, its `type` decides."""
     current: type | None = kind
     for step in path:
         if isinstance(step, int):
             continue
         if current is None or not is_dataclass(current):
             return None
-        current = next((inner for name, inner in groups(current) if name == step), None)
+        candidates = [inner for name, inner in groups(current) if name == step]
+        current = next((one for one in candidates if _is_of_type(one, group)), candidates[0] if candidates else None)
     return current
+
+
+def _is_of_type(kind: type, group: Any) -> bool:
+    """Decide whether the word that a group has as `type` is this dataclass's own."""
+    return isinstance(group, dict) and group.get("type") in get_args(get_type_hints(kind).get("type"))
 
 
 def groups(kind: type) -> Iterator[tuple[str, type]]:
     """Yield (key, dataclass) for each field of a dataclass that is one itself, also as `X | None` or `tuple[X, ...]`."""
+    if not is_dataclass(kind):  # a union of several
+        return
     hints = get_type_hints(kind)
     for field in fields(kind):
         for candidate in _members(hints[field.name]):

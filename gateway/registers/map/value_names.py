@@ -30,6 +30,8 @@ VALUE_NAMES: Final = {
     "fault_code": _values(FaultCode),
     "refusal_reason": _values(RefusalReason),
     "calibration_phase": _values(words.CalibrationPhase),
+    "self_test_result": _values(words.SelfTestResult),
+    "self_test_verdict": _values(words.SelfTestVerdict),
     "residual_cause": _values(ResidualCause),
     "commit": _values(words.CommitAction),
     "commit_status": _values(words.CommitStatus),
@@ -42,5 +44,6 @@ BIT_NAMES: Final = {
     "status_word": _bits(words.StatusBit),
     "warning_word": _bits(WarningBit),
     "commit_notice": _bits(words.CommitNotice),
+    "watchdogs": _bits(words.WatchdogBit),
 }
 """Name in a map file -> {bit: name}."""

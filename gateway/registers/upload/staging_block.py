@@ -3,7 +3,7 @@
 Staging takes words one at a time, for masters that have only FC06; nothing there is judged until the commit word is
 written. commit and slot_select act when written and are passed on; who serves them reports with `show_commit`. While a
 commit is under way staging writes are refused (06). An upload needs no ownership of the setpoint, but the calibration
-role, which plain TCP has only where the rig allows it.
+role (gateway.registers.roles), which plain faces have only where the rig allows it.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,6 @@ from gateway.modbus import Peer
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.refusal import Refusal
-from gateway.registers.rig_rules import BankRules
 from gateway.registers.upload.coefficients import (
     BLOCK_BYTES,
     HEAD_BYTES,
@@ -35,13 +34,15 @@ OnSelect = Callable[[int, Peer], None]
 
 
 class StagingBlock:
-    """ValueError for a map without the staging or the active block."""
+    """on_act(name, what, peer): a commit or a choice of slot that was passed on, for the audit.
 
-    def __init__(self, register_map: RegisterMap, rules: BankRules, image: RegisterImage) -> None:
+    ValueError for a map without the staging or the active block."""
+
+    def __init__(self, register_map: RegisterMap, image: RegisterImage) -> None:
         self.on_commit: OnCommit | None = None
         self.on_select: OnSelect | None = None
+        self.on_act: Callable[[str, str, Peer], None] = lambda name, text, peer: None
         self._image = image
-        self._rules = rules
         self._first = register_map.find("order@staging").address
         self._commit = register_map.find("commit").address
         self._select = register_map.find("slot_select").address
@@ -54,12 +55,7 @@ class StagingBlock:
         self._status = CommitStatus.IDLE
 
     def write(self, address: int, data: bytes, peer: Peer) -> None:
-        """Store these words, then act on commit and slot_select if they are among them. Refusal: 01, 03, 06."""
-        if not self._rules.allow_plain_upload:
-            text = (
-                f"rig {self._rules.rig_name} takes no coefficients over plain TCP: network.allow_plain_upload is false"
-            )
-            raise Refusal(RefusalReason.ROLE, address, text)
+        """Store these words, then act on commit and slot_select if they are among them. Refusal: 03, 06."""
         if self._status in (CommitStatus.CHECKING, CommitStatus.WRITING):
             text = f"a commit is {self._status.name.lower()}: wait until commit_status is committed or failed"
             raise Refusal(RefusalReason.BUSY, address, text)
@@ -118,6 +114,7 @@ class StagingBlock:
         if word and self.on_commit is not None:
             staged = self._image.read(self._first, BLOCK_BYTES // 2)
             self.on_commit(CommitAction(word), staged, peer)
+            self.on_act("commit", CommitAction(word).name.lower(), peer)
 
     def _choose(self, peer: Peer) -> None:
         slot = self._image.word(self._select)
@@ -127,3 +124,4 @@ class StagingBlock:
             text = "this gateway has no slots; the active set is unchanged"
             raise Refusal(RefusalReason.COEFFICIENTS, self._select, text, value=slot)
         self.on_select(slot, peer)
+        self.on_act("slot_select", f"slot {slot}", peer)

@@ -1,22 +1,24 @@
 """May this write of the command block be used, and what does it become? All checks, in order, before anything is stored.
 
 Values (03), owner (06), what control says to the edges and to a write while it is busy (`Decide`), then what the bank alone
-knows: whether start_calibration was held at 1 (04), and whether an enable has its byte-order proof (06).
+knows: whether the bit of a run was held at 1 (04), and whether an enable has its byte-order proof (06).
 
 Who clears enable wants the output off, and is never refused; an edge beside it is decided all the same, so that a lone
-start_calibration or tare while a force is held is an answer with a reason, and no stop. start_calibration alone keeps the
-output: then the bit takes enable's place.
+start_calibration or tare while a force is held is an answer with a reason, and no stop. start_calibration or start_self_test
+alone keeps the output: then the bit takes enable's place.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
+from gateway.modbus import Peer
 from gateway.registers.command import Command
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
-from gateway.registers.words import ControlBit
+from gateway.registers.words import RUN_BITS, ControlBit
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -33,8 +35,7 @@ from gateway.registers.writes.ownership import Ownership
 
 ENABLE: Final = int(ControlBit.ENABLE)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
-CALIBRATE: Final = int(ControlBit.START_CALIBRATION)
-STARTS: Final = ENABLE | CALIBRATE
+STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 ALL_BITS: Final = 0xFFFF
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
@@ -52,14 +53,18 @@ class Write(NamedTuple):
 
 class AdmittedWrite(NamedTuple):
     """values: to store; kept: control word that reads back; command: what control gets, edge bits included; is_stop: the
-    output goes off; is_taken_over: this host owns from now on, explicitly."""
+    output goes off; is_taken_over: this host owns from now on, explicitly; held: bits of runs that stay at 1."""
 
     values: Values
     kept: int
     command: Command
     is_stop: bool
     is_taken_over: bool
-    is_held: bool
+    held: int
+
+
+OnWrite = Callable[[Peer, Values, AdmittedWrite, tuple[str | None, str | None]], None]
+"""on_write(peer, values before, what was admitted, owner before and after) of each accepted write."""
 
 
 class _PermittedWrite(NamedTuple):
@@ -82,7 +87,7 @@ class Admission:
         self._ownership = ownership
         self._echo = echo
         self._rules = rules
-        self._is_held = False
+        self._held = 0
 
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
@@ -108,7 +113,7 @@ class Admission:
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
-        self._is_held = admitted.is_held
+        self._held = admitted.held
         self.lowered_from_n = admitted.command.lowered_from_n
 
     # -- what the write asks for
@@ -120,14 +125,14 @@ class Admission:
         commands.check_known(values, write.block)
         written, before = int(values[CONTROL_WORD]), int(commands.values[CONTROL_WORD])
         falls = before & ~written
-        is_stop = bool(falls & ENABLE and not written & ~before & CALIBRATE) or self._is_bare_stop(write, written)
+        is_stop = bool(falls & ENABLE and not written & ~before & RUN_BITS) or self._is_bare_stop(write, written)
         if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
             return _PermittedWrite(values, written, is_stop)
         if is_stop:
             return _PermittedWrite(commands.values.copy(), 0, True)
         asks_for_more = written & ~before & ENABLE  # than the end of a run, which anybody may ask for
-        if falls & CALIBRATE and not asks_for_more:
-            return _PermittedWrite(commands.values.copy(), before & ~CALIBRATE, False)
+        if falls & RUN_BITS and not asks_for_more:
+            return _PermittedWrite(commands.values.copy(), before & ~RUN_BITS, False)
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
         raise self._not_owner(write.address, write.host)
@@ -145,16 +150,14 @@ class Admission:
         """Return which words of the command block are written whole."""
         return self._commands.offsets(write.block, write.address, len(write.data) // 2)
 
-    def _held_by(self, write: Write, written: int) -> bool:
-        """Return whether a master that writes in cycles holds start_calibration at 1: only its own 0 lets the next 1 count."""
-        if not self._is_held and not written & CALIBRATE:
-            return False
-        is_commanded = CONTROL_WORD in self._offsets(write) and bool(write.touched & CALIBRATE)
-        if not is_commanded or not self._ownership.admits(write.host):
-            return self._is_held
-        return bool(written & CALIBRATE) and (
-            self._is_held or bool(int(self._commands.values[CONTROL_WORD]) & CALIBRATE)
-        )
+    def _held_by(self, write: Write, written: int) -> int:
+        """Return the bits of a run that a master that writes in cycles holds at 1: only its own 0 lets the next 1 count."""
+        if not self._held and not written & RUN_BITS:
+            return 0
+        if CONTROL_WORD not in self._offsets(write) or not self._ownership.admits(write.host):
+            return self._held
+        stands = self._held | int(self._commands.values[CONTROL_WORD])
+        return self._held & ~write.touched | stands & written & write.touched & RUN_BITS
 
     # -- why not
 
@@ -180,8 +183,9 @@ class Admission:
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
     def _check_starts(self, host: str, rises: int, written: int, word_at: int) -> None:
-        if rises & CALIBRATE and self._is_held:
-            text = "start_calibration was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
+        if held := rises & self._held:
+            name = str(ControlBit(held & -held).name).lower()
+            text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
             text = "enable refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"

@@ -2,15 +2,32 @@
 
 A master owns from the write that enables or sets a setpoint other than 0; when its command is at rest again (enable and
 setpoints 0), so is that ownership (`rest`). Who has taken over explicitly keeps it, whatever else is written or happens, until
-disable, the lease's end (both `release`), another takeover or a restart. Identity is the host, not the connection: a master
-that reconnects is the same master.
+disable, the lease's end (both `release`), another takeover or a restart. Identity is the host, under TLS the name in
+the certificate (`Peer.identity`), not the connection: a master that reconnects is the same master. All masters on one serial
+face are one host, for a bus has no addresses of masters.
 """
 
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Final
 
 NOT_IPV4: Final = 0xFFFFFFFF
-"""Shown in owner_ip for an owner without an IPv4 address (IPv6, serial)."""
+"""Shown in owner_ip for an owner without an IPv4 address (IPv6)."""
+LARGEST_SERIAL_PLACE: Final = 255
+"""Serial faces are shown in owner_ip as 1 to 255: 0.0.0.0/8 holds no address of a host (RFC 1122, 3.2.1.3)."""
+
+_SERIAL: Final = "serial:"
+
+
+def serial_host(place: int) -> str:
+    """Return who all masters on a serial face are. place: of the face in the rig's `fieldbus`, counted from 1."""
+    return f"{_SERIAL}{place}"
+
+
+def serial_place(host: str) -> int | None:
+    """Return the place of the serial face that this host is, None where it is no serial face."""
+    number = host.removeprefix(_SERIAL)
+    is_serial = number != host and number.isdecimal() and number[0] != "0"
+    return int(number) if is_serial and int(number) <= LARGEST_SERIAL_PLACE else None
 
 
 class Ownership:
@@ -47,9 +64,12 @@ class Ownership:
 
 
 def ip_number(host: str | None) -> int:
-    """Return what owner_ip shows: 0 for nobody, the IPv4 address (also one mapped into IPv6), else NOT_IPV4."""
+    """Return what owner_ip shows: 0 for nobody, the IPv4 address (also one mapped into IPv6), the place of a serial face,
+    else NOT_IPV4."""
     if host is None:
         return 0
+    if (place := serial_place(host)) is not None:
+        return place
     try:
         address = ip_address(host.partition("%")[0])
     except ValueError:

@@ -1,6 +1,7 @@
 """From a rig to what its bank and its server must hold to."""
 
 from gateway.fieldbus import ServerSettings
+from gateway.modbus import Role
 from gateway.profiles import Rig
 from gateway.registers import BankRules
 
@@ -17,7 +18,6 @@ def bank_rules(rig: Rig) -> BankRules:
         supported_bits=rig.supported_bits,
         require_byte_order_echo=rig.network.require_byte_order_echo,
         owner=rig.network.owner,
-        allow_plain_upload=rig.network.allow_plain_upload,
     )
 
 
@@ -31,4 +31,10 @@ def server_settings(rig: Rig) -> ServerSettings:
         idle_s=network.idle_s,
         requests_per_s=network.requests_per_s,
         allow=network.allow,
+        role=plain_role(rig),
     )
+
+
+def plain_role(rig: Rig) -> Role:
+    """Return the role of every peer of a plain face, TCP or RTU."""
+    return Role.CALIBRATION if rig.network.allow_plain_upload else Role.SETPOINT

@@ -14,7 +14,7 @@ from typing import Any, Final
 from gateway.bsfm.ladder.plan import LABELS
 from gateway.control import Controller
 from gateway.control.inputs import Output
-from gateway.control.runs.active_run import AnyPlan, AnyRun
+from gateway.control.runs.active_run import RecordedPlan, RecordedRun
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.devices.messages import ForceSample
@@ -25,7 +25,7 @@ from gateway.registers.words import CalibrationPhase
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
-from gateway.service.socket_requests import CalibrateRequest, parse_request
+from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, parse_request
 
 FOLLOWED_S: Final = 3.0
 _CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
@@ -79,9 +79,21 @@ class CalibrationRuns:
             raise ValueError(refused)
         return self.status()
 
-    def _try_plan(self, plan: AnyPlan) -> Answer:
+    def answer_self_test(self, request: Answer) -> Answer:
+        """Tell what the last self-test found; a master starts it (control_word bit 6)."""
+        parse_request(EmptyRequest, request)
+        report = self._calibrating.self_test
+        return {
+            "number": report.number,
+            "result": report.result.name.lower(),
+            "items": {
+                str(one.item): {"verdict": one.verdict.name.lower(), "text": one.text} for one in report.findings
+            },
+        }
+
+    def _try_plan(self, plan: RecordedPlan) -> Answer:
         """Return what a plan would do; ValueError where the rig does not allow it."""
-        run = self._calibrating.build(plan)
+        run = self._calibrating.build_recorded(plan)
         top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)
         top_n = self._calibrating.model.force_n(top_v, 1.0)
         return {
@@ -105,7 +117,7 @@ class CalibrationRuns:
     def status(self) -> Answer:
         """Return how the run is: phase, progress, time left, and the result of the last one."""
         calibrating, decision = self._calibrating, self._decision
-        run = calibrating.run
+        run = calibrating.recorded
         return {
             "running": calibrating.running,
             "phase": calibrating.phase.name.lower(),
@@ -128,7 +140,7 @@ class CalibrationRuns:
         """Follow the run; to be called after each step of the controller."""
         self._decision = decision
         calibrating = self._calibrating
-        if calibrating.running and self._recording is None:
+        if calibrating.recorded and self._recording is None:
             self._begin()
         elif self._closing_s is not None:
             if self._clock() - self._closing_s > _CLOSING_S:
@@ -151,7 +163,7 @@ class CalibrationRuns:
 
     def _labels(self) -> tuple[float, ...]:
         """Return where a ladder is, in the columns LABELS."""
-        run = self._calibrating.run
+        run = self._calibrating.recorded
         if run is None or isinstance(run, ExperimentRun):
             return ()
         group = run.stairs[min(run.done, len(run.stairs) - 1)].group
@@ -172,7 +184,7 @@ class CalibrationRuns:
 
     def _begin(self) -> None:
         """A disk that takes no recording ends the run: a ladder without data is wear for nothing."""
-        run, rig = self._calibrating.run, self._rig
+        run, rig = self._calibrating.recorded, self._rig
         assert run
         header = {
             "rig": rig.name,
@@ -234,7 +246,7 @@ class CalibrationRuns:
             self._log("calibration", f"{result.get('refused')}{report_clause}")
 
 
-def _describe_experiment(plan: AnyPlan) -> Answer:
+def _describe_experiment(plan: RecordedPlan) -> Answer:
     """Return what a person should know and do before an experiment."""
     if not isinstance(plan, ExperimentPlan):
         return {"experiment": "", "check": True, "notes": [], "questions": []}
@@ -248,7 +260,7 @@ def _describe_experiment(plan: AnyPlan) -> Answer:
     }
 
 
-def _describe_progress(run: AnyRun | None) -> Answer:
+def _describe_progress(run: RecordedRun | None) -> Answer:
     """Return how far a run is, in its own terms."""
     progress: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
     if isinstance(run, ExperimentRun):
@@ -258,10 +270,10 @@ def _describe_progress(run: AnyRun | None) -> Answer:
         return progress
     stair = run.stairs[min(run.done, len(run.stairs) - 1)]
     groups = run.plan.groups
-    return progress | {"stair": run.done, "stairs": len(run.stairs), "group": stair.group + 1, "groups": groups}
+    return progress | {"stair": run.done, "stairs": len(run.stairs), "group": max(0, stair.group + 1), "groups": groups}
 
 
-def _header_of_plan(run: AnyRun) -> Answer:
+def _header_of_plan(run: RecordedRun) -> Answer:
     """For the recording's header: a ladder is what `fit` and --resume look for."""
     if isinstance(run, ExperimentRun):
         return {"experiment": plan_document(run.plan)}
@@ -269,7 +281,7 @@ def _header_of_plan(run: AnyRun) -> Answer:
     return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
 
 
-def _parse_plan(fields: Any) -> AnyPlan:
+def _parse_plan(fields: Any) -> RecordedPlan:
     """Return a plan from JSON; ValueError for a name or a type that it does not have."""
     if not isinstance(fields, dict):
         raise ValueError("plan: a JSON object is expected")

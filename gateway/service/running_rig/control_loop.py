@@ -2,15 +2,16 @@
 
 A master's write calls `on_asked` and, where control can take it, `on_command` inside the bank's write: so the answer is
 control's own, and the voltage is on its way before the master has it.
-The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Clock and ports come in as arguments; the
-same class runs behind ptys, behind real ports and in virtual time. No exception of ours may leave the last voltage
-standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
+The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Where a sample or a command was decided on
+less than half a period ago it leaves the decision to the next event: two decisions are at most one and a half periods apart.
+Clock and ports come in as arguments; the same class runs behind ptys, behind real ports and in virtual time. No exception of
+ours may leave the last voltage standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
 """
 
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import nan
+from math import inf, nan
 from typing import Final
 
 from gateway import defaults
@@ -18,24 +19,28 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.control.blame_for_silence import NOT_HELD, Held
-from gateway.control.inputs import LineStatus, Output
-from gateway.devices.messages import ForceSample
+from gateway.control.inputs import LineStatus, Output, WireCounts
+from gateway.devices.messages import ForceSample, Garbage
 from gateway.processes.scheduler_counters import ProcessorTime, time_between
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command
 from gateway.registers.residual_cause import ResidualCause
+from gateway.registers.words import StatusBit
 from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
+from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
 from gateway.service.running_rig.recorded_row import row_of
 from gateway.service.running_rig.recordings import Recordings
 
-_LONG_SILENCE_S: Final = 0.03
+_FRESH_PERIODS: Final = 0.5  # a tick decides nothing so soon after a sample or a command has
+_PULLING: Final = int(StatusBit.PULLING)
+_LONG_SILENCE_S: Final = 0.03  # a shorter one needs no explanation
 _LONGEST_SILENCE_S: Final = 10.0  # then it is no hiccup any more
 
 Log = Callable[[str, str], None]
@@ -76,20 +81,24 @@ class ControlLoop:
         self.health = LoopHealth()
         self.decision: Output | None = None
         self.sample: ForceSample | None = None
-        self.samples = 0
-        self.cell_garbage_bytes = 0
+        self.samples = self.cell_garbage_bytes = 0
+        self.cell_counts = WireCounts()
         self.pressure_pa_per_v = nan  # of the output device, by its profile
         self.output_lost = FaultCode.NONE
+        self.valve: ValveExchange | None = None
         self.cell_lost = False
         self.owner_connected = True
         self.warnings = WarningBit(0)
         self.restart_cause = FaultCode.NONE
         self.residual_cause = ResidualCause.NONE
         self.plant_id = 0
+        self._shown_self_test = controller.active_run.self_test
         self._cell = cell
         self._clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
         self._last_tick_s: float | None = None
+        self._decided_s = -inf
+        self._fresh_s = _FRESH_PERIODS * process.period_s
         self._last_processor_time: ProcessorTime | None = None
         self._slow_loop = SlowLoop(process.period_s)
         self._cell_noise, self._output_noise = LineNoise("load cell's line"), LineNoise("output's line")
@@ -114,7 +123,9 @@ class ControlLoop:
             if isinstance(message, ForceSample):
                 self.sample, fresh = message, True
                 self.samples += 1
-            else:
+                self.cell_counts.heard += 1
+            elif isinstance(message, Garbage):
+                self.cell_counts.garbled += 1
                 self.cell_garbage_bytes += len(message.data)
         if fresh:
             self._step(now_s)
@@ -125,6 +136,24 @@ class ControlLoop:
         replies = self.output.on_bytes(chunk, now_s)
         self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s))
 
+    def on_valve_bytes(self, chunk: bytes, now_s: float) -> None:
+        """Take bytes of the valve's relay."""
+        if self.valve:
+            self.valve.on_bytes(chunk, now_s)
+
+    def on_valve_opened(self) -> None:
+        """Forget what the valve said before: the port has been opened again."""
+        if self.valve:
+            self.valve.reset()
+            self.valve.lost = False
+
+    def on_valve_closed(self) -> None:
+        """Decide at once that the valve is lost."""
+        if self.valve:
+            self.valve.reset()
+            self.valve.lost = True
+            self._step(self._clock())
+
     def on_tick(self, expirations: int, late_s: float) -> None:
         """Run one period of the loop.
         expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
@@ -134,7 +163,10 @@ class ControlLoop:
         self._end_warnings(now_s)
         self.output.tick(now_s)
         self._cell.tick(now_s)
-        self._step(now_s)
+        if self.valve:
+            self.valve.tick(now_s)
+        if now_s - self._decided_s > self._fresh_s:
+            self._step(now_s)
         self._last_tick_s, self._last_processor_time = now_s, self.processor_time()
         if self._lateness:
             self._lateness.tick(now_s, _waited_s(self._last_processor_time))
@@ -188,22 +220,31 @@ class ControlLoop:
             return NOT_HELD
         return self._lateness.since(since_s, now_s, _waited_s(self.processor_time()))
 
+    def _waited_since_tick(self, late_s: float) -> float | None:
+        """Asked of the kernel only where the step is late: a decision has no time for it."""
+        return _waited_s(self._used_since_tick()) if late_s >= _LONG_SILENCE_S else None
+
     def _line(self, now_s: float) -> LineStatus:
+        late_s = self._late_s(now_s)
         return LineStatus(
-            acknowledged_v=self.output.acknowledged_v,
+            acknowledged_v=self.output.confirmed_v,
             unanswered_since_s=self.output.unanswered_since_s,
-            fault=self.output_lost or self.output.fault,
+            fault=self.output_lost or self.output.fault or self._cell.identity.fault,
+            said=self.output.said or self._cell.identity.said,
             cell_lost=self.cell_lost,
             pressure_pa=self.output.pressure_pa,
             pressure_pa_per_v=self.pressure_pa_per_v,
             owner_connected=self.owner_connected,
-            late_s=self._late_s(now_s),
-            waited_s=_waited_s(self._used_since_tick()),  # so much of the lateness the machine is to blame for
+            late_s=late_s,
+            waited_s=self._waited_since_tick(late_s),  # so much of the lateness the machine is to blame for
             warnings=self.warnings,
             sent_v=self.output.sent_v,
             wire_s=self.output.round_trip_s,
             cell_held=self._processor_held(self.sample.time_s if self.sample else None, now_s),
             output_held=self._processor_held(self.output.unanswered_since_s, now_s),
+            output_counts=self.output.counts,
+            cell_counts=self.cell_counts,
+            valve=self.valve.status if self.valve else None,
         )
 
     def _decide(self, now_s: float) -> Output:
@@ -218,6 +259,8 @@ class ControlLoop:
     def _step(self, now_s: float) -> None:
         decision = self._decide(now_s)
         self.output.set_voltage(decision.voltage_v, now_s)
+        if self.valve:
+            self.valve.set_direction(decision.valve, now_s)
         self.decision = decision
         if self.calibration_runs:
             self.calibration_runs.follow(decision)
@@ -225,22 +268,32 @@ class ControlLoop:
             self.bank.clear_command()
         if decision.release_owner:
             self.bank.release_owner()
+        if decision.resets_device:
+            self.output.clear_faults()
         self.health.loop_time_s = self._clock() - now_s
+        self._decided_s = now_s
         stored = self.calibration_runs.stored if self.calibration_runs else 0
         known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
         status = status_of(decision, self.health, self.output.pressure_pa, known)
         if decision.warnings & WarningBit.RESTARTED and not decision.fault:
             status = replace(status, fault_code=self.restart_cause)
         self.bank.publish(status)
+        if self.controller.active_run.self_test is not self._shown_self_test:
+            self._show_self_test()
         for event in decision.events:
             self._log("control", event)
+
+    def _show_self_test(self) -> None:
+        self._shown_self_test = report = self.controller.active_run.self_test
+        verdicts = {str(found.item): found.verdict for found in report.findings}
+        self.bank.self_test.show(report.number, report.result, verdicts)
 
     def _record(self) -> None:
         if self.recordings and self.sample and self.decision:
             self.recordings.append(self.sample, self.decision, self.output.line)
         if self.calibration_runs and self.sample and self.decision:
             self.calibration_runs.append(self.sample, self.decision, self.output.line)
-        if self.ring and self.sample and self.decision:
+        if self.ring and self.sample and self.decision and not int(self.decision.status) & _PULLING:  # its plant pushes
             self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.line))
 
 

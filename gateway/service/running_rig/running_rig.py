@@ -1,4 +1,4 @@
-"""One running rig: its control loop with real edges (two ports, the Modbus server, tick, recorder, control socket)."""
+"""One running rig: its control loop with real edges (two ports, the Modbus faces, tick, recorder, control socket)."""
 
 import asyncio
 import contextlib
@@ -8,12 +8,13 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from gateway import VERSION
+from gateway.audit.rig_audit import RigAudit
 from gateway.calibrations.activation import ActiveCalibration
 from gateway.codes.faults import FaultCode
 from gateway.control import Controller
 from gateway.control.blame_for_silence import cause_of_silence
-from gateway.devices import cell_host, output_host
-from gateway.fieldbus import ModbusTcpServer
+from gateway.devices import ValveHost, cell_host, output_host
 from gateway.modbus import Peer
 from gateway.ports import SerialPort
 from gateway.processes.clock_tick import ClockTick
@@ -27,18 +28,23 @@ from gateway.service import banner
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.guardian_line import GuardianLine
-from gateway.service.running_rig.bank_rules import bank_rules, server_settings
+from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
+from gateway.service.running_rig.faces import Faces
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.baud_probe import explain_silent_device
+from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.rig_ports import RigPorts
+from gateway.service.running_rig.lines.valve_line import ValveExchange
+from gateway.service.running_rig.lines.watchdog_word import device_fault_note, watchdog_word
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
-from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, listen, warning_notes
+from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, warning_notes
+from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.watch_reports import WatchReports
 
 _FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
@@ -72,10 +78,11 @@ class RunningRig:
         self.failed = asyncio.Event()
         asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
         host = output_host(rig.output.device)
-        self._safe_frame = host.safe_frame(rig.control.limits.safe_voltage_v)
+        self._safe_frame, self._last_frame = host.safe_frame(rig.control.limits.safe_voltage_v), host.last_frame
         frame, reply = self._safe_frame, host.safe_reply
         self._ports = RigPorts(rig, ports, lambda descriptor: guardian.hand_over(descriptor, frame, reply), log)
-        self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s)
+        checks = DeviceChecks(host, is_waived=rig.accept_no_device_watchdog)
+        self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks)
         self._counters = SchedulerCounters(os.getpid())
         self._lateness = Lateness(1.0 / rig.loop_hz)
         self._follow_rig()
@@ -83,8 +90,13 @@ class RunningRig:
         self._cell_line = CellExchange(
             cell_host(cell.device, cell.sign, cell.unit), self._ports.write_cell, cell.device
         )
+        self._valve_line: ValveExchange | None = None
+        if rig.valve:
+            valve = rig.valve.device
+            self._valve_line = ValveExchange(ValveHost(valve), self._ports.write_valve, valve.reply_timeout_s)
         self._tick = ClockTick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
+        self._audit = RigAudit(state, log)
 
     def _wire(self, cause: FaultCode) -> None:
         """Make bank, controller and the loop between them, and who serves both."""
@@ -92,9 +104,7 @@ class RunningRig:
         rig = self._rig
         self._calibration_runs = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
         self.loop.calibration_runs = self._calibration_runs
-        self._server = ModbusTcpServer(
-            self.bank, server_settings(rig), on_peer_closed=self._on_peer_closed, log=self._log
-        )
+        self._faces = Faces(rig, self.bank, self._on_peer_closed, self._log)
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
         self._plants.serve(
             PlantEdges(
@@ -116,6 +126,8 @@ class RunningRig:
                 calibration_runs=self._calibration_runs,
                 watch=self.watch_reports,
                 plants=self._plants,
+                audit=self._audit,
+                simulation=SimulationRequests(rig),
                 running=self._running,
             ),
             self._log,
@@ -124,6 +136,7 @@ class RunningRig:
     def _wire_loop(self, cause: FaultCode) -> None:
         rig = self._rig
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
+        self._audit.watch(self.bank)
         self.bank.on_refusal = lambda refusal, peer: self._log(
             f"refusal {peer.host} {refusal.reason.name.lower()}", f"{refusal.sentence}   ({peer})"
         )
@@ -133,6 +146,7 @@ class RunningRig:
             rig.calibration_in_use(rig.calibration),
             unclean_restart=bool(cause),
             compensation=rig.compensation,
+            pull_model=rig.pull_calibration.model() if rig.pull_calibration else None,
         )
         self.loop = ControlLoop(
             self.bank,
@@ -141,6 +155,7 @@ class RunningRig:
             self._cell_line,
             LoopProcess(time.monotonic, self._log, self._tick.period_s, self._counters.read, self._lateness),
         )
+        self.loop.valve = self._valve_line
         self._ports.loop = self.loop
         self.loop.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
         self.loop.recordings = self._recordings
@@ -162,16 +177,30 @@ class RunningRig:
             notes += (f"E152 {unserved}",)
         for note in notes:
             self._log.note("start", note)
-        modbus = await listen(self._server, *(bind or (self._rig.network.bind, self._rig.network.port)))
-        self._running["port"] = modbus[1]
+        self._note_start(restarted)
+        faces = await self._faces.start(bind, is_restart=bool(restarted))
+        self._running |= {
+            "port": self._faces.modbus[1] if self._faces.modbus else None,
+            "serial": self._faces.serial_paths,
+        }
         return banner.Ready(
             rig=self._rig,
-            modbus=modbus,
+            modbus=self._faces.modbus,
             output_port=self._ports.output.path,
             cell_port=self._ports.cell.path,
             voltage_v=self._line.acknowledged_v,
             force_n=self.loop.sample.force_n if self.loop.sample else None,
             notes=notes,
+            faces=faces,
+            valve_port=self._ports.valve.path if self._ports.valve else "",
+        )
+
+    def _note_start(self, restarted: Ending | None) -> None:
+        """So that the audit shows what was changed while no gateway ran."""
+        calibration, plant = self._calibration, self._plants.status()["active"]
+        after = restarted.sentence if restarted else ""
+        self._audit.note_gateway(
+            "start", rig=self._rig.name, calibration=calibration.number, plant=plant, version=VERSION, after=after
         )
 
     def _follow_rig(self) -> None:
@@ -199,7 +228,9 @@ class RunningRig:
             notes.append(f"restarted in OFF after: {restarted.sentence}")
         else:
             notes += warning_notes(self._rig)
-        if self._line.acknowledged_v is None:
+        if self._line.checks.fault:
+            notes.append(device_fault_note(self._line))
+        elif self._line.acknowledged_v is None:
             notes.append(await self._why_silent(self._ports.output, self._rig.output, restarted))
         if self.loop.sample is None:
             notes.append(await self._why_silent(self._ports.cell, self._rig.load_cell, restarted))
@@ -235,10 +266,14 @@ class RunningRig:
         """Send the safe voltage, then close everything; the clean-shutdown marker goes last."""
         self._tick.close()
         await self._ports.write_last(self._safe_frame)
-        await self._server.close()
+        if self._last_frame:  # once the safe voltage is answered: on a bus of two wires both would talk at once
+            await asyncio.sleep(self._rig.output.device.reply_timeout_s)
+            await self._ports.write_last(self._last_frame)
+        await self._faces.close()
         await self._control_socket.close()
         self._recordings.stop()
         self._calibration_runs.close()
+        await self._audit.close()
         self._ports.close()
         self._upload.close()
         self._plants.close()
@@ -256,10 +291,12 @@ class RunningRig:
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
         self.loop.on_tick(expirations, late_s)
+        self.bank.show_watchdogs(watchdog_word(self._rig, self._ports, self._line))
         self._guardian.heartbeat()
         self._recordings.flush(time.monotonic())
         self._calibration_runs.flush(time.monotonic())
         self._plants.take_waiting()
+        self._audit.flush()
         if self._line.acknowledged_v is not None and self.loop.sample is not None:
             self._spoke.set()
 
@@ -268,6 +305,7 @@ class RunningRig:
         self._calibration = active.calibration
         self.controller.use(self._rig.calibration_in_use(active.calibration, active.model))
         self._recordings.calibration = active.calibration
+        self._audit.note_gateway("calibration in use", new=active.calibration.number)
         lowered = self.bank.set_active_model(active.calibration, active.pointer.active.slot_word)
         if lowered:
             self._log("calibration", lowered)
@@ -278,6 +316,7 @@ class RunningRig:
         self._rig = rig
         self.controller.compensate(rig.control, rig.compensation, rig.calibration_in_use(self._calibration))
         self._recordings.use_plant(rig)
+        self._audit.note_gateway("plant in use", new=self._plants.status()["active"])
         self._follow_plant()
         self.loop.refresh()
 
@@ -287,5 +326,5 @@ class RunningRig:
         self.watch_reports.follow_plant(status["active"], status["since_s"])
 
     def _on_peer_closed(self, peer: Peer) -> None:
-        if peer.host == self.bank.owner:
+        if peer.identity == self.bank.owner:
             self.loop.owner_connected = False

@@ -73,18 +73,19 @@ async def open_again(port: SerialPort) -> PortError | None:
         await asyncio.sleep(_RETRY_S)
 
 
-async def listen(server: ModbusTcpServer, host: str, port: int) -> tuple[str, int]:
-    """Start the Modbus server; return the address and port really bound. StartError says why it does not listen."""
+async def listen(server: ModbusTcpServer, host: str, port: int, instead: str = "") -> tuple[str, int]:
+    """Start the Modbus server; return the address and port really bound. StartError says why it does not listen. instead:
+    how another port is chosen; empty: --bind."""
     try:
         return await server.start(str(host), int(port))
     except PermissionError as error:
         raise StartError(
-            f"E120 port {port} needs the capability net_bind_service; use --bind {host}:{defaults.MODBUS_PORT} "
+            f"E120 port {port} needs the capability net_bind_service; use {instead or f'--bind {host}:{defaults.MODBUS_PORT}'} "
             "(force-gateway explain E120)",
             exit_codes.PERMISSION,
         ) from error
     except BindError as error:
         raise StartError(str(error), exit_codes.CONFIGURATION) from error
     except OSError as error:
-        sentence = f"E121 cannot listen on {host}:{port}: {error}; another --bind HOST:PORT?"
+        sentence = f"E121 cannot listen on {host}:{port}: {error}; another {instead or '--bind HOST:PORT'}?"
         raise StartError(sentence, exit_codes.DEVICE) from error

@@ -4,6 +4,8 @@ Nothing here may cost a restart: a fork server that dies, hangs or cannot fork i
 way; it is started again after a while, and given up when it keeps dying. Standard library only.
 """
 
+import os
+import time
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
@@ -26,6 +28,7 @@ class ChildStarter:
         self._options = {"rig": rig, "simulate": simulate}
         self._state = state
         self._say = say
+        self._run = f"{os.getpid()}-{time.time_ns()}"  # what is set on the simulated rig holds for this long
         self._server: Child | None = None
         self._is_proven = False
         self._is_doubted = False  # the last child came to nothing: the next one is started the long way
@@ -71,7 +74,7 @@ class ChildStarter:
 
         prepared: not for a second try, which avoids whatever went wrong with the first.
         """
-        arguments = {"rig": self._options["rig"], "state": str(self._state)}
+        arguments = {"rig": self._options["rig"], "state": str(self._state), "run": self._run}
         return self._child(fork_server.RIG, arguments) if prepared else spawn_child(fork_server.RIG, arguments)
 
     def watch(self, arguments: dict[str, Any]) -> Child:

@@ -145,8 +145,11 @@ class Guardian:
         info, banner = message.body["info"], message.body["banner"]
         heartbeat = self.control.heartbeat
         heartbeat.stall_s = float(message.body["stall_s"])
-        host, port = info["modbus"]
-        self.bound = (host, port)  # a restart keeps the port that masters already know
+        where = "no plain modbus tcp"
+        if info["modbus"]:
+            host, port = info["modbus"]
+            self.bound = (host, port)  # a restart keeps the port that masters already know
+            where = f"modbus tcp {host}:{port}"
         if self.control.process:
             heartbeat.record_beat(self.control.process, self.clock())
         self._provide_watch(message.body["watch"])
@@ -154,7 +157,7 @@ class Guardian:
             words.print_ready(info | {"pids": self._pids()})
         elif not self.announced:
             words.print_ready(banner)
-        self.log.note("start", f"ready: rig {self.options.rig}, modbus tcp {host}:{port}, processes {self._pids()}")
+        self.log.note("start", f"ready: rig {self.options.rig}, {where}, processes {self._pids()}")
         self.announced = True
         self.restarts.came_up()
 
@@ -243,6 +246,7 @@ class Guardian:
                     "rig": self.options.rig,
                     "simulate": self.options.simulate,
                     "bind": self.bound or self.options.bind,
+                    "rtu": self.options.rtu,
                     "state": str(self.state),
                     "record": self.options.record,
                     "realtime": self.options.realtime,

@@ -14,6 +14,7 @@ class RunOptions:
     rig: str = defaults.RIG
     simulate: bool = False
     bind: tuple[str, int] | None = None
+    rtu: str | None = None  # the port of one more serial face, empty for a pseudo-terminal
     state: Path | None = None
     json: bool = False
     record: bool = False

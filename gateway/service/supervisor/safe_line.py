@@ -42,7 +42,7 @@ class SafeLine:
         return False
 
     def _wait_for_acknowledgement(self, timeout_s: float) -> bool:
-        """Return whether the reply came. It counts as a whole line only: the 0 at the end of 510 acknowledges nothing."""
+        """Return whether the reply came. A line counts as a whole only: the 0 at the end of 510 acknowledges nothing."""
         deadline_s = time.monotonic() + timeout_s
         received = b""
         while (left_s := deadline_s - time.monotonic()) > 0:
@@ -52,9 +52,16 @@ class SafeLine:
             if not chunk:
                 return False
             received += chunk
-            if self.reply.strip(b"\r\n") in re.split(rb"[\r\n]+", received)[:-1]:
+            if self._acknowledges(received):
                 return True
         return False
+
+    def _acknowledges(self, received: bytes) -> bool:
+        """A binary reply (Modbus RTU) has no line's end and may contain one; with its checksum it is whole where it stands."""
+        words = self.reply.strip(b"\r\n")
+        if not words.isascii() or not words.decode("ascii").isprintable():
+            return self.reply in received
+        return words in re.split(rb"[\r\n]+", received)[:-1]
 
 
 def _drop_input(descriptor: int) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import KnownLease
+from gateway.cli.master.wires import TcpWire
 from gateway.cli.verbs import hold
 
 HERE = {"rig": "own", "port": 5020, "lease_s": 0.08, "lease_action": "ramp"}
@@ -26,7 +27,7 @@ def find_lease(monkeypatch, tmp_path: Path, host: str, answers: dict[str, dict[s
         return answer
 
     monkeypatch.setattr("gateway.cli.control_socket.ask", ask)
-    return hold._find_gateway_lease(host, 5020)
+    return hold._find_gateway_lease(TcpWire(host, 5020))
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1"])

@@ -11,6 +11,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, status_reading_of
 from gateway.cli.master.client import GatewayClient
+from gateway.cli.master.wires import TcpWire
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.settings import LeaseAction
@@ -134,7 +135,7 @@ def beating() -> Iterator[Callable[..., HeartbeatThread]]:
 
     def start(server: Server, lease: KnownLease | None = None) -> HeartbeatThread:
         host, _, port = server.address.partition(":")
-        clients.append(GatewayClient(host, int(port), 1, server.bank.register_map))
+        clients.append(GatewayClient(TcpWire(host, int(port)), 1, server.bank.register_map))
         beat = HeartbeatThread(clients[-1], HoldRun(12.0, heartbeat=7, resets=False), lease, time.monotonic)
         beat.start()
         return beat

@@ -22,6 +22,7 @@ from gateway.cli.live_monitor.page import page
 from gateway.cli.live_monitor.poll import Poller
 from gateway.cli.live_monitor.register_table import View, Writer
 from gateway.cli.master.client import GatewayClient, RegisterReading
+from gateway.cli.master.wires import TcpWire
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers import RegisterMap
@@ -194,7 +195,7 @@ def test_no_gateway_at_the_start_ends_with_69(call) -> None:
 
 
 def test_a_gateway_that_comes_back_is_found_again(serve, fake, register_map: RegisterMap) -> None:
-    with GatewayClient("127.0.0.1", fake.port, 1, register_map) as client:
+    with GatewayClient(TcpWire("127.0.0.1", fake.port), 1, register_map) as client:
         poller = Poller(client, None, lambda: 0.0)
         poller.poll_or_note()
         assert poller.trouble == ""
@@ -212,7 +213,7 @@ def test_writers_come_from_the_control_socket_and_their_absence_is_no_trouble(
 ) -> None:
     answer = {"owner": "10.0.0.7", "writers": {"force_setpoint": {"peer": "10.0.0.7:50001", "time_s": 97.0}}}
     monkeypatch.setattr("gateway.cli.live_monitor.poll.ask", lambda state, request: answer)
-    with GatewayClient("127.0.0.1", fake.port, 1, register_map) as client:
+    with GatewayClient(TcpWire("127.0.0.1", fake.port), 1, register_map) as client:
         poller = Poller(client, tmp_path, lambda: 100.0)
         poller.poll()
         assert poller.view(80, 24).writers == {"force_setpoint": Writer("10.0.0.7", "50001", 3.0)}

@@ -7,6 +7,7 @@ import threading
 import pytest
 
 from gateway.cli.master.client import Assignment, GatewayClient
+from gateway.cli.master.wires import TcpWire
 from gateway.codes.refusals import RefusalReason
 
 
@@ -209,13 +210,13 @@ def test_a_foreign_unit_is_an_exception_and_not_a_timeout(fake, call) -> None:
 
 def test_more_registers_than_one_request_carries_are_read_in_several(fake) -> None:
     fake.bank.words |= {1500 + at: at for at in range(200)}
-    with GatewayClient("127.0.0.1", fake.port, 1, fake.bank.register_map) as client:
+    with GatewayClient(TcpWire("127.0.0.1", fake.port), 1, fake.bank.register_map) as client:
         assert client.read_words(1500, 200) == tuple(range(200))
     assert fake.bank.reads == [(1500, 125), (1625, 75)]
 
 
 def test_values_written_by_a_program_travel_the_same_way(fake) -> None:
-    with GatewayClient("127.0.0.1", fake.port, 1, fake.bank.register_map) as client:
+    with GatewayClient(TcpWire("127.0.0.1", fake.port), 1, fake.bank.register_map) as client:
         wanted = {"force_setpoint": 12.0, "control_word": 1, "byte_order_echo": 1234.5}
         registers = [fake.bank.register_map.find(name) for name in wanted]
         client.write_values([Assignment(register, register.encode(wanted[register.name])) for register in registers])

@@ -13,7 +13,7 @@ from gateway.calibrations.activation import Activation, ActiveCalibration
 from gateway.calibrations.store import CalibrationStore, as_text
 from gateway.calibrations.upload import UploadRules, UploadService
 from gateway.cli.master.upload import place
-from gateway.modbus import MbapFramer, Peer, answer
+from gateway.modbus import MbapFramer, Peer, Role, answer
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
@@ -30,7 +30,7 @@ class Gateway:
     """Bank, store and upload service, as a cell wires them; `thread` is what the server's loop has beside it."""
 
     def __init__(self, state: Path, register_map: RegisterMap, **rules: object) -> None:
-        given = {"rig_name": "demo", "force_max_n": 60.0, "allow_plain_upload": True} | rules
+        given = {"rig_name": "demo", "force_max_n": 60.0} | rules
         self.bank = RegisterBank(register_map, BankRules(**given), now=lambda: 0.0)
         self.store = CalibrationStore(state, OWN)
         activation = Activation(self.store, CoefficientLimits(cell_range_n=100.0))
@@ -159,8 +159,8 @@ def test_a_file_with_a_fault_is_told_before_anything_is_sent(call, tmp_path):
 
 
 def test_a_rig_that_takes_no_plain_upload_says_so(tmp_path, register_map, serve, call, file):
-    gateway = Gateway(tmp_path / "closed", register_map, allow_plain_upload=False)
-    done = call("upload", file, "--gateway", serve(gateway.bank).address)
+    gateway = Gateway(tmp_path / "closed", register_map)
+    done = call("upload", file, "--gateway", serve(gateway.bank, role=Role.SETPOINT).address)
     assert done.exit_code == 1
     assert done.stderr.startswith("W211 ")
     gateway.upload.close()
@@ -208,7 +208,7 @@ def test_printed_frames_played_by_anybody_make_the_upload(gateway, call, file, f
     answers = []
     for frame in frames:
         (adu,) = framer.feed(bytes.fromhex(frame["frame"]))
-        answers.append(answer(adu.pdu, gateway.bank, Peer("10.0.0.9")))
+        answers.append(answer(adu.pdu, gateway.bank, Peer("10.0.0.9", role=Role.CALIBRATION)))
     assert all(text[0] < 0x80 for text in answers)
     assert struct.unpack(">HHH", answers[-1][2:]) == (CommitStatus.COMMITTED, 0, 0)
     assert slot_number(gateway.store, 6) == 2

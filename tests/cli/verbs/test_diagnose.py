@@ -17,48 +17,19 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-import gateway.diagnosis
 from gateway.calibrations.store import CalibrationStore, as_text
 from gateway.cli.diagnosis.outputs import write_all
-from gateway.diagnosis.result import Diagnosis, Verdict
+from gateway.diagnosis.result import Verdict
 from gateway.profiles import load_plant, load_rig, shipped_profiles_folder
 from gateway.recording import Recorder, export_csv, read_recording
 from gateway.service.closed_loop.study import ClosedLoopGain
 from gateway.twin import Plant
-from tests.reports.fake_diagnosis import FRICTION, WARMTH, command_v, diagnosis
+from tests.cli.verbs.answered_engine import Engine, engine, rows, table
+from tests.reports.fake_diagnosis import FRICTION, WARMTH, diagnosis
+
+__all__ = ["engine"]
 
 Call = Callable[..., Result]
-
-
-class Engine:
-    """Answers what it is told to, and remembers what it was asked."""
-
-    def __init__(self) -> None:
-        self.answer: Diagnosis = diagnosis()
-        self.asked: list[tuple[Any, Plant, Any]] = []
-
-    def __call__(self, measurements: Any, plant: Plant, options: Any) -> Diagnosis:
-        self.asked.append((measurements, plant, options))
-        return self.answer
-
-
-@pytest.fixture
-def engine(monkeypatch: pytest.MonkeyPatch) -> Engine:
-    engine = Engine()
-    monkeypatch.setattr(gateway.diagnosis, "diagnose", engine)
-    return engine
-
-
-def rows(seconds: float = 5.0) -> np.ndarray:
-    time_s = np.arange(round(200 * seconds)) / 200.0
-    volts = command_v(time_s)
-    return np.stack([time_s, volts, 8.5 * volts], axis=1)
-
-
-def table(path: Path, head: str = "time_s,command_v,force_n", facts: str = "# rig: demo\n") -> Path:
-    lines = "\n".join(",".join(f"{value:.6g}" for value in row) for row in rows())
-    path.write_text(f"{facts}{head}\n{lines}\n", encoding="utf-8")
-    return path
 
 
 def test_the_terminal_says_verdict_cause_gain_and_what_to_record_next(

@@ -28,7 +28,7 @@ def test_without_a_code_all_are_listed(call) -> None:
 
 
 def test_an_unknown_code_gets_a_proposal(call) -> None:
-    answer = call("explain", "E112")
+    answer = call("explain", "E119")
     assert answer.exit_code == 2
     assert "did you mean E1" in answer.stderr
     assert call("explain", "nonsense").exit_code == 2

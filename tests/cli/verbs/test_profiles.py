@@ -209,3 +209,13 @@ def test_ports_lists_by_id_names_first(call, monkeypatch: pytest.MonkeyPatch) ->
     assert json.loads(call("ports", "--json").output)[0]["path"] == by_id
     monkeypatch.setattr("gateway.ports.list_ports", list)
     assert "plug the adapter in" in call("ports").output
+
+
+def test_check_tells_every_face_of_a_rig(call, tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    demo = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    path.write_text(f"{demo}\nfieldbus: [{{type: rtu, port: /dev/ttyS9, unit: 7}}]\n", encoding="utf-8")
+    answer = call("check", str(path))
+    assert "serial:1     modbus rtu, /dev/ttyS9, 19200 8E1, unit 7" in answer.output
+    path.write_text(path.read_text(encoding="utf-8").replace("  bind:", "  plain: false\n  bind:"), encoding="utf-8")
+    assert "modbus tcp   off (network.plain: false)" in call("check", str(path)).output

@@ -31,10 +31,13 @@ def loop(response: Response, off: tuple[float, float, float] = (1.0, 1.0, 1.0)) 
         1j * FREQUENCIES,
     )
     bend_s2 = push.horizon_s**2 if timing.lags.second_lag_s else 0.0
-    predicted = np.exp(-s * response.dead_time_s) / (s * s * bend_s2 + s * push.landing_s + 1.0)
-    plant = off[0] * predicted * np.exp(-s * ((off[1] - 1.0) * response.dead_time_s + HELD_S))
+    landed = 1.0 / (s * s * bend_s2 + s * push.landing_s + 1.0)
+    predicted = landed * np.exp(-s * timing.dead_time_s)
+    plant = off[0] * landed * np.exp(-s * (off[1] * response.dead_time_s + HELD_S))
     for lag_s in (timing.lags.lag_s, timing.lags.second_lag_s):
-        plant *= (lag_s * s + 1.0) / (off[2] * lag_s * s + 1.0)
+        plant *= lag_s * s + 1.0
+    for lag_s in (response.lag_s, response.second_lag_s):
+        plant /= off[2] * lag_s * s + 1.0
     return timing.integral_per_s / (s + timing.integral_per_s * (1.0 - predicted)) * plant
 
 
@@ -67,6 +70,19 @@ def test_everything_follows_from_the_response():
     assert (slow.lead.lag_s, slow.lead.second_lag_s) == (0.2, 0.1)
     assert slow.limits == settings().limits
     assert slow.trim == settings().trim
+
+
+@pytest.mark.parametrize(
+    ("lags_ms", "dead_ms", "left_ms"),
+    [((87, 9), 132, (87, 0)), ((120, 33), 156, (120, 0)), ((38, 36), 123, (38, 36)), ((250, 60), 123, (250, 60))],
+)
+def test_a_second_lag_that_no_setting_can_brake_counts_as_dead_time(lags_ms, dead_ms, left_ms):
+    """Of a single lag the steps' fit makes two, with cell, wire and ticks; to invert the second overruns each way down."""
+    lag_s, second_lag_s = (ms * 1e-3 for ms in lags_ms)
+    timing = timing_of(Response(dead_time_s=0.123, lag_s=lag_s, second_lag_s=second_lag_s), settings()).timing
+    assert timing
+    assert timing.dead_time_s == pytest.approx(dead_ms * 1e-3)
+    assert (timing.lags.lag_s, timing.lags.second_lag_s) == pytest.approx([ms * 1e-3 for ms in left_ms])
 
 
 def test_without_a_response_or_by_the_rigs_word_nothing_changes():

@@ -10,6 +10,7 @@ import numpy as np
 
 from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.evaluation import FitRequest
+from gateway.bsfm.ladder.plan import LABELS
 from gateway.bsfm.model import Calibration, Response
 from gateway.control import (
     CalibrationInUse,
@@ -22,11 +23,12 @@ from gateway.control import (
     Supervision,
     Trim,
 )
+from gateway.control.runs.ladder_run import LadderRun
 from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import Recording
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit
+from gateway.registers.words import CalibrationPhase, ControlBit
 from gateway.service.fitting.ladder_fit import calibration_of, fit_recording
 from gateway.service.fitting.ladder_source import RigContext
 from tests.control.foreign.machine import COUNT_V, Machine, Slide
@@ -60,7 +62,7 @@ class Stand:
         self.voltage_v = self.wanted_v = 0.0
         self._sent_v, self._busy_until = 0.0, 0.0
         self._next_sample = 3.0
-        self.rows: list[tuple[float, float, float]] = []
+        self.rows: list[tuple[float, ...]] = []
         self.recording = False
         self.output: Output | None = None
         self.events: list[str] = []
@@ -123,10 +125,19 @@ class Stand:
             self._measure()
             self._step()
             if self.recording and self.controller.active_run.running and self.output and self.sample:
-                self.rows.append((self.now_s, self.output.voltage_v, self.controller.active_run.cell_n))
+                self.rows.append(
+                    (self.now_s, self.output.voltage_v, self.controller.active_run.cell_n, *self._labels())
+                )
         if self.ms % TICK_MS == 0:
             self._step()
         self.on_ms(self)
+
+    def _labels(self) -> tuple[float, ...]:
+        """As the recorder of a rig writes them, LABELS."""
+        active = self.controller.active_run
+        run = active.run
+        assert isinstance(run, LadderRun)
+        return float(active.phase), float(run.stairs[min(run.done, len(run.stairs) - 1)].group), float(run.done)
 
     def _measure(self) -> None:
         machine = self.machine
@@ -136,7 +147,7 @@ class Stand:
 
     def columns(self) -> dict[str, Any]:
         table = np.array(self.rows)
-        return {"time_s": table[:, 0], "command_v": table[:, 1], "force_n": table[:, 2]}
+        return dict(zip(("time_s", "command_v", "force_n", *LABELS), table.T, strict=True))
 
 
 @dataclass(frozen=True)
@@ -165,7 +176,12 @@ def calibrated(machine: Machine, started_with: Bsfm, plan: CalibrationPlan = QUI
     stand.recording = True
     stand.run(0.05)
     while controller.active_run.running:
+        stairs = controller.active_run.run.stairs
         stand.run(0.1)
+    # the recorder's last row says that the last stair was left
+    stand.rows.append(
+        (stand.now_s, 0.0, controller.active_run.cell_n, float(CalibrationPhase.FITTING), -1.0, len(stairs))
+    )
     facts = {"rig": "foreign", "rig_fingerprint": "", "force_unit": "N", "ladder": asdict(plan)}
     recording = Recording(Path("foreign.fgr"), facts, stand.columns(), len(stand.rows), False)
     fit = fit_recording(recording, FitRequest(), RigContext())

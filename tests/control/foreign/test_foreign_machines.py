@@ -18,8 +18,9 @@ from tests.control.foreign.kept_calibrations import kept
 from tests.control.foreign.machine import Machine, drawn
 from tests.control.foreign.stand import Calibrated, Stand, calibrated, settings
 
-FAST = (1, 5, 9, 18)
-SEEDS = tuple(seed if seed in FAST else pytest.param(seed, marks=pytest.mark.long) for seed in range(20))
+FAST = (1, 5, 9, 18, 46)
+MENDED = (29, 43, 46, 72)  # drawn after the tuning: a short second lag, a map that flattens
+SEEDS = tuple(seed if seed in FAST else pytest.param(seed, marks=pytest.mark.long) for seed in (*range(20), *MENDED))
 NEVER_WORSE_N = 0.03  # of a difference of two RMS of nine steps
 STILL_WORSE_N = 0.07  # of a single force: half of the trim's dead zone
 STATIC_N = 0.4  # a model this close needs no trim to settle
@@ -128,18 +129,28 @@ def test_friction_that_keeps_back_most_of_the_first_stair_is_no_wrong_unit(seed)
     assert stand.output.voltage_v > 1.5
 
 
+def test_a_plant_that_is_slower_than_anybody_knew_is_no_wrong_unit():
+    """Two lags of 0.3 s, and the calibration of another machine: the second stair is still rising where it seems too low."""
+    controller = Controller(settings(), CalibrationInUse(load_rig("demo").calibration.model(), 1))
+    stand = Stand(drawn(49), controller)
+    stand.run(0.3)
+    controller.active_run.ask(QUICK)
+    stand.run(3.0)
+    assert controller.active_run.running, stand.events
+
+
 @pytest.mark.long
-@pytest.mark.parametrize(("damping", "of_bound"), [(0.4, 1.8), (0.6, 1.5)])
-def test_a_regulator_that_rings_is_held_and_better_with_the_trim_than_without(damping, of_bound):
-    ringing = Machine(damping=damping, lag_s=0.06, second_lag_s=0.06)
+@pytest.mark.parametrize(("damping", "coulomb_n"), [(0.3, 1.5), (0.4, 0.5), (0.4, 3.0), (0.6, 1.5), (0.6, 3.5)])
+def test_a_regulator_that_rings_is_held_and_better_with_the_trim_than_without(damping, coulomb_n):
+    ringing = Machine(damping=damping, lag_s=0.06, second_lag_s=0.06, coulomb_n=coulomb_n)
     one = calibrated(ringing, load_rig("demo").calibration.model())
     assert one.response
-    assert one.response.damping == pytest.approx(damping, abs=0.12)  # friction cuts the swing short
+    assert one.response.damping == pytest.approx(damping, abs=0.05)
     off, on = (course(ringing, one.calibration, settings(trim), SHORT_N, tracks=False) for trim in (Trim(), None))
     assert on.hold_n <= off.hold_n + NEVER_WORSE_N
     assert on.after_1_s_n <= off.after_1_s_n + NEVER_WORSE_N
     assert on.swing_n < 0.5
-    assert float(np.median([step.settled_s / allowed_s(ringing, step) for step in on.steps])) <= of_bound
+    assert float(np.median([step.settled_s / allowed_s(ringing, step) for step in on.steps])) <= 1.35
 
 
 def test_a_cell_of_ten_samples_a_second_does_not_make_the_trim_swing():

@@ -38,7 +38,7 @@ def patient(tmp_path: Path) -> Iterator[RunningGateway]:
 
 def calibrated(state: Path, *options: str) -> "subprocess.CompletedProcess[str]":
     command = [sys.executable, "-m", "gateway", "calibrate", "--yes", "--state", str(state), *options]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return subprocess.run(command, capture_output=True, text=True, timeout=400)
 
 
 def volts_along(model: Bsfm, forces_n: list[float]) -> list[float]:
@@ -52,7 +52,7 @@ def volts_along(model: Bsfm, forces_n: list[float]) -> list[float]:
 
 def test_a_quick_ladder_gives_a_numbered_calibration_that_agrees_with_the_shipped_one(patient) -> None:
     before = patient.words(122, 1)
-    done = calibrated(patient.state, "--step", "1", "--groups", "2", "--minor", "13", "--response", "2", "--json")
+    done = calibrated(patient.state, "--step", "1", "--groups", "1", "--minor", "13", "--response", "2", "--json")
     assert done.returncode == 0, done.stderr
     end = json.loads(done.stdout)
     patient.client.close()  # which has asked nothing for most of a minute, and may have been hung up on
@@ -71,7 +71,7 @@ def test_a_quick_ladder_gives_a_numbered_calibration_that_agrees_with_the_shippe
     assert stored.data_sha256 == end["fit"]["data_sha256"]
     assert Path(end["report"]).read_text(encoding="utf-8").startswith("<!doctype html>")
     header = read_recording(Path(end["recording"])).header
-    assert header["ladder"]["groups"] == 2
+    assert header["ladder"]["groups"] == 1
     assert header["rig_fingerprint"][:12] in stored.source
 
 

@@ -1,12 +1,14 @@
-"""The verbs against a whole gateway: an upload, another calibration and back, while it presses."""
+"""The verbs against a whole gateway: an upload, another calibration and back, while it presses. They run in the test's own
+process: what a process of their own adds, tests/cli asks once."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
+from click.testing import CliRunner
+
 from gateway.calibrations.store import CalibrationStore
+from gateway.cli.main import command
 from gateway.profiles import load_calibration
 from gateway.profiles.find import locate
 from tests.calibrations.coefficients import calibration
@@ -16,10 +18,8 @@ RAMPING, HOLDING = 2, 3
 
 
 def verb(*words: object, code: int = 0) -> Any:
-    done = subprocess.run(
-        [sys.executable, "-m", "gateway", *map(str, words), "--json"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == code, done.stderr
+    done = CliRunner().invoke(command, [*map(str, words), "--json"])
+    assert done.exit_code == code, done.stderr
     return json.loads(done.stdout) if done.stdout else done.stderr
 
 

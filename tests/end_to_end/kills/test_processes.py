@@ -6,6 +6,8 @@ import time
 
 import psutil
 
+from tests.end_to_end.conftest import POLL_S
+
 OFF = 0
 
 
@@ -19,30 +21,33 @@ def reconnect(running, within_s=10.0):
     running.client.close()
     while not running.client.connect():
         assert time.monotonic() < deadline_s
+        time.sleep(POLL_S)
     while True:
         try:
             return running.status()
         except Exception:
             assert time.monotonic() < deadline_s
+            time.sleep(POLL_S)
             running.client.close()
             running.client.connect()
 
 
-def test_killing_control_drops_the_force_and_restarts_in_off(running):
-    pressing(running)
-    os.kill(running.ready["pids"]["control"], signal.SIGKILL)
-    status = reconnect(running)
+def test_killing_control_drops_the_force_and_restarts_in_off(shared):
+    pressing(shared)
+    os.kill(shared.ready["pids"]["control"], signal.SIGKILL)
+    status = reconnect(shared)
     assert status["state"] == OFF
     assert status["output_voltage"] == 0
-    assert running.words(111, 1)[0] & 1, "the restarted warning"
-    running.wait_until(lambda status: abs(status["force_measured"]) < 200)
-    pressing(running)
+    assert shared.words(111, 1)[0] & 1, "the restarted warning"
+    shared.wait_until(lambda status: abs(status["force_measured"]) < 200)
+    shared.next_ready()
+    pressing(shared)
 
 
-def test_a_stopped_control_process_is_killed_and_replaced(running):
-    pressing(running)
-    os.kill(running.ready["pids"]["control"], signal.SIGSTOP)
-    assert reconnect(running)["state"] == OFF
+def test_a_stopped_control_process_is_killed_and_replaced(shared):
+    pressing(shared)
+    os.kill(shared.ready["pids"]["control"], signal.SIGSTOP)
+    assert reconnect(shared)["state"] == OFF
 
 
 def test_ctrl_c_ramps_to_zero_and_leaves_no_process(running):

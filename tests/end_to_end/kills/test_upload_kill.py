@@ -21,7 +21,7 @@ from gateway.profiles import load_calibration
 from gateway.registers.upload.coefficients import CoefficientSet, words_of_block
 from tests.calibrations.coefficients import calibration, mark_of, requests_of, staged
 from tests.calibrations.slots import slot_number
-from tests.end_to_end.conftest import RunningGateway, start, stop
+from tests.end_to_end.conftest import POLL_S, RunningGateway, start, stop
 
 KILLS = 50
 PER_STATE = 25
@@ -150,6 +150,7 @@ def await_commit(gateway: RunningGateway) -> None:
     deadline_s = time.monotonic() + 5.0
     while gateway.words(1146, 1)[0] != COMMITTED:
         assert time.monotonic() < deadline_s
+        time.sleep(POLL_S)
 
 
 def kill_all(gateway: RunningGateway) -> None:
@@ -240,6 +241,7 @@ def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
     assert bump_mv <= 30
     worst, deadline_s = 0, time.monotonic() + 2.0
     while time.monotonic() < deadline_s:
+        time.sleep(POLL_S)
         status = running.status()
         assert status["state"] in (RAMPING, HOLDING)
         worst = max(worst, abs(status["force_measured"] - 2000))

@@ -1,9 +1,13 @@
 """What a wrong type, bound or key is told: what was seen, what is allowed, what was probably meant, and where."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 import pytest
+from pydantic import Discriminator
 
+from gateway.defaults import STRICT
 from gateway.profiles.rigs.rig_file import RigFile
 from gateway.profiles.strict_yaml.text import parse
 from gateway.profiles.strict_yaml.typed import build
@@ -118,3 +122,37 @@ def test_all_faults_are_told_at_once_from_top_to_bottom() -> None:
     )
     places = [int(fault.split(":")[0]) for fault in faults]
     assert places == [line_of(text) for text in ("seed: 7", "baud: 9600", "force_max_n: 60", "port: 5020")]
+
+
+@dataclass(frozen=True)
+class Round:
+    __pydantic_config__ = STRICT
+    type: Literal["round"]
+    radius_mm: float
+
+
+@dataclass(frozen=True)
+class Square:
+    __pydantic_config__ = STRICT
+    type: Literal["square"]
+    side_mm: float
+
+
+@dataclass(frozen=True)
+class Shapes:
+    __pydantic_config__ = STRICT
+    shapes: tuple[Annotated[Round | Square, Discriminator("type")], ...]
+
+
+@pytest.mark.parametrize(
+    ("shape", "sentence"),
+    [
+        ("{type: sqare, side_mm: 1}", "shapes[0]: type sqare is not one of round, square; did you mean square?"),
+        ("{side_mm: 1}", "shapes[0]: has no type: it says what this is"),
+        ("{type: square, side_mm: 1, sde_mm: 2}", "shapes[0].sde_mm: is not a known key; known are type, side_mm"),
+        ("{type: square, side_cm: 1}", "shapes[0].side_cm: is not a known key; did you mean side_mm?"),
+    ],
+)
+def test_a_group_of_several_kinds_is_judged_by_its_own(shape: str, sentence: str) -> None:
+    _, faults = build(Shapes, parse(f"shapes: [{shape}]".encode(), "a.yaml"))
+    assert any(str(fault).split(" ", 1)[1] == sentence for fault in faults), faults

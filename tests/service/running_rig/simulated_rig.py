@@ -8,9 +8,11 @@ from dataclasses import replace
 from math import nan
 from random import Random
 from struct import pack
+from types import SimpleNamespace
 
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller, ControlSettings
+from gateway.control.inputs import WireCounts
 from gateway.devices.messages import ForceSample, Quality
 from gateway.modbus import Peer
 from gateway.profiles import load_register_map
@@ -33,7 +35,16 @@ class Wire:
         self.voltage_v = self.acknowledged_v = 0.0
         self.unanswered_since_s: float | None = None
         self.fault = FaultCode.NONE
+        self.said = ""
         self.pressure_pa = self.round_trip_s = nan
+        self.counts = WireCounts()
+
+    @property
+    def confirmed_v(self) -> float:
+        return self.acknowledged_v
+
+    def clear_faults(self) -> None:
+        """There are none that only a reset clears."""
 
     @property
     def sent_v(self) -> float:
@@ -47,6 +58,8 @@ class Wire:
 
 class Samples:
     """Stands for the load cell's line: what is put here comes out at the next bytes."""
+
+    identity = SimpleNamespace(fault=FaultCode.NONE, said="")
 
     def __init__(self) -> None:
         self.next: ForceSample | None = None
@@ -74,7 +87,9 @@ class SmallRig:
         rules = BankRules(
             rig_name="rig",
             force_max_n=self.settings.limits.force_max_n,
-            supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION,
+            supported_bits=BASIC_BITS
+            | ControlBit.START_CALIBRATION
+            | (ControlBit.START_SELF_TEST if self.settings.self_test else ControlBit(0)),
         )
         self.bank = RegisterBank(MAP, rules, now=self.now)
         self.controller = Controller(self.settings, CalibrationInUse(bsfm(), 1))

@@ -231,7 +231,12 @@ def test_what_is_taken_and_changes_nothing_of_the_force_changes_nothing(name: st
         if expected(name, edge, leased) == SAME:
             assert asked.answer(*frame(asked)) is None, f"{edge} in {name}"
     asked.run(WATCHED_S)
-    assert asked.trace[before:] == untouched(name, leased).trace
+    assert rounded(asked.trace[before:]) == rounded(untouched(name, leased).trace)
+
+
+def rounded(trace: list[tuple[State, float, float]]) -> list[tuple[State, float, float]]:
+    """A decision more in between splits a step of time in two: the same voltage but for the last bit."""
+    return [(state, round(voltage_v, 9), round(force_n, 9)) for state, voltage_v, force_n in trace]
 
 
 @pytest.mark.parametrize(("name", "leased"), PLACES)

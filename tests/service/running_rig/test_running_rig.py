@@ -85,7 +85,7 @@ def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices
 
     began_s = time.monotonic()
     with_running_rig(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
-    assert time.monotonic() - began_s < 2.5
+    assert time.monotonic() - began_s < 5.0, "a busy machine takes longer than the first moments, but not 6 s"
     assert devices.heard
 
 
@@ -166,14 +166,14 @@ def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevic
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         await pressing(rig, devices)
-        close = rig._server.close
+        close = rig._faces.close
 
         async def look_and_close() -> None:
             await asyncio.sleep(0.02)
             seen_v.append(devices.setting_v)
             await close()
 
-        monkeypatch.setattr(rig._server, "close", look_and_close)
+        monkeypatch.setattr(rig._faces, "close", look_and_close)
 
     with_running_rig(devices, scene)
     assert seen_v == [0.0]

@@ -256,3 +256,17 @@ def test_a_release_goes_along_its_ramp_in_volts() -> None:
     wired.run(0.5)
     half_s = next(one.time_s for one in wired.settings_since(began_s) if one.voltage_v < 0.25 * before_v) - began_s
     assert 0.06 < half_s < 0.25
+
+
+def test_a_tick_decides_nothing_anew_behind_a_sample_and_everything_without_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wired = Wired().ready()
+    decided, step = [], wired.loop.controller.step
+    monkeypatch.setattr(wired.loop.controller, "step", lambda *given: (decided.append(wired.now_s), step(*given))[1])
+    wired.loop.refresh()
+    wired.loop.on_tick(1, 0.0)
+    assert len(decided) == 1, "at this very moment"
+    wired.is_cell_plugged = False
+    wired.run(0.2)
+    assert len(decided) == 21, "each tick of 10 ms, for nothing else comes"

@@ -174,3 +174,19 @@ def test_a_line_that_takes_no_bytes_does_not_hold_the_guardian(pty: Pty, client:
     began_s = time.monotonic()
     assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
     assert time.monotonic() - began_s < 1.0
+
+
+@pytest.mark.parametrize(
+    ("reply", "received", "is_acknowledged"),
+    [
+        ("01060000000089ca", "01060000000089ca", True),  # Modbus RTU, no line's end
+        ("01060000000089ca", "ff01060000000089ca", True),  # noise before it
+        ("01060000000089ca", "010600000000", False),
+        ("0106000d0a0089c9", "0106000d0a0089c9", True),  # a line's end within
+        ("300d0a", "3531300d0a", False),  # 510 is not 0
+        ("300d0a", "300d0a", True),
+    ],
+)
+def test_a_reply_in_lines_and_one_in_bytes_are_told_apart(reply: str, received: str, is_acknowledged: bool) -> None:
+    line = SafeLine(-1, b"", bytes.fromhex(reply))
+    assert line._acknowledges(bytes.fromhex(received)) is is_acknowledged

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gateway.twin import STEP_S, Drive, Plant
 from gateway.twin.experiment import Floats, settling_time_s
@@ -73,11 +74,12 @@ def useful_pulses(plant: Plant, target_n: float, full_n: Floats) -> list[tuple[i
     return [(up, down) for up in UP_MS if 0.2 * reached_ms <= up <= reached_ms + 8 for down in DOWN_MS]
 
 
-def holding_v(plant: Plant, target_n: float) -> float:
-    """Return the voltage whose steady force on a rising approach is the target: the twin's own statics, not a model's."""
+def holding_v(plant: Plant, target_n: ArrayLike) -> Floats:
+    """Return the voltage whose steady force on a rising approach is the target, of one or of many: the twin's own statics,
+    not a model's."""
     trial_v = np.linspace(0.5, 6.0, 240)
     settled_n = responses(plant, np.tile(trial_v, (1500, 1)))[-1]
-    return float(np.interp(target_n, settled_n, trial_v))
+    return np.asarray(np.interp(target_n, settled_n, trial_v))
 
 
 def fastest(plant: Plant, target_n: float, bands_n: Sequence[float], hold_v: float, full_n: Floats) -> list[Fastest]:
@@ -96,7 +98,7 @@ def fastest(plant: Plant, target_n: float, bands_n: Sequence[float], hold_v: flo
 def limits(plant: Plant, targets_n: Sequence[float], bands_n: Sequence[float]) -> list[Fastest]:
     """Search the fastest command for every target and band."""
     full_n = responses(plant, np.full((round(DURATION_S * 1000), 1), HIGH_V))[:, 0]
-    holds_v = [holding_v(plant, target_n) for target_n in targets_n]
+    holds_v = holding_v(plant, targets_n).tolist()
     rows = [
         fastest(plant, target_n, bands_n, hold_v, full_n) for target_n, hold_v in zip(targets_n, holds_v, strict=True)
     ]

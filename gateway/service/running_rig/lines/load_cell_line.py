@@ -12,7 +12,8 @@ from math import inf
 from typing import Final
 
 from gateway.devices import CellHost, DeviceProfile
-from gateway.devices.messages import ForceSample, Garbage
+from gateway.devices.messages import ForceSample, Garbage, RepeatedSample
+from gateway.service.running_rig.lines.cell_identity import CellIdentity
 
 _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only cost processor time
 
@@ -22,6 +23,7 @@ class CellExchange:
 
     def __init__(self, host: CellHost, write: Callable[[bytes], None], profile: DeviceProfile) -> None:
         self._host = host
+        self.identity = CellIdentity(profile)
         self._write = write
         self._question = host.poll()
         self._reply_timeout_s = profile.reply_timeout_s
@@ -31,20 +33,31 @@ class CellExchange:
     def reset(self) -> None:
         """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()
+        self.identity.begin()
         self._sent_s: float | None = None
         self._next_s = -inf
         self._is_overdue = False
 
-    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
-        """Return what these bytes complete; the next question goes out at once where it is due."""
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
+        """Return what these bytes complete; the next question goes out at once where it is due and the wire needs no pause."""
+        if self.identity.is_due:
+            return self._receive_identity(chunk, now_s)
         messages = self._host.receive(chunk, now_s)
-        if any(isinstance(one, ForceSample) for one in messages):
+        if any(not isinstance(one, Garbage) for one in messages):
+            self._next_s = max(self._next_s, now_s + self._host.gap_s)
             if self._is_overdue:
                 self._is_overdue = False  # of the question before, perhaps: the one that is out has its time
             else:
                 self._sent_s = None
         self._send_next(now_s)
         return messages
+
+    def _receive_identity(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
+        garbage = self.identity.receive(chunk)
+        if not self.identity.is_due:
+            self._sent_s, self._is_overdue, self._next_s = None, False, now_s + self._host.gap_s
+            self._send_next(now_s)
+        return [*garbage]
 
     def tick(self, now_s: float) -> None:
         """Give up waiting for an overdue answer, and ask again."""
@@ -54,6 +67,6 @@ class CellExchange:
         self._send_next(now_s)
 
     def _send_next(self, now_s: float) -> None:
-        if self._question and self._sent_s is None and now_s >= self._next_s:
+        if self._question and self._sent_s is None and now_s >= self._next_s and not self.identity.fault:
             self._sent_s, self._next_s = now_s, now_s + self._period_s
-            self._write(self._question)
+            self._write(self.identity.question if self.identity.is_due else self._question)

@@ -9,6 +9,9 @@ An answer may come after its time has run out, when the next question is already
 it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
 an honest device would look like one that alters its settings. So after a time-out an answer that is no echo of what was
 asked last is believed by nobody: the line is left alone for one reply time, then asked anew. A falling voltage never waits.
+
+Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
+sentence that nobody answers; a device whose watchdog has tripped obeys no setting, so none is sent until it is cleared.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,19 +19,25 @@ from dataclasses import dataclass
 from math import inf, nan
 
 from gateway.codes.faults import FaultCode
+from gateway.control.inputs import WireCounts
 from gateway.devices import OutputHost
 from gateway.devices.messages import (
     Accepted,
+    AskDevice,
+    DeviceAnswer,
     Garbage,
     OutputReply,
     OutputRequest,
     Pressure,
     Refused,
     SetVoltage,
+    WatchdogTripped,
 )
+from gateway.service.running_rig.lines.device_checks import DeviceChecks
 
 _FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
+_AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,21 +54,33 @@ class OutputExchange:
     """Asks the device through `write`, keeps what it answered.
 
     acknowledged_v: confirmed by the device, None before the first; unanswered_since_s: send time of the oldest question
-    without an answer; fault: three failures in a row; pressure_pa: last measured, nan before the first.
+    without an answer; fault: three failures in a row, or what the device's checks have found; pressure_pa: last measured, nan
+    before the first; counts: since the start, whatever reset in between. checks: the questions about the device itself, made
+    from the host where none are given.
     """
 
-    def __init__(self, host: OutputHost, write: Callable[[bytes], None], reply_timeout_s: float) -> None:
+    def __init__(
+        self,
+        host: OutputHost,
+        write: Callable[[bytes], None],
+        reply_timeout_s: float,
+        checks: DeviceChecks | None = None,
+    ) -> None:
         self._host = host
+        self.checks = checks or DeviceChecks(host, is_waived=False)
         self._write = write
         self._sent_v = self._setting_s = nan
         self._reply_timeout_s = reply_timeout_s
         self.garbage_bytes = 0
+        self.counts = WireCounts()
         self.round_trip_s = nan
         self.reset()
 
     def reset(self) -> None:
         """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()
+        self.checks.begin()
+        self._free_s = self._next_feed_s = 0.0
         self._wanted_v: float | None = None
         self._in_flight: OutputRequest | None = None
         self._asked_v = inf
@@ -71,8 +92,27 @@ class OutputExchange:
         self._failures: dict[object, int] = {}
         self.acknowledged_v: float | None = None
         self.unanswered_since_s: float | None = None
-        self.fault = FaultCode.NONE
+        self._line_fault = FaultCode.NONE
         self.pressure_pa = nan
+
+    @property
+    def fault(self) -> FaultCode:
+        """Fault of the device or its line."""
+        return self.checks.fault or self._line_fault
+
+    @property
+    def said(self) -> str:
+        """Words of the device about itself, where that is the fault; else empty."""
+        return self.checks.said if self.checks.fault else ""
+
+    @property
+    def confirmed_v(self) -> float | None:
+        """The voltage that the device has confirmed, once its checks are through; None before."""
+        return self.acknowledged_v if self.checks.is_done else None
+
+    def clear_faults(self) -> None:
+        """Clear what only a person may clear: somebody has reset."""
+        self.checks.clear()
 
     @property
     def sent_v(self) -> float | None:
@@ -109,16 +149,21 @@ class OutputExchange:
         wanted_v = self._wanted_v
         if wanted_v is None or self._in_flight is not None:
             return
-        if now_s < self._quiet_until_s and wanted_v >= self._asked_v:
+        if now_s < self._free_s or (now_s < self._quiet_until_s and wanted_v >= self._asked_v):
             return
-        if not self._is_confirmed(wanted_v):
+        if self._host.sign_of_life and now_s >= self._next_feed_s:
+            self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
+            self._write(self._host.sign_of_life)
+        elif not self._is_confirmed(wanted_v) and not self.checks.is_tripped:
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             self._asked_v, self._standing_v = wanted_v, None
             if self._host.idle_question is None:  # this is what a poll would say
                 self._next_poll_s = now_s + _POLL_PERIOD_S
             self._sent_v, self._setting_s = wanted_v, now_s
             self._send(SetVoltage(wanted_v), now_s)
-        elif now_s >= self._next_poll_s:
+        elif step := self.checks.next_step(now_s):
+            self._send(AskDevice(step), now_s)
+        elif now_s >= self._next_poll_s and not self.checks.is_tripped:
             self._next_poll_s = now_s + _POLL_PERIOD_S
             self._send(self._host.idle_question or SetVoltage(self._asked_v), now_s)
 
@@ -130,6 +175,7 @@ class OutputExchange:
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
         self._in_flight, self._sent_s = request, now_s
+        self.counts.asked += 1
         if self.unanswered_since_s is None:
             self.unanswered_since_s = now_s
         self._write(self._host.request(request))
@@ -137,21 +183,34 @@ class OutputExchange:
     def _on_reply(self, reply: OutputReply, now_s: float) -> None:
         if isinstance(reply, Garbage):
             self.garbage_bytes += len(reply.data)
+            self.counts.garbled += 1
             self._is_overdue = self._is_overdue and self._in_flight is not None  # unasked: that was it
             return
         request, self._in_flight = self._in_flight, None
         self.unanswered_since_s = None
+        self._free_s = max(self._free_s, now_s + self._host.gap_s)
+        self.counts.heard += request is not None
         if self._is_overdue and not self._is_echo(request, reply):
             self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
         self.round_trip_s = now_s - self._sent_s
-        if isinstance(reply, Pressure):
+        if isinstance(request, AskDevice):
+            self._take_check(request, reply)
+        elif isinstance(reply, WatchdogTripped):
+            self.checks.trip()
+        elif isinstance(reply, Pressure):
             self._failures[type(request)] = 0
             self.pressure_pa = reply.pressure_pa
         elif isinstance(reply, Refused):
             self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
         elif request is not None and isinstance(reply, Accepted):
             self._check_setting(request, reply)
+
+    def _take_check(self, request: AskDevice, reply: OutputReply) -> None:
+        if isinstance(reply, DeviceAnswer):
+            self.checks.take(reply)
+        elif isinstance(reply, Refused):
+            self.checks.refuse(request.step, reply.text)
 
     def _is_echo(self, request: OutputRequest | None, reply: OutputReply) -> bool:
         return (
@@ -170,10 +229,10 @@ class OutputExchange:
             self._standing_v = self._asked_v  # the answer only counts in coarser steps
         self._failures[type(request)] = 0
         if max(self._failures.values()) < _FAILURES_BEFORE_FAULT:
-            self.fault = FaultCode.NONE
+            self._line_fault = FaultCode.NONE
 
     def _count_failure(self, question: type, fault: FaultCode) -> None:
         """Counted by question: an echo that agrees makes no reading good that does not."""
         self._failures[question] = self._failures.get(question, 0) + 1
         if self._failures[question] >= _FAILURES_BEFORE_FAULT:
-            self.fault = fault
+            self._line_fault = fault

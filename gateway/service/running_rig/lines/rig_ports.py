@@ -1,4 +1,4 @@
-"""The two serial ports of a running rig: output and load cell, opened, lost, found again and closed.
+"""The serial ports of a running rig: output, load cell and, where it has one, valve, opened, lost, found again and closed.
 
 Their bytes go to the control loop; the output's descriptor goes to the guardian, which writes the last safe voltage to it.
 """
@@ -13,7 +13,7 @@ from gateway.service.running_rig.starting import open_again
 
 
 class RigPorts:
-    """paths: by line, `output` and `load_cell`. hand_over: called with the descriptor of each opened output.
+    """paths: by line, `output`, `load_cell`, `valve`. hand_over: called with the descriptor of each opened output.
 
     loop: to be set before `open`.
     """
@@ -23,6 +23,7 @@ class RigPorts:
     def __init__(self, rig: Rig, paths: dict[str, str], hand_over: Callable[[int], None], log: Log) -> None:
         self._hand_over, self._log = hand_over, log
         self._is_closing = False
+        self.is_guarded = False  # the guardian has the output's descriptor
         self.not_opened: dict[str, PortError] = {}  # after a restart, by path
         self.output = SerialPort(
             paths["output"],
@@ -37,9 +38,22 @@ class RigPorts:
             is_simulated=rig.simulated,
         )
 
+        self.valve: SerialPort | None = None
+        if rig.valve:
+            self.valve = SerialPort(
+                paths["valve"],
+                rig.valve.settings,
+                PortEvents(self._on_valve_bytes, self._on_valve_lost, self._on_valve_open),
+                is_simulated=rig.simulated,
+            )
+
+    @property
+    def _all(self) -> tuple[SerialPort, ...]:
+        return (self.output, self.cell, *((self.valve,) if self.valve else ()))
+
     async def open(self, *, is_restart: bool) -> None:
-        """Open both ports. PortError where one cannot be opened; after a restart such a port is a lost one."""
-        for port in (self.output, self.cell):
+        """Open the ports. PortError where one cannot be opened; after a restart such a port is a lost one."""
+        for port in self._all:
             if not is_restart:
                 await port.open()
             elif error := await open_again(port):
@@ -49,6 +63,8 @@ class RigPorts:
         """Move to where the devices are now: what was lost is opened there."""
         self.output.move(paths["output"])
         self.cell.move(paths["load_cell"])
+        if self.valve:
+            self.valve.move(paths["valve"])
 
     async def write_last(self, safe_frame: bytes) -> None:
         """Write the safe frame, as far as the output takes it, and nothing after it."""
@@ -57,9 +73,9 @@ class RigPorts:
             await self.output.write_last(safe_frame)
 
     def close(self) -> None:
-        """Close both ports."""
-        self.output.close()
-        self.cell.close()
+        """Close all ports."""
+        for port in self._all:
+            port.close()
 
     def write_output(self, data: bytes) -> None:
         """Write a request to the output device."""
@@ -73,16 +89,24 @@ class RigPorts:
             self.cell.flush_input()
             self.cell.write(data)
 
+    def write_valve(self, data: bytes) -> None:
+        """Write a question to the valve's relay."""
+        if self.valve and not self._is_closing:
+            self.valve.flush_input()
+            self.valve.write(data)
+
     def _on_output_bytes(self, chunk: bytes, now_s: float) -> None:
         self.loop.on_output_bytes(chunk, now_s)
 
     def _on_output_open(self, descriptor: int) -> None:
         self._hand_over(descriptor)
+        self.is_guarded = True
         self.loop.on_output_opened()
         self._warn_of_latency(self.output)
 
     def _on_output_lost(self, error: PortError) -> None:
         self._log("port", str(error))
+        self.is_guarded = False
         self.loop.on_output_closed()
 
     def _on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
@@ -95,6 +119,18 @@ class RigPorts:
     def _on_cell_lost(self, error: PortError) -> None:
         self._log("port", str(error))
         self.loop.cell_lost = True
+
+    def _on_valve_bytes(self, chunk: bytes, now_s: float) -> None:
+        self.loop.on_valve_bytes(chunk, now_s)
+
+    def _on_valve_open(self, descriptor: int) -> None:
+        self.loop.on_valve_opened()
+        assert self.valve
+        self._warn_of_latency(self.valve)
+
+    def _on_valve_lost(self, error: PortError) -> None:
+        self._log("port", str(error))
+        self.loop.on_valve_closed()
 
     def _warn_of_latency(self, port: SerialPort) -> None:
         if port.warning:

@@ -1,0 +1,173 @@
+"""The audit in the state directory: `audit/000000000001.jsonl` and so on, each named by the number of its first line.
+
+Lines are only ever added. A full file is left as it is and the next one begun, and the chain goes on in it; of files beyond
+those that are kept the oldest goes, and a line says which lines went and what their last hash was. After each batch, once it is
+on the disk, `audit/head` is replaced: number and hash of the last line. So lines that were cut off at the end are missed, and
+a power cut, after which the files may hold more than the head says but never less, is told apart from that.
+
+What a killed writer has left of a line is cut off at the next start, and the first line after it quotes it. Everything
+here waits for the disk: it runs in a thread beside the loop.
+"""
+
+import contextlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
+from gateway.processes.durable_file import make_directory
+
+FOLDER: Final = "audit"
+HEAD: Final = "head"
+LONGEST_BYTES: Final = 8 << 20
+KEPT: Final = 32
+"""Files, the one that is written among them: 256 MiB, years of a cell's edges and of summaries of its setpoints."""
+_LONGEST_QUOTE: Final = 400
+Fields = Mapping[str, Any]
+
+
+def audit_files(folder: Path) -> list[Path]:
+    """Return the files of the chain, oldest first."""
+    return sorted(path for path in folder.glob("*.jsonl") if path.stem.isdecimal())
+
+
+def read_head(folder: Path) -> ChainEnd | None:
+    """Return what the head says; None where there is none that can be read."""
+    try:
+        fields = json.loads((folder / HEAD).read_text("ascii"))
+        return ChainEnd(int(fields["n"]), str(fields["sha256"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def first_number(path: Path) -> int:
+    """Return the number of a file's first line, which is its name."""
+    return int(path.stem)
+
+
+class AuditFile:
+    """The writer of one state directory; not for two threads at once. `start` before `append`."""
+
+    def __init__(self, state: Path, longest_bytes: int = LONGEST_BYTES, kept: int = KEPT) -> None:
+        self._folder = state / FOLDER
+        self._longest_bytes, self._kept = longest_bytes, kept
+        self._end = ChainEnd()
+        self._descriptor = -1
+        self._good_bytes = 0
+        self._is_open = False
+
+    def append(self, records: Iterable[Fields]) -> None:
+        """Put these records at the end, durably, all or none. OSError when the disk does not take them."""
+        if not self._is_open:
+            self._start()
+        self._add(records)
+        self._rotate_if_full()
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def _start(self) -> None:
+        """Continue the chain that is there: what is torn goes, and a line tells of it."""
+        make_directory(self._folder)
+        files = audit_files(self._folder)
+        found: list[Fields] = []
+        self._end = ChainEnd(first_number(files[-1]) - 1 if files else 0)
+        if files:
+            found = self._continue(files[-1])
+        head = read_head(self._folder)
+        if head and head.number > self._end.number:
+            text = (
+                f"A352 the audit ends with line {self._end.number}, it had {head.number}: lines at its end were removed"
+            )
+            found.append({"what": "chain broken", "text": text})
+            self._end = head  # number and hash that were there: verify finds the gap
+        self._open(self._path_of_next() if not files else files[-1])
+        self._is_open = True
+        if found:
+            self._add(found)
+
+    def _continue(self, path: Path) -> list[Fields]:
+        """Find the end of the chain in its newest file. What is found wrong there comes back as records."""
+        data = path.read_bytes()
+        whole, newline, torn = data.rpartition(b"\n")
+        found: list[Fields] = []
+        if torn:
+            os.truncate(path, len(whole) + len(newline))
+            quote = torn[:_LONGEST_QUOTE].decode("ascii", "backslashreplace")
+            text = f"{len(torn)} bytes of an incomplete line were cut off: a writer was killed, or the power failed"
+            found.append({"what": "torn line", "text": text, "torn": quote})
+        if whole:
+            try:
+                _, self._end = open_line(whole.rpartition(b"\n")[2])
+            except BrokenLine as broken:
+                count = whole.count(b"\n") + 1
+                text = f"A352 {path.name} line {count} {broken}"
+                found.append({"what": "chain broken", "text": text})
+                self._end = ChainEnd(first_number(path) + count - 1, NO_HASH)
+        elif first_number(path) > 1:  # begun, and killed before its first line: the end is in the file before
+            before = audit_files(self._folder)[:-1]
+            return (self._continue(before[-1]) if before else []) + found
+        return found
+
+    def _add(self, records: Iterable[Fields]) -> None:
+        lines, end = [], self._end
+        for fields in records:
+            line, end = seal_line(fields, end)
+            lines.append(line)
+        data = b"".join(lines)
+        try:
+            written = 0
+            while written < len(data):
+                written += os.write(self._descriptor, data[written:])
+            os.fsync(self._descriptor)
+        except OSError:
+            with contextlib.suppress(OSError):  # else the next start cuts it off
+                os.ftruncate(self._descriptor, self._good_bytes)
+            raise
+        self._good_bytes += len(data)
+        self._end = end
+        with contextlib.suppress(OSError):  # an old head is no fault: it promises less than there is
+            self._write_head()
+
+    def _write_head(self) -> None:
+        text = json.dumps({"n": self._end.number, "sha256": self._end.sha256})
+        fresh = self._folder / f"{HEAD}.new"
+        with fresh.open("w", encoding="ascii") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        fresh.replace(self._folder / HEAD)
+
+    def _rotate_if_full(self) -> None:
+        if self._good_bytes < self._longest_bytes:
+            return
+        with contextlib.suppress(OSError):  # the file grows a little longer then
+            self._open(self._path_of_next())
+            self._drop_oldest()
+
+    def _drop_oldest(self) -> None:
+        files = audit_files(self._folder)
+        for path in files[: max(0, len(files) - self._kept)]:
+            try:
+                _, end = open_line(path.read_bytes().rstrip(b"\n").rpartition(b"\n")[2])
+            except BrokenLine:  # somebody has altered it: it stays, as evidence
+                continue
+            text = (
+                f"lines {first_number(path)} to {end.number} were dropped with {path.name}: {self._kept} files are kept"
+            )
+            self._add([{"what": "dropped", "text": text, "dropped_to": end.number, "dropped_sha256": end.sha256}])
+            path.unlink()
+
+    def _path_of_next(self) -> Path:
+        return self._folder / f"{self._end.number + 1:012d}.jsonl"
+
+    def _open(self, path: Path) -> None:
+        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
+        descriptor = os.open(path, flags, 0o600)
+        self.close()
+        self._descriptor, self._good_bytes = descriptor, os.fstat(descriptor).st_size

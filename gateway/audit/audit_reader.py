@@ -1,0 +1,114 @@
+"""Reads the audit of a state directory, and judges its chain from the first line that is kept to the head.
+
+A gateway may be writing meanwhile: a last line without its newline is no fault, and lines beyond the head are those since.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from gateway.audit.audit_file import FOLDER, HEAD, audit_files, first_number, read_head
+from gateway.audit.chain import BrokenLine, ChainEnd, check_link, open_line
+
+
+class AuditBreak(NamedTuple):
+    """The first place where the chain does not hold. line: in its file, from 1; 0 for the file as a whole."""
+
+    file: str
+    line: int
+    text: str
+
+
+class AuditVerdict(NamedTuple):
+    """lines: how many hold, from the first; end: the last of them; notes: what is as it should be, and worth knowing."""
+
+    lines: int
+    end: ChainEnd
+    broken: AuditBreak | None
+    notes: tuple[str, ...] = ()
+
+
+def read_audit(state: Path) -> Iterator[dict[str, Any]]:
+    """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over."""
+    for path in audit_files(state / FOLDER):
+        with path.open("rb") as stream:
+            for line in stream:
+                try:
+                    fields, _ = open_line(line.rstrip(b"\n"))
+                except BrokenLine:
+                    continue
+                yield fields
+
+
+def verify_audit(state: Path) -> AuditVerdict:
+    """Follow the chain to its first break. FileNotFoundError where there is no audit."""
+    folder = state / FOLDER
+    head = read_head(folder)  # before the files, which may grow meanwhile
+    files = audit_files(folder)
+    if not files and head is None:
+        raise FileNotFoundError(folder)
+    walk = _ChainWalk(head)
+    try:
+        for path in files:
+            walk.read(path, is_last=path == files[-1])
+        walk.check_ends(files[0].name if files else FOLDER)
+    except BrokenLine as broken:
+        return AuditVerdict(walk.count, walk.end, AuditBreak(walk.file, walk.line, str(broken)), tuple(walk.notes))
+    return AuditVerdict(walk.count, walk.end, None, tuple(walk.notes))
+
+
+class _ChainWalk:
+    """One way along the chain; raises BrokenLine where it ends, `file` and `line` say where that is."""
+
+    def __init__(self, head: ChainEnd | None) -> None:
+        self.count, self.end = 0, ChainEnd()
+        self.file, self.line = "", 0
+        self.notes: list[str] = []
+        self._head, self._is_head_met = head, False
+        self._begins_after: ChainEnd | None = None
+        self._dropped: set[ChainEnd] = set()
+
+    def read(self, path: Path, *, is_last: bool) -> None:
+        """Follow one file."""
+        self.file, self.line = path.name, 0
+        with path.open("rb") as stream:
+            for line in stream:
+                self.line += 1
+                if line.endswith(b"\n"):
+                    self._take(line[:-1], path)
+                elif is_last:
+                    cause = "a kill, a power cut, or it is being written"
+                    self.notes.append(f"{path.name} ends in an incomplete line ({len(line)} bytes): {cause}")
+                else:
+                    raise BrokenLine("is incomplete, and a file follows")
+
+    def check_ends(self, first_file: str) -> None:
+        """Check that nothing is missing before the first line that is kept, and after the last."""
+        begin = self._begins_after or ChainEnd()
+        if begin.number and begin not in self._dropped:
+            self.file, self.line = first_file, 1
+            raise BrokenLine(f"is number {begin.number + 1}, and no line says that those before it were dropped")
+        self.file, self.line = HEAD, 0
+        if self._head is None:
+            raise BrokenLine("is missing or damaged: lines at the end may have been removed")
+        if not self._is_head_met:
+            raise BrokenLine(
+                f"names line {self._head.number}, the last that is there is {self.end.number}: the end was removed"
+            )
+
+    def _take(self, line: bytes, path: Path) -> None:
+        fields, own = open_line(line)
+        if self._begins_after is None:
+            self._begins_after = self.end = ChainEnd(own.number - 1, str(fields.get("prev")))
+        check_link(fields, self.end)
+        if self.line == 1 and own.number != first_number(path):
+            raise BrokenLine(f"has number {own.number}, its file is named by {first_number(path)}")
+        if self._head and own.number == self._head.number:
+            if own != self._head:
+                raise BrokenLine("is another line than the one that head names: it was written anew")
+            self._is_head_met = True
+        if fields.get("what") == "dropped":
+            dropped_to = fields.get("dropped_to")
+            if isinstance(dropped_to, int):
+                self._dropped.add(ChainEnd(dropped_to, str(fields.get("dropped_sha256"))))
+        self.count, self.end = self.count + 1, own

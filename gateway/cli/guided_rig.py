@@ -1,0 +1,218 @@
+"""`init` at a terminal: asks for both devices, asks the devices themselves, and fills the answers into the starter rig.
+
+Nothing that is asked of a device changes anything (see port_probing). What is left open keeps its mark EDIT. The file is
+checked before it is written, and what does not fit is asked again.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from gateway.cli import port_probing as probing
+from gateway.cli.errors import CliError
+from gateway.cli.starter_rig import starter_rig
+
+if TYPE_CHECKING:
+    from gateway.devices import DeviceProfile
+
+_LATER: Final = "later"
+_OVER: Final = 1.3  # of force_max_n: where the over-force fault trips, unless the cell ends before
+_SATURATION: Final = 0.98  # of the cell's range
+_LEAST_TIMEOUT_S: Final = 0.05  # and of the starter rig
+_TOLERANCE_N: Final = 1.0  # of the starter rig
+_ATTEMPTS: Final = 3  # of answers that check refuses; then the file is written with its faults told
+Settings = dict[tuple[str, str], Any]
+
+
+@dataclass(slots=True)
+class GuidedRig:
+    """Answers so far: (section, key) -> value as the file has it."""
+
+    name: str
+    settings: Settings = field(default_factory=dict)
+
+    def text(self) -> str:
+        """Return the file."""
+        text = starter_rig(self.name)
+        for (section, key), value in self.settings.items():
+            text = set_in(text, section, key, value)
+        return text
+
+
+def ask_rig(name: str) -> str:
+    """Ask a person for a rig at the terminal; return its file."""
+    click.echo("Enter takes what stands in brackets. Nothing is moved: the probe asks only what changes nothing.")
+    rig = GuidedRig(name)
+    _ask_line(rig, "output", "output", "the DAC or pressure regulator")
+    _ask_line(rig, "load_cell", "load cell", "the load-cell amplifier")
+    _ask_forces(rig)
+    for _ in range(_ATTEMPTS):
+        faults = list(faults_of(rig))
+        if not faults:
+            break
+        for path, sentence in faults:
+            click.echo(f"  {path}: {sentence}")
+        if any(path.startswith("limits.") for path, _ in faults):
+            _ask_forces(rig)
+        else:
+            break
+    return rig.text()
+
+
+def _ask_line(rig: GuidedRig, section: str, role: str, what: str) -> None:
+    port = _ask_port(what)
+    device, baud = _ask_device(role, what, port)
+    rig.settings[section, "device"] = device.name
+    rig.settings[section, "baud"] = baud
+    if port != _LATER:
+        rig.settings[section, "port"] = port
+    if role == "output":
+        _ask_watchdog(rig, device)
+    else:
+        _ask_unit(rig, device)
+        _fit_supervision(rig, device, baud)
+
+
+def _ask_port(what: str) -> str:
+    from gateway.ports import list_ports
+
+    ports = [port.path for port in list_ports()]
+    for number, path in enumerate(ports, 1):
+        click.echo(f"  {number}  {path}")
+    answer = click.prompt(f"port of {what}: number, path, or {_LATER}", default="1" if ports else _LATER)
+    return ports[int(answer) - 1] if answer.isdecimal() and 0 < int(answer) <= len(ports) else str(answer)
+
+
+def _ask_device(role: str, what: str, port: str) -> "tuple[DeviceProfile, int]":
+    profiles = {one.name: one for one in (*own_profiles(role), *probing.known_profiles(role))}
+    found: tuple[str, int] | None = None
+    if port != _LATER and click.confirm("ask the device which it is?", default=True):
+        found = _probe(port, list(profiles.values()))
+    default = found[0] if found else ("smc-itv-rc" if role == "output" else "stream-st-gs")
+    click.echo(f"  known: {', '.join(profiles)}")
+    name = click.prompt(
+        f"device profile of {what}", default=default, type=click.Choice(list(profiles)), show_choices=False
+    )
+    device = profiles[name]
+    baud = found[1] if found and found[0] == name else device.serial.baud
+    return device, click.prompt("baud", default=baud, type=int)
+
+
+def _probe(port: str, profiles: "list[DeviceProfile]") -> tuple[str, int] | None:
+    try:
+        report = probing.probe_path(port, profiles)
+    except CliError as error:
+        click.echo(f"  {error.message}")
+        return None
+    for line in probing.tell_report(report):
+        click.echo(f"  {line}")
+    answer = next(iter(report.answers), None)
+    return (answer.profile.name, answer.settings.baud) if answer else None
+
+
+def own_profiles(role: str) -> "Iterator[DeviceProfile]":
+    """Yield the device files of this folder that are of a role and have no fault."""
+    from gateway.profiles import check_file
+
+    for path in sorted((*Path().glob("*.yaml"), *Path().glob("devices/*.yaml"))):
+        if re.search(r"^role:", path.read_text(encoding="utf-8", errors="replace"), re.MULTILINE):
+            checked = check_file(str(path))
+            if checked.kind == "device" and not checked.faults and checked.value.role.value == role:
+                yield checked.value
+
+
+def _ask_watchdog(rig: GuidedRig, device: "DeviceProfile") -> None:
+    if device.own_watchdog:
+        click.echo(f"  {device.name} has a watchdog of its own: armed at {device.own_watchdog.time_s:g} s")
+        rig.settings["", "accept_no_device_watchdog"] = "false"
+        return
+    click.echo(f"  {device.name} has no watchdog: it holds its last voltage when this machine loses power")
+    accepted = click.confirm("does something else help then, such as an air dump valve?", default=False)
+    rig.settings["", "accept_no_device_watchdog"] = "true" if accepted else "true # EDIT: nothing else helps yet"
+
+
+def _ask_unit(rig: GuidedRig, device: "DeviceProfile") -> None:
+    reading = device.reading
+    if reading.newton_per_unit or reading.template.field("unit"):
+        return
+    unit = click.prompt("unit of its numbers", type=click.Choice(["N", "kg", "g", "lb", "counts"]), default="N")
+    if unit != "counts":
+        rig.settings["load_cell", "unit"] = unit
+        return
+    rig.settings["load_cell", "zero_count"] = click.prompt("counts without a force", default=0.0)
+    rig.settings["load_cell", "newton_per_count"] = click.prompt(
+        "newtons of one count", type=click.FloatRange(0, min_open=True)
+    )
+
+
+def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
+    """Bounds that this amplifier can keep: of a slow one a sample is older, of a coarse one a count is larger."""
+    from gateway.profiles.rigs.wire_checks import wire_cycle_s
+    from gateway.units import NEWTON_PER_UNIT
+
+    reading, said = device.reading, rig.settings
+    period_s = max(wire_cycle_s(device, device.serial.at(baud)), 1.0 / reading.rate_hz if reading.rate_hz else 0.0)
+    gap_s = 2.2 * period_s + (device.reply_timeout_s if reading.ask else 0.0)  # one lost answer is no fault
+    said["supervision", "sample_timeout_s"] = f"{max(_LEAST_TIMEOUT_S, gap_s):.2g}"
+    unit = said.get(("load_cell", "unit"), reading.unit)
+    per_unit = NEWTON_PER_UNIT[unit] if unit else said.get(("load_cell", "newton_per_count"), reading.newton_per_count)
+    if per_unit:
+        count_n = reading.step * per_unit
+        said["supervision", "sample_quantum_n"] = f"{count_n:.3g}"
+        if count_n > _TOLERANCE_N:
+            said["defaults", "in_band_tolerance_n"] = f"{2.0 * count_n:.2g}"
+
+
+def _ask_forces(rig: GuidedRig) -> None:
+    positive = click.FloatRange(0, min_open=True)
+    range_n = click.prompt("rated force of the load cell, N", default=98.07, type=positive)
+    most_n = click.prompt(
+        "largest force that tool and workpiece take, N", default=round(0.4 * range_n, 1), type=positive
+    )
+    rig.settings |= {
+        ("load_cell", "range_n"): f"{range_n:g}",
+        ("limits", "force_max_n"): f"{most_n:g}",
+        ("limits", "over_force_n"): f"{min(_OVER * most_n, 0.95 * range_n):.4g}",
+        ("supervision", "saturation_n"): f"{_SATURATION * range_n:.4g}",
+    }
+
+
+def faults_of(rig: GuidedRig) -> Iterator[tuple[str, str]]:
+    """Yield (path, sentence) of what `check` would refuse, apart from ports that are still to come."""
+    from gateway.profiles import check_report
+
+    with TemporaryDirectory(dir=".", prefix=".init-") as folder:  # here, so that devices beside the rig are found
+        for path in own_files():
+            (Path(folder) / path.name).write_bytes(path.read_bytes())
+        file = Path(folder) / f"{rig.name}.yaml"
+        file.write_text(rig.text(), encoding="utf-8")
+        for fault in check_report(file).faults:
+            if not fault.path.endswith(".port"):
+                yield fault.path, fault.message
+
+
+def own_files() -> list[Path]:
+    """Return the YAML files of this folder, which a rig may name."""
+    return [*Path().glob("*.yaml"), *Path().glob("devices/*.yaml")]
+
+
+def set_in(text: str, section: str, key: str, value: Any) -> str:
+    """Return the starter's text with one value written, and its mark EDIT gone; a key that it does not have is added."""
+    lines, inside, end = text.splitlines(), section == "", -1
+    for index, line in enumerate(lines):
+        if re.match(r"\S", line) and not line.startswith("#"):
+            inside = line.startswith(f"{section}:") if section else True
+        head = f"{key}:" if section == "" else f"  {key}:"
+        if inside and line.startswith(head):
+            comment = re.search(r" # (?!EDIT)[^#]*$", line)
+            lines[index] = f"{head} {value}" + (comment[0] if comment and "EDIT" not in comment[0] else "")
+            return "\n".join(lines) + "\n"
+        if inside and section and line.startswith("  "):
+            end = index
+    lines.insert(end + 1, f"  {key}: {value}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,93 @@
+"""The way from the terminal to a gateway by Modbus/TCP Security: Modbus TCP by TLS, with a certificate of one's own."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gateway.cli.errors import CliError
+from gateway.cli.master.wires import TIMEOUT_S, TcpWire
+from gateway.modbus.certificate import KEY_MISMATCH
+from gateway.processes import exit_codes
+
+if TYPE_CHECKING:
+    import socket
+    import ssl
+
+    from pymodbus.client import ModbusTcpClient
+
+_ASK_LOG = "its log (force-gateway events on its machine) says which"
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """Paths of PEM files: the CA that signed the gateway's certificate, and the client's own certificate and key."""
+
+    ca: Path
+    certificate: Path
+    key: Path
+
+
+@dataclass(frozen=True, slots=True)
+class TlsWire(TcpWire):
+    """Modbus TCP by TLS 1.2 or 1.3."""
+
+    files: TlsFiles
+
+    def is_served_by(self, running: dict[str, object]) -> bool:
+        """Decide that it is not known: what a gateway tells of itself is its plain port."""
+        return False
+
+    def connect(self) -> "ModbusTcpClient":
+        """Return a connected client; CliError for files that cannot be used (E171, E172, E174) and for a gateway that
+        is not there or not the one that it should be (E130, E176)."""
+        from pymodbus.client import ModbusTlsClient
+
+        context = self._context()
+        client = ModbusTlsClient(self.host, sslctx=context, port=self.port, timeout=TIMEOUT_S, retries=0)
+        client.socket = self._greet(context, self._open())
+        return client
+
+    def _context(self) -> "ssl.SSLContext":
+        import ssl
+
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        context.minimum_version = ssl.TLSVersion.TLSv1_2
+        for file in (self.files.ca, self.files.certificate, self.files.key):
+            try:
+                file.read_bytes()
+            except OSError as error:
+                raise CliError(f"E171 {file}: {error.strerror or error}", exit_codes.DATA) from None
+        try:
+            context.load_verify_locations(self.files.ca)
+            context.load_cert_chain(self.files.certificate, self.files.key, password=lambda: b"")
+        except (ssl.SSLError, OSError, ValueError) as error:
+            if isinstance(error, ssl.SSLError) and error.reason == KEY_MISMATCH:
+                text = f"E172 {self.files.key} does not fit {self.files.certificate}: take the two made together"
+            else:
+                text = f"E174 {self.files.ca}, {self.files.certificate} or {self.files.key} is no PEM file of its kind"
+            raise CliError(text, exit_codes.DATA) from None
+        return context
+
+    def _greet(self, context: "ssl.SSLContext", plain: "socket.socket") -> "socket.socket":
+        import ssl
+
+        try:
+            return context.wrap_socket(plain, server_hostname=self.host.strip("[]"))
+        except ssl.SSLCertVerificationError as error:
+            why = f"the certificate of {self.where} is not to be trusted: {error.verify_message}"
+            cure = "give --tls the CA that has signed it, and --gateway a name that is in it (certs --host)"
+            raise CliError(f"E176 {why}; {cure}", exit_codes.DEVICE) from None
+        except OSError as error:
+            reason = error.reason if isinstance(error, ssl.SSLError) else error.strerror
+            why = f"no TLS with {self.where}: {(reason or 'the connection ended').lower().replace('_', ' ')}"
+            raise CliError(f"E176 {why}; is this the port of its line `modbus tls`?", exit_codes.DEVICE) from None
+
+    def no_answer(self, unit: int, error: Exception) -> CliError:
+        """Return E176: with TLS 1.3 a client learns with its first request only that its certificate was refused."""
+        from pymodbus.exceptions import ConnectionException
+
+        if isinstance(error, (OSError, ConnectionException)):
+            why = "another CA, expired, no role in it, or revoked"
+            text = f"E176 {self.where} closed the connection: it probably refuses {self.files.certificate} ({why}); {_ASK_LOG}"
+            return CliError(text, exit_codes.DEVICE)
+        return CliError(f"E131 {self.where} did not answer unit {unit} within {TIMEOUT_S:g} s", exit_codes.DEVICE)

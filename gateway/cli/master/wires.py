@@ -1,0 +1,176 @@
+"""The two ways from the terminal to a gateway: Modbus TCP to an address, Modbus RTU on a serial port.
+
+A wire opens itself, because pymodbus does not tell why it could not, and says in the user's words what is wrong with it.
+Imports of pymodbus, sockets and serial ports wait until a request is made: --help needs none of them.
+"""
+
+import os
+from dataclasses import dataclass
+from ipaddress import ip_address
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from gateway.cli.errors import CliError
+from gateway.processes import exit_codes
+
+if TYPE_CHECKING:
+    import socket
+
+    from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+
+    from gateway.devices.line_settings import SerialSettings
+
+TIMEOUT_S: Final = 1.0
+_LONGEST_EXCHANGE_BYTES: Final = 2 * 256
+_LOCAL: Final = "localhost"
+_PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
+
+
+class Wire(Protocol):
+    """Where a gateway is, and how it is reached."""
+
+    @property
+    def where(self) -> str:
+        """The place as messages name it."""
+
+    @property
+    def is_near(self) -> bool:
+        """Decide whether the gateway may be on this machine."""
+
+    def is_served_by(self, running: dict[str, Any]) -> bool:
+        """Decide whether this wire leads to the gateway of this machine that says this of itself."""
+
+    def connect(self) -> "ModbusTcpClient | ModbusSerialClient":
+        """Return pymodbus' client, connected. CliError where that is not possible."""
+
+    def no_answer(self, unit: int, error: Exception) -> CliError:
+        """Return what is told of a request without an answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class TcpWire:
+    """Modbus TCP."""
+
+    host: str
+    port: int
+
+    @property
+    def where(self) -> str:
+        """Host and port."""
+        return f"{self.host}:{self.port}"
+
+    @property
+    def is_near(self) -> bool:
+        """Decide whether the host is this machine's loopback."""
+        try:
+            return self.host == _LOCAL or ip_address(self.host.strip("[]")).is_loopback
+        except ValueError:
+            return False
+
+    def is_served_by(self, running: dict[str, Any]) -> bool:
+        """Decide by the port."""
+        return running.get("port") == self.port
+
+    def connect(self) -> "ModbusTcpClient":
+        """Return a connected client; CliError (E130) without a server."""
+        from pymodbus.client import ModbusTcpClient
+
+        client = ModbusTcpClient(self.host, port=self.port, timeout=TIMEOUT_S, retries=0)
+        client.socket = self._open()
+        return client
+
+    def _open(self) -> "socket.socket":
+        import socket
+
+        try:
+            return socket.create_connection((self.host, self.port), TIMEOUT_S)
+        except OSError as error:
+            raise self._no_connection(error) from None
+
+    def _no_connection(self, error: OSError) -> CliError:
+        import socket
+
+        if isinstance(error, TimeoutError):
+            symptom, probably = f"no answer within {TIMEOUT_S:g} s", "wrong address, or a firewall"
+        elif isinstance(error, socket.gaierror):
+            symptom, probably = "no such host name", "a typo in --gateway"
+        else:
+            symptom, probably = error.strerror or str(error), "not running, or on another port"
+        return CliError(
+            f"E130 no gateway at {self.where}: {symptom}; {probably}. Start one (force-gateway run demo --sim) or give "
+            "--gateway HOST:PORT",
+            exit_codes.DEVICE,
+        )
+
+    def no_answer(self, unit: int, error: Exception) -> CliError:
+        """Return E131: closed, or silent."""
+        from pymodbus.exceptions import ConnectionException
+
+        reset = isinstance(error, (OSError, ConnectionException))
+        cause = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
+        return CliError(
+            f"E131 {self.where} {cause}: not a Modbus server, another unit id, or this machine is not on its allow-list",
+            exit_codes.DEVICE,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class RtuWire:
+    """Modbus RTU on a serial port. settings: as the gateway's face has them."""
+
+    path: str
+    settings: "SerialSettings"
+
+    @property
+    def where(self) -> str:
+        """Path of the port."""
+        return self.path
+
+    @property
+    def is_near(self) -> bool:
+        """Decide that it may be near: the other end of a line is not known."""
+        return True
+
+    @property
+    def _timeout_s(self) -> float:
+        """A second, and what the longest exchange takes at this speed."""
+        return TIMEOUT_S + _LONGEST_EXCHANGE_BYTES * self.settings.character_s
+
+    def is_served_by(self, running: dict[str, Any]) -> bool:
+        """Decide by the path, which both ends have of a pseudo-terminal only."""
+        return os.path.realpath(self.path) in map(os.path.realpath, running.get("serial") or ())
+
+    def connect(self) -> "ModbusSerialClient":
+        """Return a client on the opened port; CliError (E101 to E103) where it does not open."""
+        from pymodbus.client import ModbusSerialClient
+
+        from gateway.ports import PortError
+        from gateway.ports.opening import open_serial
+
+        timeout_s = self._timeout_s
+        try:
+            port = open_serial(self.path, self.settings, timeout_s)
+        except PortError as error:
+            raise CliError(str(error), error.exit_code) from None
+        client = ModbusSerialClient(
+            self.path,
+            baudrate=self.settings.baud,
+            parity=_PARITY[self.settings.parity],
+            stopbits=self.settings.stop_bits,
+            timeout=timeout_s,
+            retries=0,
+        )
+        client.socket = port
+        return client
+
+    def no_answer(self, unit: int, error: Exception) -> CliError:
+        """Return E123: a line is silent for one of few reasons; E102 where the port is gone."""
+        from pymodbus.exceptions import ConnectionException
+
+        if isinstance(error, (OSError, ConnectionException)):
+            return CliError(f"E102 {self.path} disconnected: is the adapter still plugged in?", exit_codes.DEVICE)
+        settings = f"{self.settings} and unit {unit}"
+        return CliError(
+            f"E123 {self.path}: no answer within {self._timeout_s:.2g} s with {settings}: does the gateway's line "
+            "`modbus rtu` say the same (--baud, --parity, --stop-bits, --unit)? Are A and B swapped?",
+            exit_codes.DEVICE,
+        )

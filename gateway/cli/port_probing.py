@@ -1,0 +1,211 @@
+"""What `check --probe`, `ports --listen` and `init` ask of serial ports, and how they tell it."""
+
+import asyncio
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.cli.errors import CliError
+from gateway.processes import exit_codes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from gateway.devices import DeviceProfile
+    from gateway.ports import PortError
+    from gateway.profiles import CellLine, OutputLine, Rig
+    from gateway.profiles.rigs.rig import ValveLine
+    from gateway.service.probing.port_probe import PortReport, ProbeAnswer
+
+    AnyLine = OutputLine | CellLine | ValveLine
+
+HARMLESS: Final = (
+    "asks only what changes nothing: readings, settings as they stand, what a device is; no voltage is written"
+)
+_SLOW_LATENCY_MS: Final = 16
+PATIENCE_S: Final = 0.5  # for a device that was named: a busy machine or a slow adapter is no wrong device
+_LEAST_HZ: Final = 20.0  # what the pneumatics of a force loop need
+
+
+def known_profiles(role: str) -> "list[DeviceProfile]":
+    """Return the shipped device profiles of a role."""
+    from gateway.profiles import list_shipped, load_device
+
+    profiles = [load_device(name) for name in list_shipped("device")]
+    return [one for one in profiles if one.role.value == role]
+
+
+def probe_path(path: str, profiles: "list[DeviceProfile]", patience_s: float = 0.0) -> "PortReport":
+    """Ask one port what is behind it. CliError with the port's own code where it does not open."""
+    from gateway.ports import PortError
+    from gateway.service.probing.port_probe import probe_port
+
+    try:
+        return asyncio.run(probe_port(path, profiles, patience_s=patience_s))
+    except PortError as error:
+        raise port_failure(error) from None
+
+
+def port_failure(error: "PortError") -> CliError:
+    """Return a port's failure as a message of the command line."""
+    return CliError(str(error), error.exit_code)
+
+
+def probe_line(line: "AnyLine") -> "PortReport":
+    """Ask the port of a rig's line: its own device at its own speed first, then at others, then every shipped profile."""
+    assert line.port
+    as_set = replace(line.device, serial=line.settings)
+    report = probe_path(line.port, [as_set], PATIENCE_S)
+    if report.answers:
+        return report
+    others = [one for one in known_profiles(line.device.role.value) if one.name != line.device.name]
+    second = probe_path(line.port, others)
+    second.heard = {**second.heard, **report.heard}
+    return second
+
+
+def is_as_named(line: "AnyLine", report: "PortReport") -> bool:
+    """Decide whether the rig's own device answered at the rig's own speed."""
+    return any(_fits(line, one) for one in report.answers)
+
+
+def _fits(line: "AnyLine", answer: "ProbeAnswer") -> bool:
+    return answer.profile.name == line.device.name and answer.settings.baud == line.baud
+
+
+def tell_report(report: "PortReport", line: "AnyLine | None" = None) -> "Iterator[str]":
+    """Yield lines for people: what answered and how fast, or what was heard instead."""
+    for answer in report.answers:
+        yield from _tell_answer(answer)
+        if line and not _fits(line, answer):
+            cure = f"write device: {answer.profile.name}, baud: {answer.settings.baud}, or exchange the ports"
+            yield f"E113 the rig names {line.device.name} at {line.baud}: {cure}"
+    if not report.answers:
+        yield f"E112 {report.path}: no known device answered; {_tell_heard(report)}"
+    yield from _tell_latency(report)
+
+
+def _tell_answer(answer: "ProbeAnswer") -> "Iterator[str]":
+    from gateway.profiles.rigs.wire_checks import wire_cycle_s
+    from gateway.service.probing.port_probe import show_bytes
+
+    yield f"{answer.profile.name} answers at {answer.settings}: {answer.said}"
+    if answer.profile.set_valve:
+        yield f"  asked {show_bytes(answer.asked)}, heard {show_bytes(answer.heard)}: {answer.took_s * 1e3:.1f} ms"
+        return
+    cycle_s = wire_cycle_s(answer.profile, answer.settings)
+    if not answer.asked:
+        yield f"  streams {show_bytes(answer.heard)}, {answer.rate_hz:.0f} readings/s; the wire carries {1 / cycle_s:.0f}"
+        return
+    yield f"  asked {show_bytes(answer.asked)}, heard {show_bytes(answer.heard)}"
+    wire_s = (len(answer.asked) + len(answer.heard)) * answer.settings.character_s
+    around_s = max(0.0, answer.took_s - wire_s)  # of the device and its adapter
+    talks = 2 if answer.profile.set_voltage else 1
+    possible_hz = 1.0 / (cycle_s + talks * around_s)
+    what = "settings with a reading" if talks == 2 else "readings"
+    slow = f": slower than the {_LEAST_HZ:.0f} that a force loop needs" if possible_hz < _LEAST_HZ else ""
+    yield (
+        f"  a question takes {answer.took_s * 1e3:.1f} ms ({wire_s * 1e3:.1f} ms on the wire alone): about {possible_hz:.0f} "
+        f"{what} a second{slow}; the wire alone would carry {1 / cycle_s:.0f}"
+    )
+
+
+def _tell_heard(report: "PortReport") -> str:
+    from gateway.service.probing.port_probe import show_bytes
+
+    heard = {settings: data for settings, data in report.heard.items() if data}
+    if not heard:
+        return f"not one byte at {', '.join(report.heard)}: power, crossed wires, another port?"
+    settings, data = max(heard.items(), key=lambda one: len(one[1]))
+    return f"{len(data)} bytes at {settings} that no profile understands: {show_bytes(data)}"
+
+
+def _tell_latency(report: "PortReport") -> "Iterator[str]":
+    from gateway.ports.latency import latency_ms
+
+    if report.warning:
+        yield f"W332 {report.warning}"
+    elif (latency := latency_ms(report.path) or 0) >= _SLOW_LATENCY_MS:
+        yield f"W332 {report.path} waits up to {latency} ms before it hands over what it received; 1 ms is usual"
+
+
+def probe_rig(rig: "Rig") -> "Iterator[tuple[str, AnyLine, PortReport]]":
+    """Yield each line of a real rig with what its port answered. CliError for a simulated one."""
+    if rig.simulated or rig.output.port is None or rig.load_cell.port is None:
+        raise CliError(f"E114 rig {rig.name} is simulated: it has no ports to probe", exit_codes.CONFIGURATION)
+    yield "output", rig.output, probe_line(rig.output)
+    yield "load_cell", rig.load_cell, probe_line(rig.load_cell)
+    if rig.valve and rig.valve.port is not None:
+        yield "valve", rig.valve, probe_line(rig.valve)
+
+
+def report_fields(report: "PortReport") -> dict[str, Any]:
+    """Return a probe as JSON."""
+    return {
+        "port": report.path,
+        "answers": [
+            {
+                "device": one.profile.name,
+                "serial": str(one.settings),
+                "baud": one.settings.baud,
+                "said": one.said,
+                "question_s": round(one.took_s, 6),
+                "rate_hz": round(one.rate_hz, 2),
+            }
+            for one in report.answers
+        ],
+        "heard": {settings: len(data) for settings, data in report.heard.items()},
+        "warning": report.warning,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What came through a port by itself: lines for people, fields for programs."""
+
+    lines: tuple[str, ...]
+    fields: dict[str, Any]
+
+
+def listen_at(path: str, seconds: float) -> Heard:
+    """Listen at a port at each usual speed, without sending a byte. CliError where it does not open."""
+    from gateway.devices import SerialSettings
+    from gateway.ports import PortError
+    from gateway.service.probing.port_probe import BAUDS, listen_to_port, show_bytes
+
+    try:
+        report = asyncio.run(listen_to_port(path, [SerialSettings(baud=baud) for baud in BAUDS], seconds))
+    except PortError as error:
+        raise port_failure(error) from None
+    readers = {settings: _readers(data) for settings, data in report.heard.items()}
+    lines = [
+        f"{settings}: {len(data) / seconds:.0f} bytes/s {show_bytes(data)}" + _named(readers[settings], seconds)
+        for settings, data in report.heard.items()
+        if data
+    ]
+    if not lines:
+        lines = [
+            f"silent at {', '.join(map(str, BAUDS))} baud: it may wait to be asked (check RIG --probe), or is not powered"
+        ]
+    elif not any(readers.values()):
+        lines.append("no shipped profile reads this; the speed whose bytes look like text is probably the right one")
+    fields = {
+        "port": path,
+        "heard": [
+            {"serial": settings, "bytes_per_s": round(len(data) / seconds, 1), "devices": readers[settings]}
+            for settings, data in report.heard.items()
+        ],
+    }
+    return Heard((*lines, *_tell_latency(report)), fields)
+
+
+def _readers(data: bytes) -> dict[str, int]:
+    """Streams whose profile reads these bytes, and how many readings they are."""
+    from gateway.service.probing.harmless_questions import count_readings
+
+    streams = [one for one in known_profiles("load cell") if one.stream]
+    counts = {one.name: count_readings(one, data) for one in streams}
+    return {name: count for name, count in counts.items() if count}
+
+
+def _named(readers: dict[str, int], seconds: float) -> str:
+    return "".join(f" - {name}, {count / seconds:.0f} readings/s" for name, count in readers.items())

@@ -1,0 +1,115 @@
+"""`certs`: a test CA, the gateway's certificate and those of its clients, and what to do with them."""
+
+import re
+from pathlib import Path
+from typing import Final
+
+import click
+
+from gateway.cli.errors import CliError
+from gateway.modbus import Role
+from gateway.modbus.certificate import ROLES
+from gateway.processes import exit_codes
+
+_HOSTS: Final = ("localhost", "127.0.0.1")
+_CLIENTS: Final = ("robot:setpoint", "service:calibration", "panel:monitor")
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,62}")
+_TAKEN: Final = ("ca", "gateway")
+
+
+def parse_clients(context: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> dict[str, Role]:
+    """Return name -> role of each NAME:ROLE, for an option's callback."""
+    clients: dict[str, Role] = {}
+    for value in values:
+        name, _, role = value.partition(":")
+        if role not in ROLES:
+            raise click.BadParameter(f"{value} is not NAME:ROLE; roles are {', '.join(ROLES)}")
+        if not _NAME.fullmatch(name) or name in _TAKEN:
+            raise click.BadParameter(f"{name!r} is no name for a client: letters, digits, . _ - (not ca, not gateway)")
+        if name in clients:
+            raise click.BadParameter(f"{name} is there twice: a certificate has one role")
+        clients[name] = ROLES[role]
+    return clients
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False))
+@click.option(
+    "--host",
+    "hosts",
+    multiple=True,
+    metavar="NAME|IP",
+    help=f"The gateway is reached by this  [default: {', '.join(_HOSTS)}]",
+)
+@click.option(
+    "--client",
+    "clients",
+    multiple=True,
+    callback=parse_clients,
+    metavar="NAME:ROLE",
+    help=f"A client and its role: {', '.join(ROLES)}  [default: {', '.join(_CLIENTS)}]",
+)
+@click.option("--days", type=click.IntRange(1, 7300), default=825, show_default=True, help="How long they are valid.")
+def command(*, folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: int) -> None:
+    """Make certificates for Modbus/TCP Security.
+
+    A CA, the gateway's certificate and one per client, with the role in it. Where DIR holds a CA already, it signs further
+    clients. Nothing is overwritten. The CA's key is not protected by a password: for a plant, keep it off the machine.
+    """
+    is_first = not (folder / "ca.crt").exists()
+    if not clients and is_first:
+        clients = parse_clients(click.get_current_context(), click.Option(["--client"]), _CLIENTS)
+    if not is_first and not clients and not hosts:
+        raise click.UsageError(f"{folder} holds a CA already: say with --client NAME:ROLE whom it shall sign for")
+    makes_server = is_first or bool(hosts)
+    _refuse_to_overwrite(folder, [*(["ca"] if is_first else []), *(["gateway"] if makes_server else []), *clients])
+    _make(folder, (hosts or _HOSTS) if makes_server else (), clients, days)
+    _say_next_steps(folder, (hosts or _HOSTS)[0], clients)
+
+
+def _refuse_to_overwrite(folder: Path, names: list[str]) -> None:
+    for path in (folder / f"{name}.{kind}" for name in names for kind in ("crt", "key")):
+        if path.exists():
+            raise CliError(f"E405 {path} exists and was left alone; choose another name or DIR, or remove it first")
+
+
+def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: int) -> None:
+    from gateway.cli import certificates
+
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if (folder / "ca.crt").exists():
+        try:
+            ca = certificates.load_ca(folder)
+        except (OSError, ValueError) as error:
+            sentence = f"E174 the CA in {folder} cannot be used: {error}; another DIR makes a new one"
+            raise CliError(sentence, exit_codes.DATA) from None
+    else:
+        ca = certificates.make_ca(days)
+        certificates.store(ca, folder, "ca")
+    if hosts:
+        certificates.store(certificates.make_server(ca, hosts, days), folder, "gateway")
+    for name, role in clients.items():
+        certificates.store(certificates.make_client(ca, name, role, days), folder, name)
+        click.echo(f"{folder / name}.crt, .key   client {name}, role {role.name.lower()}")
+
+
+def _say_next_steps(folder: Path, host: str, clients: dict[str, Role]) -> None:
+    name = next(iter(clients), "CLIENT")
+    place, address = folder.resolve(), host if host[0].isdigit() else "127.0.0.1"
+    ours = f"certificate: {place}/gateway.crt, key: {place}/gateway.key, ca: {place}/ca.crt"
+    theirs = f"--cert {folder}/{name}.crt --key {folder}/{name}.key"
+    click.echo(
+        f"""
+In the rig file (force-gateway check FILE looks at all of it; beyond loopback it wants `allow: [NETWORK]` too):
+
+fieldbus:
+  - {{type: tls, bind: {address}, port: 8802, {ours}}}
+
+Then try it (port 802 is the standard's, and needs a privilege; 8802 does not):
+
+  force-gateway read force_measured --gateway {host}:8802 --tls {folder}/ca.crt {theirs}
+  openssl s_client -connect {host}:8802 -CAfile {folder}/ca.crt {theirs.replace("--", "-")}
+
+A robot or PLC gets ca.crt, its own .crt and its own .key, nothing else; ca.key stays here, readable by you alone.
+To shut a client out, put its serial number (openssl x509 -noout -serial -in FILE) under `revoked:` of the face."""
+    )

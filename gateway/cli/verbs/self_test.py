@@ -1,0 +1,164 @@
+"""`self-test`: start the rig's self-test by Modbus as a robot does, follow it, and tell the verdict on each item."""
+
+import json
+import sys
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from gateway.cli.errors import CliError
+from gateway.cli.options import gateway_options, json_option
+
+if TYPE_CHECKING:
+    from gateway.cli.master.client import GatewayClient
+    from gateway.cli.master.wires import Wire
+    from gateway.registers import Register
+
+_LOOK_S: Final = 0.05  # a heartbeat with each look: the shortest usual lease is 200 ms
+_LONGEST_S: Final = 30.0
+_PREFIX: Final = "self_test_"
+
+
+@click.command()
+@gateway_options
+@json_option
+def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
+    """Test load cell, force, response and both lines in under 20 s.
+
+    Presses with no more than the rig's self_test.force_n, against whatever the tool touches, and goes back to 0; Ctrl-C ends it
+    sooner. Begins from off or ready with force 0. Exit code 1 when an item failed, or the test did not come to its end.
+
+    Example: force-gateway self-test
+    """
+    from gateway.cli.master.client import GatewayClient
+    from gateway.cli.master.refusal_text import explain_refusals
+    from gateway.profiles import load_register_map
+
+    register_map = load_register_map(map_name)
+    with GatewayClient(wire, unit, register_map) as client:
+        with explain_refusals(client):
+            run = _SelfTest(client)
+        run.begin()
+        try:
+            run.follow(shows=sys.stderr.isatty() and not as_json)
+        except KeyboardInterrupt:
+            run.stop()
+            raise CliError("self-test stopped; the force went to 0") from None
+        with explain_refusals(client):
+            answer = run.answer(wire)
+    _tell(answer, as_json=as_json)
+    if answer["result"] not in ("passed", "warned"):
+        sys.exit(1)
+
+
+class _SelfTest:
+    """One self-test on a gateway, by its registers."""
+
+    def __init__(self, client: "GatewayClient") -> None:
+        register_map = client.register_map
+        found = [one for one in register_map.registers_of("proof") if one.name.startswith(_PREFIX)]
+        if not found:
+            raise CliError(f"map {register_map.name} has no self-test registers")
+        self._client = client
+        self._registers: dict[str, Register] = {one.name.removeprefix(_PREFIX): one for one in found}
+        self._progress = [register_map.find(f"calibration_{word}") for word in ("progress", "time_left")]
+        self._force = register_map.find("force_measured")
+        self._word, self._heartbeat = register_map.find("control_word"), register_map.find("heartbeat")
+        (beat,) = client.read_values([self._heartbeat])
+        self._beat = int(beat.value)
+
+    def begin(self) -> None:
+        """Write the bit, in one request with a new heartbeat."""
+        from gateway.registers.words import ControlBit
+
+        self._write(int(ControlBit.START_SELF_TEST))
+
+    def stop(self) -> None:
+        """End the test: the force goes to 0."""
+        self._write(0)
+
+    def follow(self, *, shows: bool) -> None:
+        """Wait for its end. shows: one line on the terminal, written over and over."""
+        from gateway.registers.words import SelfTestResult
+
+        end_s = time.monotonic() + _LONGEST_S
+        while self._read()["result"] == SelfTestResult.RUNNING:
+            if time.monotonic() > end_s:
+                self.stop()
+                raise CliError(f"the self-test did not end within {_LONGEST_S:g} s; it was stopped")
+            if shows:
+                self._show()
+            time.sleep(_LOOK_S)
+            self._write(None)
+        if shows:
+            click.echo("\r\033[K", nl=False, err=True)
+
+    def answer(self, wire: "Wire") -> dict[str, Any]:
+        """Return result, number and items; each with its numbers where the gateway is on this machine."""
+        values = self._read()
+        number = values.pop("count")
+        names = {name: self._registers[name].values.get(value, "?") for name, value in values.items()}
+        answer: dict[str, Any] = {"result": names.pop("result"), "number": number}
+        answer["items"] = {name: {"verdict": verdict.replace("_", " "), "text": ""} for name, verdict in names.items()}
+        told = _ask_gateway(wire, number)
+        for name, item in answer["items"].items():
+            item["text"] = told.get(name, {}).get("text", "")
+        return answer
+
+    def _read(self) -> dict[str, int]:
+        from gateway.cli.master.refusal_text import explain_refusals
+
+        with explain_refusals(self._client):
+            readings = self._client.read_values(list(self._registers.values()))
+        return {name: int(reading.value) for name, reading in zip(self._registers, readings, strict=True)}
+
+    def _write(self, word: int | None) -> None:
+        from gateway.cli.master.client import Assignment
+        from gateway.cli.master.refusal_text import explain_refusals
+
+        self._beat = (self._beat + 1) % 0x10000
+        assignments = [Assignment(self._heartbeat, self._heartbeat.encode(self._beat))]
+        if word is not None:
+            assignments.insert(0, Assignment(self._word, self._word.encode(word)))
+        with explain_refusals(self._client):
+            frames = self._client.frames(assignments)
+        with explain_refusals(self._client, frames):
+            for frame in frames:
+                self._client.write(frame)
+
+    def _show(self) -> None:
+        from gateway.cli.master.refusal_text import explain_refusals
+
+        with explain_refusals(self._client):
+            progress, left_s, force_n = (one.value for one in self._client.read_values([*self._progress, self._force]))
+        click.echo(
+            f"\rself-test {progress / 10:3.0f} %, {left_s:2.0f} s left, {force_n:6.2f} N\033[K", nl=False, err=True
+        )
+
+
+def _ask_gateway(wire: "Wire", number: int) -> dict[str, Any]:
+    """Return the items as the gateway itself tells them, where it is on this machine."""
+    from gateway.cli.control_socket import ask
+    from gateway.cli.master.local_gateways import sockets_near
+    from gateway.service.supervisor.run_options import default_state_root
+
+    for directory in sockets_near(wire, default_state_root()):
+        try:
+            if wire.is_served_by(ask(directory, {"do": "running"})):
+                told = ask(directory, {"do": "self-test"})
+                return dict(told["items"]) if told["number"] & 0xFFFF == number else {}
+        except CliError:
+            continue
+    return {}
+
+
+def _tell(answer: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps(answer, indent=2))
+        return
+    marks = {"passed": "ok", "warned": "WARN", "failed": "FAIL"}
+    for name, item in answer["items"].items():
+        mark = marks.get(item["verdict"], "-")
+        click.echo(f"{mark:<5} {name.replace('_', ' '):<12} {item['text'] or item['verdict']}")
+    click.echo(f"self-test {answer['number']} {answer['result']}")

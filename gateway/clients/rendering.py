@@ -1,0 +1,44 @@
+"""A client as text: the template of its language, filled in from the exchange table.
+
+The templates lie in templates/, one per language, and hold what a programmer of that machine would write by hand; only lists
+(constants, decoding, tables of texts) are spelled here, by gateway.clients.spellings.
+"""
+
+from importlib.resources import files
+from string import Template
+from typing import Final
+
+from gateway import defaults
+from gateway.clients.exchange import Endpoint, ExchangeTable
+from gateway.clients.spellings import SPELLINGS
+from gateway.profiles import Rig
+from gateway.registers.map.register_map import RegisterMap
+
+TEMPLATES: Final = {
+    "rapid": "rapid.mod",
+    "scl": "simatic.scl",
+    "st": "codesys.st",
+    "urscript": "universal.script",
+    "c": "c.h",
+    "python": "python.txt",
+}
+"""Language -> file of its template."""
+
+LANGUAGES: Final = tuple(TEMPLATES)
+
+
+def render_client(register_map: RegisterMap, language: str, where: Endpoint) -> str:
+    """Return the client's whole text. Raises MissingRegisterError, ValueError for an unknown language."""
+    if language not in TEMPLATES:
+        raise ValueError(f"{language} is not one of {', '.join(LANGUAGES)}")
+    table = ExchangeTable(register_map, where)
+    text = files("gateway.clients").joinpath("templates", TEMPLATES[language]).read_text("utf-8")
+    return Template(text).substitute({**table.values(), **SPELLINGS[language](table)})
+
+
+def endpoint_of(rig: Rig | None) -> Endpoint:
+    """Return where a rig's gateway listens: its plain TCP face; the defaults without a rig."""
+    if rig is None:
+        return Endpoint(defaults.HOST, defaults.MODBUS_PORT, defaults.UNIT_ID)
+    units = rig.network.units
+    return Endpoint(rig.network.bind, rig.network.port, defaults.UNIT_ID if defaults.UNIT_ID in units else units[0])

@@ -1,0 +1,52 @@
+"""URScript: global names, if statements; no exclusive or, so the CRC goes by tables of two bits."""
+
+from gateway.clients.exchange import STATUS_BITS, ExchangeTable
+from gateway.clients.spellings.crc_table import crc_table
+
+
+def spell_urscript(table: ExchangeTable) -> dict[str, str]:
+    """Return the lists of the script."""
+    first, status_first = table.command_span[0], table.status_span[0]
+    control = {name: 1 << bit for bit, name in table.map.find("control_word").bits.items()}
+    shown = {STATUS_BITS.get(name, name): 1 << bit for bit, name in table.map.find("status_word").bits.items()}
+    commit = {f"commit_{name}": number for number, name in table.at("commit_status", "staging").values.items()}
+    named = {name: table.at(name, "status").address for name in ("status_word", "force_measured", "fault_code")}
+    part_a, part_b, part_c = table.parts
+    words, tail = table.command_span[1], table.at("target_slot", "staging").address
+    tail_words = tail - table.at("length", "staging").address + 1
+    return {
+        "command_constants": _globals({f"FG_C_{r.name}": r.address - first for r in table.command}),
+        "status_constants": _globals({f"FG_S_{r.name}": r.address - status_first for r in table.status}),
+        "set_constants": _globals({f"FG_M_{each.name}": each.offset for each in table.model_fields}),
+        "bit_constants": _globals({f"FG_{name}": mask for name, mask in (control | shown | commit).items()}),
+        "command_zeros": _zeros(words),
+        "status_zeros": _zeros(table.status_span[1]),
+        "part_a_zeros": _zeros(part_a),
+        "part_b_zeros": _zeros(part_b),
+        "part_c_zeros": _zeros(part_c),
+        "crc_table": ", ".join(str(value >> 2 * k & 3) for value in crc_table(2) for k in range(16)),
+        "force_measured_counts": str(table.at("force_measured", "status").counts_per_unit),
+        "status_bytes": str(2 * table.status_span[1]),
+        "tail_pdu": str(6 + 2 * tail_words),
+        "tail_bytes": str(2 * tail_words),
+        **{f"at_{name}": str(address) for name, address in named.items()},
+        "fault_cases": _cases(table.texts("fault_code"), "code"),
+        "refusal_cases": _cases(table.texts("refusal_reason"), "reason"),
+        "warning_cases": _cases(table.texts("warning_word"), "bit"),
+        "failing_cases": _cases(table.texts("failing_reason"), "reason"),
+    }
+
+
+def _globals(numbers: dict[str, int]) -> str:
+    return "".join(f"global {name.upper()} = {number}\n" for name, number in numbers.items())
+
+
+def _zeros(count: int) -> str:
+    return ", ".join("0" * count)
+
+
+def _cases(texts: dict[int, str], name: str) -> str:
+    lines = []
+    for k, (number, text) in enumerate(texts.items()):
+        lines += [f"  {'elif' if k else 'if'} {name} == {number}:", f'    return "{text}"']
+    return "\n".join([*lines, "  end"])

@@ -1,0 +1,218 @@
+"""The network part of the page: where the gateway listens, and what to set in an IRC5, an S7, a CODESYS or TwinCAT controller
+and a Universal Robot. Addresses come from the exchange table that the generated clients are made from."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from ipaddress import ip_address
+from typing import Final
+
+from gateway.clients.exchange import Endpoint, ExchangeTable
+from gateway.clients.rendering import endpoint_of
+from gateway.clients.wiring.section import Row, Section
+from gateway.profiles import Rig
+
+_HOLDING: Final = 40001
+"""Name of holding register 0 in S7's MB_MODE 0 and 1."""
+_SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusal_reason")
+"""What a robot wants to see that reads register by register."""
+SHORTEST_TIMER_LEASE_S: Final = 0.3
+"""Three periods of RAPID's shortest cyclic timer, 0.1 s: two lost ones are not a loss of the master."""
+
+
+def network_sections(rig: Rig, called: str) -> Iterator[Section]:
+    """Yield the sections about Modbus TCP. called: the rig in commands. MissingRegisterError where the map lacks what the
+    clients need."""
+    table = ExchangeTable(rig.register_map, _reachable(rig))
+    yield _network(rig, table)
+    for describe, language, file in (
+        (_irc5, "rapid", "ForceGateway.mod"),
+        (_s7, "scl", "ForceGateway.scl"),
+        (_codesys, "st", "ForceGateway.st"),
+        (_universal_robot, "urscript", "force_gateway.script"),
+    ):
+        make = f"force-gateway registers --format {language} --rig {called} > {file}"
+        yield replace(describe(rig, table), commands=(make,))
+        if describe is _s7:
+            yield _s7_requests(table)
+    yield _mbpoll(rig, table)
+
+
+def _reachable(rig: Rig) -> Endpoint:
+    where = endpoint_of(rig)
+    if ip_address(where.host).is_unspecified:
+        return Endpoint("GATEWAY-ADDRESS", where.port, where.unit)
+    return where
+
+
+def _network(rig: Rig, table: ExchangeTable) -> Section:
+    network, where, lease_s = rig.network, table.where, rig.control.supervision.lease_s
+    sentences = ["Ethernet cable to the robot's or PLC's network (IRC5: WAN, LAN or service port)."]
+    if not network.plain:
+        sentences = ["Plain Modbus TCP is off in this rig (network.plain: false): none of what follows can connect."]
+    elif ip_address(network.bind).is_loopback:
+        sentences.append(
+            f"This rig listens on {network.bind} only: no robot can reach it. Set network.bind to this machine's address on "
+            "the cell's network, and network.allow to the networks that may connect."
+        )
+    if network.require_byte_order_echo:
+        echo = table.map.find("byte_order_echo").address
+        sentences.append(
+            f"Before the first enable write 1234.5 to byte_order_echo: words 16#449A, 16#5000 to address {echo} "
+            f"(4{echo + 1:04d}); the generated clients do not do it by themselves."
+        )
+    allowed = ", ".join(map(str, network.allow)) or "nobody but this machine"
+    rows = (
+        ("what", "value"),
+        ("address", f"{where.host}:{where.port}, TCP"),
+        ("unit ids", ", ".join(map(str, network.units))),
+        ("may connect", allowed),
+        ("owner", network.owner or "the first master that commands, until it lets go"),
+        (
+            "lease",
+            "none: a command lasts until the next one" if lease_s is None else f"{lease_s:g} s without a new heartbeat",
+        ),
+        (
+            "upload of models",
+            "allowed" if network.allow_plain_upload else "refused on plain TCP (W211): allow_plain_upload",
+        ),
+        (
+            "byte order",
+            "echo of 1234.5 is demanded before enable" if network.require_byte_order_echo else "ABCD, not demanded",
+        ),
+    )
+    return Section("Network: Modbus TCP", tuple(sentences), rows)
+
+
+def _irc5(rig: Rig, table: ExchangeTable) -> Section:
+    where, lease_s = table.where, rig.control.supervision.lease_s
+    timer = "any lease" if lease_s is None else f"lease {lease_s:g} s"
+    if lease_s is not None and lease_s < SHORTEST_TIMER_LEASE_S:
+        timer += f": too short for a timer of 0.1 s; use the task, or set lease_s to {SHORTEST_TIMER_LEASE_S:g} or more"
+    rows = (
+        ("what", "value"),
+        ("options", "616-1 PC Interface (sockets); 623-1 Multitasking for the background task"),
+        ("module", "ForceGateway.mod, from the command below"),
+        ("FG_HOST, FG_PORT, FG_UNIT", f'"{where.host}", {where.port}, {where.unit}'),
+        ("task", "T_FORCE, Type SemiStatic, Main entry FgServe, TrustLevel NoSafety; every FG_CYCLE 0.04 s"),
+        ("without 623-1", f"FgTimerStart in T_ROB1, every 0.1 s ({timer})"),
+    )
+    return Section("ABB IRC5: RAPID sockets", rows=rows)
+
+
+def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
+    """Yield (what, is it a write, address, words) of every request that a client makes."""
+    (command, words), (status, status_words) = table.command_span, table.status_span
+    part_a, part_b, part_c = table.parts
+    first, length = table.at("order", "staging").address, table.at("length", "staging").address
+    tail = table.at("target_slot", "staging").address - length + 1
+    yield "status", False, status, status_words
+    yield "command, when something has changed", True, command, words
+    yield "heartbeat alone", True, table.at("heartbeat", "command").address, 1
+    yield "model: order, rising branch", True, first, part_a
+    yield "model: falling branch, force limits", True, first + part_a, part_b
+    yield "model: reversal, response", True, table.at("slip_stops", "staging").address, part_c
+    yield "model: length, CRC-32, slot", True, length, tail
+    yield "model: commit", True, table.at("commit", "staging").address, 1
+    yield "model: commit_status", False, table.at("commit_status", "staging").address, 3
+
+
+def _s7(rig: Rig, table: ExchangeTable) -> Section:
+    where = table.where
+    octets = where.host.split(".")
+    shown = f"ADDR[1] .. ADDR[4] = {', '.join(octets)}" if len(octets) == 4 else where.host
+    rows = (
+        ("CONNECT (TCON_IP_v4)", "value"),
+        ("InterfaceId", "64: PROFINET interface X1 (see the CPU's system constants)"),
+        ("ID", "1, or any other that is free in the CPU, 1 .. 4095"),
+        ("ConnectionType", "16#0B (TCP)"),
+        ("ActiveEstablished", "TRUE"),
+        ("RemoteAddress", shown),
+        ("RemotePort", str(where.port)),
+        ("LocalPort", "0"),
+        (
+            "MB_Unit_ID",
+            f"{255 if 255 in rig.network.units else where.unit}: static of the MB_CLIENT instance, 255 as it comes",
+        ),
+        ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
+    )
+    return Section("Siemens S7-1200/1500: connection of MB_CLIENT", rows=rows)
+
+
+def _s7_requests(table: ExchangeTable) -> Section:
+    rows: list[Row] = [
+        ("request", "MB_MODE", "MB_DATA_ADDR", "MB_DATA_LEN", "or MB_MODE", "with MB_DATA_ADDR", "function")
+    ]
+    for what, writes, address, words in _requests(table):
+        function = 6 if writes and words == 1 else 16 if writes else 3
+        numbers = (int(writes), _HOLDING + address, words, 100 + function, address)
+        rows.append((what, *map(str, numbers), f"FC{function:02d}"))
+    once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR."
+    other = "The second pair of MB_MODE and MB_DATA_ADDR counts from 0, and needs an MB_CLIENT that has it (S7-1200: FW 4.2)."
+    return Section("Siemens S7-1200/1500: requests", (once, other), tuple(rows))
+
+
+def _codesys(rig: Rig, table: ExchangeTable) -> Section:
+    where, (command, words), (status, status_words) = table.where, table.command_span, table.status_span
+    rows = (
+        ("what", "TwinCAT 3: FB_MBReadWriteRegs", "CODESYS V3: ClientRequestReadWriteMultipleRegisters"),
+        ("address", f"sIPAddr '{where.host}', nTCPPort {where.port}", f"ClientTCP: aIPaddr, uiPort {where.port}"),
+        ("unit", f"nUnitID {where.unit}", f"uiUnitId {where.unit}"),
+        (
+            "write",
+            f"nMBWriteAddr {command}, nWriteQuantity {words}",
+            f"uiWriteStartItem {command}, uiWriteQuantity {words}",
+        ),
+        (
+            "read",
+            f"nMBReadAddr {status}, nReadQuantity {status_words}",
+            f"uiReadStartItem {status}, uiReadQuantity {status_words}",
+        ),
+        ("library", "Tc2_ModbusSrv, TF6250 on the controller", "ModbusFB"),
+    )
+    return Section("TwinCAT 3 and CODESYS V3", rows=rows)
+
+
+def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
+    where = table.where
+    slave = 255 if 255 in rig.network.units else where.unit
+    by_script = (
+        "By script (recommended: all words and reasons): a Script node in BeforeStart with the file made below, then"
+    )
+    own = "By the robot's own Modbus client: Installation, Fieldbus, Modbus; one 16-bit register per signal, slave address"
+    sentences = [f"{by_script} `fg_run = run fg_thread()`.", f"{own} {slave}, 20 Hz or more for the heartbeat."]
+    if where.port != 502:
+        sentences.append(
+            f"It asks port 502 always, and this rig listens on {where.port}: set network.port to 502 (force-gateway explain "
+            "E120), or use the script."
+        )
+    if 255 not in rig.network.units:
+        sentences.append("Its slave address is 255 unless you change it per signal, and this rig does not answer 255.")
+    rows = [("signal", "type", "address", "functions")]
+    outputs, inputs = ("control_word", "force_setpoint", "heartbeat"), _SHOWN
+    rows += [(name, "register output", str(table.at(name, "command").address), "FC03, then FC06") for name in outputs]
+    rows += [(name, "register input", str(table.at(name, "status").address), "FC04") for name in inputs]
+    return Section("Universal Robots", tuple(sentences), tuple(rows))
+
+
+def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
+    where, network = table.where, rig.network
+    unit = "" if where.unit == 1 else f" -a {where.unit}"
+    base = f"mbpoll -1 -p {where.port}{unit}"
+    (command, _), (status, words) = table.command_span, table.status_span
+    lines = [f"{base} -r {status + 1} -c {words} {where.host}    # status, int16"]
+    for block in rig.register_map.blocks:
+        if "status" in block.repeats:
+            order = " -B" if block.word_order == "abcd" else ""
+            first = block.repeats["status"] + 2 * (table.at("force_measured", "status").address - status)
+            lines.append(f"{base} -t 4:float{order} -r {first + 1} {where.host}    # force_measured in N, {block.name}")
+    sentences = ["-r counts from 1: register 1 is address 0."]
+    force_n = min(12.0, rig.control.limits.force_max_n)
+    counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
+    endpoint = f"{where.host}:{where.port}"
+    if rig.control.supervision.lease_s is not None or network.owner or network.require_byte_order_echo:
+        sentences.append("mbpoll keeps no heartbeat, so it cannot hold a force here: `hold` does.")
+        lines.append(f"force-gateway hold {force_n:g} --gateway {endpoint}    # enable, heartbeat; Ctrl-C ramps to 0")
+    else:
+        lines.append(f"{base} -r {command + 1} {where.host} 1 {counts}    # enable, {force_n:.2f} N, and it lasts")
+    lines.append(f"{base} -r {command + 1} {where.host} 0    # disable: safe voltage")
+    return Section("mbpoll, to try it", tuple(sentences), commands=tuple(lines))

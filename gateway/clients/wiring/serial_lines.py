@@ -1,0 +1,75 @@
+"""The wires of the page: a section per line to a device, and one per further face where masters ask."""
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+from gateway.clients.wiring.device_wires import GENERAL, RS485, wires_of
+from gateway.clients.wiring.section import Section
+from gateway.profiles import Rig
+from gateway.profiles.rigs.faces import RtuFace, TlsFace
+
+
+def serial_sections(rig: Rig) -> Iterator[Section]:
+    """Yield a section per device line of the rig, and one per face of its `fieldbus`."""
+    for name, line in _lines(rig):
+        yield _device_section(name, line)
+    for place, face in enumerate(rig.fieldbus, start=1):
+        if isinstance(face, RtuFace):
+            yield _face_section(place, face)
+        else:
+            yield _tls_section(place, face)
+
+
+def _lines(rig: Rig) -> Iterator[tuple[str, object]]:
+    """Yield (name, line) for all that a rig has: output, load cell, and whatever else is a line to a device."""
+    for each in fields(rig):
+        line = getattr(rig, each.name)
+        if hasattr(line, "device") and hasattr(line, "settings"):
+            yield each.name.replace("_", " "), line
+
+
+def _device_section(name: str, line: object) -> Section:
+    device, settings, port = getattr(line, "device"), getattr(line, "settings"), getattr(line, "port")  # noqa: B009
+    wires = wires_of(device.name, is_modbus=device.is_modbus)
+    address = device.constants.get("address")
+    rows = [
+        ("what", "value"),
+        ("device", f"{device.name}: {device.description}"),
+        ("port", port or "simulated: no wire"),
+        ("line", f"{settings}" + (f", address {address}" if address is not None else "")),
+        ("interface", wires.interface),
+        *(("wires", text) for text in (*GENERAL[wires.interface], *wires.terminals)),
+        *(("switches", text) for text in wires.switches or ("none documented here: see the device's manual",)),
+        ("source", wires.source or "general rules of the interface; terminal numbers are in the device's manual"),
+        ("certainty", f"{device.hardware} (language: {device.certainty})"),
+    ]
+    return Section(f"Serial line: {name}", rows=tuple(rows))
+
+
+def _face_section(place: int, face: RtuFace) -> Section:
+    parity = face.parity if face.port else "none"  # a pseudo-terminal has none
+    port = face.port or "a pseudo-terminal, which `run` names when it is ready"
+    rows = (
+        ("what", "value"),
+        ("port", port),
+        ("line", f"{face.settings}, unit {face.unit}"),
+        *(("wires", text) for text in GENERAL[RS485]),
+        ("master", "Modbus RTU master of the PLC or robot, 8 data bits, the same settings; one owner per serial face"),
+    )
+    options = f"-m rtu -b {face.baud} -P {parity} -s {face.stop_bits} -a {face.unit}"
+    commands = (
+        f"mbpoll -1 {options} -r 101 -c 32 MASTER-PORT    # on the machine at the other end, with its own port",
+    )
+    return Section(f"Serial face {place}: Modbus RTU, masters ask here", rows=rows, commands=commands)
+
+
+def _tls_section(place: int, face: TlsFace) -> Section:
+    rows = (
+        ("what", "value"),
+        ("address", f"{face.bind}:{face.port}, Modbus/TCP Security (TLS 1.2 or 1.3)"),
+        ("may connect", ", ".join(map(str, face.allow)) or "nobody but this machine"),
+        ("gateway's files", f"{face.certificate}, {face.key}"),
+        ("masters need", f"a certificate signed by {face.ca}, with a role: setpoint to command, calibration to upload"),
+        ("not for", "the generated clients, which speak plain Modbus TCP: for masters with TLS of their own"),
+    )
+    return Section(f"Face {place}: Modbus/TCP Security", rows=rows)

@@ -1,0 +1,102 @@
+"""E: what keeps a face from being served, or a master (a client verb, too) from being answered. The verb has ended."""
+
+from typing import Final
+
+from gateway import defaults
+from gateway.codes.explanation import Explanation
+
+FACE_ERRORS: Final = (
+    Explanation(
+        "E120",
+        "the Modbus port needs a right",
+        "Listening on a port below 1024 (Modbus' own is 502) was refused.",
+        "Linux gives these ports to programs with the capability net_bind_service only.",
+        f"Use --bind HOST:{defaults.MODBUS_PORT}, or run it as a service with AmbientCapabilities=CAP_NET_BIND_SERVICE.",
+    ),
+    Explanation(
+        "E121",
+        "the Modbus port cannot be opened",
+        "Listening on the wanted address failed.",
+        "Another program (an earlier gateway?) listens there, or the address is not one of this machine.",
+        "ss -ltnp shows who listens; --bind 127.0.0.1:0 takes any free port.",
+    ),
+    Explanation(
+        "E122",
+        "an open address without an allow-list",
+        "The gateway is to listen on an address that others can reach, and nobody said who may connect.",
+        "`bind:` was changed and `allow:` was not; plain Modbus has no password, so the list is the only door.",
+        "Put the robot's network under network.allow in the rig file, e.g. 192.168.125.0/24.",
+    ),
+    Explanation(
+        "E123",
+        "no answer on the serial line",
+        "A request was written to the port, and no whole answer came in time.",
+        "Baud, parity or unit id are not the gateway's, A and B are swapped, no Modbus RTU face is on this line, or two "
+        "masters speak at once.",
+        "Compare --baud, --parity and --unit with the line `modbus rtu` that the gateway prints when it is ready.",
+    ),
+    Explanation(
+        "E124",
+        "a port for masters that the rig uses",
+        "`run --rtu PORT` names the port of one of the rig's devices, or of one of its faces.",
+        "The wrong adapter, or two names of one: by-id names and /dev/ttyUSB0 lead to the same port.",
+        "Give masters an adapter of their own; force-gateway ports lists what is plugged in.",
+    ),
+    Explanation(
+        "E125",
+        "an address without plain Modbus TCP",
+        "`run --bind` was given, and the rig's file switches plain Modbus TCP off.",
+        "network.plain is false: masters come in by the faces of `fieldbus` only.",
+        "Leave --bind out, or write network.plain: true.",
+    ),
+    Explanation(
+        "E130",
+        "no gateway there",
+        "Nothing accepted the connection.",
+        "The gateway is not running, listens on another address or port, or a firewall is between.",
+        "Compare --gateway with the `modbus tcp` line of the gateway's banner.",
+    ),
+    Explanation(
+        "E131",
+        "connected, but no Modbus answer",
+        "The connection was accepted, and no answer came within a second, or one that is not Modbus.",
+        "Another program listens there, the allow-list of the gateway closes your connection, or its unit id is "
+        "another.",
+        "Check port and --unit; the rig's network.allow must contain this machine's address.",
+    ),
+    Explanation(
+        "E171",
+        "certificate or key cannot be read",
+        "A file of a TLS connection is missing, or this user may not read it.",
+        "A path that counts from another place (a rig file's count from that file), or files that belong to root.",
+        "ls -l the path in the message; force-gateway certs DIR makes files to begin with.",
+    ),
+    Explanation(
+        "E172",
+        "private key of another certificate, or open to all",
+        "The key does not belong to the certificate, or everybody on this machine can read it.",
+        "Files of two runs were mixed, or copied without their mode.",
+        "Take the .crt and .key that were made together; chmod 600 the key.",
+    ),
+    Explanation(
+        "E173",
+        "server certificate outside its days",
+        "The gateway's own certificate has expired, or is not yet valid: no client would accept it.",
+        "It was made long ago, or this machine's clock is wrong.",
+        "date shows the clock; make a new one (force-gateway certs) and give it to the rig file.",
+    ),
+    Explanation(
+        "E174",
+        "no certificate or key in a file",
+        "A file of a TLS connection is not what it should be: PEM text with BEGIN CERTIFICATE or BEGIN PRIVATE KEY.",
+        "Two paths were swapped, the file is DER or PKCS #12, or its key has a password.",
+        "openssl x509 -in FILE -noout -text, or openssl pkey -in FILE -noout, says what it is.",
+    ),
+    Explanation(
+        "E176",
+        "no TLS connection to the gateway",
+        "The handshake failed, or the gateway closed the connection right after it.",
+        "The port is the plain one; the gateway's certificate is of another CA or for another name; or it refuses yours.",
+        "force-gateway events on the gateway's machine says why it refuses (W240 to W245).",
+    ),
+)

@@ -1,0 +1,124 @@
+"""What the readings of a self-test say, as numbers: pure functions of (seconds, N) pairs in the order of time."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import ceil, sqrt
+from statistics import fmean, median
+from typing import Final, NamedTuple
+
+Trace = Sequence[tuple[float, float]]
+
+MEAN_S: Final = 0.3  # of readings for the force of a level
+_RATE_S: Final = 0.1  # of neighbouring windows, whose difference is a rate
+_STILL_N: Final = 0.05  # between neighbouring windows: less is no rise
+_NOT_REACHED: Final = 0.1  # of a step: standard error of a mean that is two thirds of the step away from where it began
+_MOST_SMOOTHED: Final = 30
+_SMOOTHED: Final = 3  # readings whose mean is compared with a level: one spike is no crossing
+_SAME_N: Final = 1.0e-9  # two readings nearer than this are equal but for arithmetic
+_MISSED: Final = 1.75  # median intervals from which on a message is missing
+
+
+class Slope(NamedTuple):
+    """Of a line through readings. error: its standard error by the noise around the line."""
+
+    n_per_s: float
+    error_n_per_s: float
+
+
+class Intervals(NamedTuple):
+    """Of the times of readings. missing: messages that did not come, by the median interval."""
+
+    median_s: float
+    longest_s: float
+    missing: int
+
+
+def mean_n(trace: Trace) -> float:
+    """Return the mean force."""
+    return fmean(force_n for _, force_n in trace)
+
+
+def noise_n(trace: Trace) -> float:
+    """Return the standard deviation by what neighbouring readings differ: a slow drift counts little. 0 for fewer than two."""
+    if len(trace) < 2:
+        return 0.0
+    return sqrt(sum((b - a) ** 2 for (_, a), (_, b) in pairwise(trace)) / (2.0 * (len(trace) - 1)))
+
+
+def count_n(trace: Trace) -> float:
+    """Return the smallest difference between unlike readings, N: one count of the amplifier; 0 where all are equal."""
+    steps = pairwise(sorted(force_n for _, force_n in trace))
+    return min((b - a for a, b in steps if b - a > _SAME_N), default=0.0)
+
+
+def is_constant(trace: Trace) -> bool:
+    """Decide whether all readings are the same."""
+    return count_n(trace) == 0.0
+
+
+def last(trace: Trace, seconds: float) -> Trace:
+    """Return the readings of the last seconds."""
+    first = len(trace)
+    while first and trace[first - 1][0] > trace[-1][0] - seconds:
+        first -= 1
+    return trace[first:]
+
+
+def fit_slope(trace: Trace) -> Slope:
+    """Return the least-squares line's slope; 0 with 0 error for fewer than three readings."""
+    if len(trace) < 3:
+        return Slope(0.0, 0.0)
+    mid_s, mid_n = fmean(at_s for at_s, _ in trace), mean_n(trace)
+    spread = sum((at_s - mid_s) ** 2 for at_s, _ in trace)
+    slope = sum((at_s - mid_s) * (force_n - mid_n) for at_s, force_n in trace) / spread
+    left = sum((force_n - mid_n - slope * (at_s - mid_s)) ** 2 for at_s, force_n in trace)
+    return Slope(slope, sqrt(left / (len(trace) - 2) / spread))
+
+
+def time_to_share_s(trace: Trace, from_n: float, to_n: float, share: float, noise_n: float) -> float:
+    """Return the seconds until the force has done this share of the way; the last time where it has not.
+
+    The mean of so many readings is compared that noise alone does not reach the level; the time is that of the middle one."""
+    level_n = from_n + share * (to_n - from_n)
+    smoothed = max(_SMOOTHED, min(_MOST_SMOOTHED, ceil((noise_n / (_NOT_REACHED * (to_n - from_n))) ** 2)))
+    for k in range(smoothed, len(trace) + 1):
+        window = trace[k - smoothed : k]
+        if (mean_n(window) - level_n) * (to_n - from_n) >= 0.0:
+            return fmean(at_s for at_s, _ in window)
+    return trace[-1][0] if trace else 0.0
+
+
+def still_rises(trace: Trace, noise_n: float) -> bool:
+    """Decide whether neighbouring windows at the end differ by more than their noise, upwards."""
+    now, before = _neighbours(trace, MEAN_S)
+    if not now or not before:
+        return False
+    error_n = noise_n * sqrt(1.0 / len(now) + 1.0 / len(before))
+    return mean_n(now) - mean_n(before) > max(_STILL_N, 3.0 * error_n)
+
+
+def rate_n_per_s(trace: Trace) -> float:
+    """Return how fast the force rises at the end of the trace, N/s; 0 where it does not, or nobody knows."""
+    now, before = _neighbours(trace, _RATE_S)
+    return max(0.0, mean_n(now) - mean_n(before)) / _RATE_S if now and before else 0.0
+
+
+def _neighbours(trace: Trace, seconds: float) -> tuple[Trace, Trace]:
+    """The last window, and the one before it."""
+    now, both = last(trace, seconds), last(trace, 2.0 * seconds)
+    return now, both[: len(both) - len(now)]
+
+
+def readings_to_know(noise_n: float, within_n: float) -> int:
+    """Return how many readings' mean is known to within_n, to three standard errors."""
+    return max(_SMOOTHED, min(_MOST_SMOOTHED, ceil((3.0 * noise_n / within_n) ** 2)))
+
+
+def intervals_of(times_s: Sequence[float]) -> Intervals:
+    """Return how regularly readings came; zeros for fewer than two."""
+    steps = [b - a for a, b in pairwise(times_s)]
+    if not steps:
+        return Intervals(0.0, 0.0, 0)
+    usual_s = median(steps)
+    missing = sum(round(step / usual_s) - 1 for step in steps if step > _MISSED * usual_s) if usual_s > 0.0 else 0
+    return Intervals(usual_s, max(steps), missing)

@@ -1,0 +1,55 @@
+"""Both ends of the line from a Modbus load-cell amplifier: weight, sign and health out of the registers of one answer."""
+
+from gateway.devices.binary.weight_registers import FORCE, RegisterBit, WeightRegisters, word_name
+from gateway.devices.fields import Value, ValueRefused
+from gateway.devices.messages import Quality
+from gateway.devices.profile import DeviceProfile
+from gateway.devices.template_codecs.cell import TemplateCellDevice, TemplateCellHost
+
+
+def _registers(profile: DeviceProfile) -> WeightRegisters:
+    registers = profile.reading.modbus
+    assert registers  # the profile was checked for it
+    return registers
+
+
+def _is_set(bit: RegisterBit, values: dict[str, Value]) -> bool:
+    return bool(int(values[word_name(bit.register)]) >> bit.bit & 1)
+
+
+class ModbusCellHost(TemplateCellHost):
+    """See roles.CellHost."""
+
+    def __init__(self, profile: DeviceProfile, sign: int = 1, unit: str | None = None) -> None:
+        super().__init__(profile, sign, unit)
+        self._registers = _registers(profile)
+
+    def _raw(self, values: dict[str, Value]) -> float:
+        weight = float(values[FORCE]) / 10.0**self._registers.decimals
+        negative = self._registers.negative
+        return -weight if negative and _is_set(negative, values) else weight
+
+    def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
+        if any(_is_set(bit, values) for bit in self._registers.overload):
+            return Quality.OVERLOAD
+        return Quality.UNSTABLE if any(_is_set(bit, values) for bit in self._registers.unstable) else Quality.OK
+
+
+class ModbusCellDevice(TemplateCellDevice):
+    """See roles.CellDevice."""
+
+    def __init__(self, profile: DeviceProfile, unit: str | None = None) -> None:
+        super().__init__(profile, unit)
+        self._registers = _registers(profile)
+
+    def _tell_registers(self, values: dict[str, Value], quality: Quality) -> None:
+        registers, raw = self._registers, float(values[FORCE])
+        weight = round(raw * 10.0**registers.decimals) if not registers.type.startswith("float") else raw
+        if abs(raw) > registers.largest_shown or (weight < 0 and not registers.is_signed):
+            raise ValueRefused(f"{raw} is more than the amplifier shows")
+        values[FORCE] = abs(weight) if registers.negative else weight
+        bits = [registers.negative] if registers.negative and weight < 0 else []
+        bits += list(registers.overload[:1]) if quality is Quality.OVERLOAD else []
+        bits += list(registers.unstable[:1]) if quality is Quality.UNSTABLE else []
+        for bit in bits:
+            values[word_name(bit.register)] = int(values[word_name(bit.register)]) | 1 << bit.bit

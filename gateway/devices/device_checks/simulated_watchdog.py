@@ -1,0 +1,38 @@
+"""The watchdog in a simulated device: armed, fed, tripped and cleared as the profile says, in the time that it is given."""
+
+from math import inf
+from typing import Final
+
+from gateway.devices.device_checks.watchdog import Watchdog, WatchdogState
+from gateway.devices.messages import DeviceStep
+
+_SWITCHED_OFF: Final = ((DeviceStep.DISARM, WatchdogState.ARMED), (DeviceStep.CLEAR, WatchdogState.TRIPPED))
+
+
+class SimulatedWatchdog:
+    """state: as the device would tell it; ticks: the time that it was armed with."""
+
+    def __init__(self, profile: Watchdog) -> None:
+        self._profile = profile
+        self.state = WatchdogState.OFF
+        self.ticks = 0
+        self._due_s = inf
+
+    def elapse(self, now_s: float) -> bool:
+        """Let time pass; return whether it trips now."""
+        if self.state is not WatchdogState.ARMED or now_s < self._due_s:
+            return False
+        self.state = WatchdogState.TRIPPED
+        return True
+
+    def feed(self, now_s: float) -> None:
+        """Note that the host is alive."""
+        self._due_s = now_s + self.ticks * self._profile.tick_s
+
+    def do(self, step: DeviceStep, ticks: int | None, now_s: float) -> None:
+        """Follow a sentence of the host; ticks: the time that it carries."""
+        if step is DeviceStep.ARM and ticks is not None and self.state is not WatchdogState.TRIPPED:
+            self.state, self.ticks = WatchdogState.ARMED, ticks
+            self.feed(now_s)
+        elif (step, self.state) in _SWITCHED_OFF:
+            self.state = WatchdogState.OFF

@@ -1,0 +1,157 @@
+"""Both ends of the line from a load-cell amplifier whose readings are templates: a stream, or answers to polls.
+
+The frame's own unit counts, so kilograms never pass for newtons. Blanks instead of digits are an overload whatever the
+status word says: a display that shows nothing has no valid reading, and saturation counts as over-force.
+"""
+
+from math import isfinite, isnan, nan
+
+from gateway.devices.binary.rtu_framing import quiet_s
+from gateway.devices.device_checks.spelling import CheckSpelling
+from gateway.devices.device_checks.watchdog import WatchdogState
+from gateway.devices.exchange import FORCE, STATUS, UNIT, ForceReading
+from gateway.devices.fields import Choice, Field, Text, Value, ValueRefused
+from gateway.devices.framing import Line
+from gateway.devices.grammar import Grammar
+from gateway.devices.messages import ForceSample, Garbage, Quality, RepeatedSample
+from gateway.devices.profile import DeviceProfile
+from gateway.units import NEWTON_PER_UNIT
+
+
+def _own_unit(reading: ForceReading) -> str | None:
+    """The unit that the device is set to: the profile's, else the first that its frames can say."""
+    unit_field = reading.template.field(UNIT)
+    return reading.unit or (unit_field.words[0] if isinstance(unit_field, Choice) else None)
+
+
+def newton_per_unit(profile: DeviceProfile, unit: str | None) -> float:
+    """Return the force of one unit of the device's numbers, N. ValueError where neither profile nor rig says it."""
+    unit = unit or _own_unit(profile.reading)
+    per_unit = NEWTON_PER_UNIT[unit] if unit else profile.reading.newton_per_count
+    if per_unit is None:
+        raise ValueError(
+            f"{profile.name} does not say its unit: the rig must, as unit, or newton_per_count for raw counts"
+        )
+    return per_unit
+
+
+def _nothing(field: Field) -> Value:
+    """What the simulated device says in a field that is not the force: a reader drops it."""
+    if isinstance(field, Choice):
+        return field.words[0]
+    return "-" if isinstance(field, Text) else 0
+
+
+def _question(grammar: Grammar, reading: ForceReading) -> bytes:
+    """What asks for a reading, with the sentence ahead of it; empty for a stream."""
+    texts = filter(None, (reading.before, reading.ask)) if reading.ask else ()
+    return b"".join(grammar.question_line(grammar.encode(text)) for text in texts)
+
+
+class TemplateCellHost:
+    """See roles.CellHost. sign -1: the wiring shows a push as negative. unit: only where frames leave it out."""
+
+    def __init__(self, profile: DeviceProfile, sign: int = 1, unit: str | None = None) -> None:
+        self._grammar = Grammar(profile)
+        self._reading = profile.reading
+        if unit and self._reading.template.field(UNIT):
+            raise ValueError(f"{profile.name} says its unit in each frame: the rig's unit ({unit}) is one too many")
+        self._newton_per_unit = newton_per_unit(profile, unit)
+        self._sign = sign
+        self._lines = self._grammar.answers()
+        self.resolution_n = self._reading.step * self._newton_per_unit
+        self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
+
+    def poll(self) -> bytes:
+        """Return the question for one sample, empty for a cell that streams."""
+        return _question(self._grammar, self._reading)
+
+    def forget(self) -> None:
+        """Drop half a frame: what comes next belongs to another stream."""
+        self._lines.forget()
+
+    def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
+        """Return the samples and the garbage that these bytes complete. now_s: time of their arrival."""
+        return [self._sample(line, now_s) for line in self._lines.feed(chunk)]
+
+    def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage | RepeatedSample:
+        values = self._grammar.read(self._reading.frame, self._grammar.body(line), self._reading.may_be_blank)
+        if values is None:
+            return Garbage(line.data)
+        raw = self._raw(values)
+        quality = self._quality(raw, values)
+        if quality is Quality.REPEATED:
+            return RepeatedSample()
+        return ForceSample(raw, self._newtons(raw, values), quality, now_s)
+
+    def _raw(self, values: dict[str, Value]) -> float:
+        """The number of the device, in its own unit."""
+        return float(values[FORCE])
+
+    def _newtons(self, raw: float, values: dict[str, Value]) -> float:
+        per_unit = NEWTON_PER_UNIT[str(values[UNIT])] if UNIT in values else self._newton_per_unit
+        return self._sign * (raw - self._reading.zero_count) * per_unit
+
+    def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
+        end = self._reading.end_count
+        if isnan(raw) or (end is not None and abs(raw) >= end):
+            return Quality.OVERLOAD
+        return self._reading.quality[str(values[STATUS])] if STATUS in values else Quality.OK
+
+
+class TemplateCellDevice:
+    """See roles.CellDevice. unit: the rig's, where neither frame nor profile says one."""
+
+    def __init__(self, profile: DeviceProfile, unit: str | None = None) -> None:
+        self._grammar = Grammar(profile)
+        self._reading = profile.reading
+        self._unit = unit or _own_unit(self._reading) or "N"
+        self._newton_per_unit = newton_per_unit(
+            profile, unit or (None if self._reading.newton_per_count else self._unit)
+        )
+        self._around = {field.name: _nothing(field) for field in self._reading.template.fields}
+        self._lines = self._grammar.questions()
+        self._checks, self._answers = CheckSpelling(self._grammar), b""
+
+    def receive(self, chunk: bytes, now_s: float) -> int:
+        """Return how many questions these bytes complete."""
+        if not self._reading.ask:
+            return 0
+        bodies = [self._grammar.body(line) for line in self._lines.feed(chunk)]
+        for body in bodies:
+            if asked := self._checks.asked(body):
+                self._answers += self._grammar.line(self._checks.reply(asked.step, WatchdogState.OFF, 0))
+        ask = self._grammar.encode(self._reading.ask)
+        return sum(body == ask for body in bodies)
+
+    def take_answers(self) -> bytes:
+        """Return the answers to questions that are none for a reading, such as for its identity; each once."""
+        answers, self._answers = self._answers, b""
+        return answers
+
+    def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
+        """Return the frame that shows this force, or overload where the display is too small for it."""
+        raw = force_n / self._newton_per_unit + self._reading.zero_count
+        if quality is not Quality.OVERLOAD and isfinite(raw) and abs(raw) <= self._reading.largest_shown:
+            try:
+                return self._encode_frame(raw, quality)
+            except ValueRefused:  # more digits than the display has
+                pass
+        return self._encode_frame(nan if self._reading.blank_is_overload else self._largest(), Quality.OVERLOAD)
+
+    def _largest(self) -> float:
+        """The largest number that the display can show: what a grammar without blanks says at overload."""
+        return self._reading.largest_shown
+
+    def _encode_frame(self, raw: float, quality: Quality) -> bytes:
+        values: dict[str, Value] = {**self._around, **self._grammar.profile.constants, UNIT: self._unit}
+        values[FORCE] = round(raw, self._reading.decimals) if isfinite(raw) else raw
+        word = self._reading.word(quality)
+        if word is not None:
+            values[STATUS] = word
+        if self._reading.modbus:
+            self._tell_registers(values, quality)
+        return self._grammar.line(self._reading.template.encode(values, self._reading.may_be_blank))
+
+    def _tell_registers(self, values: dict[str, Value], quality: Quality) -> None:
+        """Put sign, decimals and health of a Modbus device into its registers: see ModbusCellDevice."""

@@ -1,0 +1,91 @@
+"""The files of a TLS face made into a context, and what is said of a handshake that failed.
+
+TLS 1.2 and 1.3 only; both sides show a certificate of the one CA. No renegotiation. A resumed session (TLS 1.2 tickets, which
+cost no memory; TLS 1.3 gives none out) shows the certificate of the first handshake: its days, its serial and its role are
+judged at each connection anew (`certificate_refusal`), so that resumption is no way around them.
+"""
+
+import ssl
+from dataclasses import dataclass, field
+from typing import Final
+
+from gateway.fieldbus.settings import ServerSettings
+from gateway.modbus.certificate import ROLES, PeerCertificate
+
+HANDSHAKE_S: Final = 5.0
+MOST_PENDING: Final = 8
+HANDSHAKES_PER_S: Final = 20.0
+"""Of one address; each costs the control loop about a millisecond of processor. Loopback is exempt."""
+_EXPIRED, _NOT_YET = 10, 9  # X509_V_ERR_CERT_HAS_EXPIRED, X509_V_ERR_CERT_NOT_YET_VALID
+_PURPOSE: Final = 26
+_NOT_TLS: Final = (
+    "HTTP_REQUEST",
+    "WRONG_VERSION_NUMBER",
+    "HTTPS_PROXY_REQUEST",
+    "BAD_RECORD_TYPE",
+    "UNEXPECTED_MESSAGE",
+)
+_TOO_OLD: Final = ("UNSUPPORTED_PROTOCOL", "VERSION_TOO_LOW", "NO_SHARED_CIPHER", "TLSV1_ALERT_PROTOCOL_VERSION")
+
+
+@dataclass(frozen=True, slots=True)
+class TlsSettings:
+    """certificate, key, ca: paths of PEM files; revoked: serial numbers in upper-case hex that are refused."""
+
+    server: ServerSettings
+    certificate: str
+    key: str
+    ca: str
+    revoked: frozenset[str] = field(default_factory=frozenset)
+
+
+def make_context(settings: TlsSettings) -> ssl.SSLContext:
+    """Return the server's context. OSError or ssl.SSLError for files that cannot be used."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.verify_mode = ssl.CERT_REQUIRED
+    context.num_tickets = 0
+    context.options |= ssl.OP_NO_RENEGOTIATION | ssl.OP_NO_COMPRESSION
+    context.load_cert_chain(settings.certificate, settings.key)
+    context.load_verify_locations(settings.ca)
+    return context
+
+
+def certificate_refusal(shown: PeerCertificate, revoked: frozenset[str], now: str) -> str | None:
+    """Return why this certificate may not connect, as a sentence with its code; None: it may. now: as its times."""
+    who = f"the certificate of {shown.name!r}"
+    if not shown.begins <= now <= shown.ends:
+        return f"W241 {who} is valid from {shown.begins} to {shown.ends}, now is {now}"
+    if shown.serial in revoked:
+        return f"W245 {who} (serial {shown.serial}) is revoked in the rig file"
+    if not shown.name:
+        return "W242 the certificate has no common name: nobody could say who owns the setpoint"
+    known = ", ".join(ROLES)
+    if shown.role is None:
+        return f"W242 {who} names no role: make one with force-gateway certs --client NAME:ROLE (ROLE: {known})"
+    if shown.role not in ROLES:
+        return f"W242 {who} names the role {shown.role!r}, known are {known}"
+    return None
+
+
+def handshake_failure(error: ssl.SSLError) -> str:
+    """Return what a failed handshake was about, as a sentence with its code."""
+    reason = error.reason or ""
+    if isinstance(error, ssl.SSLCertVerificationError):
+        if error.verify_code in (_EXPIRED, _NOT_YET):
+            state = "has expired" if error.verify_code == _EXPIRED else "is not yet valid"
+            return f"W241 its certificate {state} (or its clock, or ours, is wrong): make a new one"
+        if error.verify_code == _PURPOSE:
+            return "W240 its certificate is not one for a client (a server's?)"
+        return f"W240 its certificate is not of our CA ({error.verify_message}): make one with the same CA"
+    if reason == "PEER_DID_NOT_RETURN_A_CERTIFICATE":
+        return "W240 it showed no certificate: give the client its certificate and key"
+    if reason in _NOT_TLS:
+        return "W244 it does not speak TLS: choose Modbus/TCP Security in the client, or the plain port"
+    if reason in _TOO_OLD:
+        return "W244 it offers TLS 1.1 or older, or no cipher of ours: TLS 1.2 or 1.3 is needed"
+    if "ALERT" in reason:
+        return (
+            f"W240 it refused our certificate ({reason.lower()}): give the client our CA, and the name it connects to"
+        )
+    return f"W244 the handshake failed: {reason.lower() or error}"

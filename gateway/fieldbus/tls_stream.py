@@ -1,0 +1,237 @@
+"""TLS between a socket and a Modbus connection, which does not know of it.
+
+Towards the socket this is a protocol, towards the connection a transport. The handshake is OpenSSL's with memory on both sides,
+so that each end of it is seen here: why it failed, how long it has lasted, how many are under way. asyncio's own TLS tells a
+server nothing of handshakes that fail, and has no bound for their number. What is left of a failed one is nothing.
+"""
+
+import asyncio
+import ssl
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final, cast
+
+from gateway.fieldbus.connection import Connection, ServerState
+from gateway.fieldbus.peers import address_of
+from gateway.fieldbus.rate_limits import RequestRate
+from gateway.fieldbus.tls_settings import (
+    HANDSHAKE_S,
+    HANDSHAKES_PER_S,
+    MOST_PENDING,
+    certificate_refusal,
+    handshake_failure,
+)
+from gateway.modbus.certificate import ROLES, read_certificate
+from gateway.modbus.peer import Peer
+
+_BUFFER_BYTES: Final = 4096
+
+
+@dataclass(slots=True)
+class Handshakes:
+    """What all connections of one TLS face share. utc: the time of now as certificates have it (YYYYMMDDHHMMSSZ)."""
+
+    context: ssl.SSLContext
+    revoked: frozenset[str]
+    utc: Callable[[], str]
+    pending: set["TlsStream"] = field(default_factory=set)
+    rates: dict[str, RequestRate] = field(default_factory=dict)
+
+    def refusal(self, host: str, now_s: float) -> str | None:
+        """Return why no further handshake may begin; None: it may."""
+        if len(self.pending) >= MOST_PENDING:
+            return f"{MOST_PENDING} handshakes are under way, the most allowed"
+        if address_of(host).is_loopback:
+            return None
+        rate = self.rates.setdefault(host, RequestRate(HANDSHAKES_PER_S, now_s))
+        if rate.wait_s(now_s) > 0.0:
+            return f"more than {HANDSHAKES_PER_S:g} handshakes a second"
+        rate.spend()
+        return None
+
+    def sweep(self, now_s: float) -> None:
+        """Cut handshakes that last too long, and forget who has been quiet."""
+        for stream in tuple(self.pending):
+            stream.sweep(now_s)
+        for host in [host for host, rate in self.rates.items() if rate.is_full(now_s)]:
+            del self.rates[host]
+
+
+class TlsStream(asyncio.BufferedProtocol):
+    """Made for each accepted socket."""
+
+    def __init__(self, shared: ServerState, handshakes: Handshakes) -> None:
+        self._shared, self._handshakes = shared, handshakes
+        self._buffer = bytearray(_BUFFER_BYTES)
+        self._view = memoryview(self._buffer)
+        self._connection: Connection | None = None
+        self._is_paused = self._is_closing = False
+
+    # -- towards the socket
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin the handshake, unless this peer may not."""
+        shared, now_s = self._shared, self._shared.clock.time()
+        self._socket = cast(asyncio.Transport, transport)
+        self._peername = transport.get_extra_info("peername")
+        self._began_s = now_s
+        if self._peername is None or shared.closing:
+            self._socket.abort()
+            return
+        host = str(address_of(self._peername[0]))
+        self.peer = Peer(host, self._peername[1])
+        if (refusal := shared.peers.refusal(host)) is not None:
+            self._refuse("refused", f"W230 {self.peer}: {refusal}")
+            return
+        if (refusal := self._handshakes.refusal(host, now_s)) is not None:
+            self._refuse("handshake", f"W243 {self.peer}: {refusal}")
+            return
+        self._incoming, self._outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        self._tls = self._handshakes.context.wrap_bio(self._incoming, self._outgoing, server_side=True)
+        self._handshakes.pending.add(self)
+
+    def get_buffer(self, _size_hint: int) -> memoryview:
+        """Lend the socket this stream's own buffer."""
+        return self._view
+
+    def buffer_updated(self, size: int) -> None:
+        """Take encrypted bytes on."""
+        if self._is_closing:
+            return
+        self._incoming.write(self._view[:size])
+        if self._connection is None:
+            self._shake_hands()
+        if self._connection is not None:
+            self._deliver()
+
+    def pause_writing(self) -> None:
+        """Tell the connection that its answers are not read; before there is one, cut the peer."""
+        if self._connection is not None:
+            self._connection.pause_writing()
+        else:
+            self.abort()
+
+    def resume_writing(self) -> None:
+        """Pass: whoever was told to pause has closed."""
+
+    def connection_lost(self, error: Exception | None) -> None:
+        """Give everything back."""
+        self._is_closing = True
+        self._handshakes.pending.discard(self)
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.connection_lost(error)
+
+    def sweep(self, now_s: float) -> None:
+        """Cut a handshake that lasts too long."""
+        if now_s - self._began_s >= HANDSHAKE_S:
+            self._refuse("handshake", f"W243 {self.peer}: the handshake was not finished within {HANDSHAKE_S:g} s")
+
+    # -- towards the connection
+
+    def get_extra_info(self, name: str, default: Any = None) -> Any:
+        """Return what is known of the far end: `peername`, and as `modbus_peer` who its certificate says that it is."""
+        return self.peer if name == "modbus_peer" else self._peername if name == "peername" else default
+
+    def set_write_buffer_limits(self, high: int) -> None:
+        """Set what the socket may hold."""
+        self._socket.set_write_buffer_limits(high=high)
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, encrypted."""
+        if self._is_closing:
+            return
+        try:
+            self._tls.write(data)
+        except ssl.SSLError:  # the far end has broken the protocol meanwhile
+            self.abort()
+            return
+        self._flush()
+
+    def pause_reading(self) -> None:
+        """Stop taking bytes on."""
+        self._is_paused = True
+        self._socket.pause_reading()
+
+    def resume_reading(self) -> None:
+        """Take on what waits, then what comes."""
+        self._is_paused = False
+        self._deliver()
+        if not self._is_paused and not self._is_closing:
+            self._socket.resume_reading()
+
+    def close(self) -> None:
+        """Say goodbye and close, once what was written is sent."""
+        if self._is_closing:
+            return
+        self._is_closing = True
+        try:
+            self._tls.unwrap()
+        except ssl.SSLError:  # the far end need not answer the goodbye
+            pass
+        self._flush()
+        self._socket.close()
+
+    def abort(self) -> None:
+        """Cut the connection."""
+        self._is_closing = True
+        self._handshakes.pending.discard(self)
+        self._socket.abort()
+
+    # -- between the two
+
+    def _shake_hands(self) -> None:
+        try:
+            self._tls.do_handshake()
+        except ssl.SSLWantReadError:
+            self._flush()
+            return
+        except ssl.SSLError as error:
+            self._flush()  # the alert that says why
+            self._fail(handshake_failure(error))
+            return
+        self._flush()
+        try:
+            shown = read_certificate(self._tls.getpeercert(binary_form=True) or b"")
+        except ValueError as error:
+            self._fail(f"W240 {error}")
+            return
+        if (refusal := certificate_refusal(shown, self._handshakes.revoked, self._handshakes.utc())) is not None:
+            self._fail(refusal)
+            return
+        self._handshakes.pending.discard(self)
+        self.peer = Peer(self.peer.host, self.peer.port, shown.name, ROLES[str(shown.role)])
+        connection = self._connection = Connection(self._shared)
+        connection.connection_made(cast(asyncio.Transport, self))
+
+    def _deliver(self) -> None:
+        """Hand decrypted bytes to the connection, until there are none or it pauses."""
+        while not self._is_paused and not self._is_closing and (connection := self._connection) is not None:
+            buffer = connection.get_buffer(-1)
+            try:
+                size = cast(int, self._tls.read(len(buffer), cast(bytearray, buffer)))
+            except ssl.SSLWantReadError:
+                break
+            except ssl.SSLError:  # a goodbye, or garbage: nothing more will come
+                self.close()
+                return
+            if not size:
+                self.close()
+                return
+            connection.buffer_updated(size)
+        self._flush()
+
+    def _flush(self) -> None:
+        if self._outgoing.pending:
+            self._socket.write(self._outgoing.read())
+
+    def _fail(self, sentence: str) -> None:
+        code, _, text = sentence.partition(" ")
+        self._shared.log(f"handshake {code}", f"{code} {self.peer}: {text}", self._shared.clock.time())
+        self._is_closing = True
+        self._handshakes.pending.discard(self)
+        self._socket.close()
+
+    def _refuse(self, cause: str, sentence: str) -> None:
+        self._shared.log(cause, sentence, self._shared.clock.time())
+        self.abort()

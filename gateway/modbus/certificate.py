@@ -1,0 +1,101 @@
+"""What a certificate says of a peer of Modbus/TCP Security: name, role, number and days. Bytes (DER) in, values out.
+
+The role is the extension 1.3.6.1.4.1.50316.802.1, a UTF8String (MODBUS/TCP Security Protocol Specification, V36).
+TLS has verified signature, chain and days before anybody asks here, so this reads the few places that it needs and no more.
+Own code, because the control process must stay small: cryptography's x509 adds 13 MB to it, this nothing.
+"""
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from gateway.modbus.peer import Role
+
+ROLE_OID: Final = "1.3.6.1.4.1.50316.802.1"
+ROLES: Final = {role.name.lower(): role for role in Role}
+"""What the extension may say."""
+KEY_MISMATCH: Final = "KEY_VALUES_MISMATCH"
+"""What OpenSSL says of a private key that is another certificate's."""
+_ROLE_OID_BYTES: Final = bytes.fromhex("2b060104018389 0c8622 01".replace(" ", ""))
+_COMMON_NAME_BYTES: Final = bytes.fromhex("550403")
+_UTF8, _UTC_TIME, _BMP = 0x0C, 0x17, 0x1E
+_VERSION, _EXTENSIONS = 0xA0, 0xA3
+
+
+class PeerCertificate(NamedTuple):
+    """name: the subject's common name; role: what the extension says, None without one; serial: in hex, as `openssl x509
+    -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the times do."""
+
+    name: str
+    role: str | None
+    serial: str
+    begins: str
+    ends: str
+
+
+def read_certificate(der: bytes) -> PeerCertificate:
+    """Return what a certificate says. ValueError for bytes that are none."""
+    try:
+        return _read_certificate(der)
+    except (IndexError, ValueError) as error:
+        raise ValueError(f"not a certificate ({error})") from None
+
+
+def encode_role(role: Role) -> bytes:
+    """Return the value of the role extension: a DER UTF8String."""
+    text = role.name.lower().encode()
+    return bytes((_UTF8, len(text))) + text
+
+
+def _read_certificate(der: bytes) -> PeerCertificate:
+    (_, whole), *_ = _parts(der)
+    (_, signed), *_ = _parts(whole)
+    fields = [part for part in _parts(signed) if part[0] != _VERSION]
+    serial, _, _, validity, subject = (body for _, body in fields[:5])
+    begins, ends = (_time(tag, body) for tag, body in _parts(validity))
+    extensions = next((body for tag, body in fields[5:] if tag == _EXTENSIONS), b"")
+    number = f"{int.from_bytes(serial, 'big'):X}"
+    return PeerCertificate(
+        _common_name(subject), _role(extensions), number.zfill(len(number) + len(number) % 2), begins, ends
+    )
+
+
+def _parts(der: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield (tag, content) of each element. ValueError for lengths that do not fit."""
+    at = 0
+    while at < len(der):
+        tag, length, at = der[at], der[at + 1], at + 2
+        if length & 0x80:
+            count = length & 0x7F
+            if not 1 <= count <= 4:
+                raise ValueError("a length that no certificate has")
+            length, at = int.from_bytes(der[at : at + count], "big"), at + count
+        if at + length > len(der):
+            raise ValueError("it ends too early")
+        yield tag, der[at : at + length]
+        at += length
+
+
+def _time(tag: int, body: bytes) -> str:
+    """UTCTime has two digits of the year: below 50 they are 20.. (RFC 5280, section 4.1.2.5.1)."""
+    text = body.decode("ascii")
+    return text if tag != _UTC_TIME else ("20" if text < "50" else "19") + text
+
+
+def _common_name(subject: bytes) -> str:
+    name = ""
+    for _, relative in _parts(subject):
+        for _, pair in _parts(relative):
+            (_, kind), (tag, value) = _parts(pair)
+            if kind == _COMMON_NAME_BYTES:
+                name = value.decode("utf-16-be" if tag == _BMP else "utf-8")
+    return name
+
+
+def _role(extensions: bytes) -> str | None:
+    for _, listed in _parts(extensions):
+        for _, extension in _parts(listed):
+            (_, kind), *rest = _parts(extension)
+            if kind == _ROLE_OID_BYTES:
+                (tag, value), *_ = _parts(rest[-1][1])
+                return value.decode("utf-8") if tag == _UTF8 else ""
+    return None

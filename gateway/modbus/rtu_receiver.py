@@ -1,0 +1,253 @@
+"""From the bytes on a serial line to the requests for one unit: a server's ear on an RTU bus. No port, no clock.
+
+On the wire 3.5 characters of silence end a frame. A program cannot see that silence truly: USB adapters hand over what they
+have every 1 to 16 ms, so that a frame comes in two pieces with a pause between them, and two frames with their silence
+come as one piece. So silence only says when to look; what is a frame, its length and its checksum say. Decisions:
+
+- Nothing is executed before the line has been silent for 3.5 characters since the last read: the answer must wait that long
+  anyway, and what follows a request may show that its master has given up.
+- A frame whose length is known and that is incomplete gets 20 ms for its rest, unless a whole one begins after a silence.
+- Everything on the bus is followed, requests to other units and their answers too, each skipped as a whole: what is inside
+  of a frame is never taken for a request, whatever it looks like. An answer to FC03 is longer than its request, one to FC16
+  shorter, and read as a request either would swallow what comes after it.
+- What is no frame is noise. A frame behind noise counts after a silence that was seen; else only where nothing but whole
+  frames follow up to the next silence, and where it cannot lie inside of what the noise may have been the beginning of: by its
+  first three bytes a frame of another unit that was heard on this line. One or two bytes are no such beginning: a line
+  without bias puts them before each frame. In doubt nothing is done, for a master asks again.
+- Only the last frame is answered: behind an older request its master, or another slave, has spoken since. It is executed all
+  the same, as on TCP.
+- An adapter may hear itself: rtu_echo.
+
+Source: "MODBUS over Serial Line Specification and Implementation Guide V1.02", sections 2.2, 2.4 and 2.5.1.
+"""
+
+from typing import Final, NamedTuple
+
+from gateway.modbus.crc import checksum_end, crc16
+from gateway.modbus.pdu import DIAGNOSTICS
+from gateway.modbus.rtu import (
+    BROADCAST_UNIT,
+    LARGEST_UNIT,
+    LONGEST_ADU,
+    SHORTEST_ADU,
+    answer_length,
+    has_answer_length,
+    has_request_length,
+    is_broadcast_function,
+    request_length,
+)
+from gateway.modbus.rtu_echo import RtuEcho
+
+SPLIT_S: Final = 0.02
+"""Longest pause inside of a frame: 16 ms is the slowest adapter's (FTDI as it comes), and a little for the machine."""
+MOST_BYTES: Final = 512
+"""Held without a silence: twice the longest frame. What comes before is dropped, unless frames can be made out in it."""
+
+_STRAY_BYTES: Final = 2  # before or behind a request: a line that floats makes one or two
+_DIAGNOSTICS_BYTES: Final = 8  # the usual FC08: a sub-function with one word
+
+
+def silence_s(baud: int, character_s: float) -> float:
+    """Return the silence that ends a frame: 3.5 characters, above 19200 baud 1.75 ms."""
+    return 1.75e-3 if baud > 19200 else 3.5 * character_s
+
+
+class RtuRequest(NamedTuple):
+    """A request for this unit or for all. is_answered: false for a broadcast, and where others have spoken since."""
+
+    unit: int
+    pdu: bytes
+    is_answered: bool
+
+
+class RtuReceiver:
+    """What one unit hears. receive() what has arrived, then take() when deadline_s has come; tell note_sent() each answer.
+
+    frames, noise_bytes: heard so far, foreign frames included. may_echo: false where the line cannot give our answers back.
+    """
+
+    __slots__ = (
+        "_burst", "_echo", "_last_s", "_marks", "_silence_s", "_unit", "_units", "_wait_s", "frames", "noise_bytes",
+    )  # fmt: skip
+
+    def __init__(self, unit: int, baud: int, character_s: float, *, may_echo: bool = True) -> None:
+        self._unit = unit
+        self._units: set[int] = set()  # others that were heard on this line
+        self._silence_s = silence_s(baud, character_s)
+        self._burst = bytearray()
+        self._marks: list[int] = []  # places in the burst that a visible silence lies before
+        self._last_s = 0.0
+        self._wait_s = self._silence_s
+        self._echo = RtuEcho(character_s, self._silence_s, may_echo=may_echo)
+        self.frames = 0
+        self.noise_bytes = 0
+
+    @property
+    def deadline_s(self) -> float | None:
+        """Time at which `take` has something to decide, if nothing arrives before; None: the line is silent."""
+        return self._last_s + self._wait_s if self._burst else None
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Append what has arrived by now."""
+        if self._burst and now_s - self._last_s >= self._silence_s:
+            self._marks.append(len(self._burst))
+        self._burst += data
+        self._last_s, self._wait_s = now_s, self._silence_s
+        if len(self._burst) > MOST_BYTES:
+            self._shorten()
+
+    def take(self, now_s: float) -> list[RtuRequest]:
+        """Return the requests that the silence has ended, in order; none while more may belong to the last one."""
+        if not self._burst or now_s < self._last_s + self._wait_s:
+            return []
+        longest_s = max(SPLIT_S, self._silence_s)
+        is_final = self._wait_s >= longest_s  # not by the time alone: a program that was late first reads what has come
+        found, noise, pending = self._scan(is_final=is_final)
+        is_waiting = pending > (_STRAY_BYTES if any(self._is_ours(at) for at, _ in found) else 0)
+        if is_waiting and not is_final:
+            self._wait_s = longest_s
+            return []
+        requests = self._requests(found)
+        self.frames += len(found)
+        self.noise_bytes += noise
+        self._drop(len(self._burst))
+        return requests
+
+    def note_sent(self, request: RtuRequest, answer: bytes, now_s: float) -> None:
+        """Expect an answer (the whole frame) back on a line that hears itself."""
+        self._echo.expect(answer, now_s, is_like_request=answer[1:-2] == request.pdu)
+
+    def forget(self) -> None:
+        """Forget what has arrived: the port was lost."""
+        self._drop(len(self._burst))
+        self._echo.forget()
+        self._units.clear()
+
+    def _drop(self, count: int) -> None:
+        del self._burst[:count]
+        self._marks = [mark - count for mark in self._marks if mark > count]
+        self._wait_s = self._silence_s
+
+    def _shorten(self) -> None:
+        """Drop the frames that can be made out, then what is older than the longest frame."""
+        at = 0
+        while at < len(self._burst) and (size := self._frame_size(at, is_start=True)):
+            self._note_unit(at)
+            at += size
+            self.frames += 1
+        self._drop(at)
+        if (surplus := len(self._burst) - LONGEST_ADU) > 0 and len(self._burst) > MOST_BYTES:
+            self.noise_bytes += surplus
+            self._drop(surplus)
+
+    def _note_unit(self, at: int) -> None:
+        if self._burst[at] != self._unit:
+            self._units.add(self._burst[at])
+
+    def _is_ours(self, at: int) -> bool:
+        return self._burst[at] in (self._unit, BROADCAST_UNIT)
+
+    def _requests(self, found: list[tuple[int, int]]) -> list[RtuRequest]:
+        """Return those frames that are requests to us, in order; echoes are not."""
+        requests: list[RtuRequest] = []
+        for at, size in found:
+            frame = bytes(self._burst[at : at + size])
+            if not self._is_ours(at) or self._echo.is_this(frame, self._last_s):
+                continue
+            is_last = at == found[-1][0]
+            requests.append(RtuRequest(frame[0], frame[1:-2], is_last and frame[0] == self._unit))
+            self._echo.note_master()
+        return requests
+
+    def _scan(self, *, is_final: bool) -> tuple[list[tuple[int, int]], int, int]:
+        """Return (the frames as place and size, bytes of noise, bytes at the end that may begin a frame)."""
+        found: list[tuple[int, int]] = []
+        at, noise, is_start = 0, 0, True
+        while at < len(self._burst):
+            if size := self._frame_size(at, is_start=is_start):
+                found.append((at, size))
+                self._note_unit(at)
+                at, is_start = at + size, True
+                continue
+            resumed, is_pending = self._resume(at, is_final=is_final)
+            if resumed is None:
+                rest = len(self._burst) - at
+                return found, noise + rest, rest if is_pending else 0
+            noise, at, is_start = noise + resumed - at, resumed, resumed in self._marks
+        return found, noise, 0
+
+    def _resume(self, noise_at: int, *, is_final: bool) -> tuple[int | None, bool]:
+        """Return where the first frame behind noise begins, None for none, and whether the noise may yet become one."""
+        end, at, start = len(self._burst), noise_at, noise_at
+        claimer = at
+        claimed = longest = self._claimed_end(at)  # what the noise may be a frame of, and up to where
+        if self._burst[at] not in self._units:
+            claimed = at
+        while (at := at + 1) < end:
+            is_marked = at in self._marks
+            if size := self._frame_size(at, is_start=is_marked):
+                is_stray = at <= claimer + _STRAY_BYTES
+                is_apart = is_stray or claimed <= at or claimed < at + size
+                is_decided = is_final or longest <= end
+                if is_marked or (is_apart and is_decided and self._is_all_frames(at + size)):
+                    return at, False
+                if self._burst[at] in self._units:
+                    at += size - 1  # whole, but inside of something else: what is in it is no frame either
+                continue
+            end_here = self._claimed_end(at)
+            longest = end_here if is_marked else max(longest, end_here)
+            start = at if is_marked else start
+            is_known = self._burst[at] in self._units
+            if is_marked or (is_known and at <= start + _STRAY_BYTES and end_here > claimed):
+                claimer, claimed = at, end_here if is_known else at
+        return None, longest > end
+
+    def _is_all_frames(self, at: int) -> bool:
+        """Decide whether whole frames and nothing else follow, up to a silence that was seen or the end."""
+        while at < len(self._burst) and at not in self._marks and (size := self._frame_size(at, is_start=True)):
+            at += size
+        return at == len(self._burst) or at in self._marks
+
+    def _frame_size(self, at: int, *, is_start: bool) -> int:
+        """Return the size of the whole frame that begins here; 0 for none. is_start: a frame is known to begin here, so that
+        one of an unknown function ends where a checksum fits. Chance makes frames of noise and the beginning of a request: a
+        frame that begins behind a silence comes before one that goes across it."""
+        frame = bytes(self._burst[at : at + LONGEST_ADU])
+        if len(frame) < SHORTEST_ADU or frame[0] > LARGEST_UNIT:
+            return 0
+        lengths = [request_length(frame)]
+        if frame[0] != self._unit:
+            if has_answer_length(frame[1]):
+                lengths.append(answer_length(frame))
+        elif self._echo.frame and frame.startswith(self._echo.frame):
+            return len(self._echo.frame)
+        if frame[1] == DIAGNOSTICS:
+            lengths.append(_DIAGNOSTICS_BYTES)
+        if is_start and not has_request_length(frame[1]):
+            silence_at = next((mark for mark in self._marks if mark > at), len(self._burst))
+            lengths.append(checksum_end(frame[: silence_at - at], SHORTEST_ADU))
+        size = next((size for size in lengths if size and _is_whole(frame, size)), 0)
+        return (
+            0 if any(self._frame_size(mark, is_start=True) for mark in self._marks if at < mark < at + size) else size
+        )
+
+    def _claimed_end(self, at: int) -> int:
+        """Return where a frame would end that begins here, by its first bytes: `at` when none can, beyond the end of the
+        burst while it may still come."""
+        frame = bytes(self._burst[at : at + LONGEST_ADU])
+        unit, beyond = frame[0], len(self._burst) + 1
+        if unit > LARGEST_UNIT:
+            return at
+        if len(frame) == 1 or self._echo.frame.startswith(frame):
+            return beyond
+        lengths: list[int | None] = []
+        if has_request_length(frame[1]) and (unit != BROADCAST_UNIT or is_broadcast_function(frame[1])):
+            lengths.append(request_length(frame))
+        if unit not in (self._unit, BROADCAST_UNIT) and has_answer_length(frame[1]):
+            lengths.append(answer_length(frame))
+        return max((at + size if size else beyond for size in lengths), default=at)
+
+
+def _is_whole(frame: bytes, size: int) -> bool:
+    """Decide whether the first bytes are a frame: a checksum that follows its own bytes leaves nothing."""
+    return SHORTEST_ADU <= size <= len(frame) and crc16(frame[:size]) == 0

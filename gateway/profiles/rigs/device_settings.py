@@ -1,0 +1,93 @@
+"""What a rig says about a device beside its name: address, channel, checksum, watchdog, counts; the profile has defaults."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, Final
+
+from gateway.devices import DeviceProfile
+from gateway.devices.exchange import UNIT
+from gateway.devices.profile import ADDRESS
+from gateway.devices.rehearsal import rehearse
+from gateway.profiles.rigs.rig_file import CellFile, OutputFile
+
+CHANNEL: Final = "channel"
+_CONSTANTS: Final = (ADDRESS, CHANNEL)
+_NAMES: Final = (*_CONSTANTS, "watchdog_s", "watchdog_tick_s", "newton_per_count", "checksum")
+Settings = Iterator[tuple[str, str]]
+
+
+def set_device(device: DeviceProfile, line: OutputFile | CellFile) -> DeviceProfile:
+    """Return the device as the rig says that it is set. ValueError where it cannot be set so."""
+    changes: dict[str, Any] = {}
+    said = {name: getattr(line, name) for name in _CONSTANTS if getattr(line, name, None) is not None}
+    if said:
+        changes["constants"] = {**device.constants, **said}
+    if line.checksum is not None:
+        changes["checksum"] = line.checksum
+    if isinstance(line, OutputFile):
+        changes |= _watchdog(device, line)
+    else:
+        changes |= _counts(device, line)
+    return replace(device, **changes) if changes else device
+
+
+def find_unfit_settings(device: DeviceProfile, line: OutputFile | CellFile) -> Settings:
+    """Yield (key, sentence) for what this device cannot be set to."""
+    if not _says_any(line):
+        return
+    for name in _CONSTANTS:
+        if (
+            getattr(line, name, None) is not None
+            and name not in device.constants
+            and not (name == ADDRESS and device.is_modbus)
+        ):
+            yield name, f"{device.name} has no {name}: leave this line out"
+    if line.checksum is not None and device.is_modbus:
+        yield "checksum", f"{device.name} speaks Modbus RTU, which has its own: leave this line out"
+        return
+    if isinstance(line, OutputFile) and device.own_watchdog is None:
+        for name in ("watchdog_s", "watchdog_tick_s"):
+            if getattr(line, name) is not None:
+                yield name, f"{device.name} has no watchdog: leave this line out"
+    if isinstance(line, CellFile) and line.newton_per_count and _has_unit(device, line):
+        yield "newton_per_count", f"{device.name} says its unit, or `unit` does: raw counts have none, leave one out"
+        return
+    try:
+        complaints = [sentence for _, sentence in rehearse(set_device(device, line))]
+    except ValueError as error:
+        complaints = [str(error)]
+    if complaints:
+        yield _blamed(line), complaints[0]
+
+
+def _has_unit(device: DeviceProfile, line: CellFile) -> bool:
+    return bool(line.unit or device.reading.unit or device.reading.template.field(UNIT))
+
+
+def _says_any(line: OutputFile | CellFile) -> bool:
+    return any(getattr(line, name, None) is not None for name in (*_NAMES, "zero_count"))
+
+
+def _blamed(line: OutputFile | CellFile) -> str:
+    """The setting that a device's own checks have refused: the first that is given."""
+    return next((name for name in _NAMES if getattr(line, name, None) is not None), "device")
+
+
+def _watchdog(device: DeviceProfile, line: OutputFile) -> dict[str, Any]:
+    watchdog = device.own_watchdog
+    if watchdog is None or (line.watchdog_s is None and line.watchdog_tick_s is None):
+        return {}
+    time_s, tick_s = line.watchdog_s or watchdog.time_s, line.watchdog_tick_s or watchdog.tick_s
+    return {"watchdog": replace(watchdog, time_s=time_s, tick_s=tick_s)}
+
+
+def _counts(device: DeviceProfile, line: CellFile) -> dict[str, Any]:
+    if line.newton_per_count is None and line.zero_count is None:
+        return {}
+    name = "stream" if device.stream else "read_force"
+    reading = device.stream or device.read_force
+    if reading is None:
+        return {}
+    per_count = line.newton_per_count or reading.newton_per_count
+    zero = reading.zero_count if line.zero_count is None else line.zero_count
+    return {name: replace(reading, newton_per_count=per_count, zero_count=zero)}

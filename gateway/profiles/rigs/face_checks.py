@@ -1,0 +1,79 @@
+"""Checks of the faces that a rig has beside plain Modbus TCP: their ports, and whether there is any face at all."""
+
+import os
+from collections.abc import Iterator
+from typing import Final
+
+from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.edit_marks import PLACEHOLDER
+from gateway.profiles.rigs.faces import RtuFace
+from gateway.profiles.rigs.line_checks import UNSTABLE_PATHS, lines_of
+from gateway.registers.writes.ownership import serial_place
+
+
+def _rtu_faces(parts: Parts) -> Iterator[tuple[str, RtuFace]]:
+    """Yield (path in the file, face) of every serial face without a fault of its own."""
+    for index, face in enumerate(parts.fieldbus):
+        if isinstance(face, RtuFace):
+            yield f"fieldbus.{index}", face
+
+
+def check_any_face(parts: Parts) -> Found:
+    """Yield a fault for a rig that nobody could reach."""
+    if parts.network and not parts.network.plain and not parts.fieldbus:
+        remedy = "take this line away, or give the rig another face under `fieldbus`"
+        yield "network.plain", f"false leaves no face that a master could reach: {remedy}"
+
+
+def check_serial_owner(parts: Parts) -> Found:
+    """Yield a fault for an owner on a serial face that is not there."""
+    owner = parts.network.owner if parts.network else None
+    if owner is None or (place := serial_place(owner)) is None or f"fieldbus.{place - 1}" in dict(_rtu_faces(parts)):
+        return
+    if place <= len(parts.fieldbus) and parts.fieldbus[place - 1] is None:  # it has a fault of its own
+        return
+    there = ", ".join(f"serial:{int(path.partition('.')[2]) + 1}" for path, _ in _rtu_faces(parts)) or "none"
+    yield "network.owner", f"{owner} is no serial face of this rig; there is {there} (places in `fieldbus`, from 1)"
+
+
+def check_face_ports_given(parts: Parts) -> Found:
+    """Yield a fault for a serial face of a real rig without a port, or with one that is no path of a device."""
+    for path, face in [] if parts.simulated else _rtu_faces(parts):
+        if face.port is None:
+            yield f"{path}.port", "is missing: `force-gateway ports` lists what is plugged in"
+        elif PLACEHOLDER.search(face.port):
+            yield f"{path}.port", f"{face.port} is a placeholder: put your adapter's path here (`force-gateway ports`)"
+        elif not face.port.startswith("/"):
+            yield f"{path}.port", f'"{face.port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
+
+
+def check_face_ports_differ(parts: Parts) -> Found:
+    """Yield a fault for a serial face on a port that a device or another face has; by-id names are followed."""
+    taken = {os.path.realpath(line.port): f"{key}.port" for key, line, _ in lines_of(parts) if line.port is not None}
+    for path, face in _rtu_faces(parts):
+        if face.port is None:
+            continue
+        user = taken.setdefault(os.path.realpath(face.port), f"{path}.port")
+        if user.startswith("fieldbus."):
+            if user != f"{path}.port":
+                first = f"fieldbus[{user.split('.')[1]}]"
+                yield f"{path}.port", f"is the port of {first} too: a serial port carries one face, with one unit id"
+        else:
+            device = user.partition(".")[0].replace("_", " ")
+            remedy = "masters need an adapter of their own, `force-gateway ports` lists what is plugged in"
+            yield f"{path}.port", f"is the {device}'s port too: {remedy}"
+
+
+def check_face_ports_stable(parts: Parts) -> Found:
+    """Yield a warning for a serial face whose port's name depends on the order of plugging."""
+    for path, face in _rtu_faces(parts):
+        if face.port is not None and face.port.startswith(UNSTABLE_PATHS):
+            reason = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
+            yield f"{path}.port", f"{face.port} {reason}"
+
+
+HARDWARE: Final[tuple[Check, ...]] = (check_face_ports_given, check_face_ports_differ)
+"""Faults that a run with simulated devices does not mind: its serial faces are pseudo-terminals."""
+
+FAULTS: Final[tuple[Check, ...]] = (check_any_face, check_serial_owner)
+WARNINGS: Final[tuple[Check, ...]] = (check_face_ports_stable,)

@@ -1,0 +1,133 @@
+"""Checks of the TLS faces of a rig: who may reach them, and whether their files can be used, today and next month.
+
+The files are looked at as the gateway will load them: a key that does not fit its certificate, a certificate that has
+expired, a key that others may read. All of it is told before the gateway starts.
+"""
+
+import ssl
+import stat
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Final
+
+from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certificate
+from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.faces import TlsFace
+from gateway.profiles.rigs.network_checks import is_loopback
+
+SOON_DAYS: Final = 30
+_MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
+
+
+def tls_faces(parts: Parts) -> Iterator[tuple[str, TlsFace]]:
+    """Yield (path in the file, face) of every TLS face without a fault of its own."""
+    for index, face in enumerate(parts.fieldbus):
+        if isinstance(face, TlsFace):
+            yield f"fieldbus.{index}", face
+
+
+def check_tls_exposure(parts: Parts) -> Found:
+    """Yield a fault for a TLS face beyond loopback without an allow-list, and for one on the plain face's port."""
+    for path, face in tls_faces(parts):
+        if not is_loopback(face.bind) and not face.allow:
+            reason = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
+            yield f"{path}.bind", f"{face.bind} {reason}"
+        network = parts.network
+        if network and network.plain and face.port and (face.bind, face.port) == (network.bind, network.port):
+            yield f"{path}.port", f"{face.port} is the port of plain Modbus TCP too: 802 is that of Modbus/TCP Security"
+        for other, first in tls_faces(parts):
+            if other < path and face.port and (face.bind, face.port) == (first.bind, first.port):
+                yield f"{path}.port", f"{face.port} is the port of another TLS face too: each needs its own"
+
+
+def check_tls_files(parts: Parts) -> Found:
+    """Yield a fault for each file that is missing, is not what it should be, or does not fit the others."""
+    for path, face in tls_faces(parts):
+        faults = list(_unreadable(path, face))
+        yield from faults or _unfit(path, face)
+
+
+def check_tls_days(parts: Parts) -> Found:
+    """Yield a warning for a server's certificate that is about to expire."""
+    for path, face in tls_faces(parts):
+        shown, now = _certificate(face.certificate), datetime.now(UTC)
+        if shown and _text(now) <= shown.ends <= _text(now + timedelta(days=SOON_DAYS)):
+            cure = "make a new one before that day, from then on no client connects"
+            yield f"{path}.certificate", f"W246 {face.certificate} expires on {_day(shown.ends)}: {cure}"
+
+
+def _unreadable(path: str, face: TlsFace) -> Found:
+    for name in ("certificate", "key", "ca"):
+        file = Path(getattr(face, name))
+        try:
+            text = file.read_bytes()
+        except OSError as error:
+            cure = _MAKE if isinstance(error, FileNotFoundError) else "let the gateway's user read it"
+            yield f"{path}.{name}", f"E171 {file}: {error.strerror or error}; {cure}"
+            continue
+        kind = b"PRIVATE KEY-----" if name == "key" else b"-----BEGIN CERTIFICATE-----"
+        if kind not in text:
+            what = "private key" if name == "key" else "certificate"
+            yield f"{path}.{name}", f"E174 {file} holds no {what} in PEM form; {_MAKE}"
+        if name == "key" and file.stat().st_mode & (stat.S_IRWXO | stat.S_IWGRP):
+            mode = f"{stat.S_IMODE(file.stat().st_mode):03o}"
+            yield f"{path}.key", f"E172 {file} can be used by everybody on this machine (mode {mode}): chmod 600 {file}"
+
+
+def _unfit(path: str, face: TlsFace) -> Found:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_cert_chain(face.certificate, face.key, password=lambda: b"")
+    except (ssl.SSLError, OSError, ValueError) as error:
+        if isinstance(error, ssl.SSLError) and error.reason == KEY_MISMATCH:
+            yield (
+                f"{path}.key",
+                f"E172 {face.key} does not fit {face.certificate}: take the two that were made together",
+            )
+        else:
+            yield (
+                f"{path}.certificate",
+                f"E174 {face.certificate} with {face.key} cannot be used: {_reason(error)}; {_MAKE}",
+            )
+    try:
+        context.load_verify_locations(face.ca)
+    except (ssl.SSLError, OSError) as error:
+        yield f"{path}.ca", f"E174 {face.ca} cannot be used: {_reason(error)}; {_MAKE}"
+    shown, now = _certificate(face.certificate), _text(datetime.now(UTC))
+    if shown and now > shown.ends:
+        yield (
+            f"{path}.certificate",
+            f"E173 {face.certificate} expired on {_day(shown.ends)}: no client would connect; {_MAKE}",
+        )
+    elif shown and now < shown.begins:
+        cure = "look at this machine's clock, or wait"
+        yield f"{path}.certificate", f"E173 {face.certificate} is not valid before {_day(shown.begins)}: {cure}"
+
+
+def _certificate(file: str) -> PeerCertificate | None:
+    """Return the first certificate of a PEM file; None where there is none that can be read."""
+    try:
+        text = Path(file).read_text("ascii")
+        begin, end = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
+        return read_certificate(ssl.PEM_cert_to_DER_cert(begin + text.split(begin, 1)[1].split(end, 1)[0] + end))
+    except (OSError, ValueError, IndexError):
+        return None
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, ssl.SSLError) and error.reason:
+        return error.reason.lower().replace("_", " ")
+    return f"{error}"
+
+
+def _text(moment: datetime) -> str:
+    return f"{moment:%Y%m%d%H%M%S}Z"
+
+
+def _day(text: str) -> str:
+    return f"{text[:4]}-{text[4:6]}-{text[6:8]}"
+
+
+FAULTS: Final[tuple[Check, ...]] = (check_tls_exposure, check_tls_files)
+WARNINGS: Final[tuple[Check, ...]] = (check_tls_days,)

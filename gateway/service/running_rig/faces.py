@@ -1,0 +1,148 @@
+"""The faces of one running rig: plain Modbus TCP, and what `fieldbus` of its file adds; made, started and closed in one place.
+
+All serve the same bank, so that a command counts whichever face it comes through, and ownership holds across them.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from gateway.fieldbus import ModbusRtuServer, ModbusTcpServer, ModbusTlsServer, RtuSettings, TlsSettings
+from gateway.modbus import Peer, Role
+from gateway.ports import PortError
+from gateway.processes import exit_codes
+from gateway.profiles import Rig
+from gateway.profiles.rigs.faces import RtuFace, TlsFace
+from gateway.registers import RegisterBank
+from gateway.registers.writes.ownership import serial_host
+from gateway.service.banner import ServedFace, tcp_face, tls_face
+from gateway.service.running_rig.bank_rules import plain_role, server_settings
+from gateway.service.running_rig.control_loop import Log
+from gateway.service.running_rig.starting import StartError, listen, open_again
+
+
+def with_rtu_face(rig: Rig, port: str) -> Rig:
+    """Return the rig with one more serial face, as Modbus sets it by default: on a port, or with an empty one on a
+    pseudo-terminal. StartError for a port that the rig uses already."""
+    users = {os.path.realpath(path): f"{line.replace('_', ' ')} (device)" for line, path in rig.ports().items()}
+    users |= {
+        os.path.realpath(face.port): "a face of its fieldbus"
+        for face in rig.fieldbus
+        if isinstance(face, RtuFace) and face.port
+    }
+    if port and (user := users.get(os.path.realpath(port))):
+        remedy = "masters need an adapter of their own, `force-gateway ports` lists what is plugged in"
+        raise StartError(f"E124 --rtu {port} is used by rig {rig.name}: {user}; {remedy}", exit_codes.CONFIGURATION)
+    return replace(rig, fieldbus=(*rig.fieldbus, RtuFace(type="rtu", port=port or None)))
+
+
+class Faces:
+    """Every face of a rig. on_peer_closed: the last connection of a peer has closed, or its serial port was lost."""
+
+    def __init__(self, rig: Rig, bank: RegisterBank, on_peer_closed: Callable[[Peer], None], log: Log) -> None:
+        self._rig, self._log = rig, log
+        self._tcp = (
+            ModbusTcpServer(bank, server_settings(rig), on_peer_closed=on_peer_closed, log=log)
+            if rig.network.plain
+            else None
+        )
+        self._serial = [
+            ModbusRtuServer(bank, _rtu_settings(rig, face, place), on_peer_closed=on_peer_closed, log=log)
+            for place, face in enumerate(rig.fieldbus, start=1)
+            if isinstance(face, RtuFace)
+        ]
+        self._tls = [
+            (face, make_tls_server(rig, face, bank, on_peer_closed, log))
+            for face in rig.fieldbus
+            if isinstance(face, TlsFace)
+        ]
+        self.modbus: tuple[str, int] | None = None  # where plain Modbus TCP is bound, once it is
+
+    @property
+    def peers(self) -> tuple[Peer, ...]:
+        """Peers that are connected now, of every face."""
+        return tuple(peer for face in self._all for peer in face.peers)
+
+    @property
+    def serial_paths(self) -> list[str]:
+        """Paths of the serial faces; pseudo-terminals have theirs once they are started."""
+        return [face.path for face in self._serial]
+
+    @property
+    def _all(self) -> list[ModbusTcpServer | ModbusRtuServer]:
+        return [*([self._tcp] if self._tcp else []), *(server for _, server in self._tls), *self._serial]
+
+    async def start(self, bind: list[Any] | None, *, is_restart: bool) -> tuple[ServedFace, ...]:
+        """Serve on every face; what each is. bind: HOST, PORT of plain Modbus TCP instead of the rig's. StartError says
+        which face cannot be served, and why; a serial port that a restart does not find is a lost one."""
+        served = []
+        if self._tcp:
+            network = self._rig.network
+            self.modbus = await listen(self._tcp, *(bind or (network.bind, network.port)))
+            served.append(tcp_face(*self.modbus, network.units))
+        elif bind and not is_restart:
+            raise StartError(
+                f"E125 --bind: rig {self._rig.name} has no plain Modbus TCP (network.plain: false)",
+                exit_codes.CONFIGURATION,
+            )
+        for tls, server in self._tls:
+            host, port = await listen(server, tls.bind, tls.port, "`port:` of the tls face, such as 8802")
+            served.append(tls_face(host, port, self._rig.network.units))
+        for face in self._serial:
+            await self._start_serial(face, is_restart=is_restart)
+            served.append(_rtu_face(face))
+        return tuple(served)
+
+    async def close(self) -> None:
+        """Close every face; answers given so far are still sent."""
+        for face in self._all:
+            await face.close()
+
+    async def _start_serial(self, face: ModbusRtuServer, *, is_restart: bool) -> None:
+        host = face.settings.peer.host
+        if is_restart:
+            if face.port is None:
+                await face.start()
+                self._log(f"face {host}", f"{host} is now {face.path}: a pseudo-terminal ends with its process")
+            else:
+                await open_again(face.port)  # what does not open is a lost port, and told as one
+            return
+        try:
+            await face.start()
+        except PortError as error:
+            raise StartError(f"{error} (the port of Modbus RTU face {host})", error.exit_code) from error
+
+
+def make_tls_server(
+    rig: Rig, face: TlsFace, bank: RegisterBank, on_peer_closed: Callable[[Peer], None], log: Log
+) -> ModbusTlsServer:
+    """Return the server of a TLS face. StartError for files that cannot be used: `check` has looked at them, and they may have
+    changed since."""
+    server = replace(server_settings(rig), allow=face.allow)
+    settings = TlsSettings(server, face.certificate, face.key, face.ca, frozenset(face.revoked))
+    try:
+        return ModbusTlsServer(bank, settings, on_peer_closed=on_peer_closed, log=log)
+    except OSError as error:
+        what = f"E174 {face.certificate}, {face.key} or {face.ca} cannot be used: {error}"
+        raise StartError(f"{what}; force-gateway check {rig.file} says more", exit_codes.CONFIGURATION) from error
+
+
+def _rtu_settings(rig: Rig, face: RtuFace, place: int) -> RtuSettings:
+    role = Role[face.role.upper()] if face.role else plain_role(rig)
+    return RtuSettings(face.port, face.settings, face.unit, Peer(serial_host(place), role=role))
+
+
+def _rtu_face(face: ModbusRtuServer) -> ServedFace:
+    settings = face.settings
+    note = f"{settings.serial}  unit {settings.unit}   owner is shown as {settings.peer.host}"
+    facts = {
+        "port": face.path,
+        "unit": settings.unit,
+        "baud": settings.serial.baud,
+        "parity": settings.serial.parity,
+        "stop_bits": settings.serial.stop_bits,
+        "host": settings.peer.host,
+        "is_terminal": face.port is None,
+    }
+    return ServedFace("rtu", face.path, note, facts)

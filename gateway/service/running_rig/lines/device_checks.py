@@ -1,0 +1,135 @@
+"""What is asked of an output device before it may do more than the safe voltage: what it is, and whether its watchdog watches.
+
+The order: identity, the watchdog's state, its arming, and the reading that proves it. A wrong device and a tripped watchdog
+end it: both are faults that need a person. A watchdog that does not arm is a fault too, unless the rig accepts to have none.
+Pure: answers in, the next question out.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+from gateway.codes.faults import FaultCode
+from gateway.devices import OutputHost
+from gateway.devices.device_checks.watchdog import WatchdogState
+from gateway.devices.messages import DeviceAnswer, DeviceStep
+
+_STATUS_PERIOD_S = 1.0  # between two readings of the watchdog's state
+_TRIES = 3  # of arming; then it does not arm
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLevel:
+    """State of the device's own watchdog, the second level: has_one; is_armed: read back; is_tripped: latched."""
+
+    has_one: bool = False
+    is_armed: bool = False
+    is_tripped: bool = False
+
+
+class DeviceChecks:
+    """next_step: the question that is due; fault: what keeps the output from being enabled; said: the device's own words for
+    it; is_done: all is asked and well. is_waived: the rig accepts an output without a watchdog."""
+
+    def __init__(self, host: OutputHost, *, is_waived: bool) -> None:
+        self._known = host.checks
+        self._is_waived = is_waived
+        self.has_watchdog = DeviceStep.ARM in self._known
+        proof = DeviceStep.VERIFY if DeviceStep.VERIFY in self._known else DeviceStep.STATUS
+        self._arming = (DeviceStep.ARM, proof) if self.has_watchdog else ()
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin anew: the port has been opened, and another device may be behind it."""
+        self._waiting = self._known_of(DeviceStep.IDENTITY, DeviceStep.STATUS, *self._arming)
+        self._tries = 0
+        self._next_status_s = 0.0
+        self.fault = FaultCode.NONE
+        self.said = ""
+        self.is_armed = self.is_tripped = False
+        self._settle()
+
+    def _settle(self) -> None:
+        self.is_done = not self._waiting and not self.fault
+
+    def _known_of(self, *steps: DeviceStep) -> deque[DeviceStep]:
+        return deque(step for step in steps if step in self._known)
+
+    @property
+    def level(self) -> DeviceLevel:
+        """State of the device's watchdog."""
+        return DeviceLevel(self.has_watchdog, self.is_armed, self.is_tripped)
+
+    def next_step(self, now_s: float) -> DeviceStep | None:
+        """Return the question that is due, None where there is none."""
+        if self._waiting:
+            return self._waiting[0]
+        if DeviceStep.STATUS in self._known and now_s >= self._next_status_s and self.fault in _GOES_ON:
+            self._next_status_s = now_s + _STATUS_PERIOD_S
+            return DeviceStep.STATUS
+        return None
+
+    def trip(self) -> None:
+        """Note that the device's watchdog has tripped: it said so in place of an answer."""
+        self.is_armed, self.is_tripped = False, True
+        self.fault, self.said = FaultCode.WATCHDOG_TRIPPED, ""
+        self._waiting.clear()
+        self._settle()
+
+    def clear(self) -> None:
+        """Clear a tripped watchdog and arm it again: somebody has asked for it, by a reset."""
+        if self.fault is FaultCode.WATCHDOG_TRIPPED and DeviceStep.CLEAR in self._known:
+            self.fault = FaultCode.NONE  # is_tripped lasts until the device has answered: before, it obeys nothing
+            self._waiting = self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming)
+        elif self.fault is FaultCode.WATCHDOG_NOT_ARMED:
+            self.begin()
+        self._settle()
+
+    def take(self, answer: DeviceAnswer) -> None:
+        """Follow an answer."""
+        if self._waiting and self._waiting[0] is answer.step:
+            self._waiting.popleft()
+        if answer.step is DeviceStep.IDENTITY and not answer.is_right:
+            self.fault, self.said = FaultCode.WRONG_DEVICE, answer.text
+            self._waiting.clear()
+        elif answer.step is DeviceStep.CLEAR:
+            self.is_tripped = False
+        elif answer.step is DeviceStep.STATUS:
+            self._take_state(WatchdogState(answer.text))
+        elif answer.step is DeviceStep.VERIFY:
+            self._take_proof(is_armed=answer.is_right)
+        self._settle()
+
+    def refuse(self, step: DeviceStep, words: str) -> None:
+        """Follow a refusal in the device's own words."""
+        if self._waiting and self._waiting[0] is step:
+            self._waiting.popleft()
+        if step is DeviceStep.IDENTITY:
+            self.fault, self.said = FaultCode.WRONG_DEVICE, words
+            self._waiting.clear()
+        elif step is DeviceStep.CLEAR:
+            self.trip()
+        elif step in (DeviceStep.ARM, DeviceStep.VERIFY):
+            self._take_proof(is_armed=False, words=words)
+        self._settle()
+
+    def _take_state(self, state: WatchdogState) -> None:
+        if state is WatchdogState.TRIPPED:
+            self.trip()
+        elif not self._waiting and not self.is_tripped and DeviceStep.VERIFY not in self._known:
+            self._take_proof(is_armed=state is WatchdogState.ARMED)  # after arming, and whenever it is looked at
+
+    def _take_proof(self, *, is_armed: bool, words: str = "") -> None:
+        self.is_armed = is_armed
+        if is_armed:
+            self._tries = 0
+            self.fault = FaultCode.NONE
+            return
+        self._tries += 1
+        if self._tries < _TRIES:
+            self._waiting = deque(self._arming)
+        elif not self._is_waived:
+            self.fault, self.said = FaultCode.WATCHDOG_NOT_ARMED, words or "it reads back otherwise"
+            self._waiting.clear()
+
+
+_GOES_ON = (FaultCode.NONE, FaultCode.WATCHDOG_TRIPPED)

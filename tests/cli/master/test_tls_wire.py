@@ -1,0 +1,107 @@
+"""The client verbs by TLS, against the real server; and what they say of files and gateways that do not fit."""
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
+from tests.certificates import Folder, serial_of, store_all
+from tests.cli.conftest import PlainBank
+
+
+class TlsServer(threading.Thread):
+    def __init__(self, bank: PlainBank, folder: Folder) -> None:
+        super().__init__(daemon=True)
+        self.bank, self.folder = bank, folder
+        self.bound, self.log = threading.Event(), list[str]()
+
+    def run(self) -> None:
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
+        crt, key = self.folder.crt, self.folder.key
+        revoked = frozenset((serial_of("thief"),))
+        files = TlsSettings(ServerSettings(), crt("gateway"), key("gateway"), crt("ca"), revoked)
+        server = ModbusTlsServer(
+            self.bank, files, on_peer_closed=lambda peer: None, log=lambda cause, sentence: self.log.append(sentence)
+        )
+        _, self.port = await server.start("127.0.0.1", 0)
+        self.bound.set()
+        await self._end.wait()
+        await server.close()
+
+    def stop(self) -> None:
+        self._loop.call_soon_threadsafe(self._end.set)
+        self.join(10)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    return store_all(tmp_path_factory.mktemp("certificates"))
+
+
+@pytest.fixture
+def server(register_map: Any, folder: Folder) -> Iterator[TlsServer]:
+    running = TlsServer(PlainBank(register_map), folder)
+    running.start()
+    assert running.bound.wait(10)
+    yield running
+    running.stop()
+
+
+def options(folder: Folder, name: str = "setpoint", key: str = "", ca: str = "ca") -> list[str]:
+    return ["--tls", folder.crt(ca), "--cert", folder.crt(name), "--key", folder.key(key or name)]
+
+
+def test_read_and_write_go_by_tls(server: TlsServer, folder: Folder, call: Any) -> None:
+    where = ["--gateway", f"localhost:{server.port}"]
+    assert call("write", "force_setpoint=12", *where, *options(folder)).exit_code == 0
+    done = call("read", "force_setpoint", *where, *options(folder))
+    assert done.exit_code == 0 and "12.00 N" in done.output
+    assert server.log == []
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "ca", "code", "words"),
+    [
+        ("thief", "", "ca", 69, "E176 127.0.0.1:{port} closed the connection: it probably refuses"),
+        ("setpoint", "", "other-ca", 69, "E176 the certificate of 127.0.0.1:{port} is not to be trusted"),
+        ("setpoint", "admin", "ca", 65, "E172 "),
+    ],
+)
+def test_what_does_not_fit_is_told(
+    server: TlsServer, folder: Folder, call: Any, name: str, key: str, ca: str, code: int, words: str
+) -> None:
+    done = call("read", "state", "--gateway", f"127.0.0.1:{server.port}", *options(folder, name, key, ca))
+    assert (done.exit_code, done.stderr[: len(words.format(port=server.port))]) == (
+        code,
+        words.format(port=server.port),
+    )
+
+
+def test_a_file_that_is_missing_and_options_that_are(folder: Folder, call: Any, tmp_path: Path) -> None:
+    gone = ["--tls", folder.crt("ca"), "--cert", tmp_path / "gone.crt", "--key", folder.key("setpoint")]
+    done = call("read", "state", *gone)
+    assert (done.exit_code, done.stderr) == (65, f"E171 {tmp_path / 'gone.crt'}: No such file or directory\n")
+    assert "--key is missing: TLS needs" in call("read", "state", *options(folder)[:4]).stderr
+    assert "--rtu is of a serial line" in call("read", "state", "--rtu", "/dev/ttyS9", *options(folder)).stderr
+
+
+def test_certs_makes_what_a_rig_and_a_client_need_and_overwrites_nothing(tmp_path: Path, call: Any) -> None:
+    made = call("certs", tmp_path / "c", "--host", "192.168.125.20", "--client", "robot:setpoint")
+    assert made.exit_code == 0 and "fieldbus:" in made.output
+    assert {path.name for path in (tmp_path / "c").glob("*.key")} == {"ca.key", "gateway.key", "robot.key"}
+    assert {path.stat().st_mode & 0o777 for path in (tmp_path / "c").glob("*.key")} == {0o600}
+    before = (tmp_path / "c" / "ca.crt").read_bytes()
+    again = call("certs", tmp_path / "c", "--client", "robot:admin")
+    assert again.exit_code == 1 and again.stderr.startswith(f"E405 {tmp_path / 'c' / 'robot.crt'} exists")
+    assert call("certs", tmp_path / "c", "--client", "panel:monitor").exit_code == 0
+    assert (tmp_path / "c" / "ca.crt").read_bytes() == before
+    assert (tmp_path / "c" / "panel.crt").exists()
+    for bad in ("robot", "robot:captain", "ca:admin", "a/b:monitor"):
+        assert call("certs", tmp_path / "d", "--client", bad).exit_code == 2

@@ -1,0 +1,69 @@
+"""`self-test` against the real bank, with a stand-in for control that decides after three heartbeats."""
+
+import json
+
+import pytest
+
+from gateway.registers import BankRules, RegisterBank, RegisterMap
+from gateway.registers.command import Command
+from gateway.registers.rig_rules import BASIC_BITS
+from gateway.registers.words import ControlBit, SelfTestResult, SelfTestVerdict
+
+PASSED, WARNED, FAILED = SelfTestVerdict.PASSED, SelfTestVerdict.WARNED, SelfTestVerdict.FAILED
+ITEMS = ("noise", "resolution", "zero", "sign", "scale", "response", "leak", "output_line", "cell_line")
+
+
+class DecidingBank:
+    """A bank whose self-test ends with these verdicts, or never. words: each control word that was accepted."""
+
+    def __init__(self, register_map: RegisterMap, result: SelfTestResult, verdicts: dict[str, SelfTestVerdict]) -> None:
+        rules = BankRules(rig_name="demo", force_max_n=60.0, supported_bits=BASIC_BITS | ControlBit.START_SELF_TEST)
+        self.bank = RegisterBank(register_map, rules, now=lambda: 0.0)
+        self.bank.on_command = self.hear
+        self.result, self.verdicts, self.beats = result, verdicts, set[int]()
+        self.words: list[int] = []
+
+    def hear(self, command: Command) -> None:
+        self.words.append(int(command.control_word))
+        self.beats.add(command.heartbeat)
+        is_over = len(self.beats) > 3 and self.result is not SelfTestResult.RUNNING
+        result = self.result if is_over else SelfTestResult.RUNNING
+        self.bank.self_test.show(1, result, self.verdicts if is_over else {})
+
+
+@pytest.fixture
+def tested(register_map: RegisterMap, serve, call):
+    def run(result: SelfTestResult, *options: str, **verdicts: SelfTestVerdict):
+        rig = DecidingBank(register_map, result, dict.fromkeys(ITEMS, PASSED) | verdicts)
+        answer = call("self-test", "--gateway", serve(rig.bank).address, *options)
+        return rig, answer
+
+    return run
+
+
+def test_it_starts_the_test_beats_while_it_runs_and_tells_each_verdict(tested) -> None:
+    rig, answer = tested(SelfTestResult.PASSED)
+    assert answer.exit_code == 0, answer.output
+    assert rig.words[0] == ControlBit.START_SELF_TEST and len(rig.beats) >= 4
+    assert [line.split()[0] for line in answer.output.splitlines()] == ["ok"] * 9 + ["self-test"]
+    assert answer.output.splitlines()[-1] == "self-test 1 passed"
+
+
+def test_a_failed_item_is_exit_code_1_and_a_warned_one_is_not(tested) -> None:
+    _, failed = tested(SelfTestResult.FAILED, leak=FAILED)
+    assert failed.exit_code == 1 and "FAIL  leak" in failed.output
+    _, warned = tested(SelfTestResult.WARNED, scale=WARNED)
+    assert warned.exit_code == 0 and "WARN  scale" in warned.output
+
+
+def test_json_has_every_item(tested) -> None:
+    _, answer = tested(SelfTestResult.STOPPED, "--json", sign=SelfTestVerdict.NOT_TESTED)
+    facts = json.loads(answer.output)
+    assert answer.exit_code == 1 and (facts["result"], facts["number"]) == ("stopped", 1)
+    assert list(facts["items"]) == list(ITEMS) and facts["items"]["sign"]["verdict"] == "not tested"
+
+
+def test_a_rig_without_one_refuses_with_what_to_do(register_map: RegisterMap, serve, call) -> None:
+    bank = RegisterBank(register_map, BankRules(rig_name="irc5-cell", force_max_n=60.0), now=lambda: 0.0)
+    answer = call("self-test", "--gateway", serve(bank).address)
+    assert answer.exit_code == 1 and "W217" in answer.output and "irc5-cell" not in answer.stdout

@@ -1,0 +1,26 @@
+"""A gateway at hand, and each controller with its generated client."""
+
+from typing import Any
+
+import pytest
+
+from tests.clients.controllers import S7, Codesys, Irc5, UniversalRobot
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.scenes import MAP, TEXTS
+
+CONTROLLERS: dict[str, Any] = {"rapid": Irc5, "scl": S7, "st": Codesys, "urscript": UniversalRobot}
+
+
+@pytest.fixture(params=CONTROLLERS)
+def language(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def gateway() -> GatewayAtHand:
+    return GatewayAtHand(MAP)
+
+
+@pytest.fixture
+def client(language: str, gateway: GatewayAtHand) -> Any:
+    return CONTROLLERS[language](TEXTS[language], gateway)

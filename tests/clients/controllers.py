@@ -1,0 +1,497 @@
+"""Four controllers, as far as the generated clients use them: sockets of an IRC5 and of a Universal Robot, MB_CLIENT of an S7,
+Structured Text behind a transport. Each runs a client's text against a gateway at hand, in virtual time."""
+
+import math
+import struct
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
+from tests.clients.machine import Frame, Machine, RapidError
+from tests.clients.syntax import Node, parse
+
+
+def values(act: Callable[..., Any]) -> Callable[[Machine, list[Node], Frame], Any]:
+    """Return a library routine that gets its arguments' values in their order."""
+
+    def call(machine: Machine, arguments: list[Node], frame: Frame) -> Any:
+        return act(*(machine.value(each[2] if each[0] == "named" else each, frame) for each in arguments))
+
+    return call
+
+
+def nothing(*_: Any) -> None:
+    """Do what no client can see."""
+
+
+class Irc5:
+    """RAPID: FgInit once, FgCycle per cycle."""
+
+    def __init__(self, text: str, gateway: GatewayAtHand) -> None:
+        self.gateway, self.received, self.now_s, self.zero_s, self.is_open = gateway, b"", 0.0, 0.0, False
+        self.sent: list[bytes] = []
+        self.said: list[str] = []
+        self.machine = Machine(parse(text, "rapid"), self.library())
+        self.machine.begin()
+        self.machine.start("FgInit")
+
+    def library(self) -> dict[str, Any]:
+        return {
+            "first_index": 1,
+            "implicit_for": True,
+            **dict.fromkeys(["UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED"]),
+            **{name: name for name in ("UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED", "ERR_FG_FRAME")},
+            **dict.fromkeys(["BOOKERRNO", "CLKSTART", "CLKSTOP", "IDELETE", "CONNECT", "ITIMER"], nothing),
+            "CLKRESET": lambda machine, arguments, frame: setattr(self, "zero_s", self.now_s),
+            "CLKREAD": lambda machine, arguments, frame: self.now_s - self.zero_s,
+            "WAITTIME": nothing,
+            "ERRWRITE": self.error_write,
+            "SOCKETCLOSE": self.close,
+            "SOCKETCREATE": nothing,
+            "SOCKETCONNECT": self.connect,
+            "SOCKETSEND": self.send,
+            "SOCKETRECEIVE": self.receive,
+            "CLEARRAWBYTES": lambda machine, arguments, frame: machine.assign(arguments[0], b"", frame),
+            "RAWBYTESLEN": lambda machine, arguments, frame: len(machine.value(arguments[0], frame) or b""),
+            "PACKRAWBYTES": self.pack,
+            "UNPACKRAWBYTES": self.unpack,
+            "NUMTOSTR": values(
+                lambda number, digits: f"{number:.{digits}f}" if isinstance(number, (int, float)) else number
+            ),
+            "ROUND": values(lambda number: math.floor(number + 0.5)),
+            "DIM": values(lambda numbers, _: len(numbers)),
+            "BITXORDNUM": values(lambda a, b: a ^ b),
+            "NUMTODNUM": values(int),
+            "DNUMTONUM": values(int),
+        }
+
+    def options(self, machine: Machine, arguments: list[Node], frame: Frame) -> dict[str, Any]:
+        return {each[1].upper(): machine.value(each[2], frame) for each in arguments if each[0] == "named"}
+
+    def error_write(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
+        words = [machine.value(each, frame) for each in arguments if each[0] != "named"]
+        assert len(words) == 2 and len(words[0]) <= 46, "header and reason; ErrWrite has 46 characters for the header"
+        self.said.append(" ".join(words))
+
+    def close(self, _machine: Machine, _arguments: list[Node], _frame: Frame) -> None:
+        self.is_open, self.received = False, b""
+
+    def connect(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
+        assert self.options(machine, arguments, frame).keys() == {"TIME"}
+        if self.gateway.is_cut:
+            raise RapidError("ERR_SOCK_TIMEOUT")
+        self.is_open = True
+
+    def send(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
+        if not self.is_open:
+            raise RapidError("ERR_SOCK_CLOSED")
+        self.sent.append(self.options(machine, arguments, frame)["RAWDATA"])
+        try:
+            self.received += self.gateway.ask(self.sent[-1])
+        except Unplugged:
+            self.received = b""
+
+    def receive(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
+        options = {each[1].upper(): each[2] for each in arguments if each[0] == "named"}
+        count = int(machine.value(options["READNOOFBYTES"], frame))
+        assert "TIME" in options
+        if len(self.received) < count:
+            raise RapidError("ERR_SOCK_TIMEOUT")
+        machine.assign(options["RAWDATA"], self.received[:count], frame)
+        self.received = self.received[count:]
+
+    def pack(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
+        options = self.options(machine, arguments, frame)
+        value, buffer, start = [each for each in arguments if each[0] != "named"]
+        number, data = machine.value(value, frame), machine.value(buffer, frame) or b""
+        assert options["NETWORK"] and machine.value(start, frame) == len(data) + 1
+        shape = ">f" if "FLOAT4" in options else {"UINT": ">H", "USINT": ">B"}[options["INTX"]]
+        machine.assign(buffer, data + struct.pack(shape, number if shape == ">f" else int(number)), frame)
+
+    def unpack(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
+        options = self.options(machine, arguments, frame)
+        buffer, start, target = [each for each in arguments if each[0] != "named"]
+        shape = ">f" if "FLOAT4" in options else {"UINT": ">H", "USINT": ">B"}[options["INTX"]]
+        data, place = machine.value(buffer, frame), int(machine.value(start, frame)) - 1
+        assert options["NETWORK"]
+        machine.assign(target, struct.unpack_from(shape, data, place)[0], frame)
+
+    def set(self, **values: Any) -> None:
+        for name, value in values.items():
+            self.machine.global_names[name.upper()] = value
+
+    def get(self, name: str) -> Any:
+        return self.machine.global_names[name.upper()]
+
+    def enable(self, force_n: float) -> None:
+        self.set(fgForce=force_n, fgEnable=True)
+
+    def force(self, force_n: float) -> None:
+        self.set(fgForce=force_n)
+
+    def disable(self) -> None:
+        self.set(fgEnable=False)
+
+    def reset(self) -> None:
+        self.set(fgReset=True)
+
+    def pull(self, *, pulls: bool) -> None:
+        self.set(fgPull=pulls)
+
+    def cycle(self, seconds: float = 0.04) -> None:
+        self.now_s += seconds
+        self.machine.start("FgCycle")
+
+    @property
+    def text(self) -> str:
+        return str(self.get("fgText"))
+
+    @property
+    def enabled(self) -> bool:
+        return bool(self.get("fgEnabled"))
+
+    @property
+    def ended(self) -> bool:
+        return bool(self.get("fgEnded"))
+
+    def begin_upload(self, model: dict[str, Any], slot: int) -> None:
+        self.machine.start("FgModelClear")
+        places = {name: self.get(f"FG_M_{name}") for name in model}
+        for name, value in model.items():
+            routine = "FgModelArray" if isinstance(value, list) else "FgModelNumber"
+            self.machine.start("FgModelCount" if name in ("order", "slip_stops") else routine, places[name], value)
+        self.set(fgSlot=slot, fgUpload=True)
+
+    @property
+    def uploaded(self) -> bool:
+        return bool(self.get("fgUploaded"))
+
+
+class UniversalRobot:
+    """URScript: fg_exchange per cycle, as fg_thread calls it."""
+
+    def __init__(self, text: str, gateway: GatewayAtHand) -> None:
+        self.gateway, self.sending, self.received = gateway, b"", b""
+        self.sent: list[bytes] = []
+        library = {
+            "first_index": 0,
+            "socket_open": values(lambda host, port, name: not self.gateway.is_cut),
+            "socket_close": values(lambda name: None),
+            "socket_send_byte": values(self.send_byte),
+            "socket_read_byte_list": values(self.read),
+            "floor": values(math.floor),
+            "str_cat": values(lambda a, b: a + b),
+            "textmsg": values(lambda *words: None),
+            "sync": values(lambda: None),
+            "sleep": values(lambda seconds: None),
+        }
+        self.machine = Machine(parse(text, "urscript"), library, fold=False)
+        self.machine.begin()
+
+    def send_byte(self, value: int, _name: str) -> bool:
+        assert isinstance(value, int) and 0 <= value <= 255
+        self.sending += bytes([value])
+        return True
+
+    def read(self, count: int, _name: str, _timeout: float) -> list[int]:
+        if self.sending:
+            self.sent.append(self.sending)
+            try:
+                self.received += self.gateway.ask(self.sending)
+            except Unplugged:
+                self.received = b""
+            self.sending = b""
+        data, self.received = self.received[:count], self.received[count:]
+        return [len(data), *data]
+
+    def get(self, name: str) -> Any:
+        return self.machine.global_names[name]
+
+    def enable(self, force_n: float) -> None:
+        assert self.machine.start("fg_enable", force_n)
+
+    def force(self, force_n: float) -> None:
+        self.machine.start("fg_force", force_n)
+
+    def disable(self) -> None:
+        self.machine.start("fg_disable")
+
+    def reset(self) -> None:
+        self.machine.start("fg_reset_fault")
+
+    def pull(self, *, pulls: bool) -> None:
+        self.machine.start("fg_pull", pulls)
+
+    def cycle(self, seconds: float = 0.04) -> None:
+        self.machine.start("fg_exchange")
+
+    @property
+    def text(self) -> str:
+        return str(self.get("fg_text"))
+
+    @property
+    def enabled(self) -> bool:
+        return bool(self.get("fg_enabled"))
+
+    @property
+    def ended(self) -> bool:
+        return bool(self.get("fg_ended"))
+
+    def begin_upload(self, model: dict[str, Any], slot: int) -> None:
+        self.machine.start("fg_model_clear")
+        for name, value in model.items():
+            place = self.get(f"FG_M_{name.upper()}")
+            for k, each in enumerate(value if isinstance(value, list) else [value]):
+                routine = "fg_model_count" if name in ("order", "slip_stops") else "fg_model_number"
+                self.machine.start(routine, place + 2 * k, each)
+        self.machine.start("fg_upload", slot)
+
+    @property
+    def uploaded(self) -> bool:
+        return bool(self.get("fg_upload_done"))
+
+
+class Timer:
+    """TON in virtual time."""
+
+    def __init__(self, plc: "Plc") -> None:
+        self.plc, self.Q, self.since_s = plc, False, 0.0
+
+    def call(self, given: dict[str, Any]) -> None:
+        if not given["IN"]:
+            self.since_s = self.plc.now_s
+        self.Q = given["IN"] and self.plc.now_s - self.since_s >= given["PT"] - 1e-9
+
+
+class Plc:
+    """What S7 and CODESYS share: a block with inputs and outputs, called in cycles of 10 ms."""
+
+    CYCLE_S = 0.01
+    NAMES: ClassVar[dict[str, str]] = {}
+
+    def __init__(self, text: str, language: str, gateway: GatewayAtHand, block: str) -> None:
+        self.gateway, self.now_s = gateway, 0.0
+        self.machine = Machine(parse(text, language), self.library())
+        self.machine.blocks |= {"TON": lambda: Timer(self), "TON_TIME": lambda: Timer(self)}
+        self.prepare()
+        self.machine.begin()
+        self.block = self.machine.fresh(block)
+        self.inputs: dict[str, Any] = dict.fromkeys(
+            [self.NAMES[each] for each in ("enable", "reset", "upload", "pull")], False
+        )
+        self.inputs[self.NAMES["force"]] = 0.0
+        self.structures = {
+            self.NAMES[name]: self.machine.fresh(kind)
+            for name, kind in zip(("command", "model"), self.TYPES, strict=True)
+        }
+
+    TYPES = ("", "")
+
+    def prepare(self) -> None:
+        """Make what stands in other blocks."""
+
+    def library(self) -> dict[str, Any]:
+        same = values(lambda number: number)
+        return {
+            "first_index": 0,
+            "words": True,
+            "IDLE": 0,
+            **dict.fromkeys(["WORD_TO_UINT", "UINT_TO_WORD", "UINT_TO_INT", "WORD_TO_INT_", "WORD_TO_DWORD"], same),
+            "DWORD_TO_WORD": values(lambda number: number & 0xFFFF),
+            "WORD_TO_INT": values(lambda word: word - 65536 if word > 32767 else word),
+            "INT_TO_WORD": values(lambda number: number & 0xFFFF),
+            "INT_TO_REAL": values(float),
+            "REAL_TO_INT": values(round),
+            "REAL_TO_DWORD": values(lambda number: struct.unpack(">I", struct.pack(">f", number))[0]),
+            "DWORD_TO_REAL": values(lambda bits: struct.unpack(">f", struct.pack(">I", bits))[0]),
+            "SHL": values(lambda number, places: number << places & 0xFFFFFFFF),
+            "SHR": values(lambda number, places: number >> places),
+        }
+
+    def enable(self, force_n: float) -> None:
+        self.inputs[self.NAMES["force"]] = force_n
+        self.inputs[self.NAMES["enable"]] = False
+        self.scan()
+        self.inputs[self.NAMES["enable"]] = True
+
+    def force(self, force_n: float) -> None:
+        self.inputs[self.NAMES["force"]] = force_n
+
+    def disable(self) -> None:
+        self.inputs[self.NAMES["enable"]] = False
+
+    def reset(self) -> None:
+        self.inputs[self.NAMES["enable"]] = False
+        self.inputs[self.NAMES["reset"]] = True
+        self.scan()
+        self.inputs[self.NAMES["reset"]] = False
+
+    def pull(self, *, pulls: bool) -> None:
+        self.inputs[self.NAMES["pull"]] = pulls
+
+    def scan(self) -> None:
+        raise NotImplementedError
+
+    def cycle(self, seconds: float = 0.12) -> None:
+        for _ in range(round(seconds / self.CYCLE_S)):
+            self.scan()
+
+    def output(self, name: str) -> Any:
+        return self.machine.member(self.block, self.NAMES[name])
+
+    @property
+    def text(self) -> str:
+        return str(self.output("text"))
+
+    @property
+    def enabled(self) -> bool:
+        return bool(self.machine.member(self.output("status"), "enabled"))
+
+    @property
+    def ended(self) -> bool:
+        return bool(self.output("ended"))
+
+    def begin_upload(self, model: dict[str, Any], slot: int) -> None:
+        holder = self.structures[self.NAMES["model"]]
+        for name, value in model.items():
+            if isinstance(value, list):
+                holder[name.upper()][: len(value)] = value
+            else:
+                holder[name.upper()] = value
+        self.inputs[self.NAMES["slot"]] = slot
+        self.inputs[self.NAMES["upload"]] = True
+
+    @property
+    def uploaded(self) -> bool:
+        return bool(self.output("uploaded"))
+
+
+class MbClient:
+    """MB_CLIENT: one request at a time, BUSY for a scan, DONE or ERROR for one call; the connection is its own."""
+
+    def __init__(self, plc: "S7") -> None:
+        self.plc, self.BUSY, self.DONE, self.ERROR, self.STATUS, self.asked = plc, False, False, False, 0x7000, None
+        self.calls = 0
+
+    def call(self, given: dict[str, Any]) -> None:
+        self.DONE = self.ERROR = False
+        if given["DISCONNECT"]:
+            assert not given["REQ"], "a request while the connection is closed"
+            return
+        place = {name: given[name] for name in ("MB_MODE", "MB_DATA_ADDR", "MB_DATA_LEN")}
+        if not self.BUSY:
+            if given["REQ"]:
+                self.BUSY, self.asked, self.calls = True, place, 0
+                self.data = list(given["MB_DATA_PTR"])
+            return
+        assert place == self.asked, "parameters must not change while BUSY"
+        self.calls += 1
+        if self.calls == 2:
+            self.BUSY = False
+            self.finish(given)
+
+    def finish(self, given: dict[str, Any]) -> None:
+        address, count, words = given["MB_DATA_ADDR"] - 40001, given["MB_DATA_LEN"], given["MB_DATA_PTR"]
+        assert words == self.data and len(words) >= count and 0 <= address < 9999
+        assert given["CONNECT"]["CONNECTIONTYPE"] == 11 and given["CONNECT"]["ACTIVEESTABLISHED"]
+        if given["MB_MODE"] == 0:
+            request = struct.pack(">BHH", 3, address, count)
+        elif count == 1:
+            request = struct.pack(">BHH", 6, address, words[0])
+        else:
+            request = struct.pack(f">BHHB{count}H", 16, address, count, 2 * count, *words[:count])
+        try:
+            pdu = self.plc.gateway.answer(request)
+        except Unplugged:
+            self.ERROR, self.STATUS = True, 0x80C8
+            return
+        if pdu[0] & 0x80:
+            self.ERROR, self.STATUS = True, 0x8380 + {1: 1, 2: 3}.get(pdu[1], 4)
+            return
+        if given["MB_MODE"] == 0:
+            words[:count] = struct.unpack(f">{count}H", pdu[2:])
+        self.DONE = True
+
+
+class S7(Plc):
+    """SCL: the block is called in a cyclic interrupt."""
+
+    CYCLE_S = 0.01
+    TYPES = ('"FG_Command"', '"FG_Model"')
+    NAMES: ClassVar[dict[str, str]] = {
+        **{name: name for name in ("enable", "reset", "force", "upload", "slot", "command", "model", "pull")},
+        **{name: name for name in ("text", "status", "ended", "uploadBusy")},
+        "uploaded": "uploadDone",
+    }
+
+    def __init__(self, text: str, gateway: GatewayAtHand) -> None:
+        super().__init__(text, "scl", gateway, "ForceGateway")
+
+    def prepare(self) -> None:
+        connection = dict.fromkeys(("InterfaceId", "ID", "ConnectionType", "ActiveEstablished"), ("int", None))
+        connection |= {"RemoteAddress": ("IP_V4", None), "RemotePort": ("int", None), "LocalPort": ("int", None)}
+        self.machine.types |= {"TCON_IP_V4": connection, "IP_V4": {"ADDR": (("array", 0, 4, "int"), None)}}
+        self.machine.blocks["MB_CLIENT"] = lambda: MbClient(self)
+
+    def scan(self) -> None:
+        self.now_s += self.CYCLE_S
+        self.machine.steps = 0
+        given = {"tare": False, "takeOwnership": False, "slot": 0} | self.inputs | self.structures
+        self.block.call(given)
+
+
+class Codesys(Plc):
+    """Structured Text: FB_ForceGateway, and a transport that takes two scans."""
+
+    TYPES = ("ST_FgCommand", "ST_FgModel")
+    NAMES: ClassVar[dict[str, str]] = {
+        "enable": "bEnable",
+        "reset": "bReset",
+        "force": "fForce",
+        "upload": "bUpload",
+        "pull": "bPull",
+        "slot": "nSlot",
+        "command": "stCommand",
+        "model": "stModel",
+        "text": "sText",
+        "status": "stStatus",
+        "ended": "bEnded",
+        "uploaded": "bUploadDone",
+    }
+
+    def __init__(self, text: str, gateway: GatewayAtHand) -> None:
+        super().__init__(text, "st", gateway, "FB_ForceGateway")
+        self.link = self.machine.fresh("ST_FgLink")
+        self.waited = 0
+
+    def scan(self) -> None:
+        self.now_s += self.CYCLE_S
+        self.machine.steps = 0
+        self.block.call(self.inputs | self.structures | {"stLink": self.link})
+        link = self.link
+        if not link["BREQUEST"]:
+            link["BDONE"] = link["BERROR"] = False
+            self.waited = 0
+        elif not (link["BDONE"] or link["BERROR"]):
+            self.waited += 1
+            if self.waited == 2:
+                self.carry_out(link)
+
+    def carry_out(self, link: dict[str, Any]) -> None:
+        write = (link["NWRITEADDRESS"], link["NWRITEQUANTITY"])
+        read = (link["NREADADDRESS"], link["NREADQUANTITY"])
+        data = struct.pack(f">{write[1]}H", *link["AWRITE"][: write[1]])
+        if write[1] and read[1]:
+            request = struct.pack(">BHHHHB", 23, *read, *write, len(data)) + data
+        elif write[1]:
+            request = struct.pack(">BHHB", 16, *write, len(data)) + data
+        else:
+            request = struct.pack(">BHH", 3, *read)
+        try:
+            pdu = self.gateway.answer(request)
+        except Unplugged:
+            link["BERROR"] = True
+            return
+        link["BDONE"], link["BERROR"] = not pdu[0] & 0x80, bool(pdu[0] & 0x80)
+        if link["BDONE"] and read[1]:
+            link["AREAD"][: read[1]] = struct.unpack(f">{read[1]}H", pdu[2:])

@@ -1,0 +1,139 @@
+"""The real register bank behind the real request handling, without a socket; control is a stand-in that obeys at once."""
+
+from __future__ import annotations
+
+import struct
+
+from gateway.bsfm.coefficients import CoefficientLimits
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.modbus import Peer, answer
+from gateway.modbus.peer import Role
+from gateway.registers import BankRules, Command, RegisterBank, RegisterMap, Status
+from gateway.registers.rig_rules import BASIC_BITS
+from gateway.registers.upload.staging import StagedFault, check_staged
+from gateway.registers.words import CommitStatus, ControlBit, State, StatusBit
+from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
+
+
+class Unplugged(Exception):  # noqa: N818
+    """The wire is cut."""
+
+
+class GatewayAtHand:
+    """requests: every PDU that was asked, exceptions: what was refused, as (function, code)."""
+
+    def __init__(self, register_map: RegisterMap, force_max_n: float = 60.0) -> None:
+        rules = BankRules(rig_name="test", force_max_n=force_max_n, supported_bits=BASIC_BITS | ControlBit.VALVE_PULL)
+        self.bank = RegisterBank(register_map, rules, now=lambda: 0.0)
+        self.bank.on_command = self.obey
+        self.bank.on_asked = self.decide
+        self.bank.staging.on_commit = self.commit
+        self.requests: list[bytes] = []
+        self.exceptions: list[tuple[int, int]] = []
+        self.is_cut = False
+        self.fault = FaultCode.NONE
+        self.peer = Peer("10.0.0.9", 40000, role=Role.CALIBRATION)
+        self.publish(0.0, on=False)
+
+    def obey(self, command: Command) -> None:
+        if ControlBit.RESET_FAULT in command.control_word:
+            self.fault = FaultCode.NONE
+        self.publish(command.force_setpoint_n, on=ControlBit.ENABLE in command.control_word)
+
+    def decide(self, proposal: ProposedWrite) -> EdgeRefusal | None:
+        if self.fault and ControlBit.ENABLE in proposal.command.control_word:
+            return EdgeRefusal(RefusalReason.FAULT_LATCHED, ControlBit.ENABLE, "a fault is latched")
+        return None
+
+    def stop_from_elsewhere(self) -> None:
+        """Another master writes 0 to control_word."""
+        answer(b"\x06\0\0\0\0", self.bank, Peer("10.0.0.7", 40001))
+
+    def take_over_from_elsewhere(self) -> None:
+        """Another master takes the setpoint over, and holds 7 N."""
+        answer(struct.pack(">BHHBHH", 16, 0, 2, 4, 9, 700), self.bank, Peer("10.0.0.7", 40001))
+
+    def publish(self, force_n: float, *, on: bool) -> None:
+        word = StatusBit.ENABLED | StatusBit.READY | StatusBit.IN_BAND if on else StatusBit(0)
+        state = State.HOLDING if on else State.OFF
+        if self.fault:
+            word, state = StatusBit.FAULT, State.FAULT
+        self.bank.publish(
+            Status(
+                state=state,
+                status_word=int(word),
+                force_measured_n=force_n - 0.5,
+                force_requested_n=force_n,
+                fault_code=self.fault,
+            )
+        )
+
+    def fail(self, fault: FaultCode) -> None:
+        """Latch a fault: control is off, and the command cleared."""
+        self.fault = fault
+        self.bank.clear_command()
+        self.publish(0.0, on=False)
+
+    def commit(self, _action: object, words: bytes, _peer: Peer) -> None:
+        limits = CoefficientLimits(cell_range_n=100.0)
+        judged = check_staged(words, limits)
+        if isinstance(judged, StagedFault):
+            self.bank.staging.show_commit(CommitStatus.FAILED, judged.index, judged.reason)
+        else:
+            self.bank.staging.show_commit(CommitStatus.COMMITTED)
+
+    def ask(self, frame: bytes) -> bytes:
+        """Return the answer to one whole request with its header."""
+        if self.is_cut:
+            raise Unplugged
+        transaction, protocol, length, unit = struct.unpack(">HHHB", frame[:7])
+        assert (protocol, length) == (0, len(frame) - 6)
+        pdu = self.answer(frame[7:])
+        return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+
+    def answer(self, request: bytes) -> bytes:
+        if self.is_cut:
+            raise Unplugged
+        self.requests.append(request)
+        pdu = answer(request, self.bank, self.peer)
+        if pdu[0] & 0x80:
+            self.exceptions.append((request[0], pdu[1]))
+        return pdu
+
+    @property
+    def writes(self) -> list[tuple[int, tuple[int, ...]]]:
+        """Every write to the command block: (first address, words)."""
+        found = []
+        for request in self.requests:
+            first, second = struct.unpack_from(">HH", request, 1)
+            if request[0] == 23:
+                address, count = struct.unpack_from(">HH", request, 5)
+                found.append((address, struct.unpack(f">{count}H", request[10:])))
+            elif request[0] == 16 and first < 16:
+                found.append((first, struct.unpack(f">{second}H", request[6:])))
+            elif request[0] == 6 and first < 16:
+                found.append((first, (second,)))
+        return found
+
+    @property
+    def words(self) -> list[tuple[int, ...]]:
+        """Every whole command that was written."""
+        return [words for address, words in self.writes if address == 0]
+
+    @property
+    def beats(self) -> list[int]:
+        """Every heartbeat that was written, alone or within a command."""
+        return [words[4] if address == 0 else words[0] for address, words in self.writes]
+
+    @property
+    def uploads(self) -> list[tuple[int, bytes]]:
+        """Every write to the staging block: (address, data)."""
+        found = []
+        for request in self.requests:
+            address = int.from_bytes(request[1:3], "big")
+            if request[0] == 16 and address >= 1000:
+                found.append((address, request[6:]))
+            elif request[0] == 6 and address >= 1000:
+                found.append((address, request[3:]))
+        return found

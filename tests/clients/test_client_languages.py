@@ -1,0 +1,106 @@
+"""The generated texts are such as their languages allow: names, lines, marks; all that is used is declared."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from tests.clients.controllers import Irc5
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.machine import Machine
+from tests.clients.scenes import MAP, MODEL, TEXTS, cycles
+from tests.clients.syntax import PATTERNS, Unit, parse, tokenize
+
+RESERVED = {
+    "rapid": "alias and backward case connect const default div do else elseif endfor endfunc endif endmodule endproc "
+    "endrecord endtest endtrap endwhile error exit false for from func goto if inout local mod module nostepin not noview or "
+    "pers proc "
+    "raise readonly record retry return step sysmodule task test then to trap true trynext undo var viewonly while with xor",
+    "urscript": "and break continue def elif else end enter_critical exit_critical false for global halt if join kill local "
+    "not or return run sec signal switch sync thread true wait while xor case default length",
+}
+
+
+def names_of(unit: Unit) -> list[str]:
+    names = [*unit.variables, *unit.types, *unit.routines]
+    for routine in unit.routines.values():
+        names += [*routine.variables, *(parameter[0] for parameter in routine.parameters)]
+    return [name.strip('"').lstrip("#") for name in names]
+
+
+@pytest.mark.parametrize(("language", "longest"), [("rapid", 32), ("scl", 128), ("st", 64), ("urscript", 64)])
+def test_names_are_such_as_the_language_allows(language: str, longest: int) -> None:
+    names = names_of(parse(TEXTS[language], language))
+    assert len(names) > 40
+    assert [name for name in names if len(name) > longest] == []
+    assert {name for name in names if name.lower() in RESERVED.get(language, "").split()} == set()
+
+
+def test_scl_marks_its_own_names_and_no_others() -> None:
+    """Behind BEGIN a name of the block's own has its #; what has none is a member, an argument or a function."""
+    body = TEXTS["scl"].split('FUNCTION_BLOCK "ForceGateway"', 1)[1].split("BEGIN", 1)[1]
+    own = parse(TEXTS["scl"], "scl").routines['"ForceGateway"'].variables
+    tokens = tokenize(re.sub(r"REGION .*", "", body), PATTERNS["scl"])
+    assert {each.text[1:] for each in tokens if each.text.startswith("#")} <= set(own)
+    for before, token, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
+        if token.kind == "name" and token.text in own:
+            assert before.text == "." or after.text in (":=", "=>"), token
+
+
+def test_rapid_lines_fit_the_editor_and_strings_the_language() -> None:
+    assert [line for line in TEXTS["rapid"].splitlines() if len(line) > 80] == []
+    assert all(len(text) <= 80 for text in re.findall(r'"([^"]*)"', TEXTS["rapid"]))
+    assert TEXTS["rapid"].isascii()
+
+
+def test_every_rapid_routine_runs_and_declares_what_it_uses() -> None:
+    gateway = GatewayAtHand(MAP)
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.enable(12.0)
+    client.set(fgTare=True, fgTake=True)
+    cycles(client, 2)
+    client.begin_upload(MODEL, 1)
+    cycles(client, 12)
+    gateway.fail(FaultCode.OVER_FORCE)
+    client.cycle()
+    client.force(400.0)
+    client.cycle()
+    client.machine.start("FgTimerStart")
+    client.machine.start("FgTick")
+    client.machine.start("FgTimerStop")
+    for name in ("FgFaultText", "FgRefusalText", "FgWarningText", "FgFailingText", "FgStateText"):
+        client.machine.start(name, 1)
+    client.machine.start("FgCrcIsRight")
+    gateway.is_cut = True
+    client.cycle()
+    client.enable(65.0)
+    gateway.is_cut = False
+    client.cycle(10.0)
+    unused = set(client.machine.unit.routines) - client.machine.called
+    assert unused <= {"FgServe", "FgExplain"}, unused
+
+
+@pytest.mark.parametrize(
+    ("language", "wrong"),
+    [
+        ("rapid", "MODULE M\n VAR num a:=1\nENDMODULE"),
+        ("rapid", "MODULE M\n PROC p()\n IF a THEN\n ENDPROC\nENDMODULE"),
+        ("rapid", "MODULE M\n PROC p()\n a=1;\n ENDPROC\nENDMODULE"),
+        ("scl", 'FUNCTION "F" : Int\nVERSION : 0.1\nBEGIN\n IF TRUE THEN\nEND_FUNCTION'),
+        ("st", "FUNCTION F : INT\nVAR\n a : INT;\n A : INT;\nEND_VAR\nEND_FUNCTION"),
+        ("urscript", "def f():\n  if True:\n    x = 1\nend\n"),
+        ("urscript", "x == 1\n"),
+    ],
+)
+def test_the_parsers_refuse_what_the_languages_do(language: str, wrong: str) -> None:
+    with pytest.raises(SyntaxError):
+        parse(wrong, language)
+
+
+def test_the_interpreter_finds_a_name_that_nobody_declared() -> None:
+    machine = Machine(parse("MODULE M\n PROC p()\n  nowhere:=1;\n ENDPROC\nENDMODULE", "rapid"), {"first_index": 1})
+    machine.begin()
+    with pytest.raises(NameError, match="nowhere"):
+        machine.start("p")

@@ -1,0 +1,140 @@
+"""The wiring page: of any rig, in any format, with numbers that are those of the generated clients."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from gateway.cli.main import command
+from gateway.clients import Endpoint, render_client
+from gateway.clients.wiring import wiring_page
+from gateway.profiles import list_shipped, load_register_map, load_rig
+from gateway.profiles.rigs.faces import TlsFace
+from tests.clients.controllers import S7, MbClient
+from tests.clients.gateway_at_hand import GatewayAtHand
+
+PROFILES = Path(__file__).parents[2] / "profiles"
+MAP = load_register_map("force-v1")
+
+
+def call(*words: str) -> str:
+    result = CliRunner().invoke(command, [*words], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def rows_of(page: dict[str, Any], title: str) -> dict[str, list[str]]:
+    (section,) = [each for each in page["sections"] if each["title"] == title]
+    return {row[0]: row[1:] for row in section["rows"]}
+
+
+def page_of(rig: Path | str) -> dict[str, Any]:
+    return dict(json.loads(call("wiring", str(rig), "--json")))
+
+
+@pytest.mark.parametrize("form", ["text", "markdown", "json"])
+@pytest.mark.parametrize("rig", list_shipped("rig"))
+def test_every_shipped_rig_has_a_page(rig: str, form: str) -> None:
+    text = call("wiring", rig, "--format", form)
+    network = load_rig(rig).network
+    assert f"{network.bind}:{network.port}" in text
+    for word in ("TCON_IP_v4", "FG_HOST", "ClientTCP", "register output", "mbpoll -1"):
+        assert word in text
+
+
+@pytest.fixture
+def own_rig(tmp_path: Path) -> Path:
+    """The cell with other devices, a serial face, another port, and its proof of byte order."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    text = text.replace("port: 5020", "port: 502").replace("bind: 192.168.125.20", "bind: 10.1.2.3")
+    text = text.replace("require_byte_order_echo: false", "require_byte_order_echo: true")
+    text += "\nfieldbus:\n  - {type: rtu, port: /dev/ttyS7, baud: 38400, parity: even, stop_bits: 1, unit: 17}\n"
+    (tmp_path / "own.yaml").write_text(text)
+    return tmp_path / "own.yaml"
+
+
+def test_the_page_of_a_rig_of_one_s_own_has_its_own_numbers(own_rig: Path) -> None:
+    page = page_of(own_rig)
+    assert rows_of(page, "Siemens S7-1200/1500: connection of MB_CLIENT")["RemoteAddress"][0].endswith("10, 1, 2, 3")
+    assert rows_of(page, "ABB IRC5: RAPID sockets")["FG_HOST, FG_PORT, FG_UNIT"] == ['"10.1.2.3", 502, 1']
+    face = rows_of(page, "Serial face 1: Modbus RTU, masters ask here")
+    assert face["line"] == ["38400 8E1, unit 17"]
+    text = call("wiring", str(own_rig))
+    assert "mbpoll -1 -m rtu -b 38400 -P even -s 1 -a 17 -r 101 -c 32 MASTER-PORT" in text
+    assert "asks port 502 always" not in text
+    assert "16#449A, 16#5000 to address 416 (40417)" in text
+
+
+def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
+    face = TlsFace(type="tls", port=802, certificate="gateway.crt", key="gateway.key", ca="ca.crt")
+    rig = replace(load_rig("demo"), fieldbus=(face,))
+    titles = {section.title: dict(row[:2] for row in section.rows) for section in wiring_page(rig, "demo")[1]}  # type: ignore[arg-type]
+    shown = titles["Face 1: Modbus/TCP Security"]
+    assert shown["address"].startswith("127.0.0.1:802,")
+    assert "ca.crt" in shown["masters need"]
+    assert "plain Modbus TCP" in shown["not for"]
+
+
+def test_a_rig_that_no_robot_can_reach_is_told_so() -> None:
+    assert "no robot can reach it" in call("wiring", "demo")
+
+
+def test_the_s7_table_is_what_the_generated_block_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = set()
+    finish = MbClient.finish
+
+    def note(self: MbClient, given: dict[str, Any]) -> None:
+        asked.add(tuple(str(given[name]) for name in ("MB_MODE", "MB_DATA_ADDR", "MB_DATA_LEN")))
+        finish(self, given)
+
+    monkeypatch.setattr(MbClient, "finish", note)
+    client = S7(render_client(MAP, "scl", Endpoint("10.1.2.3", 502, 1)), GatewayAtHand(MAP))
+    client.enable(12.0)
+    client.begin_upload({"order": 1}, 0)
+    for _ in range(10):
+        client.cycle()
+    rows = rows_of(page_of("irc5-cell"), "Siemens S7-1200/1500: requests")
+    assert asked == {tuple(row[:3]) for name, row in rows.items() if name != "request"}
+
+
+@pytest.mark.parametrize("device", list_shipped("device"))
+def test_every_shipped_device_has_its_wires(device: str) -> None:
+    from gateway.clients.wiring.device_wires import GENERAL, wires_of
+
+    for is_modbus in (False, True):
+        wires = wires_of(device, is_modbus=is_modbus)
+        assert GENERAL[wires.interface]
+        assert wires.source or not wires.switches or "menu" in wires.switches[0]
+
+
+@pytest.mark.parametrize("language", ["rapid", "scl", "st", "urscript", "c", "python"])
+def test_a_client_for_a_rig_has_its_address(own_rig: Path, language: str) -> None:
+    text = call("registers", "--format", language, "--rig", str(own_rig))
+    shown = {"scl": "IP_1 : Byte := 10;", "st": "[10, 1, 2, 3]"}.get(language, "10.1.2.3")
+    assert shown in text
+    assert f"map_hash 0x{MAP.map_hash:08X}" in text
+
+
+def test_a_map_that_lacks_registers_is_told_all_of_them(tmp_path: Path) -> None:
+    text = (PROFILES / "registers" / "force-v1.yaml").read_text()
+    text = text.replace("name: refusal_reason", "name: why").replace(
+        "name: slip_stops, address: 1150", "name: stops, address: 1150"
+    )
+    (tmp_path / "my.yaml").write_text(text.replace("name: force-v1", "name: my"))
+    result = CliRunner().invoke(command, ["registers", "--format", "rapid", "--map", str(tmp_path / "my.yaml")])
+    assert result.exit_code != 0
+    assert "E185 map my lacks refusal_reason (block status), slip_stops (block staging)" in result.output
+
+
+def test_a_map_of_one_s_own_with_other_addresses_makes_a_client(tmp_path: Path) -> None:
+    text = (PROFILES / "registers" / "force-v1.yaml").read_text().replace("name: force-v1", "name: my")
+    text = text.replace("name: heartbeat, address: 4", "name: heartbeat, address: 13")
+    (tmp_path / "my.yaml").write_text(text)
+    client = call("registers", "--format", "rapid", "--map", str(tmp_path / "my.yaml"))
+    assert "CONST num FG_C_HEARTBEAT:=14;" in client
+    assert "COMMAND_WORDS:=14;" in client

@@ -1,0 +1,143 @@
+"""The self-test on machines that nobody here has built: nothing is found on a healthy one, and each fault by its own item.
+
+Calibrations are those that the product's quick ladder gave for these machines (tests/control/foreign).
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from gateway.control.self_test.items import Item
+from gateway.registers.words import CalibrationPhase, ControlBit, SelfTestResult, SelfTestVerdict, State
+from tests.control.foreign.machine import Machine
+from tests.control.self_test.rig import KEPT, SelfTestRig
+
+FORCE_N = 34.0
+LONGEST_S = 20.0
+FAST = (5,)
+SEEDS = tuple(seed if seed in FAST else pytest.param(seed, marks=pytest.mark.long) for seed in range(20))
+PASSED, WARNED, FAILED = SelfTestVerdict.PASSED, SelfTestVerdict.WARNED, SelfTestVerdict.FAILED
+
+
+def machine_of(seed: int, **changes: float) -> Machine:
+    return replace(KEPT[seed].machine, **changes)
+
+
+def noisy(seed: int) -> SelfTestRig:
+    return SelfTestRig(seed, FORCE_N, machine=machine_of(seed, noise_n=5.0 * KEPT[seed].machine.noise_n + 0.2))
+
+
+def slow(seed: int) -> SelfTestRig:
+    return SelfTestRig(seed, FORCE_N, machine=machine_of(seed, lag_s=6.0 * KEPT[seed].machine.lag_s + 0.1))
+
+
+def stuck(seed: int) -> SelfTestRig:
+    return SelfTestRig(seed, FORCE_N, machine=machine_of(seed, noise_n=0.0), reading=lambda force_n: 0.0)
+
+
+BROKEN: dict[str, tuple[Item, Callable[[int], SelfTestRig]]] = {
+    "noise": (Item.NOISE, noisy),
+    "stuck": (Item.RESOLUTION, stuck),
+    "coarse": (Item.RESOLUTION, lambda seed: SelfTestRig(seed, FORCE_N, machine=machine_of(seed, quantum_n=0.8))),
+    "zero": (Item.ZERO, lambda seed: SelfTestRig(seed, FORCE_N, reading=lambda force_n: force_n + 8.0)),
+    "zero below": (Item.ZERO, lambda seed: SelfTestRig(seed, FORCE_N, reading=lambda force_n: force_n - 3.0)),
+    "sign": (Item.SIGN, lambda seed: SelfTestRig(seed, FORCE_N, reading=lambda force_n: -force_n)),
+    "kgf": (Item.SCALE, lambda seed: SelfTestRig(seed, FORCE_N, reading=lambda force_n: force_n / 9.80665)),
+    "span": (Item.SCALE, lambda seed: SelfTestRig(seed, FORCE_N, reading=lambda force_n: 4.0 * force_n)),
+    "air": (Item.SCALE, lambda seed: SelfTestRig(seed, FORCE_N, machine=machine_of(seed, gain_n_per_v=0.0))),
+    "slow": (Item.RESPONSE, slow),
+    "leak": (Item.LEAK, lambda seed: SelfTestRig(seed, FORCE_N, leak_per_s=0.1)),
+    "output line": (Item.OUTPUT_LINE, lambda seed: SelfTestRig(seed, FORCE_N, lost_answers=0.2)),
+    "samples": (Item.CELL_LINE, lambda seed: SelfTestRig(seed, FORCE_N, lost_samples=0.2)),
+    "garbage": (Item.CELL_LINE, lambda seed: SelfTestRig(seed, FORCE_N, garbled=0.2)),
+}
+
+
+@pytest.mark.parametrize("has_worked", [False, True])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_healthy_machine_passes_within_20_s_and_below_the_stated_force(seed: int, has_worked: bool) -> None:
+    rig = SelfTestRig(seed, FORCE_N)
+    report = (rig.worked() if has_worked else rig).tested()
+    assert report.result is SelfTestResult.PASSED, report.sentences
+    assert all(found.verdict is PASSED for found in report.findings)
+    assert rig.took_s < LONGEST_S
+    assert 0.5 * FORCE_N < rig.peak_n < FORCE_N
+    assert rig.controller.state is State.OFF and rig.output and rig.output.voltage_v == 0.0
+
+
+@pytest.mark.parametrize("name", BROKEN)
+@pytest.mark.parametrize("seed", [5, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(20) if seed != 5)])
+def test_each_fault_is_found_by_its_own_item_and_by_no_other(seed: int, name: str) -> None:
+    item, broken = BROKEN[name]
+    rig = broken(seed)
+    report = rig.tested()
+    failed = [found.item for found in report.findings if found.verdict is FAILED]
+    assert failed == [item], report.sentences
+    assert report.result is SelfTestResult.FAILED
+    assert rig.peak_n < FORCE_N and rig.took_s < LONGEST_S
+    assert any(sentence.startswith("A354 self-test") for sentence in rig.events)
+
+
+@pytest.mark.parametrize("factor", [2.5, 8.0])
+def test_a_machine_that_is_stronger_than_its_calibration_stays_below_the_stated_force(factor: float) -> None:
+    """The twin of the test above with the slide itself: what presses is what is measured."""
+    strong = machine_of(5, gain_n_per_v=factor * KEPT[5].machine.gain_n_per_v)
+    rig = SelfTestRig(5, FORCE_N, machine=strong)
+    report = rig.tested()
+    assert rig.peak_n < FORCE_N
+    assert (
+        report.verdict_on(Item.SCALE) in (WARNED, FAILED) or report.verdict_on(Item.SCALE) is SelfTestVerdict.NOT_TESTED
+    )
+    assert report.result in (SelfTestResult.WARNED, SelfTestResult.FAILED)
+
+
+def test_without_a_force_nothing_moves_and_the_rest_is_tested() -> None:
+    rig = SelfTestRig(1, 0.0)
+    report = rig.tested()
+    assert rig.peak_v == 0.0 and report.result is SelfTestResult.PASSED
+    assert [found.item for found in report.findings if found.verdict is PASSED] == [
+        Item.NOISE, Item.RESOLUTION, Item.ZERO, Item.OUTPUT_LINE, Item.CELL_LINE,
+    ]  # fmt: skip
+    assert "nothing moves" in report.sentences[3]
+
+
+def test_where_friction_leaves_no_room_that_is_said_and_not_taken_for_a_fault() -> None:
+    rig = SelfTestRig(5, 5.0).worked()
+    report = rig.tested()
+    assert report.result is SelfTestResult.WARNED
+    assert rig.peak_n < 5.0
+    assert "leave no room below self_test.force_n = 5 N: raise it" in report.sentences[3]
+
+
+def test_clearing_bit_6_ends_it_and_nothing_is_claimed() -> None:
+    rig = SelfTestRig(1, FORCE_N)
+    rig.write(ControlBit.START_SELF_TEST)
+    rig.run(5.0)
+    assert rig.controller.active_run.self_test.result is SelfTestResult.RUNNING
+    assert rig.output and rig.output.calibration_phase is CalibrationPhase.SELF_TEST
+    assert 0.0 < rig.output.calibration_progress < 1.0 and rig.output.calibration_time_left_s > 0.0
+    rig.write(ControlBit(0))
+    rig.run(1.0)
+    report = rig.controller.active_run.self_test
+    assert rig.controller.state is State.OFF and report.result is SelfTestResult.STOPPED
+    assert report.verdict_on(Item.LEAK) is SelfTestVerdict.NOT_TESTED
+    assert report.verdict_on(Item.NOISE) is PASSED
+    assert "self-test stopped by m" in rig.events
+
+
+def test_a_fault_of_the_supervision_is_the_verdict_on_what_it_is_about() -> None:
+    rig = SelfTestRig(1, FORCE_N)
+    rig.write(ControlBit.START_SELF_TEST)
+    rig.run(4.0)
+    rig.lost_samples = 1.0
+    rig.run(1.0)
+    report = rig.controller.active_run.self_test
+    assert rig.controller.state is State.FAULT and report.result is SelfTestResult.FAILED
+    assert [found.item for found in report.findings if found.verdict is FAILED] == [Item.CELL_LINE]
+    assert "A311" in next(found.text for found in report.findings if found.item is Item.CELL_LINE)
+
+
+def test_a_second_self_test_has_the_next_number() -> None:
+    rig = SelfTestRig(1, 0.0)
+    assert [rig.tested().number, rig.tested().number] == [1, 2]

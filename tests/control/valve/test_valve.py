@@ -1,0 +1,204 @@
+"""Bit 4: the force goes to 0, the valve is switched without pressure, its readback is awaited, and then the tool pulls."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.control import Controller
+from gateway.control.inputs import CalibrationInUse, Output, ValveStatus
+from gateway.control.runs.ladder_stairs import CalibrationPlan
+from gateway.control.settings import SafeDirection, ValveControl
+from gateway.control.valve.pull_model import scale_forces
+from gateway.devices.valve_profile import ValveDirection
+from gateway.registers.words import ControlBit, State, StatusBit
+from tests.control.bench import Bench, bsfm, settings
+
+PUSH, PULL = ValveDirection
+ENABLE, BIT_4, NONE = ControlBit.ENABLE, ControlBit.VALVE_PULL, ControlBit(0)
+SHARE = 0.75
+MOVES_S = 0.05  # of the valve and its relay
+
+
+class ValveBench(Bench):
+    """A rig with a valve. stands: of the relay; obeys: whether it follows; switched: (s, contact force, voltage) of each
+    move."""
+
+    def __init__(self, stands: ValveDirection = PUSH, **valve: object) -> None:
+        control = replace(settings(), valve=ValveControl(**{"pull_area_share": SHARE, **valve}))  # type: ignore[arg-type]
+        super().__init__(control)
+        self.controller = Controller(control, CalibrationInUse(bsfm(), 1))
+        self.stands, self.obeys, self.is_silent = stands, True, False
+        self.told: ValveDirection | None = stands
+        self.told_s = self.silent_s = 0.0
+        self.switched: list[tuple[float, float, float]] = []
+        self.turn(stands)
+
+    def turn(self, stands: ValveDirection) -> None:
+        self.stands = stands
+        self.plant.sign = -1.0 if stands is PULL else 1.0
+        self.plant.gain_n_per_v = 7.4 * (SHARE if stands is PULL else 1.0)
+
+    def step(self) -> Output:
+        if self.obeys and self.told not in (None, self.stands) and self.now_s - self.told_s >= MOVES_S:
+            self.switched.append((self.now_s, self.plant.force_n, self.voltage_v))
+            self.turn(self.told)  # type: ignore[arg-type]
+        since_s = self.silent_s if self.is_silent else None
+        self.line = self.line._replace(valve=ValveStatus(self.stands, since_s))
+        output = super().step()
+        if output.valve is not self.told:
+            self.told, self.told_s = output.valve, self.now_s
+        return output
+
+    def status(self) -> StatusBit:
+        return self.last.status
+
+    def pulling(self, force_n: float = 12.0) -> "ValveBench":
+        self.run(1.0)
+        self.write(control_word=ENABLE | BIT_4, force_setpoint_n=force_n)
+        self.run(3.0)
+        return self
+
+
+def test_the_tool_pulls_with_the_setpoint_and_shows_a_negative_force() -> None:
+    bench = ValveBench().pulling(12.0)
+    assert bench.stands is PULL and bench.last.state is State.HOLDING
+    assert bench.last.force_measured_n == pytest.approx(-12.0, abs=1.0)
+    assert bench.last.force_accepted_n == 12.0
+    assert bench.status() & StatusBit.PULLING and not bench.status() & StatusBit.SWITCHING
+    assert "the valve pulls" in bench.events
+
+
+def test_under_force_it_goes_to_0_first_waits_and_switches_without_pressure() -> None:
+    bench = ValveBench(dwell_s=0.3)
+    bench.run(1.0)
+    bench.enable(20.0)
+    bench.run(2.0)
+    assert bench.last.state is State.HOLDING
+    began_s = bench.now_s
+    bench.write(control_word=ENABLE | BIT_4)
+    bench.run(0.02)
+    assert bench.status() & StatusBit.SWITCHING and bench.last.voltage_v < 20.0 / 6.0
+    bench.run(4.0)
+    ((at_s, force_n, voltage_v),) = bench.switched
+    assert voltage_v == 0.0 and force_n < 3.0, "no pressure, and no more force than friction keeps"
+    vented_s = next(one.time_s for one in bench.history if one.time_s > began_s and one.output.voltage_v == 0.0)
+    assert at_s - vented_s >= 0.3
+    risen_s = next(one.time_s for one in bench.history if one.time_s > at_s and one.output.voltage_v > 0.0)
+    assert risen_s - at_s >= 0.3 - MOVES_S
+    assert bench.last.state is State.HOLDING and bench.last.force_measured_n == pytest.approx(-20.0, abs=1.0)
+
+
+def test_clearing_bit_4_pushes_again_with_the_same_setpoint() -> None:
+    bench = ValveBench().pulling(12.0)
+    bench.write(control_word=ENABLE)
+    bench.run(4.0)
+    assert bench.stands is PUSH and bench.last.state is State.HOLDING
+    assert bench.last.force_measured_n == pytest.approx(12.0, abs=1.0)
+    assert not bench.status() & StatusBit.PULLING
+
+
+@pytest.mark.parametrize(
+    ("safe", "then"), [(SafeDirection.PUSH, PUSH), (SafeDirection.PULL, PULL), (SafeDirection.KEEP, PULL)]
+)
+def test_disabled_it_goes_where_the_rig_says(safe: SafeDirection, then: ValveDirection) -> None:
+    bench = ValveBench(safe=safe).pulling()
+    bench.disable()
+    bench.run(2.0)
+    assert bench.last.state is State.OFF and bench.stands is then
+
+
+@pytest.mark.parametrize("safe", [SafeDirection.KEEP, SafeDirection.PULL])
+def test_at_the_start_nothing_is_taken_for_granted(safe: SafeDirection) -> None:
+    bench = ValveBench(PULL, safe=safe)
+    bench.run(1.0)
+    assert bench.stands is PULL and bench.status() & StatusBit.PULLING and not bench.switched
+
+
+def test_a_fault_leads_to_the_safe_direction_without_pressure() -> None:
+    bench = ValveBench().pulling()
+    bench.cell_silent = True
+    bench.run(2.0)
+    assert bench.last.fault is FaultCode.SAMPLE_STALE and bench.stands is PUSH
+    assert bench.switched[-1][2] == 0.0
+
+
+def test_a_valve_that_does_not_follow_is_a_fault_within_its_bound() -> None:
+    bench = ValveBench(timeout_s=0.5)
+    bench.run(1.0)
+    bench.obeys = False
+    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=12.0)
+    bench.run(1.5)
+    assert bench.last.fault is FaultCode.VALVE_ALTERED and bench.last.voltage_v == 0.0
+    assert max(volts for _, volts in bench.voltages()) == 0.0, "no pressure before the readback"
+    assert any(event.startswith("A356") and "reads back push and was told pull" in event for event in bench.events)
+
+
+def test_a_valve_that_turns_by_itself_or_falls_silent_is_a_fault() -> None:
+    turned = ValveBench().pulling()
+    turned.obeys = False
+    turned.turn(PUSH)
+    turned.run(1.0)
+    assert turned.last.fault in (FaultCode.VALVE_ALTERED, FaultCode.SIGN_INVERTED)
+    silent = ValveBench().pulling()
+    silent.is_silent, silent.silent_s = True, silent.now_s
+    silent.run(1.0)
+    assert silent.last.fault is FaultCode.VALVE_SILENT and silent.last.voltage_v == 0.0
+
+
+def test_enable_is_refused_until_the_relay_has_read_back() -> None:
+    bench = ValveBench()
+    bench.obeys = False
+    bench.stands = None  # type: ignore[assignment]
+    bench.run(0.5)
+    bench.write(control_word=ENABLE)
+    assert bench.refused and bench.refused.reason is RefusalReason.VALVE_UNKNOWN
+
+
+def test_more_than_pulling_reaches_is_refused_with_the_largest_force() -> None:
+    bench = ValveBench().pulling()
+    most_n = scale_forces(bsfm(), SHARE).force_range_n[1]
+    bench.force(most_n + 1.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.PULL_RANGE
+    assert f"pulling reaches {most_n:.1f} N" in bench.refused.text
+    bench.force(most_n - 5.0)
+    assert bench.refused is None
+
+
+def test_no_run_begins_while_the_valve_pulls() -> None:
+    bench = ValveBench(safe=SafeDirection.KEEP).pulling()
+    bench.disable()
+    bench.run(1.0)
+    assert "a run is made pushing" in bench.controller.refusal_of_run(bench.now_s, CalibrationPlan())
+
+
+def test_the_payloads_weight_counts_the_other_way() -> None:
+    """A tool that points down with 0.5 kg presses with 4.9 N: pulling 10 N up, the slide gives 14.9 N."""
+    bench = ValveBench()
+    bench.run(1.0)
+    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0, payload_kg=0.5)
+    bench.run(4.0)
+    assert bench.last.state is State.HOLDING
+    assert bench.plant.force_n == pytest.approx(14.9, abs=1.0)
+    assert bench.last.force_measured_n == pytest.approx(-10.0, abs=1.0)
+
+
+def test_the_derived_model_is_that_of_pushing_by_the_share_of_the_area() -> None:
+    model, pull = bsfm(), scale_forces(bsfm(), SHARE)
+    for share in (-1.0, 0.0, 1.0):
+        assert pull.force_n(4.0, share) == pytest.approx(SHARE * model.force_n(4.0, share))
+    assert pull.force_range_n[1] == pytest.approx(SHARE * model.force_range_n[1])
+
+
+def test_in_voltage_mode_it_is_switched_without_pressure_too() -> None:
+    bench = ValveBench()
+    bench.run(1.0)
+    bench.voltage(3.0)
+    bench.run(1.0)
+    assert bench.last.voltage_v == 3.0
+    bench.write(control_word=ENABLE | BIT_4)
+    bench.run(3.0)
+    ((_, force_n, voltage_v),) = bench.switched
+    assert voltage_v == 0.0 and force_n < 3.0
+    assert bench.last.voltage_v == 3.0 and bench.last.force_measured_n < -5.0

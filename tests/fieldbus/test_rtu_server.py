@@ -1,0 +1,187 @@
+"""The serial face on a real pty: answers, silence, an unplug, and an independent client."""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pymodbus.client import ModbusSerialClient
+
+from gateway.devices import SerialSettings
+from gateway.fieldbus import ModbusRtuServer, RtuSettings
+from gateway.modbus import Peer
+from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.rtu import encode_adu
+from gateway.ports import Pty
+from tests.fieldbus.conftest import NotingBank
+
+LINE = SerialSettings(baud=115200)
+FACE = Peer("serial:1")
+READ = P.read_request(3, 10, 2)
+ANSWER = encode_adu(3, bytes.fromhex("03 04 0000 0000"))
+
+
+@dataclass
+class Face:
+    """A server with its bank, and what it has told."""
+
+    bank: NotingBank = field(default_factory=NotingBank)
+    log: list[str] = field(default_factory=list)
+    gone: list[Peer] = field(default_factory=list)
+    server: Any = None
+
+    @asynccontextmanager
+    async def serving(self, path: str | None) -> AsyncIterator["Face"]:
+        settings = RtuSettings(path, LINE, unit=3, peer=FACE)
+        self.server = ModbusRtuServer(
+            self.bank, settings, on_peer_closed=self.gone.append, log=lambda _, told: self.log.append(told)
+        )
+        await self.server.start()
+        try:
+            yield self
+        finally:
+            await self.server.close()
+
+    async def until_told(self, part: str) -> str:
+        while not (told := [line for line in self.log if part in line]):
+            await asyncio.sleep(0.002)
+        return told[0]
+
+
+async def heard(fd: int, size: int) -> bytes:
+    """As many bytes as the master's end of the line gets."""
+    data = b""
+    while len(data) < size:
+        try:
+            data += os.read(fd, size - len(data))
+        except BlockingIOError:
+            await asyncio.sleep(0.001)
+    return data
+
+
+def is_silent(fd: int) -> bool:
+    try:
+        return not os.read(fd, 1)
+    except BlockingIOError:
+        return True
+
+
+def play(scene: Any) -> None:
+    asyncio.run(asyncio.wait_for(scene, 20.0))
+
+
+def test_a_request_is_answered_and_a_foreign_or_damaged_one_gets_no_byte() -> None:
+    async def scene() -> None:
+        line = Pty()
+        async with Face().serving(line.path) as face:
+            wanted = encode_adu(3, READ)
+            for unheard in (encode_adu(4, READ), wanted[:-1] + b"\x00", encode_adu(0, P.write_register_request(5, 77))):
+                os.write(line.fd, unheard)
+                await asyncio.sleep(0.03)
+                assert is_silent(line.fd)
+                os.write(line.fd, wanted)
+                assert await heard(line.fd, len(ANSWER)) == ANSWER
+            assert face.bank.writes == [(5, b"\x00M", FACE)]
+            os.write(line.fd, encode_adu(3, P.read_request(3, 9999, 1)))
+            assert await heard(line.fd, 5) == encode_adu(3, b"\x83\x02")
+            assert face.server.peers == (FACE,)
+        line.close()
+
+    play(scene())
+
+
+def test_a_port_that_was_unplugged_is_served_again(tmp_path: Path) -> None:
+    async def scene() -> None:
+        lines, name = [Pty(), Pty()], tmp_path / "rs485"
+        name.symlink_to(lines[0].path)
+        async with Face().serving(str(name)) as face:
+            os.write(lines[0].fd, encode_adu(3, READ)[:5])  # half a request, then the plug
+            await asyncio.sleep(0)
+            name.unlink()
+            lines[0].close()
+            assert "disconnected" in await face.until_told("E102")
+            assert face.gone == [FACE] and face.server.peers == ()
+            name.symlink_to(lines[1].path)
+            await face.until_told("is back")
+            os.write(lines[1].fd, encode_adu(3, READ))
+            assert await heard(lines[1].fd, len(ANSWER)) == ANSWER
+        lines[1].close()
+
+    play(scene())
+
+
+def test_noise_is_told_once_and_a_line_that_is_set_otherwise_as_such() -> None:
+    async def scene() -> None:
+        line = Pty()
+        async with Face().serving(line.path) as face:
+            for _ in range(8):
+                os.write(line.fd, b"\xfe\x80\xfe\x80\xf8")
+                await asyncio.sleep(0.005)
+            assert "is the master set to another baud or parity?" in await face.until_told("W236")
+            os.write(line.fd, encode_adu(3, READ) + b"\xff\xff")
+            assert await heard(line.fd, len(ANSWER)) == ANSWER
+            for _ in range(3):
+                os.write(line.fd, b"\xff\xff\xff")
+                await asyncio.sleep(0.005)
+                os.write(line.fd, encode_adu(3, READ))
+                assert await heard(line.fd, len(ANSWER)) == ANSWER
+            assert len(face.log) <= 3 and all(told.startswith("W23") for told in face.log)
+        line.close()
+
+    play(scene())
+
+
+def test_a_bank_that_breaks_is_told_to_the_loop() -> None:
+    """An internal error is not an answer: whoever runs the loop has to end it with the safe voltage."""
+    failures = []
+
+    async def scene() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _loop, context: failures.append(context["exception"]))
+        line, face = Pty(), Face()
+        face.bank.image = None  # type: ignore[assignment]
+        async with face.serving(line.path):
+            os.write(line.fd, encode_adu(3, READ))
+            while not failures:
+                await asyncio.sleep(0.002)
+            assert is_silent(line.fd)
+        line.close()
+
+    play(scene())
+    assert isinstance(failures[0], TypeError)
+
+
+def ask(path: str, bank: NotingBank) -> None:
+    """What pymodbus asks of a face, and gets."""
+    client = ModbusSerialClient(path, baudrate=LINE.baud, timeout=5, retries=0)
+    assert client.connect()
+    try:
+        values = [(number * 521) & 0xFFFF for number in range(123)]
+        assert not client.write_registers(20, values, device_id=3).isError()
+        assert client.read_holding_registers(20, count=123, device_id=3).registers == values
+        assert client.read_input_registers(20, count=123, device_id=3).registers == values
+        client.write_register(20, 0xBEEF, device_id=3)
+        client.mask_write_register(address=20, and_mask=0xFF00, or_mask=0x0012, device_id=3)
+        assert client.read_holding_registers(20, count=1, device_id=3).registers == [0xBE12]
+        found = client.readwrite_registers(read_address=10, read_count=3, write_address=11, values=[7, 8], device_id=3)
+        assert found.registers == [0, 7, 8]
+        client.write_coils(3, [True, False, True, True], device_id=3)
+        client.write_coil(0, True, device_id=3)
+        assert client.read_coils(0, count=8, device_id=3).bits[:8] == bank.bits[:8]
+        assert client.read_discrete_inputs(3, count=4, device_id=3).bits[:4] == [True, False, True, True]
+        assert client.read_holding_registers(9999, count=1, device_id=3).exception_code == 2
+        assert client.read_device_information(read_code=1, device_id=3).information[0] == b"Company"
+        assert client.report_device_id(device_id=3).status
+    finally:
+        client.close()
+
+
+def test_pymodbus_is_served_on_a_port_and_on_the_face_s_own_terminal() -> None:
+    async def scene() -> None:
+        async with Face().serving(None) as face:
+            assert face.server.path.startswith("/dev/pts/")
+            await asyncio.to_thread(ask, face.server.path, face.bank)
+
+    play(scene())

@@ -1,0 +1,282 @@
+"""Modbus/TCP Security: who gets in and as what, what is said of those who do not, and that they leave nothing behind."""
+
+import asyncio
+import resource
+import shutil
+import ssl
+import subprocess
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymodbus.client import AsyncModbusTlsClient
+
+from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
+from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING
+from gateway.modbus import Peer, Role, pdu
+from gateway.modbus.certificate import read_certificate
+from tests.certificates import Folder, serial_of, store_all
+from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
+from tests.fieldbus.conftest import NotingBank
+from tests.fieldbus.tls_by_hand import Face, client
+
+READ_TWO = framed(READ, 7)
+VERSIONS = [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    return store_all(tmp_path_factory.mktemp("certificates"))
+
+
+@pytest.fixture
+def face(folder: Folder) -> Face:
+    return Face(folder, lambda: f"{datetime.now(UTC):%Y%m%d%H%M%S}Z")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("step", [1, 7, 4096])
+def test_requests_by_tls_are_answered_however_their_bytes_come(
+    face: Face, folder: Folder, version: ssl.TLSVersion, step: int
+) -> None:
+    line = face.accept()
+    assert line.greet(client(folder, "setpoint", version)) == {"TLSv1_2": "TLSv1.2", "TLSv1_3": "TLSv1.3"}[version.name]
+    assert line.ask(READ_TWO, step) == framed(READ_ANSWER, 7)
+    many = b"".join(framed(READ, number) for number in range(300))
+    assert line.ask(many, step) == b"".join(framed(READ_ANSWER, number) for number in range(300))
+
+
+@pytest.mark.parametrize("role", list(Role))
+def test_the_role_and_the_name_come_out_of_the_certificate(face: Face, folder: Folder, role: Role) -> None:
+    line = face.accept()
+    line.greet(client(folder, role.name.lower()))
+    line.ask(framed(pdu.write_register_request(1, 500), 8))
+    (peer,) = [peer for *_, peer in face.bank.writes]
+    assert (peer.role, peer.name, peer.identity) == (role, role.name.lower(), f"certificate {role.name.lower()}")
+    assert face.shared.settings.role is Role.SETPOINT, "what a plain face gives counts for nothing"
+    line.socket.leave()
+    assert face.closed == [peer] and not face.shared.connections
+
+
+REFUSED = [
+    ("foreign", "W240 127.0.0.1:40000: its certificate is not of our CA"),
+    ("expired", "W241 127.0.0.1:40000: its certificate has expired"),
+    ("roleless", "W242 127.0.0.1:40000: the certificate of 'roleless' names no role"),
+    (
+        "captain",
+        "W242 127.0.0.1:40000: the certificate of 'captain' names the role 'captain', known are monitor, setpoint",
+    ),
+    ("thief", "W245 127.0.0.1:40000: the certificate of 'thief' (serial "),
+    ("gateway", "W240 127.0.0.1:40000: its certificate is not one for a client"),
+    ("", "W240 127.0.0.1:40000: it showed no certificate"),
+]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(("name", "sentence"), REFUSED)
+def test_who_may_not_is_told_apart_and_leaves_nothing(
+    face: Face, folder: Folder, name: str, sentence: str, version: ssl.TLSVersion
+) -> None:
+    line = face.accept()
+    try:
+        line.greet(client(folder, name, version))
+    except ssl.SSLError:
+        pass
+    assert [told[: len(sentence)] for told in face.log] == [sentence]
+    assert line.socket.ended and not face.handshakes.pending and not face.shared.connections
+    assert face.closed == []
+
+
+def test_a_certificate_that_is_not_yet_valid_and_one_that_ends_are_judged_at_each_connection(folder: Folder) -> None:
+    """Resumed sessions show the certificate of the first handshake: our own look at its days counts."""
+    for now in ("20000101000000Z", "20990101000000Z"):
+        face = Face(folder, lambda now=now: now)
+        face.accept().greet(client(folder, "setpoint"))
+        assert face.log[0].startswith("W241 127.0.0.1:40000: the certificate of 'setpoint' is valid from 20")
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (READ_TWO, "it does not speak TLS"),
+        (b"GET / HTTP/1.0\r\n\r\n", "it does not speak TLS"),
+        (b"\x16\x03\x01\x00\x05garbage and more of it", "the handshake failed"),
+    ],
+)
+def test_what_is_no_tls_is_told(face: Face, data: bytes, sentence: str) -> None:
+    line = face.accept()
+    line.send(data + bytes(64))
+    assert face.log and face.log[0].startswith("W244 127.0.0.1:40000: ")
+    assert sentence in face.log[0] or sentence == "the handshake failed"
+    assert line.socket.ended and not face.handshakes.pending
+
+
+@pytest.mark.parametrize("version", [ssl.TLSVersion.TLSv1, ssl.TLSVersion.TLSv1_1])
+def test_old_versions_are_refused(face: Face, folder: Folder, version: ssl.TLSVersion) -> None:
+    with pytest.raises(ssl.SSLError):
+        face.accept().greet(client(folder, "setpoint", version))
+    assert face.log == [
+        "W244 127.0.0.1:40000: it offers TLS 1.1 or older, or no cipher of ours: TLS 1.2 or 1.3 is needed"
+    ]
+
+
+def test_a_client_that_does_not_trust_us_is_told(face: Face, folder: Folder) -> None:
+    with pytest.raises(ssl.SSLCertVerificationError):
+        line = face.accept()
+        line.greet(client(folder, "foreign", ca="other-ca"))
+    line.exchange()
+    assert face.log[0].startswith("W240 127.0.0.1:40000: it refused our certificate")
+
+
+def test_eight_handshakes_at_a_time_each_at_most_five_seconds(face: Face) -> None:
+    lines = [face.accept() for _ in range(MOST_PENDING)]
+    face.accept()
+    assert face.log == [f"W243 127.0.0.1:40000: {MOST_PENDING} handshakes are under way, the most allowed"]
+    face.clock.advance(HANDSHAKE_S - 0.01)
+    face.handshakes.sweep(face.clock.time())
+    assert len(face.handshakes.pending) == MOST_PENDING
+    face.clock.advance(0.02)
+    face.handshakes.sweep(face.clock.time())
+    assert not face.handshakes.pending
+    assert [line.socket.ended for line in lines] == ["aborted"] * MOST_PENDING
+    assert face.log[1:] == ["W243 127.0.0.1:40000: the handshake was not finished within 5 s"] * MOST_PENDING
+
+
+def test_one_address_has_twenty_handshakes_a_second(face: Face) -> None:
+    for _ in range(30):
+        face.accept("10.0.0.7").socket.leave()
+    assert face.log and all("more than 20 handshakes a second" in told for told in face.log)
+    face.clock.advance(1.0)
+    face.handshakes.sweep(face.clock.time())
+    assert not face.handshakes.rates
+    assert not face.accept("10.0.0.7").socket.ended
+
+
+def test_nobody_renegotiates_and_a_resumed_session_is_judged_anew(face: Face, folder: Folder) -> None:
+    context = client(folder, "setpoint", ssl.TLSVersion.TLSv1_2)
+    line = face.accept()
+    line.greet(context)
+    assert face.handshakes.context.options & ssl.OP_NO_RENEGOTIATION
+    face.handshakes.revoked = frozenset((serial_of("setpoint"),))
+    again = face.accept()
+    again.incoming, again.outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+    again.tls = context.wrap_bio(again.incoming, again.outgoing, server_hostname="127.0.0.1", session=line.tls.session)
+    for _ in range(3):
+        try:
+            again.tls.do_handshake()
+        except ssl.SSLError:
+            pass
+        again.exchange()
+    assert again.tls.session_reused
+    assert face.log[0].startswith("W245 ") and again.socket.ended and len(face.shared.connections) == 1
+
+
+def failures(face: Face, folder: Folder, rounds: int) -> None:
+    """Handshakes that fail in each way, and some that are begun and left."""
+    contexts = [client(folder, name, version) for name, _ in REFUSED for version in VERSIONS]
+    for number in range(rounds):
+        line = face.accept()
+        try:
+            if number % 5 == 4:
+                line.send(b"\x16\x03\x01\x02\x00\x01")
+            else:
+                line.greet(contexts[number % len(contexts)])
+        except ssl.SSLError:
+            pass
+        line.socket.leave()
+
+
+def test_failed_handshakes_leave_nothing_behind(face: Face, folder: Folder) -> None:
+    before = face.left
+    failures(face, folder, 150)
+    assert (len(face.handshakes.pending), len(face.shared.connections), face.left - before) == (0, 0, 0)
+    assert face.shared.peers._open == {} and face.closed == []
+
+
+@pytest.mark.long
+def test_twenty_thousand_failed_handshakes_take_no_memory(face: Face, folder: Folder) -> None:
+    failures(face, folder, 2000)
+    before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    failures(face, folder, 20_000)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib <= 10 * 1024
+
+
+def test_our_reading_of_a_certificate_is_that_of_openssl(folder: Folder) -> None:
+    for name in ("ca", "gateway", "setpoint", "roleless", "captain", "expired"):
+        shown = read_certificate(ssl.PEM_cert_to_DER_cert(Path(folder.crt(name)).read_text()))
+        theirs = ssl._ssl._test_decode_cert(folder.crt(name))  # type: ignore[attr-defined]
+        subject = dict(pair for relative in theirs["subject"] for pair in relative)
+        assert (shown.name, shown.serial) == (subject["commonName"], theirs["serialNumber"])
+        moment = datetime.fromtimestamp(ssl.cert_time_to_seconds(theirs["notAfter"]), UTC)
+        assert shown.ends == f"{moment:%Y%m%d%H%M%S}Z"
+    assert {name: role_of(folder, name) for name in ("setpoint", "captain", "roleless", "gateway")} == {
+        "setpoint": "setpoint",
+        "captain": "captain",
+        "roleless": None,
+        "gateway": None,
+    }
+
+
+def role_of(folder: Folder, name: str) -> str | None:
+    return read_certificate(ssl.PEM_cert_to_DER_cert(Path(folder.crt(name)).read_text())).role
+
+
+def test_no_bytes_break_the_reading(folder: Folder) -> None:
+    der = ssl.PEM_cert_to_DER_cert(Path(folder.crt("setpoint")).read_text())
+    for cut in range(len(der)):
+        with pytest.raises(ValueError, match="not a certificate"):
+            read_certificate(der[:cut])
+    for place in range(0, len(der) - 2, 3):
+        try:
+            shown = read_certificate(der[:place] + b"\xff\xff" + der[place + 2 :])
+        except ValueError:
+            continue
+        assert isinstance(shown.name, str)
+
+
+def test_foreign_clients_speak_with_it(folder: Folder) -> None:
+    """pymodbus by TLS, and OpenSSL's own client; over a socket, on the stock loop."""
+
+    async def main() -> None:
+        bank, closed, log = NotingBank(), list[Peer](), list[str]()
+        server = ModbusTlsServer(
+            bank,
+            TlsSettings(ServerSettings(), folder.crt("gateway"), folder.key("gateway"), folder.crt("ca")),
+            on_peer_closed=closed.append,
+            log=lambda cause, sentence: log.append(sentence),
+        )
+        _, port = await server.start("127.0.0.1", 0)
+        master = AsyncModbusTlsClient("127.0.0.1", port=port, sslctx=unnamed(client(folder, "admin")), retries=0)
+        assert await master.connect()
+        assert not (await master.write_registers(3, [7, 8])).isError()
+        assert (await master.read_holding_registers(3, count=2)).registers == [7, 8]
+        assert bank.writes[0][2].identity == "certificate admin"
+        master.close()
+        await ask_with_openssl(folder, port)
+        await server.close()
+        assert server.pending == 0 and log == []
+
+    asyncio.run(asyncio.wait_for(main(), 20.0))
+
+
+def unnamed(context: ssl.SSLContext) -> Any:
+    context.check_hostname = False
+    return context
+
+
+async def ask_with_openssl(folder: Folder, port: int) -> None:
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl is not installed")
+    words = ["s_client", "-quiet", "-connect", f"127.0.0.1:{port}", "-CAfile", folder.crt("ca")]
+    words += ["-cert", folder.crt("setpoint"), "-key", folder.key("setpoint")]
+    process = await asyncio.create_subprocess_exec(
+        "openssl", *words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert process.stdin and process.stdout
+    process.stdin.write(READ_TWO)
+    await process.stdin.drain()
+    assert await process.stdout.readexactly(len(framed(READ_ANSWER, 7))) == framed(READ_ANSWER, 7)
+    process.stdin.close()
+    process.kill()
+    await process.wait()

@@ -1,0 +1,131 @@
+"""Two ends of a TLS connection without a socket: the server's stream with a transport in hand, the client OpenSSL itself."""
+
+import gc
+import ssl
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from gateway.fieldbus.connection import ServerState
+from gateway.fieldbus.peers import Peers
+from gateway.fieldbus.rate_limits import LogLimiter
+from gateway.fieldbus.settings import ServerSettings
+from gateway.fieldbus.tls_settings import TlsSettings, make_context
+from gateway.fieldbus.tls_stream import Handshakes, TlsStream
+from gateway.modbus import Peer
+from tests.certificates import Folder, serial_of
+from tests.fieldbus.conftest import HandClock, HandTransport, NotingBank
+
+NOW = "20270101000000Z"
+
+
+@dataclass(eq=False)
+class SocketInHand(HandTransport):
+    """As a socket: what was written can be taken, and the far end may leave."""
+
+    def leave(self) -> None:
+        if not self.ended:
+            self._end("closed")
+
+    def take(self) -> bytes:
+        data = bytes(self.written)
+        self.written.clear()
+        return data
+
+
+@dataclass
+class Face:
+    """A TLS face without a socket."""
+
+    folder: Folder
+    now: Callable[[], str]
+    clock: HandClock = field(default_factory=HandClock)
+    bank: NotingBank = field(default_factory=NotingBank)
+    log: list[str] = field(default_factory=list)
+    closed: list[Peer] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        server, folder = ServerSettings(), self.folder
+        files = TlsSettings(server, folder.crt("gateway"), folder.key("gateway"), folder.crt("ca"), frozenset())
+        log = LogLimiter(lambda cause, sentence: self.log.append(sentence))
+        self.shared = ServerState(self.bank, server, self.clock, log, Peers(server, guarded=False), self.closed.append)
+        self.handshakes = Handshakes(make_context(files), frozenset((serial_of("thief"),)), self.now)
+
+    def accept(self, host: str = "127.0.0.1") -> "Line":
+        return Line(self, SocketInHand(host))
+
+    @property
+    def left(self) -> int:
+        """Streams that anybody still holds."""
+        gc.collect()
+        return sum(isinstance(each, TlsStream) for each in gc.get_objects())
+
+
+class Line:
+    """One connection. `greet` makes the handshake, `ask` sends bytes and returns what came back until then."""
+
+    def __init__(self, face: Face, socket: SocketInHand) -> None:
+        self.face, self.socket = face, socket
+        self.stream = TlsStream(face.shared, face.handshakes)
+        socket.connection = self.stream
+        self.stream.connection_made(socket)  # type: ignore[arg-type]
+
+    def greet(self, context: ssl.SSLContext) -> str:
+        """Return the protocol agreed on; SSLError where the client's side fails."""
+        self.incoming, self.outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        self.tls = context.wrap_bio(self.incoming, self.outgoing, server_hostname="127.0.0.1")
+        while True:
+            try:
+                self.tls.do_handshake()
+                self.exchange()
+                return str(self.tls.version())
+            except ssl.SSLWantReadError:
+                if not self.exchange():
+                    return ""
+
+    def exchange(self) -> bool:
+        """Carry bytes both ways; whether anything came back."""
+        self.send(self.outgoing.read())
+        back = self.socket.take()
+        self.incoming.write(back)
+        return bool(back)
+
+    def send(self, data: bytes, step: int = 4096) -> None:
+        """Bytes as the socket would bring them, at most `step` at a time."""
+        while data and not self.socket.ended:
+            if not self.socket.reading:
+                self.face.clock.advance(0.0)  # who gave way goes on
+            room = self.stream.get_buffer(-1)
+            part, data = data[: min(step, len(room))], data[min(step, len(room)) :]
+            room[: len(part)] = part
+            self.stream.buffer_updated(len(part))
+
+    def ask(self, data: bytes, step: int = 4096) -> bytes:
+        self.tls.write(data)
+        self.send(self.outgoing.read(), step)
+        self.face.clock.advance(0.001)  # those that gave way go on
+        self.incoming.write(self.socket.take())
+        answers = b""
+        while True:
+            try:
+                got = self.tls.read(65536)
+            except ssl.SSLWantReadError:
+                return answers
+            answers += got
+            if not got:
+                return answers
+
+
+def client(folder: Folder, name: str = "", version: ssl.TLSVersion | None = None, ca: str = "ca") -> Any:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.load_verify_locations(folder.crt(ca))
+    if name:
+        context.load_cert_chain(folder.crt(name), folder.key(name))
+    if version is not None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            context.minimum_version = context.maximum_version = version
+        if version < ssl.TLSVersion.TLSv1_2:
+            context.set_ciphers("ALL:@SECLEVEL=0")
+    return context

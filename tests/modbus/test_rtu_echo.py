@@ -1,0 +1,71 @@
+"""Answers that come back from an adapter that hears itself: nothing is executed twice, and no master's write is lost."""
+
+from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.rtu import encode_adu
+from tests.modbus.rtu_bus import CHARACTER_S, SILENCE_S, Bus
+
+READ, READ_ANSWER = P.read_request(3, 100, 12), b"\x03\x18" + bytes(24)
+WRITE = P.write_register_request(1, 1200)
+ANSWERS = {READ: READ_ANSWER, WRITE: WRITE}
+ANSWER_S = 8 * CHARACTER_S
+AT_ONCE = (
+    2 * ANSWER_S + 1.1 * SILENCE_S
+)  # from our answer to the end of the next request of a master that does not wait
+
+
+def exchange(bus: Bus, pdu: bytes, *, echo_s: float | None = None) -> int:
+    """How often a request is executed that a master sends once; its answer comes back after echo_s, and so on."""
+    bus.send(encode_adu(1, pdu)).pause(1.05 * SILENCE_S)
+    executed = 0
+    while bus.heard and executed < 50:
+        ((_, heard),) = bus.heard
+        bus.heard.clear()
+        executed += 1
+        answer = encode_adu(1, ANSWERS[pdu])
+        bus.receiver.note_sent(heard, answer, bus.now_s)
+        if echo_s is not None:
+            bus.pause(echo_s).send(answer).pause(1.05 * SILENCE_S)
+    return executed
+
+
+def test_an_echo_executes_nothing() -> None:
+    for first in (WRITE, READ):
+        bus = Bus()
+        for pdu in (first, WRITE, WRITE, READ, WRITE):
+            assert exchange(bus, pdu, echo_s=ANSWER_S + 1e-3) == 1
+            bus.pause(0.1)
+
+
+def test_a_late_echo_ends_by_itself_and_is_known_after_the_first_read() -> None:
+    bus = Bus(baud=115200)
+    late_s = 8 * 11 / 115200 + 0.016
+    assert 1 < exchange(bus, WRITE, echo_s=late_s) < 6
+    assert exchange(bus.pause(0.1), READ, echo_s=late_s) == 1
+    assert [exchange(bus.pause(0.1), WRITE, echo_s=late_s) for _ in range(5)] == [1] * 5
+
+
+def test_equal_writes_of_a_master_are_all_executed() -> None:
+    """As fast as the wire allows, once a read has shown that there is no echo; and slowly always."""
+    bus = Bus()
+    exchange(bus, READ)
+    assert [exchange(bus.pause(AT_ONCE), WRITE) for _ in range(500)] == [1] * 500
+    bus = Bus()
+    assert [exchange(bus.pause(0.03), WRITE) for _ in range(100)] == [1] * 100
+
+
+def test_before_any_read_a_row_of_quick_equal_writes_loses_few() -> None:
+    bus = Bus()
+    executed = sum(exchange(bus.pause(AT_ONCE), WRITE) for _ in range(1000))
+    assert 995 <= executed < 1000
+
+
+def test_a_terminal_has_no_echo() -> None:
+    bus = Bus(may_echo=False)
+    assert [exchange(bus, WRITE) for _ in range(100)] == [1] * 100
+
+
+def test_another_adapter_may_be_otherwise() -> None:
+    bus = Bus()
+    exchange(bus, READ)
+    bus.receiver.forget()
+    assert exchange(bus, WRITE, echo_s=ANSWER_S + 1e-3) == 1

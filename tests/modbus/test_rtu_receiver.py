@@ -1,0 +1,228 @@
+"""What one unit hears on an RTU bus: its requests, each once, and nothing of what is others' or noise."""
+
+import random
+from itertools import product
+
+import pytest
+
+from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.diagnostics import loopback_request, report_request
+from gateway.modbus.identification import identification_request
+from gateway.modbus.rtu import encode_adu
+from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuRequest
+from tests.modbus.rtu_bus import SILENCE_S, Bus
+
+READ = P.read_request(3, 100, 12)
+WRITE = P.write_register_request(1, 1200)
+PDUS = [
+    READ,
+    WRITE,
+    P.read_request(1, 0, 16),
+    P.write_coil_request(0, True),
+    P.write_coils_request(0, [True] * 11),
+    P.write_registers_request(0, bytes(range(40))),
+    P.mask_write_request(0, 1, 2),
+    P.read_write_request(100, 12, 0, bytes(8)),
+    loopback_request(b"\xa5\x37"),
+    loopback_request(bytes(20)),
+    report_request(),
+    identification_request(1),
+    b"\x41\x01\x02",  # a function that nobody knows
+]
+OURS = encode_adu(1, READ)
+COMMAND = encode_adu(1, WRITE)
+
+
+def answered(pdu: bytes = READ) -> list[RtuRequest]:
+    return [RtuRequest(1, pdu, True)]
+
+
+def registers_answer(unit: int, data: bytes) -> bytes:
+    return encode_adu(unit, bytes((3, len(data))) + data)
+
+
+@pytest.mark.parametrize("pdu", PDUS, ids=lambda pdu: pdu.hex()[:12])
+def test_a_request_is_heard_once_when_the_line_is_silent(pdu: bytes) -> None:
+    bus = Bus()
+    begin_s = bus.now_s
+    assert bus.send(encode_adu(1, pdu)).pause(0.99 * SILENCE_S).heard == []
+    assert bus.pause(0.02 * SILENCE_S).heard == [(begin_s + SILENCE_S, RtuRequest(1, pdu, True))]
+    assert bus.requests() == answered(pdu) and bus.requests() == []
+
+
+def test_the_silence_is_that_of_the_specification() -> None:
+    """3.5 characters of eleven bits up to 19200 baud, 1.75 ms above."""
+    for baud, silence_s in ((1200, 38.5 / 1200), (9600, 38.5 / 9600), (19200, 38.5 / 19200), (115200, 1.75e-3)):
+        bus = Bus(baud=baud)
+        begin_s = bus.now_s
+        ((heard_s, _),) = bus.send(OURS).pause(1.0).heard
+        assert heard_s - begin_s == pytest.approx(silence_s)
+
+
+@pytest.mark.parametrize("pdu", [pdu for pdu in PDUS if pdu[0] not in (8, 0x41)], ids=lambda pdu: pdu.hex()[:12])
+def test_a_frame_in_two_reads_is_one_frame(pdu: bytes) -> None:
+    frame = encode_adu(1, pdu)
+    for cut in range(1, len(frame)):
+        assert Bus().send(frame[:cut], frame[cut:], pause_s=0.016).requests() == answered(pdu), cut
+
+
+def test_a_frame_that_comes_byte_by_byte_is_one_frame() -> None:
+    assert Bus().send(*(bytes((byte,)) for byte in COMMAND), pause_s=0.016).requests() == answered(WRITE)
+
+
+@pytest.mark.parametrize("pdu", PDUS, ids=lambda pdu: pdu.hex()[:12])
+def test_other_units_are_left_alone_and_everybody_is_obeyed_without_an_answer(pdu: bytes) -> None:
+    assert Bus().send(encode_adu(7, pdu)).requests() == []
+    assert Bus().send(encode_adu(0, pdu)).requests() == [RtuRequest(0, pdu, False)]
+
+
+def test_a_broadcast_and_the_next_request_in_one_read_are_two() -> None:
+    assert Bus().send(encode_adu(0, WRITE) + OURS).requests() == [RtuRequest(0, WRITE, False), *answered()]
+
+
+def test_an_older_request_is_executed_but_only_the_last_is_answered() -> None:
+    """Its master has given up: what comes now would be taken for the answer to the other."""
+    assert Bus().send(COMMAND + OURS).requests() == [RtuRequest(1, WRITE, False), *answered()]
+    assert Bus().send(COMMAND + encode_adu(7, READ)).requests() == [RtuRequest(1, WRITE, False)]
+
+
+FOREIGN = {
+    "a read": encode_adu(7, READ) + registers_answer(7, bytes(24)),
+    "a short answer": encode_adu(7, P.read_request(3, 1, 1)) + registers_answer(7, b"\x01\x06"),
+    "a write": 2 * encode_adu(7, WRITE),
+    "many": encode_adu(7, P.write_registers_request(3, bytes(60))) + encode_adu(7, bytes.fromhex("10 0003 001e")),
+    "a refusal": encode_adu(7, READ) + encode_adu(7, b"\x83\x02"),
+    "who": encode_adu(7, report_request()) + encode_adu(7, b"\x11\x05\x01\xff\x03\x10\x20"),
+    "a read and write": encode_adu(7, P.read_write_request(3, 4, 5, bytes(6))) + encode_adu(7, b"\x17\x08" + bytes(8)),
+    "a function of its own": encode_adu(7, b"\x41\x02\x03\x04"),
+}
+INSIDE = registers_answer(7, b"\x00\x07" + COMMAND + b"\x00\x09")
+
+
+@pytest.mark.parametrize("traffic", FOREIGN.values(), ids=FOREIGN)
+def test_what_others_say_to_each_other_neither_acts_nor_hides_what_follows(traffic: bytes) -> None:
+    assert Bus().send(traffic).requests() == []
+    assert Bus().send(traffic + OURS).requests() == answered()
+    assert Bus().send(traffic, OURS, pause_s=SILENCE_S).requests() == answered()
+    for cut in range(1, len(traffic)):
+        bus = Bus().send(traffic[:cut], traffic[cut:], pause_s=0.016)
+        assert bus.send(OURS).requests() == answered(), cut
+
+
+def test_a_request_inside_of_another_s_answer_is_no_request() -> None:
+    assert Bus().send(INSIDE).requests() == []
+    for cut in range(1, len(INSIDE)):
+        assert Bus().send(INSIDE[:cut], INSIDE[cut:], pause_s=0.5e-3).requests() == [], cut
+    assert Bus().send(encode_adu(7, READ) + INSIDE + OURS).requests() == answered()
+
+
+def test_nor_is_it_one_when_that_answer_is_cut_off() -> None:
+    """Its unit was heard, at the latest in the request that it answers."""
+    for cut in range(1, len(INSIDE)):
+        bus = Bus().send(encode_adu(7, READ) + INSIDE[:cut])
+        assert bus.requests() == [] and bus.send(OURS).requests() == answered(), cut
+        assert bus.send(INSIDE[:cut]).requests() == [] and bus.send(OURS).requests() == answered(), cut
+
+
+def test_nor_is_it_one_when_that_answer_is_damaged() -> None:
+    for place, bits in product(range(len(INSIDE)), (0x01, 0x04, 0x15, 0x40, 0x80, 0xFF)):
+        damaged = bytearray(INSIDE)
+        damaged[place] ^= bits
+        bus = Bus().send(bytes(damaged))
+        assert bus.requests() == [] and bus.send(OURS).requests() == answered(), place
+    bus = Bus().send(b"\x00" + INSIDE[:-1] + b"\x00")
+    assert bus.requests() == [] and bus.send(OURS).requests() == answered()
+
+
+@pytest.mark.parametrize("stray", [b"\x00", b"\xff", b"\xfe", b"\x00\x00", b"\x01", b"\x07"], ids=bytes.hex)
+@pytest.mark.parametrize("unit", [1, 3, 5, 6, 15, 16, 247])
+def test_the_stray_byte_of_a_line_without_bias_costs_nothing(unit: int, stray: bytes) -> None:
+    for pdu in (READ, WRITE, P.write_registers_request(0, bytes(8))):
+        frame = encode_adu(unit, pdu)
+        for burst in (stray + frame, frame + stray):
+            assert Bus(unit=unit).send(burst).requests() == [RtuRequest(unit, pdu, True)]
+
+
+def test_half_a_request_does_not_keep_the_next_one_from_being_heard() -> None:
+    long = encode_adu(1, P.write_registers_request(0, bytes(100)))
+    for half in (OURS[:5], long[:40], INSIDE[:6], b"\x07\x03\xf0"):
+        for pause_s in (1.01 * SILENCE_S, 0.5 * SPLIT_S, 2 * SPLIT_S):
+            bus = Bus().send(half, OURS, pause_s=pause_s)
+            assert bus.requests() == answered(), (half.hex(), pause_s)
+
+
+def test_a_late_program_reads_half_a_request_and_the_next_in_one_piece() -> None:
+    """And a frame of a unit that is not on this line; one that is on it would cover what follows it."""
+    long = encode_adu(1, P.write_registers_request(0, bytes(100)))
+    for half in (OURS[:5], long[:40], INSIDE[:7]):
+        bus = Bus().send(half + OURS)
+        assert bus.pause(0.9 * SPLIT_S).heard == [] or half == OURS[:5], "the rest of it may come yet"
+        assert bus.requests() == answered(), half.hex()
+    assert Bus().send(encode_adu(7, READ) + INSIDE[:7] + OURS).requests() == []
+
+
+def test_a_frame_that_noise_makes_of_a_request_s_beginning_does_not_hide_it() -> None:
+    made = bytes.fromhex("f834 bbb2 effc 4e81")  # effc 4e81 01 is a refusal with its checksum
+    assert Bus().send(made, OURS, pause_s=0.006).requests() == answered()
+    assert Bus().send(made + OURS).requests() == answered()
+
+
+def noise(draw: random.Random) -> bytes:
+    """What a line makes: anything; bytes like those of frames; a frame cut or damaged."""
+    frame = bytearray(draw.choice((OURS, COMMAND, INSIDE, *FOREIGN.values(), encode_adu(1, PDUS[5]))))
+    kind = draw.randrange(4)
+    if kind == 0:
+        return draw.randbytes(draw.randint(1, 40))
+    if kind == 1:
+        return bytes(draw.choice((0, 1, 3, 6, 7, 16, 0x83, 255)) for _ in range(draw.randint(1, 40)))
+    if kind == 2:
+        return bytes(frame[: draw.randrange(1, len(frame))])
+    frame[draw.randrange(len(frame))] ^= draw.randint(1, 255)
+    return bytes(frame)
+
+
+def is_frame(data: bytes) -> bool:
+    """What was damaged may be another's frame, or ours, by chance of the checksum."""
+    return bool(Bus().send(data).requests())
+
+
+def test_noise_costs_at_most_the_request_that_it_touches(budget: int) -> None:
+    draw = random.Random(14)
+    bus = Bus()
+    touched = lost = 0
+    for _ in range(500 * budget):
+        made = noise(draw)
+        if is_frame(made):
+            continue
+        pattern = draw.randrange(4)
+        if pattern == 0:  # alone on the line, some pause before the next request
+            bus.send(made, pause_s=draw.uniform(SILENCE_S, 0.1))
+        else:
+            cut = draw.randrange(1, len(OURS))
+            burst = (made + OURS, OURS[:cut] + made + OURS[cut:], OURS + made)[pattern - 1]
+            taken = bus.send(burst).requests()
+            assert all(request.pdu == READ for request in taken)
+            touched, lost = touched + 1, lost + (not taken)
+        taken = bus.send(COMMAND).requests()
+        assert taken[-1:] == answered(WRITE), (pattern, made.hex())
+        assert {request.pdu for request in taken} <= {WRITE}
+    assert 0 < lost < 0.6 * touched
+
+
+def test_nothing_is_held_without_bound() -> None:
+    draw = random.Random(3)
+    bus = Bus()
+    for _ in range(200):
+        bus.send(draw.randbytes(100), pause_s=0.1e-3)
+        assert len(bus.receiver._burst) <= MOST_BYTES
+    assert bus.receiver.noise_bytes > 19_000
+    bus.pause(1.0)
+    assert bus.send(OURS).requests()[-1:] == answered()
+
+
+def test_a_busy_bus_without_visible_silence_is_followed() -> None:
+    bus = Bus()
+    for _ in range(100):
+        bus.send(FOREIGN["a read"], pause_s=0.1e-3)
+    assert bus.send(OURS).requests() == answered() and bus.receiver.noise_bytes == 0
+    assert bus.receiver.frames == 201

@@ -1,0 +1,115 @@
+"""What a rig says of a device: its address, checksum, watchdog and counts reach the wire, or `check` says why they cannot."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.devices import cell_host, output_host
+from gateway.devices.messages import AskDevice, DeviceStep, SetVoltage
+from gateway.profiles import Report, check_report
+
+RIG = """
+name: own
+calibration: demo
+output: {device: OUTPUT, port: /dev/serial/by-id/a, baud: 38400OUTPUT_SETTINGS}
+load_cell: {device: CELL, port: /dev/serial/by-id/b, baud: 115200, range_n: 98CELL_SETTINGS}
+limits: {force_max_n: 40, over_force_n: 55, smallest_force_n: 2, voltage_max_v: 8}
+supervision: {sample_timeout_s: 0.5, output_timeout_s: 0.5, sample_quantum_n: 1.0, saturation_n: 96}
+accept_no_device_watchdog: true
+"""
+
+
+def rig(
+    folder: Path, output: str = "", cell: str = "", device: str = "icpdas-702x", amplifier: str = "stream-st-gs"
+) -> Report:
+    text = RIG.replace("OUTPUT_SETTINGS", output).replace("CELL_SETTINGS", cell)
+    path = folder / "own.yaml"
+    path.write_text(text.replace("OUTPUT", device).replace("CELL", amplifier), encoding="utf-8")
+    return check_report(path)
+
+
+def test_the_address_the_checksum_and_the_watchdogs_time_are_the_rigs(tmp_path: Path) -> None:
+    found = rig(tmp_path, ", address: 0x1F, checksum: dcon-sum, watchdog_s: 0.96, watchdog_tick_s: 0.0533")
+    assert found.rig, found.faults
+    host = output_host(found.rig.output.device)
+    assert host.request(SetVoltage(5.0)) == b"#1F05.000BD\r"
+    assert host.request(AskDevice(DeviceStep.ARM)).startswith(b"~1F3112")
+    assert host.gap_s == 0.0
+
+
+def test_a_modbus_units_address_is_the_rigs(tmp_path: Path) -> None:
+    found = rig(tmp_path, ", address: 17", ", address: 3", "waveshare-ao8b", "laumas-tlb")
+    assert found.rig, found.faults
+    assert output_host(found.rig.output.device).request(SetVoltage(5.0))[:6] == bytes.fromhex("110600001388")
+    assert cell_host(found.rig.load_cell.device).poll()[0] == 3
+
+
+def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:
+    found = rig(tmp_path, cell=", newton_per_count: 0.001, zero_count: 84000", amplifier="hx711-line")
+    assert found.rig, found.faults
+    (sample,) = cell_host(found.rig.load_cell.device).receive(b"94000\r\n", 0.0)
+    assert sample.force_n == pytest.approx(10.0)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("output", "cell", "devices", "told"),
+    [
+        (
+            ", address: 2",
+            "",
+            ("smc-itv-rc", "stream-st-gs"),
+            "output.address: smc-itv-rc has no address: leave this line out",
+        ),
+        (", channel: 1", "", ("icpdas-702x", "stream-st-gs"), "output.channel: icpdas-702x has no channel"),
+        (", address: 300", "", ("icpdas-702x", "stream-st-gs"), "output.address: address = 12C: does not fit"),
+        (
+            ", address: 0",
+            "",
+            ("waveshare-ao8b", "stream-st-gs"),
+            "output.address: address 0: a Modbus unit is 1 to 255",
+        ),
+        (", address: A", "", ("icpdas-702x", "stream-st-gs"), "output.address: address = A: not a number"),
+        (
+            ", checksum: xor",
+            "",
+            ("waveshare-ao8b", "stream-st-gs"),
+            "output.checksum: waveshare-ao8b speaks Modbus RTU",
+        ),
+        (
+            ", watchdog_s: 2",
+            "",
+            ("waveshare-ao8b", "stream-st-gs"),
+            "output.watchdog_s: waveshare-ao8b has no watchdog",
+        ),
+        (
+            ", watchdog_s: 60",
+            "",
+            ("icpdas-702x", "stream-st-gs"),
+            "output.watchdog_s: time = 258: does not fit in 2 characters",
+        ),
+        (
+            ", watchdog_s: 0.03, watchdog_tick_s: 0.01",
+            "",
+            ("icpdas-702x", "stream-st-gs"),
+            "output.watchdog_s: 0.03 s of icpdas-702x's watchdog would trip in normal work: 0.04 s is the least at 100 Hz",
+        ),
+        (
+            ", watchdog_s: 0.1",
+            "",
+            ("mcu-line", "stream-st-gs"),
+            "output.watchdog_s: 0.1 s of mcu-line's watchdog would trip in normal work: 0.3 s is the least",
+        ),
+        ("", "", ("smc-itv-rc", "hx711-line"), "load_cell.unit: hx711-line does not say its unit: the rig must"),
+        (
+            "",
+            ", newton_per_count: 2",
+            ("smc-itv-rc", "stream-st-gs"),
+            "load_cell.newton_per_count: stream-st-gs says its unit",
+        ),
+    ],
+)
+def test_a_setting_that_a_device_does_not_have_is_told(
+    output: str, cell: str, devices: tuple[str, str], told: str, tmp_path: Path
+) -> None:
+    faults = [str(fault).split(" ", 1)[1] for fault in rig(tmp_path, output, cell, *devices).faults]
+    assert any(fault.startswith(told) for fault in faults), faults

@@ -1,0 +1,79 @@
+"""What a rig file may say about its serial faces, and what keeps two users from one port."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import Report, check_report, load_rig
+
+RIGS = Path(__file__).parents[3] / "profiles" / "rigs"
+CELL = (RIGS / "irc5-cell.yaml").read_text(encoding="utf-8")
+OUTPUT = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A10K1ITV-if00-port0"
+GOOD = "{type: rtu, port: /dev/serial/by-id/rs485}"
+
+
+def report(folder: Path, fieldbus: str, *, simulated: bool = False) -> Report:
+    path = folder / "rig.yaml"
+    path.write_text(f"{CELL}\nfieldbus: {fieldbus}\n", encoding="utf-8")
+    return check_report(path, simulated=simulated)
+
+
+def messages(faults: tuple[object, ...]) -> list[str]:
+    return [str(fault).split(" ", 1)[1] for fault in faults]
+
+
+def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:
+    rig = report(tmp_path, f"[{GOOD}]").rig
+    assert rig is not None
+    (face,) = rig.fieldbus
+    assert (str(face.settings), face.unit) == ("19200 8E1", 1)
+    assert load_rig("irc5-cell").fieldbus == ()
+
+
+@pytest.mark.parametrize(
+    ("fieldbus", "told"),
+    [
+        (f"[{{type: rtu, port: {OUTPUT}}}]", "fieldbus[0].port: is the output's port too: masters need an adapter"),
+        (f"[{GOOD}, {GOOD}]", "fieldbus[1].port: is the port of fieldbus[0] too: a serial port carries one face"),
+        ("[{type: rtu, port: /dev/ttyS9, unit: 0}]", "fieldbus[0].unit: 0 is the broadcast of Modbus RTU"),
+        ("[{type: rtu, port: /dev/ttyS9, unit: 248}]", "fieldbus[0].unit: 248 is no unit id of Modbus RTU"),
+        ("[{type: rtu, port: /dev/ttyS9, parity: evn}]", "fieldbus[0].parity: evn is not one of none, even, odd; did"),
+        ("[{type: rtu, port: /dev/ttyS9, baud: 19201}]", "fieldbus[0].baud: 19201 is not one of 300, 600"),
+        ("[{type: rtu, port: /dev/ttyS9, unti: 3}]", "fieldbus[0].unti: is not a known key; did you mean unit?"),
+        ("[{type: rtux, port: /dev/ttyS9}]", "fieldbus[0]: type rtux is not one of rtu, tls; did you mean rtu?"),
+        ("[{type: rtu}]", "fieldbus[0].port: is missing: `force-gateway ports` lists"),
+        ("[{type: rtu, port: ttyS9}]", 'fieldbus[0].port: "ttyS9" is not the path of a device'),
+        ("[{type: rtu, port: EDIT}]", "fieldbus[0].port: EDIT is a placeholder"),
+        ("{type: rtu}", "fieldbus: a group of keys is not a list"),
+    ],
+)
+def test_a_face_that_cannot_work_is_told(tmp_path: Path, fieldbus: str, told: str) -> None:
+    (fault,) = messages(report(tmp_path, fieldbus).faults)
+    assert fault.startswith(told)
+
+
+def test_two_names_of_one_port_are_one_port(tmp_path: Path) -> None:
+    (tmp_path / "by-id").symlink_to("/dev/ttyS9")
+    faces = f"[{{type: rtu, port: /dev/ttyS9}}, {{type: rtu, port: {tmp_path / 'by-id'}}}]"
+    (fault,) = messages(report(tmp_path, faces).faults)
+    assert fault.startswith("fieldbus[1].port: is the port of fieldbus[0] too")
+
+
+def test_a_rig_needs_some_face(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(CELL.replace("  bind:", "  plain: false\n  bind:"), encoding="utf-8")
+    (fault,) = messages(check_report(path).faults)
+    assert fault.startswith("network.plain: false leaves no face that a master could reach")
+    path.write_text(path.read_text(encoding="utf-8") + f"\nfieldbus: [{GOOD}]\n", encoding="utf-8")
+    assert check_report(path).faults == ()
+
+
+def test_a_port_that_may_change_its_name_is_a_warning(tmp_path: Path) -> None:
+    warnings = messages(report(tmp_path, "[{type: rtu, port: /dev/ttyUSB0}]").warnings)
+    assert any(told.startswith("fieldbus[0].port: /dev/ttyUSB0 may be another adapter") for told in warnings)
+
+
+def test_a_simulated_run_takes_no_port_of_the_cell_and_says_so(tmp_path: Path) -> None:
+    rig = report(tmp_path, f"[{{type: rtu, port: {OUTPUT}}}]", simulated=True).rig
+    assert rig is not None and [face.port for face in rig.fieldbus] == [None]
+    assert any(note.startswith("serial faces are pseudo-terminals") for note in rig.notes)

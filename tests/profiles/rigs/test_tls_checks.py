@@ -1,0 +1,111 @@
+"""What a rig file may say about a TLS face: each of its files that cannot be used is told with its line, before the start."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import Report, check_report
+from gateway.profiles.rigs.faces import TlsFace
+from tests.certificates import store_all
+
+DEMO = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("certificates")
+    store_all(folder)
+    (folder / "no.crt").write_text("nothing of the kind")
+    (folder / "no.key").write_text("nothing of the kind")
+    (folder / "cut.crt").write_text("-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n")
+    (folder / "open.key").write_bytes((folder / "gateway.key").read_bytes())
+    (folder / "open.key").chmod(0o644)
+    for name in ("no.key", "cut.crt"):
+        (folder / name).chmod(0o600)
+    return folder
+
+
+def report(folder: Path, *faces: str) -> Report:
+    path = folder / "rig.yaml"
+    path.write_text(
+        f"{DEMO}\nfieldbus:\n" + "".join(f"  - {{type: tls, {face}}}\n" for face in faces), encoding="utf-8"
+    )
+    return check_report(path, simulated=True)
+
+
+def files(certificate: str = "gateway.crt", key: str = "gateway.key", ca: str = "ca.crt", more: str = "") -> str:
+    return f"certificate: {certificate}, key: {key}, ca: {ca}{more}"
+
+
+def test_a_face_is_read_its_paths_from_the_file_and_its_port_from_the_standard(folder: Path) -> None:
+    rig = report(folder, files(more=', revoked: ["0a:1b:2c"]')).rig
+    assert rig is not None
+    (face,) = rig.fieldbus
+    assert isinstance(face, TlsFace)
+    assert (face.port, face.bind, face.certificate) == (802, "127.0.0.1", str(folder / "gateway.crt"))
+    assert face.revoked == ("0A1B2C",)
+
+
+FAULTS = [
+    (
+        files("gone.crt"),
+        "fieldbus[0].certificate",
+        "E171 {folder}/gone.crt: No such file or directory; `force-gateway certs",
+    ),
+    (files(ca="gone.crt"), "fieldbus[0].ca", "E171 {folder}/gone.crt: No such file"),
+    (
+        files(key="open.key"),
+        "fieldbus[0].key",
+        "E172 {folder}/open.key can be used by everybody on this machine (mode 644)",
+    ),
+    (
+        files(key="admin.key"),
+        "fieldbus[0].key",
+        "E172 {folder}/admin.key does not fit {folder}/gateway.crt: take the two",
+    ),
+    (files("no.crt"), "fieldbus[0].certificate", "E174 {folder}/no.crt holds no certificate in PEM form"),
+    (files(key="no.key"), "fieldbus[0].key", "E174 {folder}/no.key holds no private key in PEM form"),
+    (files(ca="gateway.key"), "fieldbus[0].ca", "E174 {folder}/gateway.key holds no certificate in PEM form"),
+    (files(ca="cut.crt"), "fieldbus[0].ca", "E174 {folder}/cut.crt cannot be used: "),
+    (files("cut.crt"), "fieldbus[0].certificate", "E174 {folder}/cut.crt with {folder}/gateway.key cannot be used: "),
+    (
+        files("expired-gateway.crt", "expired-gateway.key"),
+        "fieldbus[0].certificate",
+        "E173 {folder}/expired-gateway.crt expired",
+    ),
+    (files(more=", port: 5020"), "fieldbus[0].port", "5020 is the port of plain Modbus TCP too"),
+    (
+        files(more=", bind: 192.168.125.20"),
+        "fieldbus[0].bind",
+        "192.168.125.20 can be reached from other machines: say",
+    ),
+    (files(more=", revoked: [robot]"), "fieldbus[0].revoked[0]", '"robot" is no serial number in hex'),
+    ("key: gateway.key, ca: ca.crt", "fieldbus[0].certificate", "is missing"),
+]
+
+
+@pytest.mark.parametrize(("face", "place", "sentence"), FAULTS)
+def test_what_cannot_work_is_told_with_its_place(folder: Path, face: str, place: str, sentence: str) -> None:
+    (fault,) = report(folder, face).faults
+    line = DEMO.count("\n") + 3
+    assert f"rig.yaml:{line}:" in str(fault)
+    assert str(fault).split(" ", 1)[1].startswith(f"{place}: {sentence.format(folder=folder)}")
+
+
+def test_two_faces_on_one_port_are_told(folder: Path) -> None:
+    (fault,) = report(folder, files(), files()).faults
+    assert "fieldbus[1].port: 802 is the port of another TLS face too" in str(fault)
+
+
+def test_a_certificate_that_is_about_to_expire_is_a_warning_and_told_at_the_start(folder: Path) -> None:
+    found = report(folder, files())  # the tests' own last ten days
+    warnings = found.warnings
+    assert found.rig is not None and found.rig.notes[0].startswith("W246 ")
+    assert any("W246 " in str(each) and "expires on 20" in str(each) for each in warnings)
+
+
+def test_an_owner_may_be_named_by_its_certificate(folder: Path) -> None:
+    path = folder / "owned.yaml"
+    path.write_text(DEMO.replace("network:\n", "network:\n  owner: certificate robot\n", 1), encoding="utf-8")
+    rig = check_report(path, simulated=True).rig
+    assert rig is not None and rig.network.owner == "certificate robot"

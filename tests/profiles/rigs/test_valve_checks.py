@@ -1,0 +1,72 @@
+"""A rig with a valve or a self-test: what keeps it from starting, each in a sentence that says what to do."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.control.settings import SafeDirection
+from gateway.profiles import check_report, load_rig
+from gateway.registers.words import ControlBit
+from tests.profiles.rigs.test_checks import CELL, RIGS, messages, report
+
+PULL = (RIGS / "paper-pull.yaml").read_text(encoding="utf-8")
+
+
+def test_the_shipped_rig_pulls_and_tests_itself() -> None:
+    rig = load_rig("paper-pull")
+    assert rig.valve and rig.valve.device.name == "waveshare-relay" and rig.ports() == {}
+    assert rig.control.valve and rig.control.valve.safe is SafeDirection.PUSH
+    assert rig.control.self_test and rig.control.self_test.force_n == 15.0
+    for bit in (ControlBit.VALVE_PULL, ControlBit.START_SELF_TEST):
+        assert rig.supported_bits & bit
+    assert not load_rig("irc5-cell").supported_bits & (ControlBit.VALVE_PULL | ControlBit.START_SELF_TEST)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "device: waveshare-relay",
+            "device: smc-itv-rc",
+            "valve.device: smc-itv-rc is of role output, a valve is needed",
+        ),
+        ("  dwell_s: 0.3", "  port: /dev/serial/by-id/x\n  dwell_s: 0.3", "valve.port: a simulated rig has no ports"),
+        ("safe_voltage_v: 0", "safe_voltage_v: 1", "limits.safe_voltage_v: 1 V: a rig with a valve needs 0 V"),
+        ("safe: push", "safe: hold", "valve.safe:"),
+        ("timeout_s: 0.5", "timeout_s: 0", "valve.timeout_s:"),
+        ("pull_area_share: 0.75", "calibration: nowhere", "valve.calibration:"),
+        ("force_n: 15", "force_n: 61", "self_test.force_n: 61 N is above limits.force_max_n = 60 N"),
+        ("force_n: 15", "force_n: -1", "self_test.force_n:"),
+    ],
+)
+def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
+    found = messages(report(tmp_path, PULL, (old, new)).faults)
+    assert any(told in message for message in found), found
+
+
+@pytest.mark.parametrize(
+    ("port", "told"),
+    [
+        ("", "valve.port: is missing"),
+        (
+            ", port: /dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A10K1ITV-if00-port0",
+            "valve.port: is the port of output too",
+        ),
+        (
+            ", port: /dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A10K2CEL-if00-port0",
+            "valve.port: is the port of load_cell too",
+        ),
+    ],
+)
+def test_a_real_valve_needs_a_port_of_its_own(tmp_path: Path, port: str, told: str) -> None:
+    source = CELL.replace("limits:\n", f"valve: {{device: mcu-valve, baud: 115200{port}}}\nlimits:\n", 1)
+    (tmp_path / "rig.yaml").write_text(source, encoding="utf-8")
+    assert any(told in message for message in messages(check_report(tmp_path / "rig.yaml").faults))
+
+
+def test_a_measured_pull_comes_from_its_own_calibration(tmp_path: Path) -> None:
+    source = PULL.replace("pull_area_share: 0.75", "calibration: demo", 1)
+    (tmp_path / "rig.yaml").write_text(source, encoding="utf-8")
+    rig = load_rig(tmp_path / "rig.yaml")
+    assert rig.pull_calibration and rig.pull_calibration.name == "demo"
+    assert load_rig("paper-pull").pull_calibration is None

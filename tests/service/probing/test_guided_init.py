@@ -1,0 +1,76 @@
+"""`init` at a terminal: from two ports to a rig that `check` accepts, with the devices asked what they are."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from gateway.cli.guided_rig import set_in
+from gateway.cli.main import command
+from gateway.cli.starter_rig import starter_rig
+from gateway.devices.messages import SetVoltage
+from gateway.profiles import check_report, load_device
+from tests.service.probing.far_ends import FarEnd, behind_ptys
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("gateway.ports.list_ports", list)
+    return tmp_path
+
+
+def answered(*lines: str) -> Result:
+    return CliRunner().invoke(command, ["init", "own", "--guided"], input="\n".join(lines) + "\n")
+
+
+def test_the_devices_say_what_they_are_and_the_file_is_accepted(folder: Path) -> None:
+    module, indicator = FarEnd(load_device("icpdas-702x")), FarEnd(load_device("stream-st-gs"))
+    with behind_ptys(module, indicator) as (output, cell):
+        result = answered(output, "y", "", "", cell, "y", "", "", "98.07", "40")
+    assert result.exit_code == 0, result.output
+    assert "icpdas-702x answers at 9600 8N1: it says that it is 7021" in result.output
+    found = check_report("own.yaml")
+    assert found.rig, [str(fault) for fault in found.faults]
+    assert (found.rig.output.device.name, found.rig.load_cell.device.name) == ("icpdas-702x", "stream-st-gs")
+    assert found.rig.ports() == {"output": output, "load_cell": cell}
+    assert not found.rig.accept_no_device_watchdog
+    assert not any(isinstance(one, SetVoltage) for one in module.heard)
+    assert sorted(path.name for path in folder.iterdir()) == ["own.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("cell", "more"),
+    [
+        ("adam-4016", ("counts", "0", "12.5")),
+        ("mantracourt-dsc", ("kg",)),
+        ("laumas-tlb", ()),
+        ("hbm-aed-binary", ("counts", "100", "0.001")),
+        ("hx711-line", ("counts", "84000", "0.0001")),
+    ],
+)
+def test_every_amplifier_gets_bounds_that_it_can_keep(cell: str, more: tuple[str, ...]) -> None:
+    result = answered("later", "smc-itv-rc", "", "y", "later", cell, "", *more, "98.07", "40")
+    assert result.exit_code == 0, result.output
+    found = check_report("own.yaml", simulated=True)
+    assert found.rig, [str(fault) for fault in found.faults]
+
+
+def test_forces_that_do_not_fit_are_asked_again() -> None:
+    result = answered("later", "", "", "y", "later", "", "", "98.07", "300", "98.07", "40")
+    assert "limits.force_max_n: 300 N is above 65.2 N" in result.output
+    assert check_report("own.yaml", simulated=True).rig
+
+
+def test_without_a_terminal_nothing_is_asked() -> None:
+    result = CliRunner().invoke(command, ["init", "own"])
+    assert result.exit_code == 0
+    assert Path("own.yaml").read_text() == starter_rig("own")
+
+
+def test_a_value_is_set_in_its_own_section() -> None:
+    text = set_in(set_in(starter_rig("own"), "load_cell", "baud", 38400), "load_cell", "address", 3)
+    before, after = text.split("load_cell:")
+    assert "baud: 9600" in before
+    assert "baud: 38400\n" in after.split("limits:")[0]
+    assert after.split("limits:")[0].rstrip().endswith("address: 3")

@@ -1,0 +1,118 @@
+"""What is behind a port: found at the speed and in the words that it has, told in numbers, and never driven."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from gateway.cli.main import command
+from gateway.cli.port_probing import tell_report
+from gateway.devices import ValveDevice
+from gateway.devices.messages import AskDevice, DeviceStep, Garbage, ReadPressure, ReadVoltage
+from gateway.devices.profile import DeviceRole
+from gateway.processes import exit_codes
+from gateway.profiles import list_shipped, load_device
+from gateway.service.probing.harmless_questions import harmless_questions
+from gateway.service.probing.port_probe import PortReport, ProbeAnswer
+from tests.service.probing.far_ends import FarEnd, behind_ptys
+
+RIG = """
+name: own
+calibration: demo
+output: {{device: {device}, port: {output}, baud: {baud}}}
+load_cell: {{device: stream-st-gs, port: {cell}, baud: 115200, range_n: 98}}
+limits: {{force_max_n: 40, over_force_n: 55, smallest_force_n: 2, voltage_max_v: 8}}
+supervision: {{saturation_n: 96}}
+accept_no_device_watchdog: true
+"""
+HARMLESS = (Garbage, ReadPressure, ReadVoltage, AskDevice(DeviceStep.IDENTITY))
+
+
+@pytest.mark.parametrize("name", list_shipped("device"))
+def test_what_a_probe_asks_changes_nothing(name: str) -> None:
+    profile = load_device(name)
+    questions = list(harmless_questions(profile))
+    if profile.role is DeviceRole.OUTPUT:
+        device = FarEnd(profile)._output
+        assert device
+        for question in questions:
+            (request,) = device.receive(question.data, 0.0)
+            assert isinstance(request, (ReadPressure, ReadVoltage)) or request == AskDevice(DeviceStep.IDENTITY)
+    elif profile.role is DeviceRole.VALVE:
+        assert [ValveDevice(profile).receive(one.data) for one in questions] == [[None]]
+    else:
+        assert len(questions) == 1
+        assert bool(questions[0].data) is (profile.stream is None)
+
+
+def probe(folder: Path, paths: list[str], device: str = "icpdas-702x", baud: int = 9600) -> tuple[int, str]:
+    rig = folder / "own.yaml"
+    rig.write_text(RIG.format(device=device, output=paths[0], cell=paths[1], baud=baud))
+    result = CliRunner().invoke(command, ["check", str(rig), "--probe"])
+    return result.exit_code, result.output
+
+
+def test_a_rig_whose_devices_answer_as_it_says(tmp_path: Path) -> None:
+    module, indicator = FarEnd(load_device("icpdas-702x")), FarEnd(load_device("stream-st-gs"))
+    with behind_ptys(module, indicator) as paths:
+        code, said = probe(tmp_path, paths)
+    assert code == exit_codes.OK, said
+    assert "icpdas-702x answers at 9600 8N1: it says that it is 7021" in said
+    assert r"asked '$01M\r', heard '!017021\r'" in said
+    assert "the wire alone would carry" in said
+    assert "stream-st-gs answers at 115200 8N1: reads 0.51" in said
+    assert "readings/s; the wire carries 640" in said
+    assert set(module.heard) <= {AskDevice(DeviceStep.IDENTITY)}, "nothing else was ever asked of it"
+
+
+def test_a_device_at_another_speed_is_found_and_told(tmp_path: Path) -> None:
+    module, indicator = FarEnd(load_device("icpdas-702x"), 19200), FarEnd(load_device("stream-st-gs"))
+    with behind_ptys(module, indicator) as paths:
+        code, said = probe(tmp_path, paths)
+    assert code == exit_codes.DEVICE
+    assert "icpdas-702x answers at 19200 8N1" in said
+    assert (
+        "E113 the rig names icpdas-702x at 9600: write device: icpdas-702x, baud: 19200, or exchange the ports" in said
+    )
+    assert all(isinstance(one, HARMLESS[:3]) or one == HARMLESS[3] for one in module.heard)
+
+
+def test_listening_says_what_comes_and_sends_nothing() -> None:
+    indicator, module = FarEnd(load_device("stream-st-gs")), FarEnd(load_device("icpdas-702x"))
+    with behind_ptys(indicator, module) as paths:
+        result = CliRunner().invoke(command, ["ports", "--listen", "--seconds", "0.1", "--json", *paths])
+    heard, silent = json.loads(result.output)
+    by_speed = {one["serial"]: one["devices"].get("stream-st-gs", 0) for one in heard["heard"]}
+    assert max(by_speed, key=lambda serial: by_speed[serial]) == "115200 8N1", by_speed
+    assert by_speed["115200 8N1"] > 3
+    assert all(one["bytes_per_s"] == 0 for one in silent["heard"])
+    assert module.heard == []
+
+
+def test_what_cannot_be_probed_is_told() -> None:
+    runner = CliRunner()
+    simulated = runner.invoke(command, ["check", "demo", "--probe"])
+    assert simulated.exit_code == exit_codes.CONFIGURATION
+    assert "E114 rig demo is simulated" in simulated.output
+    device = runner.invoke(command, ["check", "smc-itv-rc.yaml", "--probe"])
+    assert device.exit_code != 0
+    missing = runner.invoke(command, ["ports", "--listen", "/dev/none"])
+    assert "E102" in missing.output
+
+
+@pytest.mark.parametrize(("latency_ms", "is_told"), [(16, True), (1, False), (None, False)])
+def test_a_slow_adapter_is_told(latency_ms: int | None, is_told: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.ports.latency.latency_ms", lambda path: latency_ms)
+    said = list(tell_report(PortReport("/dev/ttyUSB0")))
+    assert any(line.startswith("W332 /dev/ttyUSB0 waits up to 16 ms") for line in said) is is_told
+    assert said[0].startswith("E112 /dev/ttyUSB0: no known device answered")
+
+
+def test_the_rate_that_is_told_is_that_of_the_wire_and_the_device() -> None:
+    profile = load_device("icpdas-702x")
+    asked, heard = b"$01M\r", b"!017021\r"
+    answer = ProbeAnswer(profile, profile.serial, "it says that it is 7021", asked, heard, 0.0235, 42.0)
+    told = " ".join(tell_report(PortReport("/dev/ttyUSB0", [answer])))
+    assert "a question takes 23.5 ms (13.5 ms on the wire alone): about 21 settings with a reading a second" in told
+    assert "the wire alone would carry 36" in told

@@ -1,0 +1,99 @@
+"""The valve's line in virtual time: one question is out, the readback decides, an order goes out once, silence has an age."""
+
+from gateway.devices import ValveDevice, ValveDirection, ValveHost
+from gateway.service.running_rig.lines.valve_line import ValveExchange
+from tests.profile_files import load_device
+
+PUSH, PULL = ValveDirection
+PROFILE = load_device("waveshare-relay")
+
+
+class Relay:
+    """The device behind the line; takes_s: until its answer; deaf: it hears nothing."""
+
+    def __init__(self, stands: ValveDirection = PUSH) -> None:
+        self.device, self.stands = ValveDevice(PROFILE), stands
+        self.now_s = 0.0
+        self.is_deaf = self.is_stuck = False
+        self.asked: list[tuple[float, ValveDirection | None]] = []
+        self.answers: list[tuple[float, bytes]] = []
+        self.line = ValveExchange(ValveHost(PROFILE), self.hear, PROFILE.reply_timeout_s)
+
+    def hear(self, data: bytes) -> None:
+        if self.is_deaf:
+            return
+        (question,) = self.device.receive(data)
+        assert question is None or isinstance(question, ValveDirection)
+        assert not self.answers, "a second question while one is out"
+        self.asked.append((self.now_s, question))
+        if question is not None and not self.is_stuck:
+            self.stands = question
+        self.answers.append((self.now_s + 0.02, self.device.reply(question, self.stands)))
+
+    def run(self, seconds: float, order: ValveDirection | None = None) -> "Relay":
+        for _ in range(round(seconds * 200)):
+            self.now_s += 0.005
+            while self.answers and self.answers[0][0] <= self.now_s:
+                self.line.on_bytes(self.answers.pop(0)[1], self.now_s)
+            self.line.tick(self.now_s)
+            self.line.set_direction(order, self.now_s)
+        return self
+
+    @property
+    def orders(self) -> list[ValveDirection]:
+        return [question for _, question in self.asked if question is not None]
+
+
+def test_nothing_is_known_before_the_first_readback_which_is_repeated() -> None:
+    relay = Relay(PULL)
+    assert relay.line.status.stands is None
+    relay.run(1.0)
+    assert relay.line.status == (PULL, None, False) and relay.orders == []
+    assert 9 <= len(relay.asked) <= 11
+
+
+def test_an_order_goes_out_once_and_its_readback_follows_at_once() -> None:
+    relay = Relay().run(0.5, PUSH)
+    began_s = relay.now_s
+    relay.run(0.5, PULL)
+    assert relay.orders == [PULL] and relay.line.status.stands is PULL
+    told_s = next(at_s for at_s, question in relay.asked if question is PULL)
+    read_s = next(at_s for at_s, question in relay.asked if at_s > told_s)
+    assert told_s - began_s < 0.035 and read_s - told_s < 0.045
+
+
+def test_without_an_order_a_valve_that_moved_is_left_alone() -> None:
+    relay = Relay(PULL).run(0.5, PULL)
+    relay.stands = PUSH
+    relay.run(0.5, None)
+    assert relay.line.status.stands is PUSH and relay.orders == []
+    relay.run(0.5, PULL)
+    assert relay.orders == [PULL] and relay.line.status.stands is PULL
+
+
+def test_a_relay_that_does_not_move_keeps_its_readback_and_is_told_again() -> None:
+    relay = Relay().run(0.3)
+    relay.is_stuck = True
+    relay.run(1.0, PULL)
+    assert relay.line.status.stands is PUSH and len(relay.orders) > 2
+
+
+def test_silence_has_an_age_until_an_answer_ends_it() -> None:
+    relay = Relay().run(0.5)
+    relay.is_deaf = True
+    began_s = relay.now_s
+    relay.run(0.7)
+    since_s = relay.line.status.unanswered_since_s
+    assert since_s is not None and since_s - began_s <= 0.11
+    relay.is_deaf = False
+    relay.run(0.3)
+    assert relay.line.status.unanswered_since_s is None or relay.now_s - relay.line.status.unanswered_since_s < 0.035
+
+
+def test_noise_is_counted_and_a_new_port_begins_with_nothing() -> None:
+    relay = Relay().run(0.3)
+    relay.line.on_bytes(bytes.fromhex("01050000FF008C3A"), relay.now_s)  # that nobody has asked for
+    relay.run(0.3)
+    assert relay.line.garbage_bytes == 8 and relay.line.status.stands is PUSH
+    relay.line.reset()
+    assert relay.line.status.stands is None

@@ -1,0 +1,151 @@
+"""Who owns the setpoint during runs and after, and edges write by write."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from struct import pack
+
+import pytest
+
+from gateway.codes.refusals import RefusalReason
+from gateway.control import CalibrationInUse
+from gateway.profiles import load_calibration
+from gateway.registers.words import State
+from tests.service.running_rig.simulated_rig import (
+    CALIBRATE,
+    ENABLE,
+    OTHER,
+    OWNER,
+    RESET,
+    TAKE,
+    TARE,
+    SmallRig,
+)
+from tests.service.running_rig.test_runs_and_masters import leased, locally
+
+HOLDERS: dict[str, Callable[[], SmallRig]] = {
+    "off": SmallRig,
+    "prepared": lambda: _written(SmallRig(), 1, 500),
+    "ready": lambda: _written(SmallRig(), 0, ENABLE),
+    "holding": lambda: leased().holding(),
+    "fault": lambda: leased().faulted(),
+    "calibrating": lambda: SmallRig().calibrating(),
+    "calibrating here": lambda: locally(SmallRig()),
+}
+
+
+def _written(rig: SmallRig, *words: int) -> SmallRig:
+    rig.write(*words)
+    return rig.run(0.1)
+
+
+@pytest.mark.parametrize("name", HOLDERS)
+def test_bit_3_of_another_master_takes_over_alike_in_every_state(name: str) -> None:
+    rig = HOLDERS[name]()
+    stood = (rig.state, rig.word("control_word"), rig.word("force_setpoint"))
+    rig.bank.write_bits(3, [True], OTHER)
+    assert rig.bank.owner == OTHER.host
+    assert (rig.state, rig.word("control_word"), rig.word("force_setpoint")) == stood
+    for words in ((4, 71), (4, 72), (0, *rig.block(rig.word("control_word"), beat=73))):
+        rig.write(*words, peer=OTHER)
+        rig.run(0.1)
+        assert rig.bank.owner == OTHER.host, "its own heartbeat never ends it"
+    if rig.state is not State.CALIBRATING:
+        for words in ((6, 10), (2, 300), (1, 0)):
+            rig.write(*words, peer=OTHER)
+            assert rig.bank.owner == OTHER.host
+    refused = rig.answer(2, 100)
+    assert refused is not None
+    assert (refused.code, refused.reason) == (6, RefusalReason.NOT_OWNER)
+    rig.bank.write_bits(3, [True], OWNER)
+    assert rig.bank.owner == OWNER.host
+
+
+def test_a_takeover_in_the_write_that_disables_holds_too() -> None:
+    rig = SmallRig().holding()
+    rig.write(0, TAKE, peer=OTHER)
+    rig.run(0.5)
+    assert (rig.state, rig.bank.owner) == (State.OFF, OTHER.host)
+
+
+def test_a_takeover_ends_with_disable() -> None:
+    rig = SmallRig().holding()
+    rig.bank.write_bits(3, [True], OWNER)
+    rig.write(0, 0)
+    assert rig.bank.owner is None
+
+
+def test_a_takeover_ends_with_the_lease_and_with_no_other_fault() -> None:
+    rig = leased().holding()
+    rig.bank.write_bits(3, [True], OWNER)
+    rig.is_cell_silent = True
+    rig.until(State.FAULT)
+    assert rig.bank.owner == OWNER.host
+    rig.is_cell_silent = False
+    rig.run(0.5).write(0, RESET, 0, 0, 0, 4711)
+    rig.run(1.0).holding()
+    rig.beats = False
+    rig.until(State.FAULT)
+    assert rig.bank.owner is None
+
+
+def test_a_takeover_outlives_the_end_of_its_own_run() -> None:
+    rig = SmallRig()
+    rig.write(0, TAKE | CALIBRATE)
+    rig.run(2.5).write(0, 0)
+    rig.until(State.OFF)
+    assert rig.bank.owner == OWNER.host
+
+
+def test_an_edge_bit_acts_each_time_it_is_written() -> None:
+    rig = SmallRig()
+    for _ in range(3):
+        rig.write(0, TARE)
+    assert sum(sentence.startswith("tare") for sentence in rig.log) == 3
+    rig.write(4, 1)
+    assert sum(sentence.startswith("tare") for sentence in rig.log) == 3
+
+
+def test_a_reset_with_a_new_heartbeat_counts_in_the_very_moment_of_the_fault() -> None:
+    rig = leased().holding()
+    rig.is_cell_silent = True
+    rig.until(State.FAULT)
+    rig.write(0, RESET, 0, 0, 0, 4711)
+    assert rig.state is State.OFF
+
+
+def test_a_force_that_is_still_leaving_cannot_become_the_zero() -> None:
+    rig = SmallRig().holding(30.0)
+    rig.write(0, 0)
+    refused = rig.answer(0, TARE)
+    assert refused is not None
+    assert "on their way to 0" in refused.sentence
+    rig.run(1.5).write(0, TARE)
+    assert abs(rig.controller.zero_n) < 1.0
+
+
+def test_control_answers_for_this_moment_and_not_for_the_last_step() -> None:
+    """The last step saw a fresh sample; meanwhile it has grown old, and no step has told."""
+    rig = SmallRig()
+    assert rig.word("status_word") & 2
+    rig.ticks += 20
+    refused = rig.answer(0, ENABLE, 1200)
+    assert refused is not None
+    assert (refused.code, refused.reason) == (0x0B, RefusalReason.CELL_SILENT)
+
+
+def test_a_calibration_with_a_smaller_limit_lowers_the_setpoint_in_the_registers() -> None:
+    rig = SmallRig().holding(20.0)
+    less = replace(load_calibration("demo"), number=17, force_limits_n=(1.0, 8.0))
+    said = rig.bank.set_active_model(less)
+    rig.controller.use(CalibrationInUse(less.model(), 17))
+    assert said == "W314 force_setpoint lowered from 20.00 N to 8.00 N: calibration 17 allows no more"
+    for _ in range(2):
+        rig.run(0.1)
+        assert (rig.word("force_setpoint"), rig.word("force_requested")) == (800, 2000)
+        assert rig.bank.read_registers(202, 2) == pack(">f", 8.0)
+        rig.write(4, 5)
+    rig.run(2.0)
+    assert (rig.state, rig.word("force_accepted")) == (State.HOLDING, 800)
+    rig.write(1, 500)
+    assert (rig.word("force_setpoint"), rig.word("force_requested")) == (500, 500)
+    assert rig.bank.set_active_model(less) == ""

@@ -1,0 +1,61 @@
+"""A TLS face of a running rig: on the same bank as the plain one, the owner known by its certificate, told when ready."""
+
+import asyncio
+import struct
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from gateway.modbus import pdu
+from gateway.profiles.rigs.faces import TlsFace
+from gateway.service.running_rig.starting import StartError
+from tests.certificates import Folder, store_all
+from tests.fieldbus.by_hand import framed
+from tests.fieldbus.tls_by_hand import client
+from tests.service.rigs import demo
+from tests.service.running_rig.test_faces import Served
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    return store_all(tmp_path_factory.mktemp("certificates"))
+
+
+def rig_with(folder: Folder, certificate: str = "gateway") -> Any:
+    rig = demo()
+    face = TlsFace(
+        type="tls", port=0, certificate=folder.crt(certificate), key=folder.key("gateway"), ca=folder.crt("ca")
+    )
+    return replace(rig, fieldbus=(face,), network=replace(rig.network, port=0))
+
+
+async def ask(port: int, request: bytes, context: Any = None) -> bytes:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port, ssl=context)
+    writer.write(framed(request))
+    size = struct.unpack(">4xH", await reader.readexactly(6))[0]
+    answer = await reader.readexactly(size)
+    writer.transport.abort()
+    return answer[1:]
+
+
+def test_both_faces_serve_one_bank_and_the_certificate_owns(folder: Folder) -> None:
+    async def scene() -> None:
+        served = Served(rig_with(folder))
+        async with served.running():
+            plain, tls = served.told
+            assert (plain.type, tls.type, tls.facts["host"]) == ("tcp", "tls", "127.0.0.1")
+            command = pdu.write_registers_request(0, struct.pack(">HH", 1, 1200))
+            assert await ask(tls.facts["port"], command, client(folder, "setpoint")) == command[:5]
+            assert served.bank.owner == "certificate setpoint"
+            assert await ask(plain.facts["port"], pdu.write_register_request(1, 1300)) == b"\x86\x06"
+            while not any(peer.identity == "certificate setpoint" for peer in served.closed):
+                await asyncio.sleep(0.001)
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+def test_files_that_changed_since_check_keep_the_rig_from_starting(folder: Folder) -> None:
+    with pytest.raises(StartError, match=r"E174 .*cannot be used") as caught:
+        Served(rig_with(folder, "admin"))
+    assert caught.value.exit_code == 78

@@ -1,0 +1,147 @@
+"""The guardian's end, and children that come late or never: the safe voltage goes first, and nothing waits for what is gone."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from gateway.processes import message_link
+from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.scheduler_counters import ProcessorTime
+from tests.service.supervisor.guarded import (
+    PTYS,
+    SAFE_FRAME,
+    FakeChild,
+    FakeTurns,
+    Scene,
+    port,
+)
+from tests.service.supervisor.scripted_children import assert_comes_up, dies_after, lives, rig_lives, scene
+
+__all__ = ["port", "scene"]
+
+
+def test_a_stop_does_not_wait_for_a_process_that_does_not_go(scene, port):
+    def script(child: FakeChild) -> None:
+        dies_after(8, port, None)(child)
+        child.is_immortal = True
+
+    one = scene(script)
+    one.run(lambda: len(one.said) == 2)
+    began_s = one.now_s
+    one.signals.send()
+    assert one.run() == 0
+    assert one.now_s == began_s
+
+
+@pytest.mark.parametrize(
+    ("turns", "letter", "cause"),
+    [
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.01, 5.09)], "R", EndCause.MACHINE_BUSY),
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.09, 5.01)], "R", EndCause.STALLED),
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.0, 5.0)], "S", EndCause.STALLED),
+        ([ProcessorTime(1.0, 5.0), ProcessorTime(1.0, 5.0)], "T", EndCause.STOPPED),
+    ],
+)
+def test_a_silence_is_told_by_what_the_kernel_gave_the_loop(scene, port, turns, letter, cause):
+    def script(child: FakeChild) -> None:
+        dies_after(6, port, None)(child)
+        child.counters = FakeTurns(turns, letter)
+
+    one = scene(script, lives(port))
+    assert one.run(lambda: len(one.starter.started) == 2) is None
+    assert one.now_s == pytest.approx(100.1), "within the bound"
+    assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is cause
+    assert f"({ {'machine-busy': 'A403', 'stalled': 'A404', 'stopped': 'A405'}[cause.value] })" in one.said[0]
+
+
+def test_a_busy_machine_that_ends_the_gateway_is_named_as_the_cause(scene, port):
+    def script(child: FakeChild) -> None:
+        dies_after(6, port, None)(child)
+        child.counters = FakeTurns([ProcessorTime(0.0, 0.0), ProcessorTime(0.0, 0.1)], "R")
+
+    one = scene(script)
+    assert one.run() == 1
+    assert "(6 machine-busy)" in one.said[-1]
+    assert "A403" in one.said[-1]
+
+
+def beats_until_told(one: Scene) -> list[message_link.Message]:
+    """Control goes on beating; what it is told next."""
+    for _ in range(100):
+        one.now_s += 0.01
+        one.child.say(message_link.HEARTBEAT)
+        assert one.guardian._step() is None, one.said
+        if heard := one.child.hears():
+            return heard
+    raise AssertionError(f"control was told nothing: {one.said}")
+
+
+def test_a_rig_that_dies_is_started_again_and_control_learns_where_it_is_now(scene, port):
+    moved = {"output": "/dev/pts/7", "load_cell": "/dev/pts/8"}
+
+    def second(child: FakeChild) -> None:
+        child.say(message_link.PTYS, {"ptys": moved})
+
+    one = scene(lives(port), rigs=(rig_lives, second))
+    assert_comes_up(one)
+    assert beats_until_told(one) == [message_link.Message(message_link.RIG, {"ptys": PTYS})]
+    one.starter.rigs_started[0].dies(-9)
+    assert beats_until_told(one) == [message_link.Message(message_link.RIG, {"ptys": moved})]
+    assert one.said[0].startswith("A408 the simulated rig ended (SIGKILL)")
+    assert one.starter.calls[-1] == "rig prepared=False"
+    assert len(one.starter.started) == 1, "control was left alone"
+
+
+def test_a_rig_that_never_starts_is_told_to_control_in_the_end(scene, port):
+    def dies(child: FakeChild) -> None:
+        child.say(message_link.BORN, {"pid": 3})
+        child.dies(1)
+
+    one = scene(dies_after(2, port, None), rigs=(dies,))
+    heard: list[message_link.Message] = []
+
+    def told() -> bool:
+        heard.extend(one.child.hears())
+        return bool(heard)
+
+    one.run(told)
+    assert heard == [message_link.Message(message_link.RIG, {"failed": True})]
+    assert [line[:4] for line in one.said] == ["A408", "A408", "A408", "A409"]
+
+
+def test_a_stop_before_there_is_a_line_waits_for_nothing(scene, port):
+    one = scene(dies_after(1, port, None))
+    one.run(lambda: one.child.pid != 0)
+    began_s = one.now_s
+    one.signals.send()
+    assert one.run() == 0
+    assert one.now_s == began_s
+
+
+def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, monkeypatch):
+    one = scene(lives(port))
+    assert_comes_up(one)
+
+    def broken(*_: object) -> None:
+        raise RuntimeError("a defect of the guardian itself")
+
+    monkeypatch.setattr(one.guardian, "_poll_others", broken)
+    with pytest.raises(RuntimeError):
+        one.run()
+    one.guardian._close()
+    assert port.wrote() == SAFE_FRAME
+
+
+def test_a_reader_that_has_gone_does_not_end_the_guardian():
+    """`run --json | head -1`, and a closed stderr: said to nobody, and exit 0."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    code = (
+        "from gateway.service.supervisor.guardian_sentences import print_error, print_ready; print_ready('READY'); "
+        "print_ready({}); print_error('A401')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], stdout=writer, stderr=writer, check=False)
+    os.close(writer)
+    assert done.returncode == 0

@@ -1,0 +1,53 @@
+"""The simulated rig's valve: the relay answers, the valve moves a moment later, and then the slide pulls, weaker by the rod."""
+
+import pytest
+
+from gateway.devices import ValveDirection, ValveHost
+from gateway.profiles import load_rig
+from gateway.service.simulation.world import SimulatedRig
+
+PUSH, PULL = ValveDirection
+
+
+class Rig:
+    """A simulated rig whose wires take no time. Times are virtual seconds."""
+
+    def __init__(self) -> None:
+        rig = load_rig("paper-pull")
+        assert rig.valve
+        self.simulated = SimulatedRig(rig, send_output=lambda data: None, send_cell=lambda data: None, now_s=0.0)
+        self.host = ValveHost(rig.valve.device)
+        self.now_s = 0.0
+
+    def run(self, seconds: float) -> "Rig":
+        for _ in range(round(100 * seconds)):
+            self.now_s += 0.01
+            self.simulated.advance(self.now_s)
+        return self
+
+    def ask(self, question: ValveDirection | None) -> list[object]:
+        return list(self.host.receive(self.simulated.on_valve_bytes(self.host.request(question), self.now_s)))
+
+    @property
+    def force_n(self) -> float:
+        return self.simulated.valve.sign * float(self.simulated.twin.force_n)
+
+
+def test_a_pull_is_the_push_by_the_share_of_the_area_and_negative() -> None:
+    rig = Rig()
+    rig.simulated.twin.command(4.0)
+    pushed_n = rig.run(2.0).force_n
+    rig.simulated._setting_v = 4.0
+    assert rig.ask(PULL) == [PULL] and rig.ask(None) == [PUSH], "the valve takes its time"
+    pulled_n = rig.run(2.0).force_n
+    assert rig.ask(None) == [PULL]
+    assert pushed_n > 20.0 and pulled_n == pytest.approx(-0.75 * pushed_n, rel=0.1)
+
+
+def test_stuck_it_answers_and_stands_cut_it_is_silent() -> None:
+    rig = Rig()
+    rig.simulated.fault({"do": "fault", "name": "valve-stuck", "on": True})
+    assert rig.ask(PULL) == [PULL]
+    assert rig.run(1.0).ask(None) == [PUSH]
+    rig.simulated.fault({"do": "fault", "name": "valve-cut", "on": True})
+    assert rig.ask(None) == []
