@@ -1,0 +1,1 @@
+"""Fit and diagnosis over many recordings of many cells."""
