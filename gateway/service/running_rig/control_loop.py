@@ -3,7 +3,8 @@
 A master's write calls `on_asked` and, where control can take it, `on_command` inside the bank's write: so the answer is
 control's own, and the voltage is on its way before the master has it.
 The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Where a sample or a command was decided on
-less than half a period ago it leaves the decision to the next event: two decisions are at most one and a half periods apart.
+within the last period it leaves the decision to the next sample, which a cell as fast as the loop brings before the next
+tick; only a tick that finds none decides, so that two decisions are at most two periods apart (and a bit, for jitter).
 Clock and ports come in as arguments; the same class runs behind ptys, behind real ports and in virtual time. No exception of
 ours may leave the last voltage standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
 """
@@ -38,7 +39,7 @@ from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
 from gateway.service.running_rig.recorded_row import row_of
 from gateway.service.running_rig.recordings import Recordings
 
-_FRESH_PERIODS: Final = 0.5  # a tick decides nothing so soon after a sample or a command has
+_FRESH_PERIODS: Final = 1.05  # a tick decides nothing so soon after a sample or a command; more than 1: a cell's jitter
 _PULLING: Final = int(StatusBit.PULLING)
 _LONG_SILENCE_S: Final = 0.03  # a shorter one needs no explanation
 _LONGEST_SILENCE_S: Final = 10.0  # then it is no hiccup any more
@@ -97,7 +98,7 @@ class ControlLoop:
         self._clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
         self._last_tick_s: float | None = None
-        self._decided_s = -inf
+        self._heard_s = -inf
         self._fresh_s = _FRESH_PERIODS * process.period_s
         self._last_processor_time: ProcessorTime | None = None
         self._slow_loop = SlowLoop(process.period_s)
@@ -112,7 +113,8 @@ class ControlLoop:
 
     def _on_command(self, command: Command) -> None:
         self.owner_connected = True
-        self._step(self._clock())
+        self._heard_s = now_s = self._clock()
+        self._step(now_s)
 
     def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
         """Take bytes of the load cell; a complete sample makes control decide at once."""
@@ -128,6 +130,7 @@ class ControlLoop:
                 self.cell_counts.garbled += 1
                 self.cell_garbage_bytes += len(message.data)
         if fresh:
+            self._heard_s = now_s
             self._step(now_s)
             self._record()
 
@@ -165,7 +168,7 @@ class ControlLoop:
         self._cell.tick(now_s)
         if self.valve:
             self.valve.tick(now_s)
-        if now_s - self._decided_s > self._fresh_s:
+        if now_s - self._heard_s > self._fresh_s:
             self._step(now_s)
         self._last_tick_s, self._last_processor_time = now_s, self.processor_time()
         if self._lateness:
@@ -271,7 +274,6 @@ class ControlLoop:
         if decision.resets_device:
             self.output.clear_faults()
         self.health.loop_time_s = self._clock() - now_s
-        self._decided_s = now_s
         stored = self.calibration_runs.stored if self.calibration_runs else 0
         known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
         status = status_of(decision, self.health, self.output.pressure_pa, known)
