@@ -101,7 +101,7 @@ def table(comparison: Comparison) -> str:
 
 def page(comparison: Comparison) -> str:
     """Return a self-contained HTML page: both loops, and the differences."""
-    from gateway.reports.style import STYLE
+    from gateway.reports.style import inline_style
     from gateway.reports.svg_chart import Axis, Chart, spread
 
     volts = comparison.voltage_v
@@ -118,7 +118,8 @@ def page(comparison: Comparison) -> str:
     title = escape(f"A: {_title(comparison.a)} · B: {_title(comparison.b)}")
     figures = "".join(f"<figure>{chart.svg()}</figure>" for chart in (loops, differences))
     return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style></head>\n'
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        f"<style>{inline_style()}</style></head>\n"
         f"<body><main><h1>{title}</h1><div class='pair'>{figures}</div></main></body></html>\n"
     )
 

@@ -22,7 +22,7 @@ from gateway.reports.diagnosis.series import (
     join_traces,
     most_improved_window,
 )
-from gateway.reports.diagnosis.style import DIAGNOSIS_STYLE
+from gateway.reports.style import inline_style
 
 _MOST_TRACES: Final = 2  # recordings that are drawn over time; the others count in all other charts
 _MOST_COVARIATES: Final = 6
@@ -57,7 +57,7 @@ def diagnosis_page(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
     """Return the whole page. Text from recordings and profiles is escaped."""
     body = [*_summary(diagnosis, circumstances), *_pictures(diagnosis), *_outlook(diagnosis, circumstances)]
     text = "\n".join(part for part in body if part)
-    return _FRAME.format(title=escape(f"Diagnosis: {words.title(diagnosis)}"), style=DIAGNOSIS_STYLE, body=text)
+    return _FRAME.format(title=escape(f"Diagnosis: {words.title(diagnosis)}"), style=inline_style(), body=text)
 
 
 def _summary(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str]:

@@ -8,7 +8,7 @@ from gateway import VERSION
 from gateway.bsfm.fit.evaluation import Evaluation
 from gateway.reports.fit import charts
 from gateway.reports.fit.document import Document
-from gateway.reports.style import STYLE
+from gateway.reports.style import inline_style
 
 _WORDS: Final = " class='words'"
 _FRAME: Final = """<!doctype html>
@@ -48,7 +48,7 @@ def fit_page(evaluation: Evaluation, document: Document) -> str:
         _provenance(document),
     ]
     body = "\n".join(part for part in parts if part)
-    return _FRAME.format(title=escape(_title(document)), style=STYLE, body=body)
+    return _FRAME.format(title=escape(_title(document)), style=inline_style(), body=body)
 
 
 def _title(document: Document) -> str:

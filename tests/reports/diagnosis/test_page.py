@@ -53,7 +53,7 @@ def balanced(html: str) -> bool:
 def test_the_report_loads_nothing_is_small_and_serves_dark_and_paper() -> None:
     html = page(diagnosis())
     assert not re.search(r"https?:|<script|<link|@import|url\(|src=", html)
-    assert "prefers-color-scheme:dark" in html and "@media print" in html
+    assert "prefers-color-scheme: dark" in html and "@media print" in html
     assert 60_000 < len(html) < 160_000
     assert balanced(html)
 
