@@ -23,7 +23,7 @@ MENDED = (29, 43, 46, 72)  # drawn after the tuning: a short second lag, a map t
 SEEDS = tuple(seed if seed in FAST else pytest.param(seed, marks=pytest.mark.long) for seed in (*range(20), *MENDED))
 NEVER_WORSE_N = 0.03  # of a difference of two RMS of nine steps
 STILL_WORSE_N = 0.07  # of a single force: half of the trim's dead zone
-STATIC_N = 0.4  # a model this close needs no trim to settle
+MEDIAN_OF_BOUND = 1.5  # time to settle to 0.5 N, over what the plant's physics allows
 
 
 @cache
@@ -42,6 +42,11 @@ def gone(seed: int, gain: float, *, measured: bool = True) -> Course:
         measured=measured,
         tracks=False,
     )
+
+
+def ratios_of(machine: Machine, done: Course) -> list[float]:
+    """Of each step: time to settle over what physics allows."""
+    return [step.settled_s / allowed_s(machine, step) for step in done.steps]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -64,15 +69,20 @@ def test_the_trim_is_never_worse_than_none(seed):
     assert all(step.is_settled for step in on.steps)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_where_the_model_is_right_steps_settle_within_half_as_much_again_as_physics_allows(seed):
-    """Median over the steps at whose end the feedforward alone is within STATIC_N."""
-    off, on, plant = gone(seed, 0.0), gone(seed, 0.3), machine(seed).machine
-    right = [
-        step for step, alone in zip(on.steps, off.steps, strict=True) if abs(alone.error_n[-500:].mean()) < STATIC_N
-    ]
-    ratios = [step.settled_s / allowed_s(plant, step) for step in right]
-    assert float(np.median(ratios)) <= 1.5
+def test_steps_settle_within_half_as_much_again_as_physics_allows():
+    """Median over the short course's steps of all these machines: of one machine's nine it would be chance."""
+    ratios = [ratio for seed in FAST for ratio in ratios_of(machine(seed).machine, gone(seed, 0.3))]
+    assert float(np.median(ratios)) <= MEDIAN_OF_BOUND
+    assert float(np.quantile(ratios, 0.75)) <= 2.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [*range(20), *MENDED])
+def test_on_each_machine_steps_settle_within_half_as_much_again_as_physics_allows(seed):
+    """Median over the whole course: seed 7, whose model is the furthest off, is at the bound."""
+    one = machine(seed)
+    whole = course(one.machine, one.calibration, settings(Trim(gain_v_per_n_s=0.3, limit_v=0.5)), tracks=False)
+    assert float(np.median(ratios_of(one.machine, whole))) <= MEDIAN_OF_BOUND
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -150,7 +160,7 @@ def test_a_regulator_that_rings_is_held_and_better_with_the_trim_than_without(da
     assert on.hold_n <= off.hold_n + NEVER_WORSE_N
     assert on.after_1_s_n <= off.after_1_s_n + NEVER_WORSE_N
     assert on.swing_n < 0.5
-    assert float(np.median([step.settled_s / allowed_s(ringing, step) for step in on.steps])) <= 1.35
+    assert float(np.median(ratios_of(ringing, on))) <= 1.35
 
 
 def test_a_cell_of_ten_samples_a_second_does_not_make_the_trim_swing():
