@@ -1,16 +1,14 @@
-"""One frame of the monitor, for any size from 80 x 24: header, four big numbers, a minute of force, alarms, registers."""
+"""One frame of the monitor, for any size from 60 x 24: header, four big numbers, a minute of force, alarms, registers."""
 
 from math import isnan
 from typing import Final
 
-from rich.console import Group, RenderableType
-from rich.panel import Panel
-from rich.table import Table
 from rich.text import Text
 
-from gateway.cli.live_monitor.drawing import big, chart, chart_top_n
+from gateway.cli.live_monitor.drawing import beside, big, boxed, chart, chart_top_n
+from gateway.cli.live_monitor.flow import StyledWords, flow_lines
 from gateway.cli.live_monitor.history import Track, buckets
-from gateway.cli.live_monitor.register_table import View, register_table
+from gateway.cli.live_monitor.register_table import View, register_lines
 from gateway.cli.master.value_text import format_value
 from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
@@ -25,6 +23,7 @@ _STATE_STYLE: Final = {
     State.FAULT: "bold white on red",
     State.CALIBRATING: "bold white on blue",
 }
+_TALL: Final = 30  # lines from which what to do is said of every alarm
 _SHOWN_BITS: Final = {
     StatusBit.CONTACT: "green",
     StatusBit.IN_BAND: "green",
@@ -35,35 +34,38 @@ _SHOWN_BITS: Final = {
 }
 
 
-def page(view: View) -> RenderableType:
+def page(view: View) -> list[Text]:
     """Return the whole frame, `height` lines at most."""
-    alarms = _alarms(view.track)
+    header, alarms = _header(view), _alarms(view)
+    hint = flow_lines([StyledWords(view.hint, "dim", is_sentence=True)], view.width) if view.hint else []
     chart_rows = 3 if view.height < 36 else 6
-    above = 1 + 5 + chart_rows + 2 + len(alarms)
-    table_rows = max(1, view.height - above - 2)  # its heading, and a line for the prompt after one frame
-    return Group(_header(view), _numbers(view), _minute(view, chart_rows), *alarms, register_table(view, table_rows))
+    above = len(header) + 5 + chart_rows + 2 + len(alarms)
+    below = len(hint) or 1  # a line for the prompt after one frame
+    table_rows = max(1, view.height - above - below - 1)
+    table = register_lines(view, table_rows)[: table_rows + 1]
+    return [*header, *_numbers(view), *_minute(view, chart_rows), *alarms, *table, *hint]
 
 
-def _header(view: View) -> Text:
+def _header(view: View) -> list[Text]:
+    """Return the state, what holds of it, and where it is: one line, more where that does not fit."""
     track = view.track
-    state = track.value("state")
-    text = Text(no_wrap=True, overflow="crop")
     if view.trouble:
-        text.append(f" NO ANSWER {view.trouble[: view.width - 12]}", style="bold white on red")
-        return text
+        words = f"NO ANSWER {view.trouble}".split()
+        return flow_lines([StyledWords(" ".join(words), "bold white on red", is_sentence=True)], view.width)
+    state = track.value("state")
     known = State(int(state)) if not isnan(state) and int(state) in set(State) else None
-    text.append(
-        f" {known.name if known is not None else '?'} ", style=_STATE_STYLE.get(known, "") if known is not None else ""
-    )
+    parts = [StyledWords(f" {known.name if known else '?'} ", _STATE_STYLE[known] if known else "")]
     if known is State.CALIBRATING:
-        text.append(f"  {_describe_run(track)}", style="bold")
+        parts.append(StyledWords(_describe_run(track), "bold"))
     else:
-        for bit, style in _SHOWN_BITS.items():
-            if track.has_status(bit):
-                text.append(f"  {(bit.name or '').lower().replace('_', ' ')}", style=style)
-        text.append(f"   {_describe_settling(track)}")
-    text.append(f"   {view.where}", style="dim")
-    return text
+        parts += [StyledWords(_name_of(bit), style) for bit, style in _SHOWN_BITS.items() if track.has_status(bit)]
+        parts.append(StyledWords(_describe_settling(track)))
+    parts.append(StyledWords(view.where, "dim"))
+    return flow_lines((part for part in parts if part.words), view.width)
+
+
+def _name_of(bit: StatusBit) -> str:
+    return (bit.name or "").lower().replace("_", " ")
 
 
 def _describe_run(track: Track) -> str:
@@ -88,7 +90,7 @@ def _describe_settling(track: Track) -> str:
     return f"{after}last 5 s ±{track.largest_error_n(5.0):.2f} N{band}"
 
 
-def _numbers(view: View) -> Table:
+def _numbers(view: View) -> list[Text]:
     track = view.track
     measured_n, setpoint_n = track.value("force_measured"), track.wanted_n
     numbers = (
@@ -97,28 +99,24 @@ def _numbers(view: View) -> Table:
         ("error N", measured_n - setpoint_n, 2, "+", "green" if track.has_status(StatusBit.IN_BAND) else "white"),
         ("output V", track.value("output_voltage") / 1e3, 3, "-", "magenta"),
     )
-    table = Table.grid(expand=True)
-    panels = []
-    for title, value, decimals, sign, style in numbers:
-        table.add_column(ratio=1)
-        width = view.width // 4 - 2
-        panels.append(
-            Panel(big(value, decimals, sign=sign, width=width, style=style), title=title, padding=0, height=5)
-        )
-    table.add_row(*panels)
-    return table
+    boxes = []
+    for place, (title, value, decimals, sign, style) in enumerate(numbers):
+        width = (view.width * (place + 1)) // 4 - (view.width * place) // 4
+        rows = big(value, decimals, sign=sign, width=width - 2, style=style)
+        boxes.append(boxed(title, rows, width, is_centred=True))
+    return beside(boxes)
 
 
-def _minute(view: View, rows: int) -> Panel:
-    columns = view.width - 2
-    points = buckets(view.track.points, view.track.time_s, columns)
+def _minute(view: View, rows: int) -> list[Text]:
+    points = buckets(view.track.points, view.track.time_s, view.width - 2)
     top_n = chart_top_n(points)
-    title = f"force, last 60 s, 0 .. {top_n:g} N (line: setpoint)"
-    return Panel(chart(points, rows, top_n), title=title, title_align="left", padding=0, height=rows + 2)
+    return boxed(f"force, last 60 s, 0 .. {top_n:g} N (line: setpoint)", chart(points, rows, top_n), view.width)
 
 
-def _alarms(track: Track) -> list[Text]:
-    """Return the fault first, then warnings, each with what to do; at most three lines."""
+def _alarms(view: View) -> list[Text]:
+    """Return the fault first, then warnings, each with what to do; three at most, on a low terminal what to do about the first
+    alone."""
+    track = view.track
     codes = []
     fault = track.value("fault_code")
     if not isnan(fault) and int(fault):
@@ -126,9 +124,14 @@ def _alarms(track: Track) -> list[Text]:
     warnings = track.value("warning_word")
     if not isnan(warnings):
         codes += [(bit.code, "black on yellow") for bit in WarningBit if int(warnings) & bit]
-    lines = [_alarm(code, style, _detail(code, track)) for code, style in codes[:3]]
-    if len(codes) > 3:
-        lines[-1] = Text(f" and {len(codes) - 2} more: see warning_word ", style="black on yellow")
+    shown = codes[:3] if len(codes) <= 3 else codes[:2]
+    lines: list[Text] = []
+    for place, (code, style) in enumerate(shown):
+        parts = _alarm(code, style, _detail(code, track), is_whole=place == 0 or view.height >= _TALL)
+        lines += flow_lines(parts, view.width)
+    if len(codes) > len(shown):
+        more = f" and {len(codes) - len(shown)} more: force-gateway read warning_word "
+        lines += flow_lines([StyledWords(more, "black on yellow")], view.width)
     return lines
 
 
@@ -143,9 +146,9 @@ def _code_of_fault(number: int) -> str:
     return FaultCode(number).code if number in set(FaultCode) else ""
 
 
-def _alarm(code: str, style: str, detail: str) -> Text:
+def _alarm(code: str, style: str, detail: str, *, is_whole: bool) -> list[StyledWords]:
     entry = CATALOGUE.get(code)
-    text = Text(no_wrap=True, overflow="ellipsis")
     if entry is None:
-        return text.append(" a fault that this version does not know ", style=style)
-    return text.append(f" {entry.code} {entry.title}{detail} ", style=style).append(f" {entry.do}")
+        return [StyledWords(" a fault that this version does not know ", style)]
+    title = StyledWords(f" {entry.code} {entry.title}{detail} ", style)
+    return [title, StyledWords(entry.do, is_sentence=True)] if is_whole else [title]

@@ -1,6 +1,7 @@
 """Polls a gateway and keeps the track, through lost connections; writers come from the control socket where it is known."""
 
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,18 +11,21 @@ from gateway.cli.live_monitor.history import Track
 from gateway.cli.live_monitor.register_table import View, Writer
 from gateway.cli.master.client import GatewayClient, RefusedError
 
-POLL_S: Final = 0.1
-"""Refresh period of the live page: ten frames a second look continuous and are two requests each."""
+POLL_S: Final = 0.25
+"""Refresh period of the live page. A frame costs 2 to 4 ms of processor, nearly all of it drawing: four a second are one or two
+hundredths of a core, ten were more than a tenth on a slow machine."""
+_WRITERS_S: Final = 1.0  # between two looks at who wrote
+_ASK_AGAIN_S: Final = 5.0  # between two searches for the gateway's directory
 
 
 class Poller:
     """Reads a gateway: one poll is two requests, the command block and the status block."""
 
-    def __init__(self, client: GatewayClient, state: Path | None, clock: Callable[[], float]) -> None:
+    def __init__(self, client: GatewayClient, writers: "WriterSource", clock: Callable[[], float]) -> None:
         self.track = Track()
         self.trouble = ""
         self._client = client
-        self._state = state
+        self._source = writers
         self._clock = clock
 
     def poll(self) -> None:
@@ -37,23 +41,51 @@ class Poller:
         except (CliError, RefusedError) as error:
             self.trouble = str(error)
 
-    def view(self, width: int, height: int) -> View:
-        """Return what a frame of this size is drawn from."""
-        return View(self.track, self._client.where, width, height, self.trouble, self._writers())
+    def view(self, width: int, height: int, hint: str = "") -> View:
+        """Return what a frame of this size is drawn from. hint: what a key does."""
+        writers = self._source.read(self._clock())
+        words = " · ".join(part for part in (hint, self._source.why_none) if part)
+        return View(self.track, self._client.where, width, height, self.trouble, writers, words)
 
-    def _writers(self) -> dict[str, Writer] | None:
-        """Who wrote each register last, and how long ago; None without a state directory or a gateway on it."""
-        if self._state is None:
+
+class WriterSource:
+    """Who wrote each register last: from the gateway's control socket, where it runs on this machine.
+
+    find: finds its state directory, and says why there is none; asked again now and then, for a gateway may come later.
+    """
+
+    def __init__(self, find: Callable[[], tuple[Path | None, str]]) -> None:
+        self.why_none = ""
+        self._find = find
+        self._state: Path | None = None
+        self._ask_again_s = -inf
+        self._entries: dict[str, tuple[str, str, float]] | None = None
+
+    def read(self, now_s: float) -> dict[str, Writer] | None:
+        """Return who wrote each register, and how long ago; None where nobody can tell: `why_none` says why."""
+        if now_s >= self._ask_again_s:
+            self._look(now_s)
+        if self._entries is None:
             return None
-        try:
-            writers = ask(self._state, {"do": "last-writer"})["writers"]
-            now_s = self._clock()
-            return {name: _writer(entry, now_s) for name, entry in writers.items()}
-        except (CliError, KeyError, TypeError, ValueError):
-            return {}
+        return {name: Writer(host, port, now_s - time_s) for name, (host, port, time_s) in self._entries.items()}
+
+    def _look(self, now_s: float) -> None:
+        if self._state is None:
+            self._state, self.why_none = self._find()
+        self._entries = None if self._state is None else _ask_writers(self._state)
+        self._ask_again_s = now_s + (_ASK_AGAIN_S if self._state is None else _WRITERS_S)
 
 
-def _writer(entry: dict[str, Any], now_s: float) -> Writer:
+def _ask_writers(state: Path) -> dict[str, tuple[str, str, float]]:
+    """Return host, port and time of each register's last write; nothing where no gateway answers."""
+    try:
+        writers = ask(state, {"do": "last-writer"})["writers"]
+        return {name: _writer(entry) for name, entry in writers.items()}
+    except (CliError, KeyError, TypeError, ValueError):
+        return {}
+
+
+def _writer(entry: dict[str, Any]) -> tuple[str, str, float]:
     """From the control socket's answer; its times are of this machine's monotonic clock, as ours are."""
     host, _, port = str(entry["peer"]).rpartition(":")
-    return Writer(host or port, port if host else "", now_s - float(entry["time_s"]))
+    return host or port, port if host else "", float(entry["time_s"])

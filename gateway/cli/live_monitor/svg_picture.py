@@ -5,6 +5,7 @@ import re
 from typing import Final
 
 from rich.console import Console
+from rich.text import Text
 
 from gateway.cli.live_monitor.page import page
 from gateway.cli.live_monitor.register_table import View
@@ -22,5 +23,5 @@ def svg_picture(view: View) -> str:
         force_terminal=True,
         color_system="truecolor",
     )
-    console.print(page(view))
+    console.print(Text("\n").join(page(view)))
     return _WEB_FONT.sub("", console.export_svg(title=f"force-gateway monitor  {view.where}", unique_id="monitor"))

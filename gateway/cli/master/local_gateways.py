@@ -16,8 +16,21 @@ def sockets_near(wire: Wire, root: Path) -> list[Path]:
 def running_behind(wire: Wire, root: Path) -> dict[str, Any] | None:
     """Return what the gateway behind this wire says of itself (`running`); None where it is elsewhere, nobody says, or two
     do."""
-    answer = [one for directory in sockets_near(wire, root) if wire.is_served_by(one := _ask_what_runs(directory))]
-    return answer[0] if len(answer) == 1 else None
+    directory, _ = find_state_behind(wire, root)
+    return _ask_what_runs(directory) if directory else None
+
+
+def find_state_behind(wire: Wire, root: Path) -> tuple[Path | None, str]:
+    """Return the state directory of the gateway behind this wire; where it is not known, why, in words."""
+    if not wire.is_near:
+        return None, "last writers: only where the gateway runs on this machine"
+    found = [directory for directory in sockets_near(wire, root) if wire.is_served_by(_ask_what_runs(directory))]
+    if len(found) == 1:
+        return found[0], ""
+    why = (
+        f"no gateway of this user below {root} says that it serves {wire.where}" if not found else "two gateways say so"
+    )
+    return None, f"last writers: {why}; --state DIR names its directory"
 
 
 def _ask_what_runs(directory: Path) -> dict[str, Any]:

@@ -22,23 +22,28 @@ _TEXT_SIZE: Final = (80, 24)
 @click.option(
     "--seconds", type=click.FloatRange(min=0.0), help="End after this time; with --once or --svg, watch first."
 )
-@click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory: shows last writers.")
+@click.option(
+    "--state",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="State directory, for last writers, where it is not the usual one.",
+)
 @gateway_options
 def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options: Any) -> None:
     """Show a gateway live: state, force, alarms.
 
-    Ctrl-C ends. Works against any gateway that speaks the register map, at 80x24 and larger.
+    q or Ctrl-C ends. Works against any gateway that speaks the register map, at 60x24 and larger. Who wrote each register
+    last is shown where the gateway runs on this machine.
     """
     import sys
 
-    from gateway.cli.live_monitor.poll import Poller
+    from gateway.cli.live_monitor.poll import Poller, WriterSource
     from gateway.cli.master.client import GatewayClient
     from gateway.cli.master.refusal_text import explain_refusals
     from gateway.profiles import load_register_map
 
     register_map = load_register_map(options["map_name"])
     with GatewayClient(wire, options["unit"], register_map) as client:
-        poller = Poller(client, options["state"], time.monotonic)
+        poller = Poller(client, WriterSource(lambda: _find_state(wire, options["state"])), time.monotonic)
         with explain_refusals(client):
             poller.poll()  # the first one fails loudly: a wrong address is no reason to wait
         if svg or options["once"] or not sys.stdout.isatty():
@@ -46,6 +51,14 @@ def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options:
             _picture(poller, svg) if svg else _text(poller)
         else:
             _live(poller, seconds)
+
+
+def _find_state(wire: "Wire", given: Path | None) -> tuple[Path | None, str]:
+    """Return the gateway's state directory; without one, why."""
+    from gateway.cli.master.local_gateways import find_state_behind
+    from gateway.service.supervisor.run_options import default_state_root
+
+    return (given, "") if given else find_state_behind(wire, default_state_root())
 
 
 def _watch(poller: "Poller", seconds: float) -> None:
@@ -59,18 +72,23 @@ def _watch(poller: "Poller", seconds: float) -> None:
 
 def _live(poller: "Poller", seconds: float | None) -> None:
     from rich.console import Console
-    from rich.live import Live
 
+    from gateway.cli.live_monitor.keyboard import is_quit_pressed, take_single_keys
     from gateway.cli.live_monitor.page import page
     from gateway.cli.live_monitor.poll import POLL_S
+    from gateway.cli.live_monitor.screen import Screen
 
     console = Console()
+    screen = Screen(console)
     end_s = time.monotonic() + seconds if seconds else float("inf")
     try:
-        with Live(console=console, screen=True, auto_refresh=False) as live:
+        with take_single_keys() as has_keys, screen.open():
+            hint = "q quits" if has_keys else "Ctrl-C quits"
             while time.monotonic() < end_s:
-                live.update(page(poller.view(*console.size)), refresh=True)
-                time.sleep(POLL_S)
+                size = (console.width, console.height)
+                screen.show(page(poller.view(*size, hint)), size)
+                if is_quit_pressed(POLL_S, has_keys=has_keys):
+                    return
                 poller.poll_or_note()
     except KeyboardInterrupt:
         pass
@@ -80,12 +98,13 @@ def _text(poller: "Poller") -> None:
     import sys
 
     from rich.console import Console
+    from rich.text import Text
 
     from gateway.cli.live_monitor.page import page
 
     console = Console()
     size = console.size if sys.stdout.isatty() else _TEXT_SIZE
-    Console(width=size[0]).print(page(poller.view(*size)))
+    Console(width=size[0]).print(Text("\n").join(page(poller.view(*size))))
 
 
 def _picture(poller: "Poller", svg: Path) -> None:
