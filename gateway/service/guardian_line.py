@@ -6,9 +6,11 @@ import os
 import socket
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
+
+_BEATS_PER_STALL: Final = 8  # at least so many fit into the silence that kills; each wakes the guardian
 
 
 class GuardianLine:
@@ -27,6 +29,7 @@ class GuardianLine:
         self._rig: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self.told_to_stop = asyncio.Event()
         self.is_gone = False
+        self._beat_every_s = self._next_beat_s = 0.0
         asyncio.get_running_loop().add_reader(link.fileno(), self._on_readable)
 
     async def simulated_ports(self, rig: str) -> dict[str, str] | None:
@@ -36,10 +39,13 @@ class GuardianLine:
         ptys: dict[str, str] | None = answer.get("ptys")
         return ptys
 
-    def heartbeat(self) -> None:
-        """Send a heartbeat, and what the line could not take before."""
+    def heartbeat(self, now_s: float) -> None:
+        """Send a heartbeat where one is due, and what the line could not take before. now_s: monotonic."""
         if self._waiting:
             self._send_waiting()
+        if now_s < self._next_beat_s:
+            return
+        self._next_beat_s = now_s + self._beat_every_s
         with contextlib.suppress(OSError):  # a guardian that is gone shows as the end of the line
             guardian_link.send(self._link, guardian_link.HEARTBEAT)
 
@@ -54,6 +60,7 @@ class GuardianLine:
 
     def ready(self, announcement: dict[str, Any], stall_s: float) -> None:
         """Tell the guardian that the rig runs. stall_s: silence that it has to act on."""
+        self._beat_every_s = stall_s / _BEATS_PER_STALL
         self._tell(guardian_link.READY, announcement | {"stall_s": stall_s})
 
     def close(self) -> None:

@@ -83,6 +83,26 @@ def test_the_last_words_of_a_peer_killed_with_unread_messages_are_heard(ends: Pa
     assert message_link.receive(ends[1]) is None
 
 
+def test_a_heartbeat_goes_out_eight_times_in_the_silence_that_kills_and_not_at_each_tick(ends: Pair) -> None:
+    async def scene() -> list[str]:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        guardian.ready({}, 0.1)
+        for tick in range(100):
+            guardian.heartbeat(tick * 0.004)
+        guardian.close()
+        ends[0].setblocking(False)
+        tags = []
+        with contextlib.suppress(BlockingIOError):
+            while message := message_link.receive(ends[0]):
+                tags.append(message.tag)
+        return tags
+
+    tags = asyncio.run(scene())
+    assert tags[0] == message_link.READY
+    assert tags[1:] == [message_link.HEARTBEAT] * 25, "0.4 s in ticks of 4 ms: at 0, 16, 32 ..."
+
+
 def test_control_hears_stop_and_the_end_of_its_guardian(ends: Pair) -> None:
     async def scene() -> tuple[bool, bool]:
         ends[1].setblocking(False)
@@ -95,7 +115,7 @@ def test_control_hears_stop_and_the_end_of_its_guardian(ends: Pair) -> None:
         ends[0].close()
         async with asyncio.timeout(2):
             await guardian.told_to_stop.wait()
-        guardian.heartbeat()  # nobody listens: no exception
+        guardian.heartbeat(0.0)  # nobody listens: no exception
         guardian.first_cause("nobody hears it")
         is_gone = guardian.is_gone
         guardian.close()
@@ -164,7 +184,7 @@ def test_a_guardian_that_does_not_read_does_not_stop_the_loop(ends: Pair) -> Non
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1])
         for _ in range(10_000):
-            guardian.heartbeat()
+            guardian.heartbeat(0.0)
         guardian.close()
         return guardian.is_gone
 
@@ -215,7 +235,7 @@ def test_what_a_full_line_does_not_take_comes_after_it_in_order(ends: Pair) -> N
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1])
         for _ in range(10_000):
-            guardian.heartbeat()
+            guardian.heartbeat(0.0)
         guardian.hand_over(writer, b"SET 0", b"")
         os.close(writer)
         guardian.ready({}, 0.1)
@@ -224,7 +244,7 @@ def test_what_a_full_line_does_not_take_comes_after_it_in_order(ends: Pair) -> N
         with contextlib.suppress(BlockingIOError):
             while message_link.receive(ends[0]):
                 pass
-        guardian.heartbeat()
+        guardian.heartbeat(0.0)
         guardian.close()
 
     asyncio.run(scene())

@@ -292,9 +292,10 @@ class RunningRig:
     def _on_tick(self, expirations: int, late_s: float) -> None:
         self.loop.on_tick(expirations, late_s)
         self.bank.show_watchdogs(watchdog_word(self._rig, self._ports, self._line))
-        self._guardian.heartbeat()
-        self._recordings.flush(time.monotonic())
-        self._calibration_runs.flush(time.monotonic())
+        now_s = time.monotonic()
+        self._guardian.heartbeat(now_s)
+        self._recordings.flush(now_s)
+        self._calibration_runs.flush(now_s)
         self._plants.take_waiting()
         self._audit.flush()
         if self._line.acknowledged_v is not None and self.loop.sample is not None:
