@@ -1,6 +1,7 @@
 """The command `force-gateway`. A verb's module is imported when that verb is called, so `--help` and `check` start fast
 and a verb's libraries cost only those who use it."""
 
+import os
 import sys
 from difflib import get_close_matches
 from importlib import import_module
@@ -96,4 +97,8 @@ def command(debug: bool) -> None:
 
 def main() -> None:
     """Run `force-gateway` or `python -m gateway`."""
+    if "_FORCE_GATEWAY_COMPLETE" in os.environ:
+        from gateway.cli.command_line.bash_completion import use_our_bash
+
+        use_our_bash()
     command(prog_name="force-gateway")

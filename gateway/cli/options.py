@@ -83,8 +83,15 @@ def _gateway_option(default: str | None, gateway_help: str) -> Callable[[Any], A
 
 def gateway_options(function: Function) -> Function:
     """Add --gateway, --rtu and what belongs to it, --unit and --map: which server to speak to, how, and by which names."""
+    from gateway.cli.command_line.completion_words import complete_maps
+
     option = click.option(
-        "--map", "map_name", default=defaults.REGISTER_MAP, metavar="NAME", help="Register map (name or file)."
+        "--map",
+        "map_name",
+        default=defaults.REGISTER_MAP,
+        metavar="NAME",
+        shell_complete=complete_maps,
+        help="Register map (name or file).",
     )
     return option(wire_options(DEFAULT_ENDPOINT, "Where the gateway's Modbus TCP is.")(function))
 
@@ -159,7 +166,7 @@ def _rtu_wire(path: str, unit: int, line: dict[str, Any]) -> "Wire":
 
 @dataclass(frozen=True, slots=True)
 class StateChoice:
-    """--state and --rig as given: which state directory is meant. path None: the rig's own."""
+    """Which state directory is meant. path: as --state says, None: the rig's own; rig: that of --rig, or the one that runs."""
 
     path: Path | None
     rig: str
@@ -172,17 +179,22 @@ class StateChoice:
 
 def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add --state and --rig; the function receives both as one argument, `state`, a StateChoice."""
+    from gateway.cli.command_line.known_rigs import choose_rig
+    from gateway.cli.command_line.rig_choice import rig_option, tell_rig
 
     @wraps(function)
-    def with_choice(*, state: Path | None, rig: str, **options: Any) -> Any:
-        return function(state=StateChoice(state, rig), **options)
+    def with_choice(*, state: Path | None, rig: str | None, **options: Any) -> Any:
+        choice = StateChoice(state, choose_rig(rig, state))
+        if rig is None and state is None:
+            tell_rig(choice.rig, choice.directory)
+        return function(state=choice, **options)
 
     for option in (
+        rig_option(f"The rig that is meant  [default: the one that runs here, else {defaults.RIG}]", checks=False),
         click.option(
-            "--rig", default=defaults.RIG, show_default=True, help="The rig whose default state directory is meant."
-        ),
-        click.option(
-            "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway."
+            "--state",
+            type=click.Path(path_type=Path, file_okay=False),
+            help="State directory of the gateway  [default: the rig's]",
         ),
     ):
         option(with_choice)
@@ -214,8 +226,8 @@ def count_of(things: Sized, noun: str) -> str:
     return f"{len(things)} {noun}{'' if len(things) == 1 else 's'}"
 
 
-def state_directory(state: Path | None, rig: str) -> Path:
-    """Return the directory that `run` would use."""
-    from gateway.service.supervisor.run_options import RunOptions
+def state_directory(state: Path | None, rig: str | None) -> Path:
+    """Return the directory that `run` would use. rig None: the one that runs here, else demo."""
+    from gateway.cli.command_line.known_rigs import directory_of
 
-    return RunOptions(rig=rig, state=state).state_directory
+    return directory_of(state, rig)

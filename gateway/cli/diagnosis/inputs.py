@@ -145,9 +145,9 @@ def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
     """Return the file of a recording: a number, a path, or the rig's `reference`. CliError (65) where there is none."""
     path = Path(name)
     if name == REFERENCE and not path.exists():
-        return reference_file(state_directory(state, rig or _ANY_STATE))
+        return reference_file(state_directory(state, rig))
     if name.isdecimal() and not path.exists():
-        return find_recording(state_directory(state, rig or _ANY_STATE), int(name))
+        return find_recording(state_directory(state, rig), int(name))
     if not path.exists():
         raise no_such_recording(path)
     return path

@@ -38,3 +38,8 @@ def _ask_what_runs(directory: Path) -> dict[str, Any]:
         return control_socket.ask(directory, {"do": "running"})
     except CliError:  # one that was killed, an older one, another user's
         return {}
+
+
+def is_answering(directory: Path) -> bool:
+    """Decide whether a gateway of this user runs on this state directory now."""
+    return bool(_ask_what_runs(directory))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_calibration_numbers, complete_calibrations
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
@@ -60,7 +61,7 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
 
 
 @command.command(name="show")
-@click.argument("which", metavar="[N]", required=False)
+@click.argument("which", metavar="[N]", required=False, shell_complete=complete_calibrations)
 @state_options
 @json_option
 def show_command(*, which: str | None, state: StateChoice, as_json: bool) -> None:
@@ -74,7 +75,7 @@ def show_command(*, which: str | None, state: StateChoice, as_json: bool) -> Non
 
 
 @command.command(name="use")
-@click.argument("number", metavar="N", type=click.IntRange(min=1))
+@click.argument("number", metavar="N", type=click.IntRange(min=1), shell_complete=complete_calibration_numbers)
 @click.option("--force", is_flag=True, help="Also one whose fit was rejected.")
 @state_options
 @json_option
@@ -99,8 +100,8 @@ def rollback_command(*, state: StateChoice, as_json: bool) -> None:
 
 
 @command.command(name="compare")
-@click.argument("a", metavar="A")
-@click.argument("b", metavar="B")
+@click.argument("a", metavar="A", shell_complete=complete_calibrations)
+@click.argument("b", metavar="B", shell_complete=complete_calibrations)
 @click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw both loops into this HTML file.")
 @state_options
 @json_option
@@ -124,7 +125,7 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
 
 
 @command.command(name="export")
-@click.argument("which", metavar="N")
+@click.argument("which", metavar="N", shell_complete=complete_calibrations)
 @click.option("--yaml", "yaml_file", type=click.Path(path_type=Path, allow_dash=True), help="YAML; - is stdout.")
 @click.option("--c", "c_directory", type=click.Path(path_type=Path, file_okay=False), help="C header and source.")
 @click.option("--force", is_flag=True, help="Overwrite.")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.completion_words import complete_profiles
 from gateway.cli.errors import CliError
 from gateway.cli.options import count_of, json_option
 from gateway.processes import exit_codes
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("file", metavar="RIG", default=defaults.RIG)
+@click.argument("file", metavar="RIG", default=defaults.RIG, shell_complete=complete_profiles)
 @click.option(
     "--probe", is_flag=True, help="Ask the devices too: which answers, at which speed, how fast. Moves nothing."
 )

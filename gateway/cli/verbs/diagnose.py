@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from gateway import defaults
+from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
+from gateway.cli.command_line.rig_choice import rig_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -48,14 +49,20 @@ class _Finite(click.FloatRange):
 
 
 @click.command()
-@click.argument("recordings", metavar="RECORDING...", nargs=-1)
-@click.option("--rig", metavar="R.yaml", help="The rig whose plant is the start; default the recording's own.")
+@click.argument("recordings", metavar="RECORDING...", nargs=-1, shell_complete=complete_recordings)
+@rig_option("The rig whose plant is the start  [default: the recording's own]")
 @click.option(
     "--calibration",
     metavar="N",
+    shell_complete=complete_calibrations,
     help="The calibration that tells the cell's noise: number, name or file; default the recording's own.",
 )
-@click.option("--without", metavar="EFFECT", help="Switch one effect of the base model off, to see it found again.")
+@click.option(
+    "--without",
+    metavar="EFFECT",
+    shell_complete=complete_effects,
+    help="Switch one effect of the base model off, to see it found again.",
+)
 @click.option(
     "--noise-floor-n",
     type=_Finite(min=0.0, min_open=True),
@@ -78,10 +85,16 @@ class _Finite(click.FloatRange):
     "--against",
     metavar="OLD",
     multiple=True,
+    shell_complete=complete_recordings,
     help="What has changed since this recording of the same machine, or since its `reference`; again for more of them.",
 )
-@click.option("--before", metavar="A", help="With --after: what B gained in commanded force over A, two real runs.")
-@click.option("--after", metavar="B", help="See --before.")
+@click.option(
+    "--before",
+    metavar="A",
+    shell_complete=complete_recordings,
+    help="With --after: what B gained in commanded force over A, two real runs.",
+)
+@click.option("--after", metavar="B", shell_complete=complete_recordings, help="See --before.")
 @click.option("--closed-loop", is_flag=True, help="Measure on the twin what the extension is worth in commanded force.")
 def command(**options: Any) -> None:
     """Say what the simulation gets wrong on a recording, and why.
@@ -191,7 +204,7 @@ def _read_old(options: dict[str, Any], rig: str) -> "Sources | None":
 
     if not options["against"]:
         return None
-    directory = state_directory(options["state"], options["rig"] or rig or defaults.RIG)
+    directory = state_directory(options["state"], options["rig"] or rig or None)
     names = [str(reference_file(directory)) if each == REFERENCE else each for each in options["against"]]
     return read_sources(names, rig=options["rig"], columns=options["columns"], state=options["state"])
 

@@ -5,26 +5,31 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_effects
 from gateway.cli.options import json_option
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from gateway.diagnosis import Effect
+    from gateway.catalogue.effect import Effect
 
 FORMAT = 1
 
 
 @click.command()
+@click.argument("name", required=False, shell_complete=complete_effects)
 @json_option
-def command(*, as_json: bool) -> None:
-    """List the effects that diagnose can name.
+def command(*, name: str | None, as_json: bool) -> None:
+    """List the effects that diagnose can name, or show one.
 
-    For each: what it is, what it looks like, what a recording must contain to show it, its parameters, and the effects
-    that it is easily taken for.
+    For each: what it is, what it looks like, what a recording must contain to show it, and its parameters. With NAME: the
+    experiment that shows it, what control does about it, and the effects that it is easily taken for, too.
     """
-    from gateway.diagnosis import EFFECTS
+    from gateway.catalogue.all_effects import EFFECTS
 
+    if name is not None:
+        _show_card(name, as_json=as_json)
+        return
     if as_json:
         document = {"format": FORMAT, "effects": [_facts(effect) for effect in EFFECTS]}
         click.echo(json.dumps(document, indent=2, ensure_ascii=False))
@@ -38,6 +43,28 @@ def command(*, as_json: bool) -> None:
     console.print(
         f"{len(EFFECTS)} effects; all are off in a plant that does not name them", style="dim", highlight=False
     )
+
+
+def _show_card(name: str, *, as_json: bool) -> None:
+    """Print one effect; UsageError with the nearest names where there is none of this name."""
+    from rich.console import Console
+
+    from gateway.catalogue.all_effects import EFFECTS
+    from gateway.cli.cards.card import describe_unknown, render_card
+    from gateway.cli.cards.effect_card import effect_facts
+
+    found = next((effect for effect in EFFECTS if effect.name == name.lower().replace("_", "-")), None)
+    if found is None:
+        known = [effect.name for effect in EFFECTS]
+        raise click.UsageError(describe_unknown(name, "an effect that diagnose knows", known, "effects"))
+    if as_json:
+        more = {"experiment": found.experiment, "number": found.number}
+        more |= {"treatments": [{"by": one.by.value, "why_not": one.why_not or None} for one in found.treatments]}
+        click.echo(json.dumps({"format": FORMAT} | _facts(found) | more, indent=2, ensure_ascii=False))
+        return
+    console = Console()
+    for part in render_card(found.name, effect_facts(found)):
+        console.print(part, highlight=False)
 
 
 def _facts(effect: "Effect") -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_codes
 from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
@@ -43,7 +44,14 @@ def parse_since(context: click.Context, parameter: click.Parameter, value: str |
     help="Only what is younger: 90s, 10m, 2h, 1d, or a time (UTC unless it says otherwise).",
 )
 @click.option("--severity", type=click.Choice(SEVERITIES), default="info", help="This severity and worse.")
-@click.option("--code", "codes", multiple=True, metavar="CODE", help="Only this code, such as W204; may be repeated.")
+@click.option(
+    "--code",
+    "codes",
+    multiple=True,
+    metavar="CODE",
+    shell_complete=complete_codes,
+    help="Only this code, such as W204; may be repeated.",
+)
 @click.option("--follow", is_flag=True, help="Wait for more; Ctrl-C ends it.")
 @json_option
 @state_options

@@ -6,11 +6,12 @@ from difflib import get_close_matches
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_codes
 from gateway.cli.options import json_option
 
 
 @click.command()
-@click.argument("code", required=False)
+@click.argument("code", required=False, shell_complete=complete_codes)
 @json_option
 def command(*, code: str | None, as_json: bool) -> None:
     """Explain a code of a message, such as E110.

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.completion_words import complete_recordings
+from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import json_option, name_option, state_directory
 from gateway.processes import exit_codes
@@ -40,7 +42,7 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
 
 
 @click.command()
-@click.argument("recording", metavar="RECORDING")
+@click.argument("recording", metavar="RECORDING", shell_complete=complete_recordings)
 @click.option("--models", callback=_models, default=",".join(MODELS), show_default=True, help="Which to compare.")
 @click.option("--orders", callback=_orders, default="1-5", show_default=True, help="Orders, such as 1-5 or 2,3.")
 @click.option(
@@ -62,7 +64,7 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
 @click.option("--store", is_flag=True, help="Store the chosen fit as a numbered calibration (it is not activated).")
 @name_option
 @click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway.")
-@click.option("--rig", help="The rig it must be from; default the recording's own.")
+@rig_option("The rig it must be from  [default: the recording's own]")
 @json_option
 def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:
     """Fit the four models to a recorded ladder, and say which to use.
@@ -100,7 +102,7 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     from gateway.service.fitting.ladder_fit import fit_recording
     from gateway.service.fitting.ladder_source import RigContext, find_source, read_source
 
-    path = find_source(name, state_directory(options["state"], options["rig"] or defaults.RIG))
+    path = find_source(name, state_directory(options["state"], options["rig"]))
     if not path.exists():
         raise no_such_recording(path)
     mapping = column_mapping(options["columns"])

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
@@ -36,11 +37,9 @@ def _parse_time(context: click.Context, parameter: click.Parameter, text: str | 
 @click.argument("newton", type=float)
 @click.option("--for", "for_s", callback=_parse_time, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
 @click.option("--reset", "resets", is_flag=True, help="Reset a latched fault first.")
-@click.option(
-    "--rig",
-    metavar="RIG",
-    help="The rig that runs there; its lease sets the pace of the heartbeat. "
-    f"Where it is not known, {format_ms(defaults.LEASE_S)} is assumed.",
+@rig_option(
+    "The rig that runs there, whose lease sets the pace of the heartbeat  [default: as a gateway on this machine says, else "
+    f"{format_ms(defaults.LEASE_S)}]"
 )
 @gateway_options
 @json_option

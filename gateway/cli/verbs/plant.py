@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_plant_numbers, complete_recordings
 from gateway.cli.options import StateChoice, json_option, state_options
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def _line(entry: "StoredDocument[NumberedPlant]") -> str:
 
 
 @command.command(name="show")
-@click.argument("number", metavar="N", type=click.IntRange(min=1))
+@click.argument("number", metavar="N", type=click.IntRange(min=1), shell_complete=complete_plant_numbers)
 @state_options
 @json_option
 def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
@@ -72,8 +73,8 @@ def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
 
 
 @command.command(name="compare")
-@click.argument("a", metavar="A")
-@click.argument("b", metavar="B")
+@click.argument("a", metavar="A", shell_complete=complete_plant_numbers)
+@click.argument("b", metavar="B", shell_complete=complete_plant_numbers)
 @state_options
 @json_option
 def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool) -> None:
@@ -107,9 +108,12 @@ def add_command(*, file: Path, state: StateChoice, as_json: bool) -> None:
 
 
 @command.command(name="use")
-@click.argument("number", metavar="N", type=click.IntRange(min=0))
+@click.argument("number", metavar="N", type=click.IntRange(min=0), shell_complete=complete_plant_numbers)
 @click.option(
-    "--before", metavar="RECORDING", help="The run that the watch compares with; default the newest one before."
+    "--before",
+    metavar="RECORDING",
+    shell_complete=complete_recordings,
+    help="The run that the watch compares with; default the newest one before.",
 )
 @click.option("--dry-run", is_flag=True, help="Only say what would be compensated.")
 @state_options

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_registers
 from gateway.cli.options import gateway_options, json_option
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("names", metavar="NAME...", nargs=-1, required=True)
+@click.argument("names", metavar="NAME...", nargs=-1, required=True, shell_complete=complete_registers)
 @gateway_options
 @json_option
 def command(*, names: tuple[str, ...], wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:

@@ -6,11 +6,12 @@ from typing import Any
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.completion_words import complete_rigs
 from gateway.cli.options import endpoint, serial_port
 
 
 @click.command()
-@click.argument("rig", default=defaults.RIG)
+@click.argument("rig", default=defaults.RIG, shell_complete=complete_rigs)
 @click.option("--sim", "simulate", is_flag=True, help="Simulate the rig's devices, whatever its file says.")
 @click.option(
     "--bind",

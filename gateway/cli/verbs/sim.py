@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_setting_names, complete_settings
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
@@ -23,7 +24,7 @@ def command() -> None:
 
 
 @command.command(name="set")
-@click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True)
+@click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=complete_settings)
 @json_option
 @state_options
 def set_command(*, assignments: tuple[str, ...], as_json: bool, state: StateChoice) -> None:
@@ -38,7 +39,7 @@ def set_command(*, assignments: tuple[str, ...], as_json: bool, state: StateChoi
 
 
 @command.command(name="clear")
-@click.argument("names", metavar="[NAME...]", nargs=-1)
+@click.argument("names", metavar="[NAME...]", nargs=-1, shell_complete=complete_setting_names)
 @json_option
 @state_options
 def clear_command(*, names: tuple[str, ...], as_json: bool, state: StateChoice) -> None:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_plant_files, complete_recordings
+from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.options import json_option
 
 if TYPE_CHECKING:
@@ -24,10 +26,13 @@ _MOST_STEPS: Final = 2_000_000  # one plant alone may have many
 
 
 @click.command()
-@click.argument("recording", metavar="RECORDING")
-@click.option("--rig", metavar="R.yaml", help="The rig; default the recording's own.")
+@click.argument("recording", metavar="RECORDING", shell_complete=complete_recordings)
+@rig_option("The rig whose plant is run  [default: the recording's own]")
 @click.option(
-    "--plant", metavar="PLANT.yaml", help="The plant to run, such as diagnose --extend writes; default the rig's."
+    "--plant",
+    metavar="PLANT.yaml",
+    shell_complete=complete_plant_files,
+    help="The plant to run, such as diagnose --extend writes; default the rig's.",
 )
 @click.option("--columns", metavar="MAP", help="time_s=1:ms,force_n=7:n for foreign tables, or a YAML file.")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False), help="Write the simulated series.")

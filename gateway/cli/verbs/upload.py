@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_calibration_files
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
 from gateway.processes import exit_codes
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("file", metavar="FILE")
+@click.argument("file", metavar="FILE", shell_complete=complete_calibration_files)
 @click.option("--slot", type=click.IntRange(0, 7), default=0, show_default=True, help="Recipe slot that it fills.")
 @click.option("--print-frames", is_flag=True, help="Print every Modbus request, for those who program a PLC.")
 @click.option("--dry-run", is_flag=True, help="Check only, store nothing. With --print-frames: send nothing.")

@@ -3,11 +3,12 @@
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.completion_words import complete_rigs
 from gateway.cli.errors import CliError
 
 
 @click.command()
-@click.argument("rig_name", metavar="RIG", default=defaults.RIG)
+@click.argument("rig_name", metavar="RIG", default=defaults.RIG, shell_complete=complete_rigs)
 @click.option("--format", "form", type=click.Choice(["text", "markdown", "json"]), default="text", show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
 def command(*, rig_name: str, form: str, as_json: bool) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli.command_line.completion_words import complete_assignments
 from gateway.cli.options import gateway_options, json_option
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True)
+@click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=complete_assignments)
 @click.option("--dry-run", is_flag=True, help="Say what would be sent, and send nothing that writes.")
 @click.option(
     "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory: tells why in numbers."

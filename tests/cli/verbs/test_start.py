@@ -147,7 +147,7 @@ def test_completion_prints_a_script_for_the_shell(shell: str, word: str, call) -
 def test_completion_offers_the_verbs(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "gateway"],
-        env={"_FORCE_GATEWAY_COMPLETE": "bash_complete", "COMP_WORDS": "force-gateway re", "COMP_CWORD": "1"},
+        env={"_FORCE_GATEWAY_COMPLETE": "bash_complete", "COMP_LINE": "force-gateway re"},
         capture_output=True,
         text=True,
         check=False,

@@ -1,0 +1,77 @@
+"""Which rigs there are, and which is meant: a shipped name, a rig file, or one that has run here.
+
+Without a name it is the one whose gateway runs on this machine, where that is one; else demo.
+"""
+
+from pathlib import Path
+
+import click
+
+from gateway import defaults
+
+
+def running_rigs() -> list[str]:
+    """Return the names of the state directories whose gateway answers on this machine."""
+    from gateway.cli.master.local_gateways import is_answering
+    from gateway.service.supervisor.run_options import default_state_root
+
+    return [
+        path.parent.name for path in sorted(default_state_root().glob("*/control.sock")) if is_answering(path.parent)
+    ]
+
+
+def rigs_with_state() -> list[str]:
+    """Return the names of rigs that have run here, with the usual state directory."""
+    from gateway.service.supervisor.run_options import default_state_root
+
+    root = default_state_root()
+    return sorted(path.name for path in root.iterdir() if path.is_dir()) if root.is_dir() else []
+
+
+def known_rigs() -> list[str]:
+    """Return every name that --rig takes besides files: the shipped ones first."""
+    from gateway.profiles import list_shipped
+
+    return list(dict.fromkeys([*list_shipped("rig"), *rigs_with_state()]))
+
+
+def check_rig(name: str) -> None:
+    """Raise UsageError for a rig that is neither known nor a file; it lists those that are."""
+    path = Path(name).expanduser()
+    if name in known_rigs() or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
+        return
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, known_rigs(), n=1)
+    meant = f"; did you mean {near[0]}?" if near else "."
+    ran = [rig for rig in rigs_with_state() if rig not in _shipped()]
+    here = f" Run here: {', '.join(ran)}." if ran else ""
+    what = "is no file, and no rig of this name is known" if path.suffix in (".yaml", ".yml") else "is not known"
+    raise click.UsageError(
+        f"rig {name} {what}{meant} Shipped: {', '.join(_shipped())}.{here} Or a file, such as my-cell.yaml."
+    )
+
+
+def _shipped() -> list[str]:
+    from gateway.profiles import list_shipped
+
+    return list_shipped("rig")
+
+
+def choose_rig(given: str | None, state: Path | None) -> str:
+    """Return the rig that is meant. state: the directory that was given instead: then the rig need not be known."""
+    if given is not None:
+        if state is None:
+            check_rig(given)
+        return given
+    if state is not None:
+        return defaults.RIG
+    running = running_rigs()
+    return running[0] if len(running) == 1 else defaults.RIG
+
+
+def directory_of(state: Path | None, rig: str | None) -> Path:
+    """Return the state directory that `run` would use."""
+    from gateway.service.supervisor.run_options import RunOptions
+
+    return RunOptions(rig=rig or choose_rig(None, state), state=state).state_directory

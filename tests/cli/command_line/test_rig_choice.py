@@ -1,0 +1,68 @@
+"""--rig means one thing: a shipped name, a file, or a rig that ran here; an unknown one is answered with those that exist."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.cli.command_line import known_rigs, rig_choice
+from gateway.cli.options import state_directory
+
+
+@pytest.fixture
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "state" / "force-gateway" / "my-cell").mkdir(parents=True)
+    return tmp_path / "state" / "force-gateway"
+
+
+VERBS = (
+    ("calibration", "list"),
+    ("recordings", "list"),
+    ("plant", "list"),
+    ("events",),
+    ("record", "status"),
+    ("metrics",),
+    ("diagnose", "1"),
+    ("fit", "1"),
+    ("simulate", "1"),
+)
+
+
+@pytest.mark.parametrize("verb", VERBS, ids="-".join)
+def test_an_unknown_rig_is_answered_with_those_that_exist(verb: tuple[str, ...], root: Path, call) -> None:
+    answer = call(*verb, "--rig", "irc-cell")
+    assert answer.exit_code == 2, answer.output
+    assert "rig irc-cell is not known; did you mean irc5-cell?" in answer.stderr
+    assert "Shipped: demo, irc5-cell, paper-pull. Run here: my-cell." in answer.stderr
+
+
+def test_a_file_that_is_not_there_is_said_to_be_none(root: Path, call) -> None:
+    answer = call("recordings", "list", "--rig", "my-sell.yaml")
+    assert answer.exit_code == 2
+    assert "rig my-sell.yaml is no file" in answer.stderr
+
+
+@pytest.mark.parametrize("name", ["demo", "my-cell", "other.yaml", "other"])
+def test_a_shipped_name_a_file_and_one_that_ran_here_are_taken(name: str, root: Path, call) -> None:
+    Path("other.yaml").touch()
+    answer = call("recordings", "list", "--rig", name)
+    assert answer.exit_code == 0, answer.output
+    assert str(root / Path(name).stem / "recordings") in answer.output
+
+
+def test_without_one_it_is_the_rig_that_runs_here(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert state_directory(None, None) == root / "demo"
+    monkeypatch.setattr(known_rigs, "running_rigs", lambda: ["my-cell"])
+    assert state_directory(None, None) == root / "my-cell"
+    monkeypatch.setattr(known_rigs, "running_rigs", lambda: ["demo", "my-cell"])
+    assert state_directory(None, None) == root / "demo", "of two nobody knows which is meant"
+    assert state_directory(root, None) == root
+
+
+def test_on_a_terminal_it_is_said_which_was_taken(root: Path, call, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert call("recordings", "list").stderr == ""
+    monkeypatch.setattr(rig_choice, "is_terminal", lambda: True)
+    said = call("recordings", "list").stderr
+    assert f"rig demo, state {root / 'demo'}; --rig takes another: my-cell" in said
+    assert call("recordings", "list", "--rig", "demo").stderr == ""
