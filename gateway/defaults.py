@@ -16,6 +16,8 @@ PLANT: Final = "paper-slide"
 
 HOST: Final = "127.0.0.1"
 MODBUS_PORT: Final = 5020
+WEB_PORT: Final = 8080
+METRICS_PORT: Final = 9464
 """Modbus' own is 502 (IANA), which Linux gives to programs with a right of their own only."""
 UNIT_ID: Final = 1
 UNIT_IDS: Final = (0, 1, 255)

@@ -34,6 +34,20 @@ def endpoint(context: click.Context, parameter: click.Parameter, value: str | No
     return host or defaults.HOST, int(port)
 
 
+def http_endpoint(context: click.Context, parameter: click.Parameter, value: str | None) -> Endpoint | None:
+    """Return HOST:PORT, :PORT or PORT as (host, port); an empty host for an option that stands alone."""
+    if value is None:
+        return None
+    if not value:
+        return "", 0
+    host, port = ("", value) if value.isdecimal() else _split(value)
+    host = defaults.HOST if host in ("", "localhost") else host
+    if not port.isdecimal() or int(port) > 65535:
+        hint = f"; RIG goes before --{parameter.name}" if context.info_name == "run" and not port else ""
+        raise click.BadParameter(f"{value} is not HOST:PORT such as {defaults.HOST}:{defaults.WEB_PORT}{hint}")
+    return host, int(port)
+
+
 def _split(text: str) -> tuple[str, str]:
     """Return host and port, either may be empty; brackets hold an IPv6 address, and one without brackets has no port."""
     if text.startswith("["):

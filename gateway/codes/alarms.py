@@ -108,11 +108,11 @@ ALARMS: Final = (
     ),
     Explanation(
         "A346",
-        "residual watch ended",
-        "The process that compares measurements with the rig's plant died; the fourth time it stays off. Control "
-        "goes on.",
-        "The machine ran out of memory (the watch is the first to go), somebody ended it, or an internal error.",
-        "Look at the lines above it in the log; `residual_watch: {enabled: false}` in the rig file switches it off.",
+        "residual watch, page or telemetry ended",
+        "A process that control can do without died (the line says which); the fourth time it stays off. Control goes on.",
+        "The machine ran out of memory (these are the first to go), somebody ended it, or an internal error.",
+        "Look at the lines above it in the log; its section of the rig file (`residual_watch: {enabled: false}`) switches it "
+        "off.",
         is_warning=True,
     ),
     Explanation(

@@ -50,6 +50,20 @@ FACE_ERRORS: Final = (
         "Leave --bind out, or write network.plain: true.",
     ),
     Explanation(
+        "E127",
+        "the port of the page or the metrics cannot be opened",
+        "Listening on the address of `web` or `metrics` failed.",
+        "Another program (another gateway's page?) listens there, or the address is not one of this machine.",
+        "ss -ltnp shows who listens; --web 127.0.0.1:0 takes any free port.",
+    ),
+    Explanation(
+        "E128",
+        "an open page without a token",
+        "The page is to listen on an address that others can reach, and whoever opens it could command the force.",
+        "`web.listen` or --web names another address than 127.0.0.1, and the rig file has no `web: {token: ...}`.",
+        "Write a token of at least 16 characters there; openssl rand -hex 16 makes one. Browsers ask for it once.",
+    ),
+    Explanation(
         "E130",
         "no gateway there",
         "Nothing accepted the connection.",

@@ -17,7 +17,9 @@ from typing import Any, Final
 HEARTBEAT: Final = "h"  # control -> guardian, each tick of the loop
 LINE: Final = "l"  # control -> guardian: {"safe_frame": hex, "safe_reply": hex} + descriptor
 NEED_RIG: Final = "n"  # control -> guardian: {"rig": name or path}: start the simulated rig
-READY: Final = "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s}
+READY: Final = (
+    "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s, "optional": ..., "listening": ...}
+)
 FIRST_CAUSE: Final = "f"  # control -> guardian: {"text": ...}, kept for the next start
 BORN: Final = "b"  # a forked child -> guardian: {"pid": number}, before anything else
 ADOPTED: Final = "a"  # guardian -> a forked child: it is followed from now on, and may begin

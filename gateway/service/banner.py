@@ -1,6 +1,6 @@
 """What a person reads when the gateway is ready, and what a program reads with --json."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from ipaddress import ip_address
 from typing import Any, Final
 
@@ -50,6 +50,7 @@ class Ready:
     notes: tuple[str, ...] = ()
     faces: tuple[ServedFace, ...] = ()
     valve_port: str = ""
+    http: dict[str, tuple[str, int]] = field(default_factory=dict)  # where page and metrics listen, by name
 
 
 def ready_fields(ready: Ready) -> dict[str, Any]:
@@ -59,7 +60,8 @@ def ready_fields(ready: Ready) -> dict[str, Any]:
         "rig": ready.rig.name,
         "modbus": list(ready.modbus) if ready.modbus else None,
         "faces": [{"type": face.type, **face.facts} for face in ready.faces],
-        "web": None,
+        "web": list(ready.http["web"]) if "web" in ready.http else None,
+        "metrics": list(ready.http["metrics"]) if "metrics" in ready.http else None,
         "ptys": _ptys(ready) if ready.rig.simulated else {},
         "notes": list(ready.notes),
     }
@@ -83,11 +85,21 @@ def format_banner(ready: Ready) -> str:
         f"  load cell    {ready.cell_port:<16} {cell.device.name} {cell.baud}  {_reading(ready.force_n, 'N', 2)}",
         *([f"  valve        {ready.valve_port:<16} {rig.valve.device.name} {rig.valve.baud}"] if rig.valve else []),
         f"  lease        {_lease(rig)}",
+        *_http_lines(ready),
         *(f"  {'' if index else 'try':<12} {line}" for index, line in enumerate(_all_lines_to_try(ready))),
         *(f"  note         {note}" for note in ready.notes),
         f"READY  loop {rig.loop_hz:g} Hz · Ctrl-C ramps the force to 0 and stops · not a safety device",
     ]
     return "\n".join(lines)
+
+
+def _http_lines(ready: Ready) -> tuple[str, ...]:
+    """Return where a browser and a scraper find the gateway; a token is the reader's to know."""
+    paths = {"web": "/", "metrics": "/metrics"}
+    return tuple(
+        f"  {name:<12} http://{_in_url(_reachable_host(host, ready.rig))}:{port}{paths[name]}"
+        for name, (host, port) in ready.http.items()
+    )
 
 
 def _all_lines_to_try(ready: Ready) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
+from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.faces import with_rtu_face
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
@@ -74,20 +75,12 @@ def load(options: dict[str, Any]) -> Rig:
 
 
 def sample_ring(descriptor: int | None) -> SampleRing | None:
-    """Return the ring in the guardian's memory; None without one: nothing but the residual watch needs it."""
+    """Return the ring in the guardian's memory; None without one: nothing but the processes beside control needs it."""
     if descriptor is None:
         return None
     with contextlib.suppress(OSError):
         return SampleRing(descriptor, COLUMNS)
     return None
-
-
-def watch_arguments(rig: Rig, ring: SampleRing | None) -> dict[str, Any] | None:
-    """Return what the guardian tells the residual watch; None where there is none to start."""
-    if not rig.is_watched or rig.why_unwatched or ring is None:
-        return None
-    watch = rig.residual_watch
-    return {"simulated": rig.simulated, "window_s": watch.window_s, "every_s": watch.every_s}
 
 
 def _loop_factory() -> Any:
@@ -105,6 +98,8 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
     if ports is None:
         return exit_codes.DEVICE
+    listeners = Listeners(options["listening"])
+    notes += listeners.open(rig, {name: options[name] for name in ("web", "metrics")})
     running = RunningRig(rig, ports, Path(options["state"]), guardian, log)
     running.ring = sample_ring(options["ring"])
     guardian.on_ports = running.move_ports
@@ -112,21 +107,24 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         ready = await running.start(
             options["bind"], record=options["record"], restarted=Ending.from_json(options["restarted"])
         )
-        ready = replace(ready, notes=ready.notes + notes)
+        ready = replace(ready, notes=ready.notes + notes, http=listeners.addresses)
         gc.collect()
         gc.freeze()
         announcement = {
             "banner": banner.format_banner(ready),
             "info": banner.ready_fields(ready),
-            "watch": watch_arguments(rig, running.ring),
+            "optional": optional_children(rig, running.ring, listeners.addresses),
+            "listening": {name: listeners.addresses[name] for name in listeners.sockets},
         }
-        guardian.ready(announcement, rig.control.supervision.stall_s)
+        descriptors = (listener.fileno() for listener in listeners.sockets.values())
+        guardian.ready(announcement, rig.control.supervision.stall_s, *descriptors)
         await _wait_first(guardian.told_to_stop, running.failed)
         if running.failed.is_set():
             return exit_codes.FAILED
         if not guardian.is_gone:
             await running.ramp_down()
     finally:
+        listeners.close()
         await running.close()
         guardian.close()
     return exit_codes.OK

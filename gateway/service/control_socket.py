@@ -2,7 +2,8 @@
 
 record on|off|status, calibration runs, the last self-test's findings, the calibration and the plant in use and their change,
 last writers of each register and the sentence of the last refusal, which rig runs and its lease, what the residual watch has
-found (its process tells it here, others may read it), the loop's health, and whether something may be set on a simulated rig
+found (its process tells it here, others may read it), the loop's health, the whole state in words and Modbus requests of the
+processes beside control (gateway.service.live_answers), and whether something may be set on a simulated rig
 (judged and audited here, passed on to the rig's own socket by the tools themselves).
 Mode 0600: whoever may write the state directory may ask. What each verb takes stands in gateway.service.socket_requests.
 """
@@ -14,10 +15,12 @@ from typing import Any
 
 from gateway.audit.rig_audit import RigAudit
 from gateway.calibrations.upload import UploadService
+from gateway.modbus import Peer
 from gateway.processes.json_socket import Handler, JsonLineServer
-from gateway.registers import RegisterBank
+from gateway.profiles import Rig
+from gateway.service.live_answers import LiveAnswers, LiveParts
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
-from gateway.service.running_rig.published_status import LoopHealth
+from gateway.service.running_rig.control_loop import ControlLoop
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
 from gateway.service.simulation.requests import SimulationRequests
@@ -29,15 +32,18 @@ from gateway.service.watch_reports import WatchReports
 class RunningParts:
     """Parts of a running gateway that its tools may ask."""
 
-    bank: RegisterBank
+    rig: Rig
+    loop: ControlLoop
     recordings: Recordings
-    health: LoopHealth
     upload: UploadService
     calibration_runs: CalibrationRuns
     watch: WatchReports
     plants: RigPlants
     audit: RigAudit
     simulation: SimulationRequests
+    paths: Callable[[], dict[str, str]]
+    peers: Callable[[], tuple[Peer, ...]]
+    calibration_date: Callable[[], str]
     running: dict[str, Any] = field(default_factory=dict)
     """What does not change while it runs: rig, port of Modbus TCP, lease_s (null: none), lease_action."""
 
@@ -46,6 +52,7 @@ class ControlSocket(JsonLineServer):
     """Local socket of control's process, on which commands of the command line are answered."""
 
     def __init__(self, state: Path, parts: RunningParts, log: Callable[[str, str], None]) -> None:
+        self.live = LiveAnswers(parts.rig, _live_parts(parts))
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,
@@ -58,6 +65,8 @@ class ControlSocket(JsonLineServer):
             "running": self._running,
             "sim": parts.simulation.answer,
             "residual": parts.watch.answer,
+            "state": self.live.state,
+            "modbus": self.live.modbus,
         }
         super().__init__(state / "control.sock", parts.audit.watch_handlers(handlers), log)
         self._asked = parts
@@ -80,14 +89,14 @@ class ControlSocket(JsonLineServer):
 
     def _last_writer(self, request: dict[str, Any]) -> dict[str, Any]:
         parse_request(EmptyRequest, request)
-        bank = self._asked.bank
+        bank = self._asked.loop.bank
         writers = {name: {"peer": str(peer), "time_s": at_s} for name, (peer, at_s) in bank.last_writer.items()}
         return {"owner": bank.owner, "writers": writers}
 
     def _last_refusal(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return what the last-refusal registers stand for, in the gateway's own words; empty before the first."""
         parse_request(EmptyRequest, request)
-        refusal = self._asked.bank.last_refusal
+        refusal = self._asked.loop.bank.last_refusal
         if refusal is None:
             return {"sentence": ""}
         return {"address": refusal.address, "reason": int(refusal.reason), "sentence": refusal.sentence}
@@ -98,7 +107,7 @@ class ControlSocket(JsonLineServer):
 
     def _health_figures(self, request: dict[str, Any]) -> dict[str, Any]:
         parse_request(EmptyRequest, request)
-        health = self._asked.health
+        health = self._asked.loop.health
         return {
             "ticks": health.ticks,
             "missed_ticks": health.missed_ticks,
@@ -107,3 +116,19 @@ class ControlSocket(JsonLineServer):
             "late_p99_us": health.lateness_us(0.99),
             "residual": self._asked.watch.figures(),
         }
+
+
+def _live_parts(parts: RunningParts) -> LiveParts:
+    return LiveParts(
+        loop=parts.loop,
+        paths=parts.paths,
+        peers=parts.peers,
+        runs=parts.calibration_runs,
+        status={
+            "calibration": parts.upload.status,
+            "plant": parts.plants.status,
+            "recording": parts.recordings.status,
+            "residual": lambda: parts.watch.answer({}),
+        },
+        calibration_date=parts.calibration_date,
+    )

@@ -25,7 +25,7 @@ class GuardianLine:
         self.on_ports: Callable[[dict[str, str]], None] = lambda ports: None
         self.rig_pid: int | None = None
         self._link = link
-        self._waiting: deque[tuple[str, dict[str, Any], int | None]] = deque()
+        self._waiting: deque[tuple[str, dict[str, Any], tuple[int, ...]]] = deque()
         self._rig: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self.told_to_stop = asyncio.Event()
         self.is_gone = False
@@ -58,10 +58,10 @@ class GuardianLine:
         """Tell the guardian of an internal error, in words: this process is about to end."""
         self._tell(guardian_link.FIRST_CAUSE, {"text": cause})
 
-    def ready(self, announcement: dict[str, Any], stall_s: float) -> None:
-        """Tell the guardian that the rig runs. stall_s: silence that it has to act on."""
+    def ready(self, announcement: dict[str, Any], stall_s: float, *listeners: int) -> None:
+        """Tell the guardian that the rig runs. stall_s: silence that it has to act on; listeners: sockets for it to keep."""
         self._beat_every_s = stall_s / _BEATS_PER_STALL
-        self._tell(guardian_link.READY, announcement | {"stall_s": stall_s})
+        self._tell(guardian_link.READY, announcement | {"stall_s": stall_s}, *listeners)
 
     def close(self) -> None:
         """Send what is still waiting, as far as the line takes it, and close the line."""
@@ -71,16 +71,16 @@ class GuardianLine:
         asyncio.get_running_loop().remove_reader(self._link.fileno())
         self._link.close()
 
-    def _tell(self, tag: str, body: dict[str, Any], descriptor: int | None = None) -> None:
+    def _tell(self, tag: str, body: dict[str, Any], *descriptors: int) -> None:
         with contextlib.suppress(OSError):  # a port that is lost already is handed over after its next opening
-            self._waiting.append((tag, body, None if descriptor is None else os.dup(descriptor)))
+            self._waiting.append((tag, body, tuple(os.dup(descriptor) for descriptor in descriptors)))
         self._send_waiting()
 
     def _send_waiting(self) -> None:
         while self._waiting:
-            tag, body, descriptor = self._waiting[0]
+            tag, body, descriptors = self._waiting[0]
             try:
-                guardian_link.send(self._link, tag, body, *(() if descriptor is None else (descriptor,)))
+                guardian_link.send(self._link, tag, body, *descriptors)
             except BlockingIOError:
                 return
             except OSError:
@@ -88,8 +88,8 @@ class GuardianLine:
             self._forget_first()
 
     def _forget_first(self) -> None:
-        _, _, descriptor = self._waiting.popleft()
-        if descriptor is not None:
+        _, _, descriptors = self._waiting.popleft()
+        for descriptor in descriptors:
             os.close(descriptor)
 
     def _on_readable(self) -> None:

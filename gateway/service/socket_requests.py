@@ -7,7 +7,7 @@ request: they take milliseconds, which the control loop does not have.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from annotated_types import Ge, Le, MaxLen
 
@@ -101,7 +101,18 @@ class SimulationRequest:
     clear_all: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModbusRequest:
+    """A Modbus request that came by another way than a face. pdu: in hex."""
+
+    __pydantic_config__ = _STRICT
+    via: Literal["web", "mqtt", "opcua"]
+    pdu: Annotated[str, MaxLen(506)]
+    unit: Annotated[int, Ge(0), Le(255)] = defaults.UNIT_ID
+
+
 for _shape in (
+    ModbusRequest,
     EmptyRequest,
     RecordRequest,
     CalibrationRequest,

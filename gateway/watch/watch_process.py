@@ -9,10 +9,8 @@ with the guardian: the end of its link ends it, whatever it is doing.
 
 import contextlib
 import json
-import os
 import socket
 import sys
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -22,7 +20,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway import progress
 from gateway.extras import MissingExtraError
-from gateway.processes import exit_codes, priority
+from gateway.processes import exit_codes
+from gateway.processes.beside_control import exit_with_guardian, yield_to_others
 from gateway.recording.ring import RingReader
 from gateway.side_by_side import one_after_another
 from gateway.watch.memory import resident_mb, return_memory
@@ -38,33 +37,7 @@ if TYPE_CHECKING:
 _ALL_ROWS: Final = 1 << 30
 _ANSWER_S: Final = 5.0
 _LONGEST_ANSWER: Final = 1 << 16
-_FIRST_AMONG_THE_KILLED: Final = "900"
-_LAST_NICE: Final = 19
 _ROOM_BYTES: Final = 2_000_000  # of a stage of a replay: forty series of a window
-
-
-def yield_to_others() -> None:
-    """Give way to everybody else in processor time and memory; use one thread for the mathematics."""
-    priority.lower_priority()
-    with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, _LAST_NICE)  # where the idle class is refused
-    with contextlib.suppress(OSError, AttributeError):  # takes the idle class of the disk with it, see ioprio_set(2)
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-    with contextlib.suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text(_FIRST_AMONG_THE_KILLED)
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
-
-
-def exit_with_guardian(link: socket.socket) -> None:
-    """Start a thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does."""
-
-    def wait() -> None:
-        with contextlib.suppress(OSError):
-            link.recv(1)
-        os._exit(0)
-
-    threading.Thread(target=wait, daemon=True).start()
 
 
 def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:

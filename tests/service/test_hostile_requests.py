@@ -24,7 +24,7 @@ from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.simulation.world import SimulatedRig
 from gateway.service.watch_reports import WatchReports
 from tests.service.hostile import garbage, mutants
-from tests.service.wired import ENABLE, Wired
+from tests.service.wired import ENABLE, MASTER, Wired
 
 PLAN = {"step_v": 1.0, "groups": 2, "minor_points": 24, "v_max_v": 4.0, "tare": False, "first_group": 0}
 MOVE = {"do": "ramp", "to_share": 0.5, "over_s": 2.0, "hold_s": 1.0}
@@ -51,6 +51,8 @@ CONTROL: list[dict[str, Any]] = [
     {"do": "running"},
     {"do": "sim"},
     {"do": "sim", "set": {"cell.silent": True, "creep": 0.05}, "clear": ["leak"], "clear_all": True},
+    {"do": "state"},
+    {"do": "modbus", "via": "web", "unit": 1, "pdu": "0300640004"},
     {"do": "residual"},
     {"do": "residual", "cause": 12, "sentence": "friction", "counters": {"looks": 3, "rms_n": 0.2}},
 ]
@@ -87,15 +89,18 @@ class Stage:
         self.plants.serve(PlantEdges(lambda: False, lambda rig: None, lambda: wired.now_s, log))
         self.plants.run_in_background = lambda work, done: None  # type: ignore[assignment]
         asked = RunningParts(
-            bank=wired.bank,
+            rig=wired.rig,
+            loop=wired.loop,
             recordings=self.recordings,
-            health=wired.loop.health,
             upload=self.upload,
             plants=self.plants,
             calibration_runs=self.calibration_runs,
             audit=RigAudit(self.state, log),
             simulation=SimulationRequests(wired.rig),
             watch=WatchReports(wired.loop, lambda: wired.now_s, log),
+            paths=lambda: {"output": "/dev/pts/1", "load_cell": "/dev/pts/2"},
+            peers=lambda: (MASTER,),
+            calibration_date=lambda: wired.rig.calibration.date_utc,
             running={"rig": "demo", "port": 5020, "lease_s": None, "lease_action": "fault"},
         )
         self.server = ControlSocket(self.state, asked, log)
@@ -149,6 +154,8 @@ def test_no_request_ends_or_stops_control(seed: int, stage: Stage) -> None:
             stage.ask(b'{"do": "calibrate", "stop": true}')
     assert 0.04 < sum(answers) / len(answers) < 0.7, "the mutants try both sides"
     assert not [line for line in stage.said if "A499" in line]
+    wired.run(0.02)
+    stage.ask(b'{"do": "calibrate", "stop": true}')
     wired.run(0.1)
     assert wired.fault_code is FaultCode.NONE
     wired.write(0, ENABLE, 1000)

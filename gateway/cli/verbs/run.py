@@ -7,7 +7,7 @@ import click
 
 from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_rigs
-from gateway.cli.options import endpoint, serial_port
+from gateway.cli.options import endpoint, http_endpoint, serial_port
 
 
 @click.command()
@@ -26,6 +26,20 @@ from gateway.cli.options import endpoint, serial_port
     callback=serial_port,
     metavar="[PORT]",
     help="Serve Modbus RTU too, 19200 8E1, unit 1: on PORT, without it on a pseudo-terminal.",
+)
+@click.option(
+    "--web",
+    is_flag=False,
+    flag_value="",
+    callback=http_endpoint,
+    metavar="[HOST:PORT]",
+    help=f"Serve the page here; without HOST:PORT on {defaults.HOST}:{defaults.WEB_PORT}, or a free port where that is taken.",
+)
+@click.option(
+    "--metrics",
+    callback=http_endpoint,
+    metavar="HOST:PORT",
+    help="Serve figures for Prometheus here; port 0: any free one.",
 )
 @click.option(
     "--state",

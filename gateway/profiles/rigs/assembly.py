@@ -20,6 +20,7 @@ from gateway.control.settings import (
 from gateway.devices import DeviceProfile
 from gateway.devices.profile import ADDRESS
 from gateway.profiles.find import display, shipped_profiles_folder
+from gateway.profiles.http_sections import Web, http_sections_of, without_secrets
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
@@ -199,6 +200,7 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         valve_calibration=read_part("calibration", ("valve", "calibration"), read_calibration),
         self_test=_optional_part(document, "self_test", SelfTestSettings),
         network=_part(document, "network", Network),
+        web=_optional_part(document, "web", Web),
         fieldbus=_faces(document, folder),
         calibration=read_part("calibration", ("calibration",), read_calibration),
         output_device=_as_set(output_device, output),
@@ -279,13 +281,18 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
         network=file.network,
         fieldbus=tuple(face for face in parts.fieldbus if face),
         residual_watch=file.residual_watch,
+        **http_sections_of(file),
         supported_bits=_supported_bits(file),
         accept_no_device_watchdog=file.accept_no_device_watchdog,
-        texts={name: text.decode("utf-8-sig") for name, text in findings.texts.items()},
+        texts=_texts(findings),
         fingerprint=_fingerprint(findings.texts.values()),
         notes=_notes(parts, compensation),
         compensation=compensation,
     )
+
+
+def _texts(findings: Findings) -> dict[str, str]:
+    return {name: without_secrets(text.decode("utf-8-sig")) for name, text in findings.texts.items()}
 
 
 def _notes(parts: Parts, compensation: Compensation) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from gateway.bsfm.model import Calibration
 from gateway.control.compensation.compensation import Compensation
 from gateway.control.settings import Defaults, Limits, SelfTestSettings, Supervision, Trim
 from gateway.devices import DeviceProfile
+from gateway.profiles.http_sections import Web
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.faces import Face
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, ValveFile
@@ -50,6 +51,7 @@ class Parts:
     calibration: Calibration | None = None
     extended: PlantProfile | None = None
     compensation: Compensation | None = None
+    web: Web | None = None
 
 
 Check = Callable[[Parts], Found]

@@ -4,6 +4,7 @@ from ipaddress import ip_address
 from typing import Final
 
 from gateway import defaults
+from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.addresses import is_certificate
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.registers.writes.ownership import serial_place
@@ -48,5 +49,15 @@ def check_network_exposure(parts: Parts) -> Found:
         yield "network.allow", "lets every address in the world connect"
 
 
-FAULTS: Final[tuple[Check, ...]] = (check_allow_list, check_unit_ids)
+def check_web(parts: Parts) -> Found:
+    """Yield a fault for a page that other machines can reach and that asks for no token."""
+    if parts.web and parts.web.token is None and not is_loopback(split_listen(parts.web.listen)[0]):
+        yield "web.listen", f"E128 {parts.web.listen} {NEEDS_TOKEN}"
+
+
+NEEDS_TOKEN: Final = (
+    "can be reached from other machines: give the rig file `web: {token: ...}` with at least 16 characters, "
+    f"or stay on {defaults.HOST}"
+)
+FAULTS: Final[tuple[Check, ...]] = (check_allow_list, check_unit_ids, check_web)
 WARNINGS: Final[tuple[Check, ...]] = (check_network_exposure,)

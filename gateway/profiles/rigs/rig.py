@@ -15,6 +15,7 @@ from gateway.control.inputs import CalibrationInUse
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.extras import is_installed, missing_note
+from gateway.profiles.http_sections import Metrics, Web
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.compensated_effects import in_simulation
 from gateway.profiles.rigs.faces import Face, RtuFace
@@ -101,6 +102,8 @@ class Rig:
     texts: Mapping[str, str]
     fingerprint: str
     notes: tuple[str, ...] = ()
+    web: Web | None = None
+    metrics: Metrics | None = None
     valve: ValveLine | None = None
     pull_calibration: Calibration | None = None  # measured pulling, None: derived from the one of pushing
     compensation: Compensation = NO_COMPENSATION

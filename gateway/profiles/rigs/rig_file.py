@@ -23,6 +23,7 @@ from gateway.control.settings import (
 from gateway.defaults import STRICT
 from gateway.devices.checksum import ChecksumName
 from gateway.devices.line_settings import Baud
+from gateway.profiles.http_sections import Metrics, Web
 from gateway.profiles.rigs.addresses import Address, Network4Or6, Owner
 from gateway.profiles.rigs.faces import Face
 
@@ -147,4 +148,6 @@ class RigFile:
     network: Network = field(default_factory=Network)
     fieldbus: tuple[Face, ...] = ()  # faces beside plain Modbus TCP: serial ports with Modbus RTU, Modbus TCP by TLS
     residual_watch: ResidualWatch = field(default_factory=ResidualWatch)
+    web: Web | None = None  # the page in the browser; null: there is none, unless `run --web` asks for it
+    metrics: Metrics | None = None  # figures for Prometheus; null: there are none, unless `run --metrics` asks for them
     accept_no_device_watchdog: bool = False  # true: enable although the output device has no watchdog of its own

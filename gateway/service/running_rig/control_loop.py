@@ -95,7 +95,7 @@ class ControlLoop:
         self.plant_id = 0
         self._shown_self_test = controller.active_run.self_test
         self._cell = cell
-        self._clock, self._log = process.clock, process.log
+        self.clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
         self._last_tick_s: float | None = None
         self._heard_s = -inf
@@ -108,12 +108,12 @@ class ControlLoop:
 
     def _on_asked(self, proposal: ProposedWrite) -> EdgeRefusal | None:
         """Before the bank stores a write: whether control can take it at this moment."""
-        now_s = self._clock()
+        now_s = self.clock()
         return self.controller.refusal_of(now_s, proposal, self._line(now_s))
 
     def _on_command(self, command: Command) -> None:
         self.owner_connected = True
-        self._heard_s = now_s = self._clock()
+        self._heard_s = now_s = self.clock()
         self._step(now_s)
 
     def on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
@@ -155,13 +155,13 @@ class ControlLoop:
         if self.valve:
             self.valve.reset()
             self.valve.lost = True
-            self._step(self._clock())
+            self._step(self.clock())
 
     def on_tick(self, expirations: int, late_s: float) -> None:
         """Run one period of the loop.
         expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
         self.health.count(expirations, late_s)
-        now_s = self._clock()
+        now_s = self.clock()
         self._begin(WarningBit.SLOW_LOOP, self._slow_loop.tick(now_s, expirations, late_s, self._used_since_tick))
         self._end_warnings(now_s)
         self.output.tick(now_s)
@@ -196,11 +196,11 @@ class ControlLoop:
         """Decide at once that the output is lost: at the next tick another device may be behind the port."""
         self.output.reset()
         self.output_lost = FaultCode.OUTPUT_LOST
-        self._step(self._clock())
+        self._step(self.clock())
 
     def refresh(self) -> None:
         """Decide and publish now: something besides command and sample has changed."""
-        self._step(self._clock())
+        self._step(self.clock())
 
     def on_cell_opened(self) -> None:
         """Forget what the cell said before: the port has been opened again."""
@@ -273,7 +273,7 @@ class ControlLoop:
             self.bank.release_owner()
         if decision.resets_device:
             self.output.clear_faults()
-        self.health.loop_time_s = self._clock() - now_s
+        self.health.loop_time_s = self.clock() - now_s
         stored = self.calibration_runs.stored if self.calibration_runs else 0
         known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
         status = status_of(decision, self.health, self.output.pressure_pa, known)

@@ -55,6 +55,14 @@ class Recordings:
             except OSError as error:
                 self._log("recording", f"{ended['written']} ends with the plant in use, not recording: {error}")
 
+    def try_start(self) -> tuple[str, ...]:
+        """Begin a recording; a sentence where the disk takes none, which is no reason not to control."""
+        try:
+            self.start()
+        except OSError as error:
+            return (f"not recording: {error}",)
+        return ()
+
     def stop(self) -> dict[str, Any]:
         """End the recording, if there is one; return where it is and how many rows it has."""
         if not self._current:

@@ -119,15 +119,18 @@ class RunningRig:
         self._control_socket = ControlSocket(
             self._state,
             RunningParts(
-                bank=self.bank,
+                rig=rig,
+                loop=self.loop,
                 recordings=self._recordings,
-                health=self.loop.health,
                 upload=self._upload,
                 calibration_runs=self._calibration_runs,
                 watch=self.watch_reports,
                 plants=self._plants,
                 audit=self._audit,
                 simulation=SimulationRequests(rig),
+                paths=lambda: {"output": self._ports.output.path, "load_cell": self._ports.cell.path},
+                peers=lambda: self._faces.peers,
+                calibration_date=lambda: self._calibration.date_utc,
                 running=self._running,
             ),
             self._log,
@@ -172,7 +175,7 @@ class RunningRig:
             await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
         notes = await self._notes(restarted)
         if record:
-            notes += self._record_from_the_start()
+            notes += self._recordings.try_start()
         if unserved := await self._control_socket.start():
             notes += (f"E152 {unserved}",)
         for note in notes:
@@ -211,14 +214,6 @@ class RunningRig:
         """Follow the simulated rig to other ports after a restart: what was lost is opened there."""
         self._follow_rig()
         self._ports.move(ports)
-
-    def _record_from_the_start(self) -> tuple[str, ...]:
-        """Begin a recording; a sentence where the disk takes none, which is no reason not to control."""
-        try:
-            self._recordings.start()
-        except OSError as error:
-            return (f"not recording: {error}",)
-        return ()
 
     async def _notes(self, restarted: Ending | None) -> tuple[str, ...]:
         notes = [*self._rig.notes, *self._calibrations.notes, *self._plants.notes]
@@ -294,6 +289,7 @@ class RunningRig:
         self.bank.show_watchdogs(watchdog_word(self._rig, self._ports, self._line))
         now_s = time.monotonic()
         self._guardian.heartbeat(now_s)
+        self._control_socket.live.alarm_times.follow(self.loop.decision)
         self._recordings.flush(now_s)
         self._calibration_runs.flush(now_s)
         self._plants.take_waiting()

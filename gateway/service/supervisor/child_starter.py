@@ -18,7 +18,14 @@ from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 _START_TIMEOUT_S: Final = 5.0  # from asking a prepared server: a busy machine is no reason to import everything again
 _FIRST_START_TIMEOUT_S: Final = 30.0  # imports on a slow machine
 _COMMAND_ROOM: Final = 1024
-WATCH: Final = "gateway.watch.watch_process"
+OPTIONAL: Final = {
+    "watch": "gateway.watch.watch_process",
+    "web": "gateway.web.web_process",
+    "metrics": "gateway.telemetry.metrics_process",
+    "mqtt": "gateway.telemetry.mqtt_process",
+    "opcua": "gateway.telemetry.opcua_process",
+}
+"""Modules of the children that control can do without, by name."""
 
 
 class ChildStarter:
@@ -77,9 +84,10 @@ class ChildStarter:
         arguments = {"rig": self._options["rig"], "state": str(self._state), "run": self._run}
         return self._child(fork_server.RIG, arguments) if prepared else spawn_child(fork_server.RIG, arguments)
 
-    def watch(self, arguments: dict[str, Any]) -> Child:
-        """Start the residual watch; it reports to control through the control socket."""
-        return spawn_child(WATCH, arguments, arguments["ring"])
+    def optional(self, name: str, arguments: dict[str, Any]) -> Child:
+        """Start a child that control can do without; it speaks to control through the control socket."""
+        shared = (arguments[key] for key in ("ring", "listen") if arguments.get(key) is not None)
+        return spawn_child(OPTIONAL[name], arguments, *shared)
 
     def on_born(self) -> None:
         """Note that the server has given a child: later ones need less time."""

@@ -71,7 +71,8 @@ class Guardian:
     control: ControlChild = field(init=False)
     leaving: Child | None = None  # killed and not gone yet: until then no other is started, for there are never two
     others: OtherChildren = field(init=False)
-    ring: int | None = None  # memory for the sample ring, which control writes and the watch reads
+    ring: int | None = None  # memory for the sample ring, which control writes and others read
+    listeners: dict[str, tuple[int, list[Any]]] = field(default_factory=dict)  # by child: descriptor, [host, port]
     bound: tuple[str, int] | None = None
     next_start: Ending | None = None  # why control is started again, once it is
     stop_deadline_s: float | None = None
@@ -152,7 +153,8 @@ class Guardian:
             where = f"modbus tcp {host}:{port}"
         if self.control.process:
             heartbeat.record_beat(self.control.process, self.clock())
-        self._provide_watch(message.body["watch"])
+        self._take_listeners(message)
+        self._provide_optional(message.body["optional"])
         if self.options.json:
             words.print_ready(info | {"pids": self._pids()})
         elif not self.announced:
@@ -166,12 +168,18 @@ class Guardian:
         pids = {"guardian": os.getpid(), "control": control.pid if control else None, **self.others.pids}
         return {name: pid for name, pid in pids.items() if pid}
 
-    def _provide_watch(self, wanted: dict[str, Any] | None) -> None:
-        """wanted: what the residual watch is told, None where the rig has none."""
-        if wanted is None or self.ring is None:
-            return
-        arguments = wanted | {"rig": self.options.rig, "state": str(self.state), "ring": self.ring}
-        self.others.provide_watch(arguments, self.clock())
+    def _take_listeners(self, message: message_link.Message) -> None:
+        """Keep the listening sockets that control has bound: they outlive a restart of control, and of who serves on them."""
+        for name, address in message.body.get("listening", {}).items():
+            if name not in self.listeners and message.descriptors:
+                self.listeners[name] = (message.descriptors.pop(0), address)
+
+    def _provide_optional(self, wanted: dict[str, dict[str, Any]]) -> None:
+        """wanted: what each child that control can do without is told, by its name."""
+        for name, options in wanted.items():
+            listen, _ = self.listeners.get(name, (None, None))
+            shared = {"rig": self.options.rig, "state": str(self.state), "ring": self.ring, "listen": listen}
+            self.others.provide_optional(name, options | shared, self.clock())
 
     # -- when control is silent or gone
 
@@ -252,6 +260,9 @@ class Guardian:
                     "realtime": self.options.realtime,
                     "restarted": self.next_start.to_json() if self.next_start else None,
                     "ring": self.ring,
+                    "web": self.options.web,
+                    "metrics": self.options.metrics,
+                    "listening": {name: address for name, (_, address) in self.listeners.items()},
                 }
             )
         except OSError as error:
@@ -266,5 +277,7 @@ class Guardian:
             self.control.process.end()
         self.others.end()
         self._forget_leaving()
+        for descriptor, _ in self.listeners.values():
+            os.close(descriptor)
         if self.ring is not None:
             os.close(self.ring)

@@ -1,4 +1,4 @@
-"""What the guardian keeps besides control: the prepared process, the simulated rig and the residual watch.
+"""What the guardian keeps besides control: the prepared process, the simulated rig, and children that control can do without.
 
 Each looks after itself (see its supervisor); together they say what to wait for and until when, and who is there. Standard
 library only.
@@ -6,12 +6,20 @@ library only.
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 from gateway.processes.event_log import EventLog
 from gateway.service.supervisor.child_starter import ChildStarter
+from gateway.service.supervisor.optional_child import OptionalChildSupervisor
 from gateway.service.supervisor.simulated_rig_child import Answer, RigSupervisor
-from gateway.service.supervisor.watch_child import WatchSupervisor
+
+_WORDS: Final = {
+    "watch": "the residual watch",
+    "web": "the page",
+    "metrics": "the metrics",
+    "mqtt": "the MQTT client",
+    "opcua": "the OPC UA server",
+}
 
 
 class OtherChildren:
@@ -20,7 +28,7 @@ class OtherChildren:
     def __init__(self, starter: ChildStarter, log: EventLog, tell: Callable[[Answer], None]) -> None:
         self._starter, self._log, self._tell = starter, log, tell
         self._rig: RigSupervisor | None = None
-        self._watch: WatchSupervisor | None = None
+        self._optional: dict[str, OptionalChildSupervisor] = {}
 
     @property
     def sources(self) -> list[int]:
@@ -37,7 +45,7 @@ class OtherChildren:
         """Process numbers by name; None for a child that is not there."""
         return {
             "rig": self._rig.pid if self._rig else None,
-            "watch": self._watch.pid if self._watch else None,
+            **{name: child.pid for name, child in self._optional.items()},
             "fork_server": self._starter.server_pid,
         }
 
@@ -53,19 +61,19 @@ class OtherChildren:
             self._rig = RigSupervisor(lambda first: starter.rig(prepared=first), self._tell, partial(self._log, "rig"))
         self._rig.ask(now_s)
 
-    def provide_watch(self, arguments: dict[str, Any], now_s: float) -> None:
-        """Start the watch, when control is ready and its rig is a watched one. The first arguments count."""
-        if self._watch is None:
-            starter = self._starter
-            self._watch = WatchSupervisor(lambda: starter.watch(arguments), partial(self._log, "watch"))
-        self._watch.start(now_s)
+    def provide_optional(self, name: str, arguments: dict[str, Any], now_s: float) -> None:
+        """Start a child that control can do without, now that control is ready. The first arguments count."""
+        if name not in self._optional:
+            spawn = partial(self._starter.optional, name, arguments)
+            self._optional[name] = OptionalChildSupervisor(_WORDS[name], spawn, partial(self._log, name))
+        self._optional[name].start(now_s)
 
     def end(self) -> None:
         """Ask each, then insist."""
-        for one in (self._rig, self._watch, self._starter):
+        for one in (self._rig, *self._optional.values(), self._starter):
             if one:
                 one.end()
 
     @property
-    def _all(self) -> list[ChildStarter | RigSupervisor | WatchSupervisor]:
-        return [one for one in (self._starter, self._rig, self._watch) if one]
+    def _all(self) -> list[ChildStarter | RigSupervisor | OptionalChildSupervisor]:
+        return [one for one in (self._starter, self._rig, *self._optional.values()) if one]

@@ -19,6 +19,8 @@ class RunOptions:
     json: bool = False
     record: bool = False
     realtime: bool = False
+    web: tuple[str, int] | None = None  # host empty: the usual address, or a free port where that is taken
+    metrics: tuple[str, int] | None = None
 
     @property
     def state_directory(self) -> Path:

@@ -24,7 +24,7 @@ PTYS = {"output": "/dev/pts/1", "load_cell": "/dev/pts/2"}
 READY = {
     "banner": "READY",
     "info": {"ready": True, "modbus": ["127.0.0.1", 5020]},
-    "watch": None,
+    "optional": {},
     "stall_s": 0.1,
 }
 

@@ -130,7 +130,7 @@ def test_a_dead_childs_last_words_still_count(scene, port):
         b'l{"safe_frame": "zz", "safe_reply": ""}',
         b"b{}",
         b"f{}",
-        b'r{"info": 3, "banner": "", "stall_s": "soon", "watch": null}',
+        b'r{"info": 3, "banner": "", "stall_s": "soon", "optional": {}}',
     ],
 )
 def test_a_control_process_that_talks_nonsense_is_replaced(scene, port, nonsense):

@@ -1,6 +1,7 @@
-"""The guardian's part in the residual watch: start it, start it again when it dies, each time later, and give up in time.
+"""The guardian's part in a child that control can do without (the residual watch, the page, metrics, MQTT, OPC UA): start it,
+start it again when it dies, each time later, and give up in time.
 
-The watch is a luxury: nothing here may keep the guardian from its work. It is started between two heartbeats (a spawn
+Such a child is a luxury: nothing here may keep the guardian from its work. It is started between two heartbeats (a spawn
 takes a few milliseconds), its death is read like any other event, and a start that fails counts as a death. Standard
 library only.
 """
@@ -12,13 +13,15 @@ from typing import Final
 from gateway.service.supervisor.child_process import LOST, Child, describe_exit
 from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
-_LONG_LIFE_S: Final = 900.0  # a watch that lived this long begins to count anew
+_LONG_LIFE_S: Final = 900.0  # a child that lived this long begins to count anew
 
 
-class WatchSupervisor:
-    """spawn: starts the process, OSError when that fails; say: a sentence for people. Times are monotonic seconds."""
+class OptionalChildSupervisor:
+    """what: the child in words; spawn: starts the process, OSError when that fails; say: a sentence for people. Times are
+    monotonic seconds."""
 
-    def __init__(self, spawn: Callable[[], Child], say: Callable[[str], None]) -> None:
+    def __init__(self, what: str, spawn: Callable[[], Child], say: Callable[[str], None]) -> None:
+        self._what = what
         self._spawn = spawn
         self._say = say
         self._child: Child | None = None
@@ -28,7 +31,7 @@ class WatchSupervisor:
 
     @property
     def pid(self) -> int | None:
-        """Process number of the watch, None without one."""
+        """Process number of the child, None without one."""
         return self._child.pid if self._child else None
 
     @property
@@ -38,11 +41,11 @@ class WatchSupervisor:
 
     @property
     def sources(self) -> list[int]:
-        """Descriptors that become readable when the watch has died."""
+        """Descriptors that become readable when the child has died."""
         return [self._child.died] if self._child else []
 
     def start(self, now_s: float) -> None:
-        """Start the watch for the first time; one that runs goes on."""
+        """Start the child for the first time; one that runs goes on."""
         if self._child is None and self._deaths == 0:
             self._begin(now_s)
 
@@ -57,7 +60,7 @@ class WatchSupervisor:
             self._begin(now_s)
 
     def end(self) -> None:
-        """End the watch."""
+        """End the child."""
         if self._child is not None:
             self._child.end()
             self._child = None
@@ -74,8 +77,8 @@ class WatchSupervisor:
             self._deaths = 0
         self._deaths += 1
         if self._deaths > len(HELPER_PAUSES_S):
-            self._say(f"A346 the residual watch {how} {self._deaths} times: it stays off, control goes on without it")
+            self._say(f"A346 {self._what} {how} {self._deaths} times: it stays off, control goes on without it")
             return
         pause_s = HELPER_PAUSES_S[self._deaths - 1]
         self._due_s = now_s + pause_s
-        self._say(f"A346 the residual watch {how}: it is started again in {pause_s:g} s, control goes on")
+        self._say(f"A346 {self._what} {how}: it is started again in {pause_s:g} s, control goes on")

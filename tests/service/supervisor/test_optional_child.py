@@ -1,4 +1,5 @@
-"""The guardian's part in the residual watch: restarts with growing pauses, gives up in time, never fails itself."""
+"""The guardian's part in a child that control can do without: it is started again
+with growing pauses, given up in time, and never makes the guardian fail."""
 
 import os
 from dataclasses import dataclass, field
@@ -6,8 +7,8 @@ from math import inf
 
 import pytest
 
+from gateway.service.supervisor.optional_child import OptionalChildSupervisor
 from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
-from gateway.service.supervisor.watch_child import WatchSupervisor
 
 
 @dataclass
@@ -49,15 +50,15 @@ def starter() -> FakeStarter:
 
 
 @pytest.fixture
-def supervisor(starter: FakeStarter) -> WatchSupervisor:
-    return WatchSupervisor(starter.spawn, starter.said.append)  # type: ignore[arg-type]
+def supervisor(starter: FakeStarter) -> OptionalChildSupervisor:
+    return OptionalChildSupervisor("the page", starter.spawn, starter.said.append)  # type: ignore[arg-type]
 
 
-def dies(supervisor: WatchSupervisor, now_s: float) -> None:
+def dies(supervisor: OptionalChildSupervisor, now_s: float) -> None:
     supervisor.poll_child([*supervisor.sources], now_s)
 
 
-def test_a_dead_watch_is_started_again_later_each_time_and_then_no_more(supervisor, starter):
+def test_a_dead_child_is_started_again_later_each_time_and_then_no_more(supervisor, starter):
     now_s = 0.0
     supervisor.start(now_s)
     for number, pause_s in enumerate(HELPER_PAUSES_S, 1):
@@ -74,7 +75,7 @@ def test_a_dead_watch_is_started_again_later_each_time_and_then_no_more(supervis
     assert supervisor.due_s == inf
     assert all(child.closed for child in starter.children)
     assert [line[:4] for line in starter.said] == ["A346"] * 4
-    assert "stays off" in starter.said[-1]
+    assert starter.said[-1].startswith("A346 the page ended (exit 1) 4 times: it stays off")
     supervisor.start(now_s + 2.0)
     assert len(starter.children) == 4, "a restarted control does not wake it"
 

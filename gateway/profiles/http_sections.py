@@ -1,0 +1,81 @@
+"""What a rig file says of the faces for people and their tools that speak HTTP: the page (`web`) and its metrics (`metrics`).
+
+A token must not travel with recordings, which carry the rig's texts, nor be shown: `without_secrets` blanks it there.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Protocol
+
+from annotated_types import MaxLen, MinLen
+from pydantic import AfterValidator
+
+from gateway import defaults
+from gateway.defaults import STRICT
+from gateway.profiles.rigs.addresses import Address
+from gateway.profiles.strict_yaml.typed import adapter
+
+_SECRET: Final = re.compile(r"""(\b(?:token|password)\s*:\s*)("[^"\n]*"|'[^'\n]*'|[^\s,}#]+)""")
+_BLANK: Final = "removed-from-this-copy"
+
+
+def _check_listen(text: str) -> str:
+    host, port = split_listen(text)
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def split_listen(text: str) -> tuple[str, int]:
+    """Return HOST:PORT or [IPV6]:PORT as (host, port); ValueError for anything else."""
+    host, _, port = text.rpartition(":")
+    if not port.isdecimal() or int(port) > 65535 or (":" in host and not host.startswith("[")):
+        raise ValueError(f'"{text}" is not HOST:PORT such as {defaults.HOST}:{defaults.WEB_PORT}')
+    bare: Any = host.removeprefix("[").removesuffix("]")
+    address: str = adapter(Address).validate_python(bare)
+    return address, int(port)
+
+
+Listen = Annotated[str, AfterValidator(_check_listen)]
+Token = Annotated[str, MinLen(16), MaxLen(200)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Web:
+    """The page in the browser."""
+
+    __pydantic_config__ = STRICT
+    listen: Listen = (
+        f"{defaults.HOST}:{defaults.WEB_PORT}"  # HOST:PORT; port 0: any free one; beyond loopback it needs `token`
+    )
+    token: Token | None = None  # what a browser must know, at least 16 characters; keep this file from others then
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metrics:
+    """The gateway's figures for Prometheus, read only."""
+
+    __pydantic_config__ = STRICT
+    listen: Listen = (
+        f"{defaults.HOST}:{defaults.METRICS_PORT}"  # HOST:PORT of http://HOST:PORT/metrics; port 0: any free one
+    )
+
+
+class HttpSections(Protocol):
+    """A rig file, as far as this page is concerned."""
+
+    @property
+    def web(self) -> Web | None:
+        """Section `web`."""
+
+    @property
+    def metrics(self) -> Metrics | None:
+        """Section `metrics`."""
+
+
+def http_sections_of(file: HttpSections) -> dict[str, Any]:
+    """Return the sections of a rig file by their names in a Rig."""
+    return {"web": file.web, "metrics": file.metrics}
+
+
+def without_secrets(text: str) -> str:
+    """Return the text of a rig file with tokens and passwords blanked; it reads as before otherwise."""
+    return _SECRET.sub(rf"\g<1>{_BLANK}", text)

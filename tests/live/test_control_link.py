@@ -1,0 +1,52 @@
+"""The way to control's socket: answers in order, refusals as sentences, and a restarted control is found again."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+from gateway.live.control_link import ControlLink, ask_once
+from gateway.processes.json_messages import Answer
+from gateway.processes.json_socket import JsonLineServer
+
+Scene = Callable[[Path], Awaitable[None]]
+
+
+def _refuse(request: Answer) -> Answer:
+    raise ValueError(f"no {request['what']} here")
+
+
+def server(state: Path) -> JsonLineServer:
+    return JsonLineServer(state / "control.sock", {"echo": lambda request: {"n": request["n"]}, "refuse": _refuse})
+
+
+def test_questions_asked_at_once_get_their_own_answers(tmp_path: Path) -> None:
+    async def scene() -> None:
+        control, link = server(tmp_path), ControlLink(tmp_path)
+        await control.start()
+        answers = await asyncio.gather(*(link.ask({"do": "echo", "n": n}) for n in range(20)))
+        assert [answer["n"] for answer in answers] == list(range(20))
+        with pytest.raises(ValueError, match=r"^no butter here$"):
+            await link.ask({"do": "refuse", "what": "butter"})
+        await link.close()
+        await control.close()
+
+    asyncio.run(scene())
+
+
+def test_a_restarted_control_is_found_again_and_an_absent_one_is_said_to_be(tmp_path: Path) -> None:
+    async def scene() -> None:
+        link = ControlLink(tmp_path)
+        for n in range(2):
+            control = server(tmp_path)
+            await control.start()
+            assert await link.ask({"do": "echo", "n": n}) == {"n": n}
+            await control.close()
+        with pytest.raises(OSError):
+            await link.ask({"do": "echo", "n": 3})
+        with pytest.raises(OSError):
+            await ask_once(tmp_path, {"do": "echo", "n": 3})
+        await link.close()
+
+    asyncio.run(scene())

@@ -1,0 +1,96 @@
+"""What processes beside control are told and may ask: the state as control has it, and Modbus by the rules of any face."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.codes.warning_bits import WarningBit
+from gateway.live.live_state import LiveState
+from gateway.registers.words import State
+from gateway.service.live_answers import AlarmTimes
+from gateway.service.optional_children import Listeners, optional_children
+from gateway.service.running_rig.starting import StartError
+from tests.service.rigs import demo
+from tests.service.test_hostile_requests import Stage
+
+ENABLE_12_N = "10000000020400" + "01" + "04b0"
+DISABLE = "060000" + "0000"
+
+
+@pytest.fixture
+def stage(tmp_path: Path):
+    stage = Stage(tmp_path)
+    yield stage
+    stage.close()
+
+
+def ask(stage: Stage, request: dict[str, Any]) -> dict[str, Any]:
+    return stage.ask(json.dumps(request).encode())
+
+
+def send(stage: Stage, pdu: str, via: str = "web") -> str:
+    return str(ask(stage, {"do": "modbus", "via": via, "pdu": pdu})["pdu"])
+
+
+def test_a_command_by_the_page_is_held_shown_and_owned_by_it(stage: Stage) -> None:
+    assert send(stage, ENABLE_12_N) == "1000000002"
+    stage.wired.until(lambda: stage.wired.state is State.HOLDING, 3.0)
+    state = LiveState.from_json(ask(stage, {"do": "state"}))
+    assert (state.rig, state.state, state.owner) == ("demo", "holding", "web")
+    assert state.force.requested_n == 12.0 and state.force.measured_n == pytest.approx(12.0, abs=1.0)
+    assert state.writers["force_setpoint"].peer == "web"
+    assert [peer.identity for peer in state.peers] == ["10.0.0.5"]
+    assert state.load_cell.heard > 20 and state.limits.tolerance_n == 1.0
+
+
+def test_who_does_not_own_the_setpoint_may_stop_and_nothing_else(stage: Stage) -> None:
+    stage.wired.write(0, 1, 1000)
+    assert send(stage, "0600010320") == "8606", "8 N, refused: another master owns the setpoint"
+    assert (
+        "owner" in ask(stage, {"do": "state"})["last_refusal"] or "owns" in ask(stage, {"do": "state"})["last_refusal"]
+    )
+    assert send(stage, DISABLE) == DISABLE
+    stage.wired.run(0.1)
+    assert stage.wired.state is State.OFF
+
+
+def test_an_alarm_keeps_the_time_at_which_it_rose(stage: Stage) -> None:
+    now_s = [1000.0]
+    times = AlarmTimes(lambda: now_s[0])
+    decision = stage.wired.loop.decision
+    assert decision is not None
+    times.follow(decision._replace(warnings=WarningBit.SLOW_LOOP))
+    now_s[0] = 1060.0
+    times.follow(decision._replace(warnings=WarningBit.SLOW_LOOP | WarningBit.SERIAL_NOISE))
+    assert (times.since(WarningBit.SLOW_LOOP), times.since(WarningBit.SERIAL_NOISE)) == (1000.0, 1060.0)
+    times.follow(decision)
+    times.follow(decision._replace(warnings=WarningBit.SLOW_LOOP))
+    assert times.since(WarningBit.SLOW_LOOP) == 1060.0
+
+
+def test_a_taken_address_ends_the_start_unless_any_will_do() -> None:
+    first = Listeners({})
+    first.open(demo(), {"web": ["127.0.0.1", 0], "metrics": ["127.0.0.1", 0]})
+    host, port = first.addresses["web"]
+    assert port and first.addresses["metrics"][1] not in (0, port)
+    with pytest.raises(StartError, match=rf"^E127 --web {host}:{port}: Address already in use; another --web"):
+        Listeners({}).open(demo(), {"web": [host, port]})
+    usual = [Listeners({}), Listeners({})]
+    notes = [listeners.open(demo(), {"web": ["", 0]}) for listeners in usual]
+    assert usual[0].addresses["web"][1] != usual[1].addresses["web"][1], "a free one where the usual one is taken"
+    assert f"the page is on {usual[1].addresses['web'][1]}" in notes[1][0]
+    kept = Listeners({"web": [host, port]})
+    kept.open(demo(), {"web": [host, port]})
+    assert kept.sockets == {} and kept.addresses == {"web": (host, port)}, "the guardian has it already"
+    children = optional_children(replace(demo(), simulated=True), None, first.addresses)
+    assert children["web"] == {"simulated": True, "settings": {"host": host, "port": port}}
+    for listeners in (first, *usual):
+        listeners.close()
+
+
+def test_a_page_that_others_can_reach_needs_a_token() -> None:
+    with pytest.raises(StartError, match=r"^E128 0\.0\.0\.0:0 can be reached from other machines: .*token"):
+        Listeners({}).open(demo(), {"web": ["0.0.0.0", 0]})
