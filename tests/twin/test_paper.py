@@ -150,6 +150,7 @@ def test_the_demo_calibration_may_drive_the_plant() -> None:
     assert 0.1 < calibration.rms_n < 0.3
 
 
+@pytest.mark.long
 def test_the_demo_calibration_is_what_its_tool_makes() -> None:
     command = [sys.executable, str(ROOT / "tools" / "fit_demo"), "--check"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)

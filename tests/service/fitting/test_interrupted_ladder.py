@@ -132,7 +132,7 @@ def stored_calibration(state: Path, result: dict[str, Any]) -> Calibration:
     return CalibrationStore(state, load_rig("demo").calibration).load(result["stored"])
 
 
-@pytest.mark.parametrize("groups", [1, 2])
+@pytest.mark.parametrize("groups", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_the_fit_of_a_resumed_run_is_offered_and_its_error_is_that_of_a_whole_one(
     runs, whole_fit, groups, tmp_path: Path
 ) -> None:
