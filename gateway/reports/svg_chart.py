@@ -1,150 +1,132 @@
-"""A small chart as inline SVG: axes with round ticks, dots, lines, error bars. Colours are CSS classes of the page.
+"""A chart as inline SVG that stretches with the page while its words keep their size. Colours are CSS classes of the page.
 
-Own code instead of a plotting library: a report needs four charts, and matplotlib would be the largest dependency of a
-gateway. Coordinates are rounded to a tenth of a pixel, which keeps a report of 2000 dots near 100 kB.
+Own code instead of a plotting library: a report needs a few charts, and matplotlib would be the largest dependency of a
+gateway. The drawing is an SVG without an aspect of its own, as wide as its place and always `height` px high; ticks, names
+and marked points stand at shares of that width beside it. So one drawing serves a telephone and a wall of screens.
+Coordinates are rounded to a tenth of a pixel, which keeps a report of 2000 dots near 100 kB.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from math import ceil, floor, log10
-from typing import Final
 
-LEFT, RIGHT, TOP, BOTTOM = 62, 14, 12, 40  # margins, px
+from gateway.reports.axis import Axis
 
-
-@dataclass(frozen=True, slots=True)
-class Axis:
-    """low..high in data units; logarithmic where asked; ticks at whole numbers where whole."""
-
-    low: float
-    high: float
-    label: str
-    logarithmic: bool = False
-    whole: bool = False
-
-    def share(self, value: float) -> float:
-        """Return where a value lies on the axis, 0 at its low end and 1 at its high one."""
-        if self.logarithmic:
-            return (log10(value) - log10(self.low)) / (log10(self.high) - log10(self.low))
-        return (value - self.low) / (self.high - self.low)
-
-    def ticks(self) -> list[float]:
-        """Return round values to mark on the axis."""
-        if self.logarithmic:
-            steps = [m * 10.0**e for e in range(floor(log10(self.low)), ceil(log10(self.high)) + 1) for m in (1, 2, 5)]
-            return [step for step in steps if self.low <= step * (1 + 1e-9) and step <= self.high * (1 + 1e-9)]
-        if self.whole:
-            return [float(n) for n in range(ceil(self.low), floor(self.high) + 1)]
-        return _round_ticks(self.low, self.high)
-
-
-_STEPS: Final = (1.0, 2.0, 5.0, 10.0)
-
-
-def _round_ticks(low: float, high: float, count: int = 6) -> list[float]:
-    rough = (high - low) / count
-    unit = 10.0 ** floor(log10(rough))
-    step = next(s for s in _STEPS if s * unit >= rough * (1 - 1e-9)) * unit
-    first = ceil(low / step - 1e-9)
-    return [k * step for k in range(first, floor(high / step + 1e-9) + 1)]
-
-
-def spread(values: Iterable[float], margin: float = 0.06, around: float | None = None) -> tuple[float, float]:
-    """Return limits that hold all values with a margin; symmetric about `around` where given."""
-    finite = list(values)
-    low, high = min(finite), max(finite)
-    if around is not None:
-        reach = max(abs(low - around), abs(high - around), 1e-9) * (1.0 + 2.0 * margin)
-        return around - reach, around + reach
-    width = max(high - low, 1e-9)
-    return low - margin * width, high + margin * width
+RIGHT, TOP, BOTTOM = 14, 28, 40  # room around the drawing, px
+_LEAST_LEFT, _SIGN_PX, _TICK_GAP = 34, 7, 14  # room at the left for the longest number at a tick
+_WORDS_ABOVE, _WORDS_BELOW, _ROOM_ABOVE = -10.0, 20.0, 16.0  # of a marked point, px
 
 
 @dataclass
 class Chart:
-    """Draw, then `svg()`. title is read out to those who cannot see it."""
+    """Draw, then `svg()` and its legend `key`. title is read out to those who cannot see it. width: of the drawing where the
+    page has its usual size, px; its lines and dots are rounded for that."""
 
     x: Axis
     y: Axis
     title: str
     width: int = 560
-    height: int = 340
-    key_at: float = 0.0  # where the legend begins, as a share of the width
+    height: int = 270
     _parts: list[str] = field(default_factory=list)
+    _marks: list[str] = field(default_factory=list)
     _legend: list[tuple[str, str, str]] = field(default_factory=list)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Return the place of a point in the picture, px from its left and upper edge."""
-        across, down = self.width - LEFT - RIGHT, self.height - TOP - BOTTOM
-        return LEFT + across * self.x.share(x), TOP + down * (1.0 - self.y.share(y))
+        """Return the place of a point in the drawing, px from its left and upper edge."""
+        return self.width * self.x.share(x), self.height * (1.0 - self.y.share(y))
 
     def line(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str = "") -> None:
         """Draw a line through the points."""
-        points = " ".join(f"{px:.1f},{py:.1f}" for px, py in (self.at(x, y) for x, y in zip(xs, ys, strict=True)))
+        points = " ".join(f"{px:.1f},{py:.1f}" for px, py in self._places(xs, ys))
         self._parts.append(f'<polyline class="line {style}" points="{points}"/>')
-        self._note(name, "line", style)
+        self._note(name, "dash" if "dash" in style.split() else "", style)
 
-    def dots(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str = "", radius: float = 1.8) -> None:
-        """Draw a dot at each point."""
-        circles = "".join(
-            f'<circle cx="{px:.1f}" cy="{py:.1f}" r="{radius}"/>'
-            for px, py in (self.at(x, y) for x, y in zip(xs, ys, strict=True))
-        )
-        self._parts.append(f'<g class="dots {style}">{circles}</g>')
+    def dots(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str = "") -> None:
+        """Draw a dot at each point: strokes without length and with round ends, which stay round however wide the chart is."""
+        strokes = "".join(f"M{px:.1f} {py:.1f}h0" for px, py in self._places(xs, ys))
+        self._parts.append(f'<path class="dots {style}" d="{strokes}"/>')
         self._note(name, "dot", style)
 
     def bar(self, x: float, low: float, high: float, style: str) -> None:
         """Draw a vertical bar between two values."""
         (px, bottom), (_, top) = self.at(x, low), self.at(x, high)
-        self._parts.append(
-            f'<path class="line thin {style}" d="M{px:.1f} {bottom:.1f}V{top:.1f}M{px - 3:.1f} {top:.1f}h6"/>'
-        )
+        self._parts.append(f'<path class="line thin {style}" d="M{px:.1f} {bottom:.1f}V{top:.1f}"/>')
 
-    def ring(self, x: float, y: float) -> None:
-        """Draw a ring around a point, to mark it."""
+    def circle(self, x: float, y: float, style: str, radius: float = 8.0) -> None:
+        """Draw a circle around a point, in front of all lines."""
         px, py = self.at(x, y)
-        self._parts.append(f'<circle class="ring" cx="{px:.1f}" cy="{py:.1f}" r="8"/>')
+        share = 100.0 * px / self.width
+        self._marks.append(f'<circle class="{style}" cx="{share:.2f}%" cy="{py:.1f}" r="{radius:g}"/>')
+
+    def mark(self, x: float, y: float, words: str) -> None:
+        """Draw a ring around a point and say what is there, in few words: they reach over at most half of a narrow chart."""
+        self.circle(x, y, "ring", 5.0)
+        self._write(x, self.at(x, y)[1], words)
+
+    def mark_change(self, x: float, words: str) -> None:
+        """Draw a broken line across the height where something changes, and say what."""
+        share = 100.0 * self.x.share(x)
+        self._marks.append(f'<line class="change" x1="{share:.2f}%" x2="{share:.2f}%" y1="0" y2="{self.height}"/>')
+        self._write(x, self.height - _WORDS_BELOW, words)
 
     def level(self, y: float) -> None:
         """Draw a horizontal line across the chart."""
-        self._parts.append(f'<path class="level" d="M{LEFT} {self.at(self.x.low, y)[1]:.1f}H{self.width - RIGHT}"/>')
+        self._parts.append(f'<path class="level" d="M0 {self.at(self.x.low, y)[1]:.1f}H{self.width}"/>')
 
     def svg(self) -> str:
-        """Return the whole chart as an SVG element."""
-        head = f'<svg viewBox="0 0 {self.width} {self.height}" role="img" aria-label="{escape(self.title)}">'
-        return head + self._axes() + "".join(self._parts) + self._key() + "</svg>"
+        """Return the chart as HTML, without its legend."""
+        drawing = (
+            f'<svg class="drawing" viewBox="0 0 {self.width} {self.height}" preserveAspectRatio="none" '
+            f'width="100%" height="{self.height}">{"".join(self._parts)}</svg>'
+        )
+        inside = self._axes() + drawing + "".join(self._marks)
+        room = f"padding:{TOP}px {RIGHT}px {BOTTOM}px {self._left()}px"
+        label = f'role="img" aria-label="{escape(self.title)}"'
+        return f'<div class="plot" style="{room}"><svg {label} height="{self.height}">{inside}</svg></div>'
+
+    @property
+    def key(self) -> str:
+        """The legend as HTML, to stand above the picture where it hides no data."""
+        marks = (
+            f'<span><i class="{f"{kind} {style}".strip()}"></i>{escape(name)}</span>'
+            for name, kind, style in self._legend
+        )
+        return f'<p class="key">{"".join(marks)}</p>' if self._legend else ""
+
+    def _places(self, xs: Sequence[float], ys: Sequence[float]) -> Iterable[tuple[float, float]]:
+        return (self.at(x, y) for x, y in zip(xs, ys, strict=True))
 
     def _note(self, name: str, kind: str, style: str) -> None:
         if name:
             self._legend.append((name, kind, style))
 
+    def _write(self, x: float, down_px: float, words: str) -> None:
+        """Towards the middle, so that the words stay in the chart; above the point where there is room."""
+        share = self.x.share(x)
+        way, gap = ("end", -9) if share > 0.5 else ("start", 9)
+        top = down_px + (_WORDS_ABOVE if down_px > _ROOM_ABOVE else _WORDS_BELOW)
+        place = f'x="{100.0 * share:.2f}%" dx="{gap}" y="{top:.1f}"'
+        self._marks.append(f'<text class="words {way}" {place}>{escape(words)}</text>')
+
+    def _left(self) -> int:
+        longest = max((len(_number(tick)) for tick in self.y.ticks()), default=0)
+        return max(_LEAST_LEFT, _SIGN_PX * longest + _TICK_GAP)
+
     def _axes(self) -> str:
-        bottom, right = self.height - BOTTOM, self.width - RIGHT
-        parts = []
+        parts, spare = [], self.x.spare_ticks()
         for tick in self.x.ticks():
-            px = self.at(tick, self.y.low)[0]
-            parts.append(
-                f'<path class="grid" d="M{px:.1f} {TOP}V{bottom}"/><text x="{px:.1f}" y="{bottom + 16}">{tick:g}</text>'
-            )
+            share = f"{100.0 * self.x.share(tick):.2f}%"
+            style = ' class="spare"' if tick in spare else ""
+            parts.append(f'<line class="grid" x1="{share}" x2="{share}" y1="0" y2="{self.height}"/>')
+            parts.append(f'<text{style} x="{share}" y="{self.height + 16}">{_number(tick)}</text>')
         for tick in self.y.ticks():
-            py = self.at(self.x.low, tick)[1]
-            number = f"{tick:.6g}".replace("-", "−")
-            parts.append(f'<path class="grid" d="M{LEFT} {py:.1f}H{right}"/>')
-            parts.append(f'<text class="end" x="{LEFT - 7}" y="{py + 4:.1f}">{number}</text>')
-        middle = (TOP + bottom) / 2
-        parts.append(f'<text class="name" x="{(LEFT + right) / 2}" y="{self.height - 6}">{escape(self.x.label)}</text>')
-        parts.append(f'<text class="name" transform="translate(12 {middle}) rotate(-90)">{escape(self.y.label)}</text>')
+            down = self.at(self.x.low, tick)[1]
+            parts.append(f'<line class="grid" x1="0" x2="100%" y1="{down:.1f}" y2="{down:.1f}"/>')
+            parts.append(f'<text class="end" x="-7" y="{down + 4:.1f}">{_number(tick)}</text>')
+        parts.append(f'<text class="name" x="50%" y="{self.height + 34}">{escape(self.x.label)}</text>')
+        parts.append(f'<text class="name start" x="{-self._left() + 2}" y="-12">{escape(self.y.label)}</text>')
         return "".join(parts)
 
-    def _key(self) -> str:
-        parts, x = [], LEFT + self.key_at * (self.width - LEFT - RIGHT)
-        for k, (name, kind, style) in enumerate(self._legend):
-            y = TOP + 16 + 17 * k
-            mark = (
-                f'<path class="line {style}" d="M{x + 12:.0f} {y - 4}h18"/>'
-                if kind == "line"
-                else f'<g class="dots {style}"><circle cx="{x + 21:.0f}" cy="{y - 4}" r="3"/></g>'
-            )
-            parts.append(f'{mark}<text class="key" x="{x + 37:.0f}" y="{y}">{escape(name)}</text>')
-        return "".join(parts)
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "−")

@@ -129,7 +129,7 @@ def said(*words: str) -> str:
 def test_a_force_that_does_not_answer_is_told_and_gives_no_plant(tmp_path: Path, force_n: Floats) -> None:
     path, plant = written(tmp_path / "dead.csv", columns(force_n=force_n)), tmp_path / "plant.yaml"
     text = said(str(path), "--extend", str(plant))
-    assert "Nothing can be told dead.csv: the force stands at 3 N while command_v moves by" in text
+    assert "Nothing can be told: dead.csv: the force stands at 3 N while command_v moves by" in text
     assert f"{plant} is not written" in text
     assert not plant.exists()
 
@@ -143,7 +143,7 @@ def test_an_effect_that_is_not_there_cannot_be_switched_off(tmp_path: Path) -> N
 def test_a_force_of_a_thousand_times_the_piston_s_asks_for_its_unit(tmp_path: Path) -> None:
     path = str(written(tmp_path / "mn.csv", {**columns(), "force_n": columns()["force_n"] * 1.0e3}))
     text = said(path)
-    assert text.index("E520 mn.csv: the force is ") < text.index("Unknown")
+    assert text.index("E520 mn.csv: the force is ") < text.index("Nothing can be told yet")
     assert "force_n is probably in mn; --columns force_n=force_n:mn corrects it" in text
     assert "E52" not in said(path, "--columns", "time_s=1,command_v=2,force_n=3:mn")
 

@@ -1,7 +1,6 @@
 """Two calibrations over the voltages that both cover: by how much their branches differ, B minus A."""
 
 from dataclasses import dataclass
-from html import escape
 from math import sqrt
 from typing import Any, Final
 
@@ -69,7 +68,7 @@ def compare_calibrations(a: Calibration, b: Calibration) -> Comparison:
     """Compare the branches of two calibrations. ValueError when the two have no voltage in common."""
     low_v, high_v = max(a.x0_v, b.x0_v), min(a.x1_v, b.x1_v)
     if low_v >= high_v:
-        raise ValueError(f"{_title(a)} and {_title(b)} have no voltage in common")
+        raise ValueError(f"{title(a)} and {title(b)} have no voltage in common")
     voltage_v = tuple(low_v + (high_v - low_v) * k / (_POINTS - 1) for k in range(_POINTS))
     models = a.model().branches, b.model().branches
     branches = {
@@ -78,12 +77,25 @@ def compare_calibrations(a: Calibration, b: Calibration) -> Comparison:
     return Comparison(a, b, voltage_v, branches)
 
 
+def answer_sentence(comparison: Comparison) -> str:
+    """Return the answer, for terminal and page: by how much, and where most."""
+    name, worst = max(comparison.branches.items(), key=lambda item: abs(item[1].max_n))
+    rms_n = sqrt(sum(branch.rms_n**2 for branch in comparison.branches.values()) / len(comparison.branches))
+    if worst.max_n == 0.0:
+        return "Both calibrations are the same over the voltages that both cover"
+    way = "more" if worst.max_n > 0.0 else "less"
+    return (
+        f"B differs from A by {rms_n:.2f} N RMS, most at {comparison.place_v(worst):.2f} V {name}: "
+        f"{abs(worst.max_n):.2f} N {way} than A"
+    )
+
+
 def table(comparison: Comparison) -> str:
     """Return text for the terminal: the figures, then the branches at a few voltages."""
     lines = [
-        f"{name}  {_title(each)}, {each.reversal_kind}" for name, each in (("A", comparison.a), ("B", comparison.b))
+        f"{name}  {title(each)}, {each.reversal_kind}" for name, each in (("A", comparison.a), ("B", comparison.b))
     ]
-    lines.append("")
+    lines += ["", f"{answer_sentence(comparison)}.", ""]
     for name, difference in comparison.branches.items():
         place_v = comparison.place_v(difference)
         lines.append(
@@ -99,34 +111,10 @@ def table(comparison: Comparison) -> str:
     return "\n".join(lines)
 
 
-def page(comparison: Comparison) -> str:
-    """Return a self-contained HTML page: both loops, and the differences."""
-    from gateway.reports.style import inline_style
-    from gateway.reports.svg_chart import Axis, Chart, spread
-
-    volts = comparison.voltage_v
-    across = Axis(volts[0], volts[-1], "command (V)")
-    forces = [force for difference in comparison.branches.values() for force in (*difference.a_n, *difference.b_n)]
-    loops = Chart(across, Axis(*spread(forces), "force (N)"), "Both loops")
-    gaps = [gap for difference in comparison.branches.values() for gap in difference.difference_n]
-    differences = Chart(across, Axis(*spread(gaps, around=0.0), "B − A (N)"), "Difference of the branches")
-    differences.level(0.0)
-    for name, difference in comparison.branches.items():
-        loops.line(volts, difference.a_n, f"{name} faint", f"A, {name}")
-        loops.line(volts, difference.b_n, name, f"B, {name}")
-        differences.line(volts, difference.difference_n, name, name)
-    title = escape(f"A: {_title(comparison.a)} · B: {_title(comparison.b)}")
-    figures = "".join(f"<figure>{chart.svg()}</figure>" for chart in (loops, differences))
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f"<style>{inline_style()}</style></head>\n"
-        f"<body><main><h1>{title}</h1><div class='pair'>{figures}</div></main></body></html>\n"
-    )
-
-
 def _forces(curve: RationalBezier, voltage_v: tuple[float, ...]) -> Forces:
     return tuple(float(curve.value(volts)) for volts in voltage_v)
 
 
-def _title(calibration: Calibration) -> str:
+def title(calibration: Calibration) -> str:
+    """Return what a calibration is called."""
     return f"calibration {calibration.number} ({calibration.name}, {calibration.date_utc})"

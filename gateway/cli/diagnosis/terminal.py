@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gateway.diagnosis.result import Cause, Diagnosis, Verdict
+from gateway.reports.diagnosis import headline
 from gateway.reports.diagnosis import wording as words
 
 _COLOUR = {
@@ -33,10 +34,10 @@ def render_diagnosis(
     yield Text()
     for suspect in diagnosis.suspects:
         yield Text(suspect.sentence, style="bold red" if suspect.is_sure else "bold yellow")
-    yield Text.assemble(
-        (words.title(diagnosis), f"bold {'yellow' if words.why_blind(diagnosis) else _COLOUR[diagnosis.verdict]}"),
-    )
-    yield Text(words.sentence(diagnosis))
+    colour = "yellow" if words.why_blind(diagnosis) else _COLOUR[diagnosis.verdict]
+    yield Text(headline.answer_sentence(diagnosis), style=f"bold {colour}")
+    if lack := headline.lack_sentence(diagnosis):
+        yield Text(lack)
     yield Text()
     yield _line("off by", _initial_error(diagnosis))
     if diagnosis.machine is not None:
@@ -90,7 +91,7 @@ def _cause_table(diagnosis: Diagnosis) -> Iterator[RenderableType]:
         return
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
     table.add_column("cause", min_width=23)
-    for name in ("sure", "held out N RMS", "gain N [95 %]", "excess"):
+    for name in ("confidence", "held out N RMS", "gain N [95 %]", "excess"):
         table.add_column(name, justify="right", no_wrap=True)
     for cause in diagnosis.causes:
         table.add_row(*_cells(cause))
@@ -114,7 +115,7 @@ def _cells(cause: Cause) -> tuple[str | Text, ...]:
     low_n, high_n = gain.ci95
     return (
         name,
-        words.percent(cause.confidence),
+        words.confidence(cause.confidence),
         words.gain_text(cause).removesuffix(" N"),
         f"{words.force(won_n)} [{words.force(low_n)}, {words.force(high_n)}]",
         words.percent(gain.share_of_excess),

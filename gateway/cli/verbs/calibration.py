@@ -110,7 +110,7 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
 
     Numbers of the store, shipped names or files. Differences are B minus A.
     """
-    from gateway.cli.calibration.comparison import compare_calibrations, page, table
+    from gateway.cli.calibration.comparison import compare_calibrations, table
     from gateway.cli.calibration.store_access import find_calibration, open_store
 
     store = open_store(state.directory, state.rig)
@@ -120,7 +120,11 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
     except ValueError as error:
         raise CliError(f"E433 {error}", exit_codes.DATA) from None
     if plot:
-        plot.write_text(page(comparison), encoding="utf-8")
+        from gateway.cli.calibration.comparison_page import comparison_page
+        from gateway.cli.calibration.measured_points import measured_points
+
+        points = {name: measured_points(each, state.directory) for name, each in (("A", first), ("B", second))}
+        plot.write_text(comparison_page(comparison, points), encoding="utf-8")
     click.echo(json.dumps(comparison.facts(), indent=2) if as_json else table(comparison))
 
 

@@ -4,19 +4,20 @@
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.result import Trace
-from gateway.reports.diagnosis import series
+from gateway.reports.axis import Axis
+from gateway.reports.diagnosis import peaks, series
+from gateway.reports.diagnosis import wording as words
 from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows, TraceResiduals
 from gateway.reports.diagnosis.series_chart import SeriesChart, limits
-from gateway.reports.svg_chart import Axis
+from gateway.reports.figures import NOTHING, Drawing, drawing
 
-_WIDE, _NARROW, _WIDE_HIGH, _HIGH = 1140, 560, 250, 300
+_WIDE, _NARROW, _WIDE_HIGH, _HIGH = 1064, 484, 220, 248  # of the drawing, px
 _COLUMNS: Final = 260  # of a full-width picture: bands of 4 pixels
 _UNITS: Final = {
     "temperature_c": "temperature (°C)",
@@ -27,24 +28,6 @@ _UNITS: Final = {
     "position_mm": "position (mm)",
     "distance_m": "distance (m)",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """A chart and its legend, as HTML."""
-
-    svg: str
-    key: str
-
-    def __bool__(self) -> bool:
-        return bool(self.svg)
-
-
-NOTHING: Final = Drawing("", "")
-
-
-def _drawing(chart: SeriesChart) -> Drawing:
-    return Drawing(chart.svg(), chart.key)
 
 
 def axis_name(quantity: str) -> str:
@@ -77,38 +60,57 @@ def force_over_time(
     name = "after" if after else "before"
     chart.envelope(series.envelope(time_s, measured_n, columns), "measured", "measured")
     chart.envelope(series.envelope(time_s, both[int(after)], columns), name, f"simulated, {name}")
-    return _drawing(chart)
+    return drawing(chart)
 
 
-def residual_over_time(trace: Trace) -> Drawing:
-    """Return the chart of the residual over time, before and after."""
+def residual_over_time(trace: Trace, *, changed: bool = True) -> Drawing:
+    """Return the chart of the residual over time, before and after, with its largest values named. changed: there is an
+    after."""
     residuals = TraceResiduals.of(trace)
     chart = SeriesChart(
         Axis(0.0, max(trace.measurement.duration_s, 1e-9), "time (s)"),
         Axis(*limits(residuals.before_n, residuals.after_n, around=0.0), "measured − simulated (N)"),
-        "Residual over time, before and after",
+        "Residual over time, before and after" if changed else "Residual over time",
         width=_WIDE,
         height=_WIDE_HIGH,
     )
-    for left_n, name in ((residuals.before_n, "before"), (residuals.after_n, "after")):
+    both = ((residuals.before_n, "before"), (residuals.after_n, "after"))[: 1 + changed]
+    for left_n, name in both:
         chart.envelope(series.envelope(residuals.time_s, left_n, _COLUMNS), name, name)
     chart.level(0.0)
-    return _drawing(chart)
+    for left_n, name in both:
+        _mark_peak(chart, peaks.largest(residuals.time_s, left_n), name)
+    return drawing(chart, peaks.describe_residual_over_time(trace.measurement, residuals, changed=changed))
 
 
-def residual_against(rows: ResidualRows, quantity: str, *, wide: bool = False) -> Drawing:
-    """Draw the residual over a quantity: clouds before and after, with the means over bins."""
+def _mark_peak(chart: SeriesChart, peak: peaks.Peak | None, name: str) -> None:
+    if peak is not None:
+        chart.mark(peak.x, peak.y, f"{name}: {peaks.signed_force(peak.y)}")
+
+
+def residual_against(rows: ResidualRows, quantity: str, *, wide: bool = False, changed: bool = True) -> Drawing:
+    """Draw the residual over a quantity: clouds before and after, with the means over bins, of which the largest is named."""
     x = rows.quantities[quantity]
     finite = np.isfinite(x)
     chart = _residual_chart(x[finite], rows, quantity, wide)
-    for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
+    both = ((rows.before_n, "before"), (rows.after_n, "after"))[: 1 + changed]
+    for left_n, name in both:
         chart.cloud(x[finite], left_n[finite], name)
-    for left_n, name in ((rows.before_n, "before"), (rows.after_n, "after")):
+    found = []
+    for left_n, name in both:
         means = series.bin_means(x, left_n)
         chart.line(means.x.tolist(), means.mean.tolist(), f"{name} halo")
-        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", name)
+        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", f"mean, {name}")
+        found.append(peaks.largest(means.x, means.mean))
     chart.level(0.0)
-    return _drawing(chart)
+    _mark_peak(chart, found[0], "mean before")
+    return drawing(chart, peaks.describe_means(found[0], found[1] if changed else None, _unit(quantity)))
+
+
+def _unit(quantity: str) -> str:
+    """Return ` V` of `command (V)`; empty where no unit is known."""
+    _, bracket, unit = axis_name(quantity).partition(" (")
+    return f" {unit.removesuffix(')')}" if bracket else ""
 
 
 def residual_by_direction(rows: ResidualRows, quantity: str, after: bool, *, wide: bool = False) -> Drawing:
@@ -122,9 +124,9 @@ def residual_by_direction(rows: ResidualRows, quantity: str, after: bool, *, wid
     for way, name in ways:
         means = series.bin_means(x[rows.direction == way], left_n[rows.direction == way])
         chart.line(means.x.tolist(), means.mean.tolist(), f"{name} halo")
-        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", name)
+        chart.line(means.x.tolist(), means.mean.tolist(), f"{name} thick", f"mean, {name}")
     chart.level(0.0)
-    return _drawing(chart)
+    return drawing(chart)
 
 
 def _residual_chart(x: Floats, rows: ResidualRows, quantity: str, wide: bool) -> SeriesChart:
@@ -155,12 +157,18 @@ def loop(traces: Sequence[Trace], after: bool, *, wide: bool = False) -> Drawing
         height=_HIGH,
         cell_px=2.0,
     )
+    left_n = residuals[int(after)]
     chart.cloud(x, measured_n, "measured wider", "measured")
-    chart.cloud(x, measured_n - residuals[int(after)], f"{name} strong", f"simulated, {name}")
-    return _drawing(chart)
+    chart.cloud(x, measured_n - left_n, f"{name} strong", f"simulated, {name}")
+    if not left_n.size:
+        return drawing(chart)
+    place = int(np.argmax(np.abs(left_n)))
+    if np.isfinite(x[place]):
+        chart.mark(float(x[place]), float(measured_n[place]), f"off by {peaks.signed_force(float(left_n[place]))}")
+    return drawing(chart, "Ring: the reading that is furthest from the simulation.")
 
 
-def spectra(trace: Trace, *, wide: bool = False) -> Drawing:
+def spectra(trace: Trace, *, wide: bool = False, changed: bool = True) -> Drawing:
     """Draw the amplitude density of the residual, before and after; NOTHING for a recording that is too short."""
     residuals = TraceResiduals.of(trace)
     both = [series.spectrum(residuals.time_s, left_n) for left_n in (residuals.before_n, residuals.after_n)]
@@ -177,6 +185,10 @@ def spectra(trace: Trace, *, wide: bool = False) -> Drawing:
         width=_width(wide),
         height=_HIGH,
     )
-    for (hertz, density), name in zip(both, ("before", "after"), strict=True):
+    for (hertz, density), name in list(zip(both, ("before", "after"), strict=True))[: 1 + changed]:
         chart.line(hertz.tolist(), np.maximum(density, chart.y.low).tolist(), f"{name} thick", name)
-    return _drawing(chart)
+    line = peaks.spectral_line(*both[int(changed)])
+    if line is None:
+        return drawing(chart, "No line stands out.")
+    chart.mark(line.x, line.y, f"a line at {words.number(line.x)} Hz")
+    return drawing(chart, f"A line at {words.number(line.x)} Hz stands out: {words.number(line.y)} N/√Hz.")

@@ -7,8 +7,8 @@ from typing import Final
 
 from gateway.diagnosis.result import Diagnosis, Leftover, Trace
 from gateway.reports.diagnosis import charts
-from gateway.reports.diagnosis.grid import Panel, figure, grid
 from gateway.reports.diagnosis.series import ResidualRows, TraceResiduals, drive, is_constant, join_traces
+from gateway.reports.figures import Panel, figure, grid
 
 _OF_THE_DRIVE: Final = ("force", "direction", "speed", "command")  # drawn over the command or the pressure
 

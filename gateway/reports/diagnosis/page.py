@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one HTML file, no scripts, nothing loaded; light and dark, and fit for paper."""
+"""The report of a diagnosis: the answer first, then what it stands on."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,12 +6,9 @@ from functools import partial
 from html import escape
 from typing import Final
 
-from gateway import VERSION
 from gateway.diagnosis.result import Diagnosis, Trace, Verdict
-from gateway.reports.diagnosis import charts, tables
+from gateway.reports.diagnosis import charts, headline, tables
 from gateway.reports.diagnosis import wording as words
-from gateway.reports.diagnosis.charts import Drawing
-from gateway.reports.diagnosis.grid import Panel, figure, grid
 from gateway.reports.diagnosis.leftover_figures import leftover_figures
 from gateway.reports.diagnosis.series import (
     ResidualRows,
@@ -22,19 +19,14 @@ from gateway.reports.diagnosis.series import (
     join_traces,
     most_improved_window,
 )
-from gateway.reports.style import inline_style
+from gateway.reports.figures import Drawing, Panel, figure, grid
+from gateway.reports.frame import Head, notes, page, section, tiles
 
 _MOST_TRACES: Final = 2  # recordings that are drawn over time; the others count in all other charts
 _MOST_COVARIATES: Final = 6
+_MOST_NAMES: Final = 4  # of recordings on the first screen
+_BANDS: Final = "Bands reach from the least to the greatest reading of each column of pixels."
 _MOST_OPEN: Final = 8  # rows of a table that is shown unfolded
-_FRAME: Final = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>{title}</title><style>{style}</style></head>
-<body><main>
-{body}
-</main></body></html>
-"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,35 +48,23 @@ class ReportContext:
 def diagnosis_page(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
     """Return the whole page. Text from recordings and profiles is escaped."""
     body = [*_summary(diagnosis, circumstances), *_pictures(diagnosis), *_outlook(diagnosis, circumstances)]
-    text = "\n".join(part for part in body if part)
-    return _FRAME.format(title=escape(f"Diagnosis: {words.title(diagnosis)}"), style=inline_style(), body=text)
+    return page(_head(diagnosis, circumstances), body, _provenance(diagnosis, circumstances))
 
 
-def _summary(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str]:
-    yield _heading(diagnosis, circumstances)
-    yield _tiles(diagnosis)
-    yield _notes(words.all_notes(diagnosis, circumstances.notes))
-    yield _section("What is missing in the simulation", tables.causes_table(diagnosis, circumstances.about))
-    yield _section("What no effect explains", tables.leftover_table(diagnosis) + leftover_figures(diagnosis))
-    lines = "".join(f"<li>{escape(line)}</li>" for line in circumstances.loop)
-    yield _section("What it is worth in commanded force, on the twin", f"<ul>{lines}</ul>" if lines else "")
-
-
-def _heading(diagnosis: Diagnosis, circumstances: ReportContext) -> str:
+def _head(diagnosis: Diagnosis, circumstances: ReportContext) -> Head:
     names = [trace.measurement.name for trace in diagnosis.traces]
-    listed = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     baseline = diagnosis.baseline
-    facts = (
-        listed,
-        f"rig {circumstances.rig}",
-        f"plant {circumstances.plant}",
-        _extent(baseline.samples, baseline.duration_s),
+    listed = ", ".join(names[:_MOST_NAMES]) + (
+        f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     )
-    return (
-        f"<header><p class='kicker'>Diagnosis · force-gateway {VERSION} · {escape(circumstances.made_utc)}</p>"
-        f"<h1>{escape(words.title(diagnosis))}</h1><p class='verdict'>{words.sentence(diagnosis)}</p>"
-        f"<p>{escape(words.machine_sentence(diagnosis))}</p>"
-        f"<p>{escape(' · '.join(fact for fact in facts if fact))}</p></header>"
+    rig, plant = f"rig {circumstances.rig}", f"plant {circumstances.plant}"
+    machine = words.machine_sentence(diagnosis)
+    return Head(
+        kind="Diagnosis",
+        answer=headline.answer_sentence(diagnosis),
+        badge=headline.badge(diagnosis),
+        sentences=(headline.lack_sentence(diagnosis), machine[:1].upper() + machine[1:]),
+        facts=(listed, rig, plant, _extent(baseline.samples, baseline.duration_s)),
     )
 
 
@@ -92,45 +72,69 @@ def _extent(samples: int, duration_s: float) -> str:
     return f"{samples:,} readings in {duration_s:,.1f} s".replace(",", " ")
 
 
-def _tiles(diagnosis: Diagnosis) -> str:
-    cells = "".join(
-        f"<div><dt>{name}</dt><dd>{value}</dd><dd class='unit'>{unit}</dd></div>"
-        for name, value, unit in _figures(diagnosis)
-    )
-    return f"<dl class='tiles'>{cells}</dl>"
+def _provenance(diagnosis: Diagnosis, circumstances: ReportContext) -> dict[str, str]:
+    names = [trace.measurement.name for trace in diagnosis.traces]
+    return {
+        "recordings" if len(names) > 1 else "recording": ", ".join(names),
+        "rig": circumstances.rig,
+        "plant": circumstances.plant,
+        "made": f"{circumstances.made_utc}, computed in {circumstances.runtime_s:.1f} s",
+    }
+
+
+def _summary(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str]:
+    yield tiles(*_figures(diagnosis))
+    yield _worst_residual(diagnosis)
+    yield notes(words.all_notes(diagnosis, circumstances.notes))
+    yield section("What is missing in the simulation", tables.causes_table(diagnosis, circumstances.about))
+    yield section("What no effect explains", tables.leftover_table(diagnosis) + leftover_figures(diagnosis))
+    lines = "".join(f"<li>{escape(line)}</li>" for line in circumstances.loop)
+    yield section("What it is worth in commanded force, on the twin", f"<ul>{lines}</ul>" if lines else "")
 
 
 def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
     baseline, extended = diagnosis.baseline, diagnosis.extended
-    yield "Simulation off by", words.force(baseline.rms_n), "N RMS, base model refitted"
+    model = "base model refitted" if diagnosis.machine is None else "the machine as it was"
+    yield "Left before", words.force(baseline.rms_n), f"N RMS, {model}"
     if diagnosis.causes:
         reached = "at the noise floor" if extended.reaches_noise_floor else "above the noise floor"
-        yield "With the causes", words.force(extended.held_out_rms_n), f"N RMS, held out, {reached}"
-        yield "Noise floor", words.force(baseline.noise_floor_n), f"N, {words.floor_source(diagnosis)}"
+        yield "Left after", words.force(extended.held_out_rms_n), f"N RMS with the causes, held out, {reached}"
+        yield "Noise", words.force(baseline.noise_floor_n), f"N, {words.floor_source(diagnosis)}"
         yield "Explained", words.percent(words.explained_share(diagnosis)), "of the squared error above the noise"
+        strongest = diagnosis.causes[0]
+        yield "Confidence", words.confidence(strongest.confidence), f"in the name {strongest.name}, 0 to 1"
     else:
-        yield "Noise floor", words.force(baseline.noise_floor_n), f"N, {words.floor_source(diagnosis)}"
+        yield "Noise", words.force(baseline.noise_floor_n), f"N, {words.floor_source(diagnosis)}"
         yield "Above the noise", words.force(words.excess_n(diagnosis)), "N RMS"
 
 
-def _notes(notes: Sequence[str]) -> str:
-    lines = "".join(f"<li>{escape(note)}</li>" for note in notes)
-    return f"<section class='notes'><h2>Notes</h2><ul>{lines}</ul></section>" if notes else ""
+def _by_error(diagnosis: Diagnosis) -> list[Trace]:
+    """The recordings that have rows to draw, the greatest error first."""
+    traces = [trace for trace in diagnosis.traces if trace.measurement.usable.any()]
+    return sorted(traces, key=lambda trace: -float((TraceResiduals.of(trace).before_n ** 2).mean()))
 
 
-def _section(title: str, content: str) -> str:
-    return f"<h2>{title}</h2>{content}" if content else ""
+def _worst_residual(diagnosis: Diagnosis) -> str:
+    """The residual of the recording with the greatest error: what was there before, and what is left."""
+    traces = _by_error(diagnosis)
+    if not traces:
+        return ""
+    name = f", {traces[0].measurement.name}" if len(traces) > 1 else ""
+    drawn = charts.residual_over_time(traces[0], changed=bool(diagnosis.causes))
+    return figure(f"Residual over time{name}", drawn, _BANDS, "full")
 
 
 def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
     traces = [trace for trace in diagnosis.traces if trace.measurement.usable.any()]
     if not traces:
         return
-    worst = sorted(traces, key=lambda trace: -float((TraceResiduals.of(trace).before_n ** 2).mean()))
+    worst = _by_error(diagnosis)
     top = worst[:_MOST_TRACES]
     changed = bool(diagnosis.causes)
-    for trace in top:
+    for rank, trace in enumerate(top):
         yield from _over_time(trace, f" · {trace.measurement.name}" if len(traces) > 1 else "", changed)
+        if rank:  # the first one's is at the head of the page
+            yield figure("Residual over time", charts.residual_over_time(trace, changed=changed), _BANDS, "full")
     if len(traces) > len(top):
         yield f"<p class='small'>The {len(top)} recordings with the greatest error are drawn over time, of {len(traces)}.</p>"
     rows = join_traces(traces)
@@ -141,7 +145,7 @@ def _pictures(diagnosis: Diagnosis) -> Iterator[str]:
     loops = [Panel("Loop, before", partial(charts.loop, traces, after=False), "Base model, refitted.")]
     if changed:
         loops.append(Panel("Loop, after", partial(charts.loop, traces, after=True), "Extended model."))
-    yield grid(*loops, Panel("Spectrum of the residual", partial(charts.spectra, longest), caption))
+    yield grid(*loops, Panel("Spectrum of the residual", partial(charts.spectra, longest, changed=changed), caption))
 
 
 def _over_time(trace: Trace, suffix: str, changed: bool) -> Iterator[str]:
@@ -152,8 +156,6 @@ def _over_time(trace: Trace, suffix: str, changed: bool) -> Iterator[str]:
         yield figure("After: with the causes", charts.force_over_time(trace, after=True), style="full")
     close = f"Closer, {words.number(window[0])} to {words.number(window[1])} s"
     yield grid(*_before_and_after(close, partial(charts.force_over_time, trace, window=window), changed))
-    caption = "Bands reach from the least to the greatest reading of each column of pixels."
-    yield figure("Residual over time", charts.residual_over_time(trace), caption, "full")
 
 
 def _before_and_after(title: str, draw: Callable[..., Drawing], changed: bool) -> list[Panel]:
@@ -182,7 +184,7 @@ def _dependences(rows: ResidualRows, axis: str, diagnosis: Diagnosis) -> Iterato
         *(
             Panel(
                 f"Against {charts.axis_name(name)}",
-                partial(charts.residual_against, rows, name),
+                partial(charts.residual_against, rows, name, changed=bool(diagnosis.causes)),
                 _dependence_caption(*strength[name]),
             )
             for name in quantities
@@ -207,8 +209,8 @@ def _not_drawn(rows: ResidualRows, covariates: Sequence[str]) -> str:
 
 
 def _outlook(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str]:
-    yield _section("What to record next", _next(diagnosis, circumstances.run))
-    yield _section("Alternatives, ranked", tables.rejected_table(diagnosis, circumstances.about))
+    yield section("What to record next", _next(diagnosis, circumstances.run))
+    yield section("Alternatives, ranked", tables.rejected_table(diagnosis, circumstances.about))
     count = len(diagnosis.not_identifiable)
     if count:
         summary = (
@@ -218,9 +220,8 @@ def _outlook(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str
         )
         state = " open" if count <= _MOST_OPEN else ""
         details = f"<details{state}><summary>{summary}</summary>{tables.unseen_table(diagnosis)}</details>"
-        yield _section("What this recording cannot show", details)
-    yield _section("The base model", tables.base_table(diagnosis.base_parameters))
-    yield f"<p class='small'>Computed in {circumstances.runtime_s:.1f} s.</p>"
+        yield section("What this recording cannot show", details)
+    yield section("The base model", tables.base_table(diagnosis.base_parameters))
 
 
 def _next(diagnosis: Diagnosis, run: str) -> str:

@@ -1,15 +1,15 @@
 """What the charts of a diagnosis need beyond those of a fit: envelopes of many rows, and clouds of points in few bytes."""
 
 from dataclasses import dataclass
-from html import escape
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.diagnosis.measurement import Floats
+from gateway.reports.axis import Axis, spread
 from gateway.reports.diagnosis.series import Envelope, occupied_cells
-from gateway.reports.svg_chart import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, spread
+from gateway.reports.svg_chart import Chart
 
 _LEAST_SPREAD: Final = 1e-6
 
@@ -26,7 +26,7 @@ def limits(*arrays: Floats, margin: float = 0.06, around: float | None = None) -
 
 @dataclass
 class SeriesChart(Chart):
-    """A Chart that also draws bands and clouds, and says its legend above the picture, where no data is hidden.
+    """A Chart that also draws bands and clouds.
 
     cell_px: size of a cell of its clouds.
     """
@@ -44,40 +44,25 @@ class SeriesChart(Chart):
                 bottom = self._run(series.x[piece][::-1], series.low[piece][::-1])
                 paths.append(f'<path class="band {style}" d="M{top}L{bottom}Z"/>')
         self._parts.append("".join(paths))
-        self._note(name, "line", style)
+        self._note(name, "block", style)
 
     def cloud(self, x: Floats, y: Floats, style: str, name: str = "") -> None:
         """Draw every small cell of the picture that holds a point, once. Its path counts in cells, which keeps it short."""
         columns, rows = self._cells()
-        across, down = (self.width - LEFT - RIGHT) / columns, (self.height - TOP - BOTTOM) / rows
+        across, down = self.width / columns, self.height / rows
         box = (self.x.low, self.x.high, self.y.low, self.y.high)
-        place = f"translate({LEFT + across / 2:.2f} {self.height - BOTTOM}) scale({across:.4f} {-down:.4f})"
+        place = f"translate({across / 2:.2f} {self.height}) scale({across:.4f} {-down:.4f})"
         strokes = _strokes(occupied_cells(x, y, (columns, rows), box))
         self._parts.append(f'<path class="cloud {style}" transform="{place}" d="{strokes}"/>')
-        self._note(name, "line", style)
-
-    def svg(self) -> str:
-        """Return the whole chart as an SVG element, without its legend."""
-        head = f'<svg viewBox="0 0 {self.width} {self.height}" role="img" aria-label="{escape(self.title)}">'
-        return head + self._axes() + "".join(self._parts) + "</svg>"
-
-    @property
-    def key(self) -> str:
-        """The legend as HTML."""
-        marks = (f'<span><i class="{style}"></i>{name}</span>' for name, _, style in self._legend)
-        return f'<p class="key">{"".join(marks)}</p>'
+        self._note(name, "block", style)
 
     def _run(self, x: Floats, y: Floats) -> str:
-        across, down = self.width - LEFT - RIGHT, self.height - TOP - BOTTOM
         shares_x, shares_y = _shares(self.x, x), _shares(self.y, y)
-        pairs = zip((LEFT + across * shares_x).tolist(), (TOP + down * (1.0 - shares_y)).tolist(), strict=True)
+        pairs = zip((self.width * shares_x).tolist(), (self.height * (1.0 - shares_y)).tolist(), strict=True)
         return " ".join(f"{px:.1f} {py:.1f}" for px, py in pairs)
 
     def _cells(self) -> tuple[int, int]:
-        return (
-            max(1, round((self.width - LEFT - RIGHT) / self.cell_px)),
-            max(1, round((self.height - TOP - BOTTOM) / self.cell_px)),
-        )
+        return max(1, round(self.width / self.cell_px)), max(1, round(self.height / self.cell_px))
 
 
 def _strokes(cells: NDArray[np.int64]) -> str:

@@ -1,6 +1,6 @@
 """The tables of a diagnosis' report: causes with their gains, what is left, what lost, what cannot be seen, directions."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from html import escape
 from math import sqrt
 from typing import Final
@@ -11,19 +11,9 @@ from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.result import Cause, Diagnosis, Estimate
 from gateway.reports.diagnosis import wording as words
 from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows
+from gateway.reports.frame import table
 
 _MOST_REJECTED: Final = 12
-
-
-def table(heads: Iterable[str], rows: Iterable[Iterable[str]], style: str = "") -> str:
-    """Return an HTML table. Cells are HTML; the first of each row is its heading. Empty without rows."""
-    body = "".join(_row(list(row)) for row in rows)
-    head = "".join(f"<th>{name}</th>" for name in heads)
-    return f"<div class='wide'><table class='{style}'><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
-
-
-def _row(cells: list[str]) -> str:
-    return f"<tr><th>{cells[0]}</th>" + "".join(f"<td>{cell}</td>" for cell in cells[1:]) + "</tr>"
 
 
 def causes_table(diagnosis: Diagnosis, about: Mapping[str, str]) -> str:
@@ -41,7 +31,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause, about: Mapping[str, str]) -> tupl
     share = min(1.0, max(0.0, gain.share_of_excess)) if np.isfinite(gain.share_of_excess) else 0.0
     return (
         _name(cause, about),
-        words.percent(cause.confidence),
+        words.confidence(cause.confidence),
         words.gain_text(cause),
         f"{words.force(won_n)} N<br><small>[{words.force(low_n)}, {words.force(high_n)}]</small>",
         f"<span class='meter'><i style='width:{100.0 * share:.0f}%'></i></span> {words.percent(gain.share_of_excess)}",

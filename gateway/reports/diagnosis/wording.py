@@ -5,32 +5,9 @@ from math import floor, isfinite, log10, sqrt
 from typing import Final
 
 from gateway.diagnosis import notes
-from gateway.diagnosis.result import Cause, Diagnosis, Estimate, FloorSource, Interval, Leftover, Verdict
+from gateway.diagnosis.result import Cause, Diagnosis, Estimate, FloorSource, Interval, Leftover
 from gateway.twin.plant import Plant
 
-_SENTENCES: Final = {
-    Verdict.NOTHING_FOUND: "Nothing is missing that this recording could show.",
-    Verdict.CONFIRMED: "The cause is found, and nothing is left above the noise floor.",
-    Verdict.UNKNOWN: "The simulation is off, and no effect of the catalogue explains it.",
-}
-_TITLES: Final = {
-    Verdict.NOTHING_FOUND: "Nothing found",
-    Verdict.CONFIRMED: "Confirmed",
-    Verdict.PARTIAL: "Partial",
-    Verdict.UNKNOWN: "Unknown",
-}
-_TITLES_OF_CHANGES: Final = {
-    Verdict.NOTHING_FOUND: "Nothing has changed",
-    Verdict.CONFIRMED: "Changed",
-    Verdict.PARTIAL: "Changed",
-    Verdict.UNKNOWN: "Changed, by no name",
-}
-_SENTENCES_ON_CHANGES: Final = {
-    Verdict.NOTHING_FOUND: "What this machine does is what it did before, as far as these recordings could show.",
-    Verdict.CONFIRMED: "What has changed is found, and as little is left as in the older recordings.",
-    Verdict.PARTIAL: "A change is found; more is left than in the older recordings, or it looks like others.",
-    Verdict.UNKNOWN: "More is off than in the older recordings, and no effect of the catalogue explains it.",
-}
 _FLOOR_SOURCES: Final = {
     FloorSource.GIVEN: "as given",
     FloorSource.REPLICATES: "from repeated cycles",
@@ -38,41 +15,8 @@ _FLOOR_SOURCES: Final = {
     FloorSource.CALIBRATION: "from the calibration",
     FloorSource.SEARCH: "estimated",
 }
-_PLURAL: Final = {
-    "The cause is": "The causes are",
-    "A cause is": "Causes are",
-    "that explains": "that explain",
-    "it does": "they do",
-    " it ": " them ",
-}
 _NO_AREA_M2: Final = 5.0e-6
 """What is left of the model's area where no force answers; a small signal leaves it whole."""
-_PARTIAL: Final = (
-    "A cause is found, but this recording cannot tell it from others that look alike.",
-    "A cause is found that explains the error; to confirm it, record rests, repeat a cycle or give the noise floor.",
-    "A cause is found, but it does not explain everything.",
-)
-"""Where a group is named, where nothing is left but the noise floor is a guess, and else."""
-
-
-def title(diagnosis: Diagnosis) -> str:
-    """Return the verdict with its causes: `Partial: creep or warm-up; mains-hum`."""
-    names = "; ".join(label(cause) for cause in diagnosis.causes)
-    titles = _TITLES if diagnosis.machine is None else _TITLES_OF_CHANGES
-    word = "Nothing can be told" if why_blind(diagnosis) else titles[diagnosis.verdict]
-    return f"{word}: {names}" if names else word
-
-
-def sentence(diagnosis: Diagnosis) -> str:
-    """Return the verdict, and for `partial` what it lacks."""
-    if any(suspect.is_sure for suspect in diagnosis.suspects):
-        return "The columns are not what their names say: no cause was looked for. Fix this first, then run it again."
-    if why := why_blind(diagnosis):
-        return f"{why}."
-    if diagnosis.machine is not None:
-        return _SENTENCES_ON_CHANGES[diagnosis.verdict]
-    words = _SENTENCES.get(diagnosis.verdict) or _PARTIAL[_missing_evidence(diagnosis)]
-    return _use_plural(words) if len(diagnosis.causes) > 1 else words
 
 
 def machine_sentence(diagnosis: Diagnosis) -> str:
@@ -93,24 +37,6 @@ def why_blind(diagnosis: Diagnosis) -> str:
         diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
     )
     return "" if has_findings else notes.uninformative_force([trace.measurement for trace in diagnosis.traces])
-
-
-def _missing_evidence(diagnosis: Diagnosis) -> int:
-    if diagnosis.leftover or not diagnosis.extended.reaches_noise_floor:
-        return 2
-    return 0 if any(others(cause) for cause in diagnosis.causes) else 1
-
-
-def _use_plural(sentence: str) -> str:
-    """Return the same of several causes."""
-    for one, several in _PLURAL.items():
-        sentence = sentence.replace(one, several)
-    return sentence
-
-
-def label(cause: Cause) -> str:
-    """Return the name, or all names that the recording cannot tell apart."""
-    return " or ".join((cause.name, *others(cause)))
 
 
 def others(cause: Cause) -> list[str]:
@@ -136,6 +62,13 @@ def force(value_n: float) -> str:
     if not isfinite(value_n):
         return "–"
     return f"{value_n:.{2 if abs(value_n) >= 10.0 else 3}f}".replace("-", "−")
+
+
+def confidence(value: float) -> str:
+    """Return a confidence as the JSON has it, 0 to 1, with two digits that never say 1 of what is not certain."""
+    if not isfinite(value):
+        return "–"
+    return "> 0.99" if 0.995 <= value < 1.0 else f"{value:.2f}"
 
 
 def percent(share: float) -> str:

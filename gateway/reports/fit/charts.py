@@ -1,28 +1,54 @@
-"""The charts of a fit: the loop, what it leaves by branch, the order sweep, the minor loops."""
+"""The charts of a fit: the raw ladder, the loop, what it leaves by branch, the order sweep, the minor loops."""
 
 from itertools import groupby
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gateway.bsfm import RationalBezier
 from gateway.bsfm.fit.blend_span import command_error_n, rms_n
 from gateway.bsfm.fit.evaluation import Evaluation
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
+from gateway.reports.axis import Axis, spread
+from gateway.reports.figures import NOTHING, Drawing, drawing
 from gateway.reports.fit.document import Document, residual_of
-from gateway.reports.svg_chart import Axis, Chart, spread
+from gateway.reports.fit.names import spell_model, spell_reversal
+from gateway.reports.fit.raw_ladder import RawLadder
+from gateway.reports.svg_chart import Chart
 
+Floats = NDArray[np.float64]
 _WAYS = ((RISING, "rising"), (FALLING, "falling"))
 _CURVE_POINTS: Final = 200  # of a drawn curve: closer than a pixel's width on screen
 _ORDER_MARGIN: Final = 0.4  # of an order, left and right of the first and last one, so that marks are whole
-_BELOW_LEAST, _ABOVE_MOST = 0.7, 8.0  # the error axis over its data; the room above holds the key
-_KEY_AT: Final = 0.78  # share of the chart's width at which the key begins
+_BELOW_LEAST, _ABOVE_MOST = 0.7, 1.5  # the error axis over its data
 _LEAST_BAR: Final = 0.01  # of its height: a shorter error bar is hidden by its mark
-_MARK_RADIUS_PX: Final = 3.2
-_ERROR_MARGIN: Final = 0.25  # of the spread of the errors along the walk, for the key
+_ERROR_MARGIN: Final = 0.15  # of the spread of the errors along the walk
+_MANY_POINTS: Final = 600  # are drawn as smaller dots
+_WIDE, _WIDE_HIGH = 1064, 220  # of the drawing, px
 
 
-def draw_loop(evaluation: Evaluation) -> str:
-    """Draw the measured readings over the chosen model's two branches."""
+def draw_raw_ladder(raw: RawLadder) -> Drawing:
+    """Draw the recording as it came: force and command over time; words: how long, how many rows, where the ladder ends."""
+    time = Axis(raw.time_s[0], max(raw.time_s[-1], raw.time_s[0] + 1e-9), "time (s)")
+    chart = Chart(time, Axis(*spread(raw.force_n), "force (N)"), "Force over time as recorded", _WIDE, _WIDE_HIGH)
+    chart.line(raw.time_s, raw.force_n, "walk thin", "measured force")
+    for begin_s, words in raw.changes:
+        chart.mark_change(begin_s, words)
+    return drawing(chart, raw.sentence)
+
+
+def draw_raw_command(raw: RawLadder) -> Drawing:
+    """Draw the command over time."""
+    time = Axis(raw.time_s[0], max(raw.time_s[-1], raw.time_s[0] + 1e-9), "time (s)")
+    volts = Axis(*spread(raw.command_v), "command (V)")
+    chart = Chart(time, volts, "Command over time as recorded", _WIDE, _WIDE_HIGH // 2)
+    chart.line(raw.time_s, raw.command_v, "switched", "command")
+    return drawing(chart)
+
+
+def draw_loop(evaluation: Evaluation) -> Drawing:
+    """Draw the measured stairs and the chosen model's two branches."""
     ladder, result = evaluation.checked.ladder, evaluation.chosen.result
     rising, falling = result.branches.rising, result.branches.falling
     volts = np.linspace(rising.x0, rising.x1, _CURVE_POINTS)
@@ -33,14 +59,26 @@ def draw_loop(evaluation: Evaluation) -> str:
     )
     for way, name in _WAYS:
         mask = ladder.direction == way
-        chart.dots(ladder.voltage_v[mask].tolist(), ladder.force_n[mask].tolist(), name, f"measured, {name}")
+        style = f"{name} {_dot_size(int(mask.sum()))}".strip()
+        chart.dots(ladder.voltage_v[mask].tolist(), ladder.force_n[mask].tolist(), style, f"measured, {name}")
+    model = spell_model(result.model, result.order)
     for curve, name in ((rising, "rising"), (falling, "falling")):
-        chart.line(volts.tolist(), np.asarray(curve.value(volts)).tolist(), name)
-    return chart.svg()
+        chart.line(volts.tolist(), np.asarray(curve.value(volts)).tolist(), name, f"{model}, {name}")
+    return drawing(chart, _describe_gap(rising, falling, volts))
 
 
-def draw_residuals(evaluation: Evaluation) -> str:
-    """Draw measured minus model against the command, by branch."""
+def _dot_size(count: int) -> str:
+    return "many" if count > _MANY_POINTS else ""
+
+
+def _describe_gap(rising: RationalBezier, falling: RationalBezier, volts: Floats) -> str:
+    gap_n = np.asarray(falling.value(volts)) - np.asarray(rising.value(volts))
+    place = int(np.argmax(np.abs(gap_n)))
+    return f"The branches are furthest apart at {volts[place]:.2f} V: {gap_n[place]:.2f} N."
+
+
+def draw_residuals(evaluation: Evaluation) -> Drawing:
+    """Draw measured minus model against the command, by branch, with the largest named."""
     ladder, left_n = evaluation.checked.ladder, residual_of(evaluation)
     low_v, high_v = float(ladder.voltage_v.min()), float(ladder.voltage_v.max())
     chart = Chart(
@@ -51,26 +89,36 @@ def draw_residuals(evaluation: Evaluation) -> str:
     chart.level(0.0)
     for way, name in _WAYS:
         mask = ladder.direction == way
-        chart.dots(ladder.voltage_v[mask].tolist(), left_n[mask].tolist(), name, name)
-    return chart.svg()
+        style = f"{name} {_dot_size(int(mask.sum()))}".strip()
+        chart.dots(ladder.voltage_v[mask].tolist(), left_n[mask].tolist(), style, name)
+    worst = int(np.argmax(np.abs(left_n)))
+    side = dict(_WAYS)[int(ladder.direction[worst])]
+    volts, error = float(ladder.voltage_v[worst]), _signed(float(left_n[worst]))
+    chart.mark(volts, float(left_n[worst]), f"largest: {error}")
+    return drawing(chart, f"Largest: {error} at {volts:.2f} V, {side}.")
 
 
-def draw_order_sweep(document: Document) -> str:
+def _signed(value_n: float) -> str:
+    return f"{value_n:+.2f} N".replace("-", "−")
+
+
+def draw_order_sweep(document: Document) -> Drawing:
     """Draw the held-out RMS by order, one line per model; a hollow mark is a fit that may not drive a plant."""
     fits = [fit for fit in document["fits"] if fit["heldout_rms_n"]]
+    if not fits:
+        return NOTHING
     orders = sorted({fit["order"] for fit in fits})
     heights = [fit["heldout_rms_n"] for fit in fits]
     chart = Chart(
         Axis(orders[0] - _ORDER_MARGIN, orders[-1] + _ORDER_MARGIN, "order", whole=True),
         Axis(_BELOW_LEAST * min(heights), _ABOVE_MOST * max(heights), "held-out RMS (N)", logarithmic=True),
         "Held-out error by model and order",
-        key_at=_KEY_AT,
     )
     for model, same in groupby(fits, key=lambda fit: str(fit["model"])):
         line = list(same)
         chart.line([fit["order"] for fit in line], [fit["heldout_rms_n"] for fit in line], model, model.upper())
         _draw_marks(chart, line, model)
-    return chart.svg()
+    return drawing(chart)
 
 
 def _draw_marks(chart: Chart, fits: list[Document], model: str) -> None:
@@ -78,16 +126,19 @@ def _draw_marks(chart: Chart, fits: list[Document], model: str) -> None:
         height, error = fit["heldout_rms_n"], fit["heldout_error_n"] or 0.0
         if error > _LEAST_BAR * height:
             chart.bar(fit["order"], max(chart.y.low, height - error), height + error, model)
-        chart.dots([fit["order"]], [height], model if fit["usable"] else f"{model} hollow", radius=_MARK_RADIUS_PX)
+        if fit["usable"]:
+            chart.dots([fit["order"]], [height], f"{model} few")
+        else:
+            chart.circle(fit["order"], height, f"{model} hollow", 3.4)
         if fit["chosen"]:
-            chart.ring(fit["order"], height)
+            chart.mark(fit["order"], height, f"chosen: {spell_model(model, fit['order'])}")
 
 
-def draw_minor_loops(evaluation: Evaluation) -> str:
-    """Draw the walk of partial reversals within the loop; empty where there was none."""
+def draw_minor_loops(evaluation: Evaluation) -> Drawing:
+    """Draw the walk of partial reversals within the loop; NOTHING where there was none."""
     volts, newtons = evaluation.checked.minor_v, evaluation.checked.minor_n
     if len(volts) < 2:
-        return ""
+        return NOTHING
     branches = evaluation.chosen.result.branches
     grid = np.linspace(branches.rising.x0, branches.rising.x1, _CURVE_POINTS)
     chart = Chart(
@@ -96,32 +147,32 @@ def draw_minor_loops(evaluation: Evaluation) -> str:
         "Partial reversals inside the loop",
     )
     for curve, name in ((branches.rising, "rising"), (branches.falling, "falling")):
-        chart.line(grid.tolist(), np.asarray(curve.value(grid)).tolist(), f"{name} faint", f"{name} branch")
+        chart.line(grid.tolist(), np.asarray(curve.value(grid)).tolist(), name, f"{name} branch")
     chart.line(volts.tolist(), newtons.tolist(), "walk thin")
-    chart.dots(volts.tolist(), newtons.tolist(), "walk", "measured")
-    return chart.svg()
+    chart.dots(volts.tolist(), newtons.tolist(), "walk", "measured, inside the loop")
+    return drawing(chart)
 
 
-def draw_minor_errors(evaluation: Evaluation) -> str:
+def draw_minor_errors(evaluation: Evaluation) -> Drawing:
     """Draw the error of the command along the walk: with the chosen reversal, and with branches switched at once."""
     checked, reversal = evaluation.checked, evaluation.reversal
     if reversal is None:
-        return ""
+        return NOTHING
     chosen_n = command_error_n(evaluation.model, checked.minor_v, checked.minor_n)
     switched_n = command_error_n(evaluation.chosen.result.bsfm(0.0), checked.minor_v, checked.minor_n)
-    policy = (
-        f"{len(reversal.slip.stops.radii_v)} slip stops" if reversal.slip else f"blend over {evaluation.span_n:g} N"
-    )
+    stops = len(reversal.slip.stops.radii_v) if reversal.slip else 0
     steps = list(range(1, len(chosen_n) + 1))
+    both = [*chosen_n.tolist(), *switched_n.tolist()]
     chart = Chart(
         Axis(0, len(steps) + 1, "step of the walk"),
-        Axis(
-            *spread([*chosen_n.tolist(), *switched_n.tolist()], margin=_ERROR_MARGIN, around=0.0),
-            "error of the command (N)",
-        ),
+        Axis(*spread(both, margin=_ERROR_MARGIN, around=0.0), "error of the command (N)"),
         "Command error along the partial reversals",
     )
     chart.level(0.0)
-    chart.line(steps, switched_n.tolist(), "faint switched", f"branches switched: {rms_n(switched_n):.2f} N RMS")
+    chart.line(steps, switched_n.tolist(), "dash switched", f"branches switched: {rms_n(switched_n):.2f} N RMS")
+    policy = spell_reversal(stops, evaluation.span_n)
     chart.line(steps, chosen_n.tolist(), "walk", f"{policy}: {rms_n(chosen_n):.2f} N RMS")
-    return chart.svg()
+    worst = int(np.argmax(np.abs(chosen_n)))
+    error = _signed(float(chosen_n[worst]))
+    chart.mark(steps[worst], float(chosen_n[worst]), f"largest: {error}")
+    return drawing(chart, f"Largest with {policy}: {error} at step {steps[worst]}.")

@@ -101,7 +101,8 @@ def coefficients_of(branches: Branches) -> Document:
 
 
 def _reversal_facts(evaluation: Evaluation) -> Document:
-    """policy: linear-blend or slip-stops; rms_n, max_n: on the whole walk; *_heldout_n: on the half not fitted to."""
+    """policy: linear-blend or slip-stops, `stops` of them; rms_n, max_n: on the whole walk; *_heldout_n: on the half not
+    fitted to."""
     reversal = evaluation.reversal
     if reversal is None:
         return {"policy": "linear-blend", "identified": False, "span_n": evaluation.span_n, "points": 0}
@@ -112,6 +113,7 @@ def _reversal_facts(evaluation: Evaluation) -> Document:
         "policy": "slip-stops" if reversal.slip else "linear-blend",
         "identified": True,
         "span_n": evaluation.span_n,
+        "stops": len(reversal.slip.stops.radii_v) if reversal.slip else 0,
         "points": reversal.span.points,
         "rms_n": rms_n(error_n),
         "max_n": float(np.abs(error_n).max()),

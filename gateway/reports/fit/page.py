@@ -1,87 +1,101 @@
-"""The report of a fit: one HTML file, no scripts, nothing loaded; light and dark, and fit for paper."""
+"""The report of a fit: which model, how well it holds, how it reverses, and what it was made from."""
 
 from html import escape
 from pathlib import Path
 from typing import Final
 
-from gateway import VERSION
 from gateway.bsfm.fit.evaluation import Evaluation
+from gateway.reports.figures import figure
 from gateway.reports.fit import charts
 from gateway.reports.fit.document import Document
-from gateway.reports.style import inline_style
+from gateway.reports.fit.names import describe_model, spell_model, spell_reversal
+from gateway.reports.fit.raw_ladder import RawLadder
+from gateway.reports.frame import Head, notes, page, section, table, tiles
 
 _WORDS: Final = " class='words'"
-_FRAME: Final = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title><style>{style}</style></head>
-<body><main>
-{body}
-</main></body></html>
-"""
 
 
-def fit_page(evaluation: Evaluation, document: Document) -> str:
-    """Return the whole page. document: `fit_document` of the evaluation, with `calibration` where one was stored."""
+def fit_page(evaluation: Evaluation, document: Document, raw: RawLadder | None = None) -> str:
+    """Return the whole page. document: `fit_document` of the evaluation, with `calibration` where one was stored; raw: the
+    rows of its recording."""
     parts = [
-        _heading(document),
         _figures(document),
-        _notes(document["notes"]),
         _pair(
-            _figure(
+            figure(
                 "Hysteresis loop",
                 charts.draw_loop(evaluation),
-                "Settled readings over the two branches of the chosen model.",
+                "Dots: settled readings, one for each stair. Lines: the two branches of the chosen model.",
             ),
-            _figure("Residuals", charts.draw_residuals(evaluation), "Measured minus model at each stair."),
+            figure("Residuals", charts.draw_residuals(evaluation), "Measured minus model at each stair."),
         ),
+        notes(document["notes"]),
+        _raw(raw),
         "<h2>Choice of model and order</h2>",
         _pair(
-            _figure(
+            figure(
                 "Order sweep",
                 charts.draw_order_sweep(document),
-                "Error on a group that the fit has not seen. Hollow: may not drive a plant. Ring: chosen.",
+                "Error on a group that the fit has not seen. Hollow: may not drive a plant.",
             ),
             f"<div>{_why(document)}</div>",
         ),
         _table(document),
         _reversal(evaluation, document),
-        _provenance(document),
     ]
-    body = "\n".join(part for part in parts if part)
-    return _FRAME.format(title=escape(_title(document)), style=inline_style(), body=body)
+    return page(_head(document), parts, _provenance(document))
 
 
-def _title(document: Document) -> str:
-    """Return the name that the user gave, and where to find it."""
-    number = f"calibration {document['calibration']}" if document.get("calibration") else ""
-    return f"{document['name']} · {number or 'fit of ' + Path(document['recording']).name}"
+def _raw(raw: RawLadder | None) -> str:
+    if raw is None:
+        return ""
+    force = figure("Force", charts.draw_raw_ladder(raw), style="full")
+    return section("The ladder as recorded", force + figure("Command", charts.draw_raw_command(raw), style="full"))
 
 
-def _heading(document: Document) -> str:
-    ladder = document["ladder"]
+def _head(document: Document) -> Head:
+    ladder, why = document["ladder"], document["measured"]["rejected"]
     low_v, high_v = ladder["voltage_v"]
-    facts = [
-        _model(document["chosen"]),
-        str(document["rig"] or "unnamed rig"),
-        Path(document["recording"]).name,
-        f"{ladder['points']} stairs in {ladder['groups']} groups, {low_v:g} to {high_v:g} V",
-    ]
-    if document["started_utc"]:
-        facts.append(document["started_utc"][:16].replace("T", " ") + " UTC")
-    number = f"Calibration {document['calibration']} · " if document.get("calibration") else ""
-    return (
-        f"<header><p class='kicker'>{escape(number)}force-gateway {VERSION}</p>"
-        f"<h1>{escape(document['name'])}</h1><p>{escape(' · '.join(facts))}</p>{_rejection(document)}</header>"
+    name = Path(document["recording"]).name
+    number = f"calibration {document['calibration']}" if document.get("calibration") else ""
+    return Head(
+        kind=f"{number.capitalize() or 'Fit of a ladder'} · {document['name']}",
+        answer=answer_sentence(document),
+        badge=("rejected", "bad") if why else ("may drive the rig", "good"),
+        sentences=(f"Rejected, not offered for use: {why}" if why else "", _reversal_sentence(document["reversal"])),
+        facts=(
+            f"rig {document['rig']}" if document["rig"] else "unnamed rig",
+            name,
+            f"{ladder['points']} stairs in {ladder['groups']} groups, {low_v:g} to {high_v:g} V",
+        ),
+        title=f"{document['name']} · {number or 'fit of ' + name}",
     )
 
 
-def _rejection(document: Document) -> str:
-    why = document["measured"]["rejected"]
-    return f"<p><strong>Rejected, not offered for use:</strong> {escape(why)}</p>" if why else ""
+def answer_sentence(document: Document) -> str:
+    """Return `BSFM, order 2, with 2 slip stops describes this machine to 0.21 N RMS, 0.80 N at most`."""
+    measured = document["measured"]
+    return (
+        f"{_model(document['chosen'])}, with {_policy(document['reversal'])} describes this machine to "
+        f"{measured['rms_n']:.3f} N RMS, {measured['max_n']:.2f} N at most"
+    )
+
+
+def _policy(reversal: Document) -> str:
+    return spell_reversal(reversal.get("stops", 0), reversal["span_n"])
+
+
+def _reversal_sentence(reversal: Document) -> str:
+    """Say how well the reversal policy holds inside the loop, and that of nothing but switching branches."""
+    if not reversal["identified"]:
+        return f"Reversals were not measured: {_policy(reversal)} is assumed."
+    return (
+        f"Reversals inside the loop: {_policy(reversal)}, off by {reversal['rms_n']:.2f} N RMS and {reversal['max_n']:.2f} N "
+        f"at most; switching branches at once would be off by {reversal['switched_rms_n']:.2f} N RMS."
+    )
 
 
 def _model(fit: Document) -> str:
-    return f"{fit['model'].upper()} of order {fit['order']}"
+    return spell_model(fit["model"], fit["order"])
 
 
 def _figures(document: Document) -> str:
@@ -89,34 +103,14 @@ def _figures(document: Document) -> str:
     low_n, high_n = chosen["force_range_n"]
     heldout = f"{chosen['heldout_rms_n']:.3f}" if chosen["heldout_rms_n"] else "not tried"
     reversals = "reversals included" if measured["reversals"] else "no reversals measured"
-    tiles = (
-        ("RMS error", f"{measured['rms_n']:.3f}", f"N on all {measured['points']} points, {reversals}"),
+    off = f"{reversal['rms_n']:.2f}" if reversal["identified"] else "assumed"
+    return tiles(
+        ("Error", f"{measured['rms_n']:.3f}", f"N RMS on all {measured['points']} points, {reversals}"),
         ("Largest", f"{measured['max_n']:.2f}", "N at one of them"),
-        ("Held out", heldout, "N by branch, on a group not seen"),
+        ("Held out", heldout, "N RMS by branch, on a group not seen"),
+        ("Reversals", off, f"{'N RMS, ' if reversal['identified'] else ''}{_policy(reversal)}"),
         ("Range", f"{low_n:.1f} – {high_n:.1f}", "N on both branches"),
-        ("Reversal", *_reversal_tile(reversal)),
     )
-    cells = "".join(
-        f"<div><dt>{name}</dt><dd>{value}</dd><dd class='unit'>{unit}</dd></div>" for name, value, unit in tiles
-    )
-    return f"<dl class='tiles'>{cells}</dl>"
-
-
-def _reversal_tile(reversal: Document) -> tuple[str, str]:
-    if reversal["policy"] == "slip-stops":
-        return f"{reversal['rms_n']:.2f}", "N RMS, slip stops"
-    return f"{reversal['span_n']:g} N", "blend, identified" if reversal["identified"] else "blend, assumed"
-
-
-def _notes(notes: list[str]) -> str:
-    if not notes:
-        return ""
-    lines = "".join(f"<li>{escape(note)}</li>" for note in notes)
-    return f"<section class='notes'><h2>Notes</h2><ul>{lines}</ul></section>"
-
-
-def _figure(title: str, svg: str, caption: str) -> str:
-    return f"<figure><h3>{title}</h3>{svg}<figcaption>{escape(caption)}</figcaption></figure>" if svg else ""
 
 
 def _pair(*blocks: str) -> str:
@@ -142,19 +136,17 @@ def _why(document: Document) -> str:
         else "not identifiable from these data, though the curve is: never compare fits by them"
     )
     return (
-        f"<h3>Why {escape(_model(chosen))}</h3><p>{words}</p>"
+        f"<h3>Why {escape(_model(chosen))}</h3><p>{chosen['model'].upper()}: {describe_model(chosen['model'])}. {words}</p>"
         f"<p>{branches} Its {chosen['coefficients']} coefficients are {certainty}.</p>{_coefficients(chosen)}"
     )
 
 
 def _coefficients(chosen: Document) -> str:
-    rows = "".join(
-        f"<tr><th>{way}</th><td>{_numbers(chosen[f'{way}_handles_n'], '.3f')}</td>"
-        f"<td>{_numbers(chosen[f'{way}_weights'], '.4g')}</td></tr>"
+    rows = (
+        (way, _numbers(chosen[f"{way}_handles_n"], ".3f"), _numbers(chosen[f"{way}_weights"], ".4g"))
         for way in ("rising", "falling")
     )
-    head = "<thead><tr><th>branch</th><th>handles (N)</th><th>weights</th></tr></thead>"
-    return f"<table>{head}<tbody>{rows}</tbody></table>"
+    return table(("branch", "handles (N)", "weights"), rows)
 
 
 def _numbers(values: list[float], form: str) -> str:
@@ -166,7 +158,7 @@ def _table(document: Document) -> str:
     head = "".join(f"<th>{name}</th>" for name in heads)
     rows = "".join(_row(fit) for fit in document["fits"])
     return (
-        f"<div class='wide'><table class='fits'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+        f"<div class='wide' tabindex='0'><table class='fits'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
         "<p class='small'>RMS and max: of the stairs, each by its own branch. "
         "* the paper's normalised figure (2-norm of the group means' residuals over the number of points), "
         "for comparison with its tables; it is no force.</p>"
@@ -197,14 +189,13 @@ def _reversal(evaluation: Evaluation, document: Document) -> str:
     if not walk:
         return ""
     points = document["ladder"]["minor_points"]
-    return "<h2>Reversals inside the loop</h2>" + _pair(
-        _figure(
-            "Partial reversals", walk, f"{points} points of partial reversals; two branches alone cannot describe them."
-        ),
-        _figure(
-            "Error of the command",
-            charts.draw_minor_errors(evaluation),
-            _why_reversal(document["reversal"]),
+    caption = f"{points} points of partial reversals; two branches alone cannot describe them."
+    errors = charts.draw_minor_errors(evaluation)
+    return section(
+        "Reversals inside the loop",
+        _pair(
+            figure("Partial reversals", walk, caption),
+            figure("Error of the command", errors, _why_reversal(document["reversal"])),
         ),
     )
 
@@ -218,13 +209,13 @@ def _why_reversal(reversal: Document) -> str:
     return f"On the half of the walk that was not fitted to: {figures}."
 
 
-def _provenance(document: Document) -> str:
-    facts = {
+def _provenance(document: Document) -> dict[str, object]:
+    noise_n = document["ladder"]["noise_n"]
+    return {
         "recording": document["recording"],
+        "recorded": (document["started_utc"] or "")[:16].replace("T", " ") + " UTC" if document["started_utc"] else "",
         "rig": document["rig"],
         "rig fingerprint": document["rig_fingerprint"],
         "data SHA-256": document.get("data_sha256"),
-        "noise of a reading": f"{document['ladder']['noise_n']:.3f} N" if document["ladder"]["noise_n"] else None,
+        "noise of a reading": f"{noise_n:.3f} N" if noise_n else "",
     }
-    rows = "".join(f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in facts.items() if value)
-    return f"<h2>Provenance</h2><table class='facts'><tbody>{rows}</tbody></table>"

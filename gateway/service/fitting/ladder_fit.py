@@ -19,6 +19,7 @@ from gateway.bsfm.response.identification import MeasuredResponse
 from gateway.recording import Recording
 from gateway.reports.fit.document import Document, fit_document
 from gateway.reports.fit.page import fit_page
+from gateway.reports.fit.raw_ladder import raw_ladder
 from gateway.service.fitting.acceptance import Acceptance, judge_fit
 from gateway.service.fitting.ladder_source import RigContext, acceptance_bounds, check_source
 from gateway.service.fitting.measured_response import measure_recorded_response
@@ -102,7 +103,8 @@ def _source(fit: LadderFit) -> str:
 
 def write_report(fit: LadderFit, target: Path) -> None:
     """Write the HTML report, whole or not at all."""
-    write_whole(target, fit_page(fit.evaluation, fit.document))
+    raw = raw_ladder(fit.recording.columns, fit.recording.header)
+    write_whole(target, fit_page(fit.evaluation, fit.document, raw))
 
 
 def write_whole(target: Path, text: str) -> None:

@@ -2,6 +2,7 @@
 
 import fcntl
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -129,7 +130,11 @@ def test_compare_tells_the_differences_of_the_branches(state, call, tmp_path):
     plot = tmp_path / "plot.html"
     text = call("calibration", "compare", "2", "demo", "--state", state, "--plot", plot)
     assert text.output.startswith("A  calibration 2 (mark 16, 2026-11-21), blend 5 N\nB  calibration 1 (demo, ")
-    assert plot.read_text(encoding="utf-8").count("<svg") == 2
+    html = plot.read_text(encoding="utf-8")
+    assert html.count('class="plot"') == 2
+    answer = re.search(r"<h1>(.*?)</h1>", html)
+    assert answer and f"{answer[1]}.\n" in text.output
+    assert "No measured points of A: " in html
 
 
 def test_only_the_common_voltages_are_compared(state, call, tmp_path):

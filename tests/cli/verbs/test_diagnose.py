@@ -38,7 +38,7 @@ def test_the_terminal_says_verdict_cause_gain_and_what_to_record_next(
     answer = call("diagnose", str(table(tmp_path / "a.csv")))
     assert answer.exit_code == 0, answer.output
     for text in (
-        "a.csv · rig demo · plant paper-slide", "Partial: load-dependent-friction", "1.186 → 0.257",
+        "a.csv · rig demo · plant paper-slide", "Load-dependent-friction explains part of the difference: ", "1.186 → 0.257",
         "friction.load_dependent_n_per_n = 0.0497 N/N [0.0482, 0.0511]", "depends on temperature_c", "rejected",
         "next      dwell 60 s at 20 N",
     ):  # fmt: skip
@@ -62,7 +62,7 @@ def test_files_are_written_and_the_plant_is_a_plant(tmp_path: Path, call: Call, 
     answer = call("diagnose", str(path), "--json", str(names[0]), "--report", str(names[1]), "--extend", str(names[2]))
     assert answer.exit_code == 0, answer.output
     assert json.loads(names[0].read_text())["causes"][0]["name"] == "load-dependent-friction"
-    assert "<h1>Partial" in names[1].read_text(encoding="utf-8")
+    assert "<h1>Load-dependent-friction explains part" in names[1].read_text(encoding="utf-8")
     profile = load_plant(names[2])
     assert profile.plant == engine.answer.plant and profile.name == "stiffer"
     assert sorted(tmp_path.iterdir()) == sorted([path, *names])

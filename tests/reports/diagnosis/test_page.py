@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from html import escape
 from html.parser import HTMLParser
 from math import nan
 
@@ -9,11 +10,13 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis.result import Diagnosis, Extended, Leftover, NotIdentifiable, Verdict
+from gateway.reports.diagnosis import headline
 from gateway.reports.diagnosis import wording as words
 from gateway.reports.diagnosis.page import ReportContext, diagnosis_page
 from gateway.twin.plant import with_value
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, diagnosis, trace
 
+REACHED = Extended(0.121, True)
 ABOUT = {"load-dependent-friction": "friction in proportion to the thrust"}
 
 
@@ -77,7 +80,7 @@ def test_no_place_of_a_grid_is_empty(columns: int, changed: bool) -> None:
     """Two figures to a row; where one is left it reaches across, as wide as it is drawn."""
     one = trace(rows=3000, **{f"column_{k}": np.linspace(0.0, 1.0, 3000) ** (k + 2) for k in range(columns)})
     html = page(diagnosis(traces=(one,), **({} if changed else {"causes": ()})))
-    grids = re.findall(r"<div class='pair'>(.*?)</div>", html, re.DOTALL)
+    grids = re.findall(r"<section class='pair'>(.*?)</section>", html, re.DOTALL)
     assert len(grids) == 5, "with what is left over its temperature"
     for grid in grids:
         styles = re.findall(r"<figure class='(.*?)'>", grid)
@@ -89,14 +92,18 @@ def test_no_place_of_a_grid_is_empty(columns: int, changed: bool) -> None:
 def test_a_group_is_named_as_a_group() -> None:
     html = page(diagnosis(causes=(FRICTION, WARMTH)))
     assert "or warm-up, or linear-drift: not told apart here" in html
-    assert "<h1>Partial: load-dependent-friction; thermal-zero-drift or warm-up or linear-drift</h1>" in html
+    assert (
+        "<h1>Load-dependent-friction and thermal-zero-drift (or warm-up, or linear-drift) explain part of the difference: "
+        "1.186 N before, 0.257 N after, the noise is 0.120 N</h1>"
+    ) in html
 
 
 @pytest.mark.parametrize("verdict", [Verdict.NOTHING_FOUND, Verdict.UNKNOWN])
 def test_without_causes_there_is_no_after(verdict: Verdict) -> None:
     html = page(diagnosis(causes=(), verdict=verdict))
     assert "After: with the causes" not in html and "With the causes" not in html
-    assert words.sentence(diagnosis(causes=(), verdict=verdict)) in html
+    answer = diagnosis(causes=(), verdict=verdict)
+    assert f"<h1>{headline.answer_sentence(answer)}</h1>" in html
 
 
 def test_text_from_recordings_cannot_become_markup() -> None:
@@ -140,7 +147,7 @@ def odd_traces() -> dict[str, object]:
 def test_odd_data_give_a_page_all_the_same(name: str) -> None:
     html = page(diagnosis(traces=(odd_traces()[name],)))
     assert balanced(html)
-    assert "nan" not in re.sub(r"<style>.*?</style>", "", html, flags=re.S)
+    assert not re.search(r"\bnan\b", re.sub(r"<style>.*?</style>", "", html, flags=re.S))
 
 
 def test_many_effects_that_cannot_be_seen_are_folded_away() -> None:
@@ -173,24 +180,73 @@ def test_a_share_is_never_called_all_or_nothing_when_it_is_not(share: float, tex
     assert words.percent(share) == text
 
 
-def test_partial_says_what_it_lacks() -> None:
-    reached = Extended(0.121, True)
-    sentences = [
-        words.sentence(diagnosis()),
-        words.sentence(diagnosis(leftover=(), extended=reached)),
-        words.sentence(diagnosis(leftover=(), extended=reached, causes=(WARMTH,))),
-        words.sentence(diagnosis(causes=(FRICTION, WARMTH))),
-        words.sentence(diagnosis(leftover=(), extended=reached, causes=(FRICTION, WARMTH))),
-        words.sentence(diagnosis(verdict=Verdict.CONFIRMED, causes=(FRICTION, FRICTION))),
+CHANGED = (
+    ({}, "Load-dependent-friction explains part of the difference", "What is left depends on temperature_c."),
+    (
+        {"leftover": ()}, "Load-dependent-friction explains part of the difference",
+        "What is left is more than the noise, and depends on nothing that was recorded.",
+    ),
+    (
+        {"leftover": (), "extended": REACHED}, "Load-dependent-friction explains the difference, as far as the noise is known",
+        "To confirm it, record rests, repeat a cycle or give the noise floor (--noise-floor-n).",
+    ),
+    (
+        {"leftover": (), "extended": REACHED, "causes": (WARMTH,)},
+        "Thermal-zero-drift (or warm-up, or linear-drift) explains the difference, but not told apart from what looks alike",
+        "They look alike in this recording; what to record next tells them apart.",
+    ),
+    (
+        {"leftover": (), "extended": REACHED, "verdict": Verdict.CONFIRMED},
+        "Load-dependent-friction explains the whole difference", "Nothing is left above the noise floor.",
+    ),
+    (
+        {"causes": (FRICTION, FRICTION), "leftover": (), "extended": REACHED, "verdict": Verdict.CONFIRMED},
+        "Load-dependent-friction and load-dependent-friction explain the whole difference",
+        "Nothing is left above the noise floor.",
+    ),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "answer", "lack"), CHANGED)
+def test_the_answer_says_how_much_is_explained_and_what_is_lacking(
+    changes: dict[str, object], answer: str, lack: str
+) -> None:
+    found = diagnosis(**changes)
+    after = found.extended.held_out_rms_n
+    assert headline.answer_sentence(found) == f"{answer}: 1.186 N before, {after:.3f} N after, the noise is 0.120 N"
+    assert headline.lack_sentence(found) == lack
+    assert f"<p class='verdict'>{escape(lack)}</p>" in page(found)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "answer"),
+    [
+        (Verdict.NOTHING_FOUND, "No effect is missing that this recording could show"),
+        (Verdict.UNKNOWN, "No effect of the catalogue explains the difference"),
+    ],
+)
+def test_without_a_cause_the_answer_says_how_far_the_simulation_is_off(verdict: Verdict, answer: str) -> None:
+    found = diagnosis(causes=(), verdict=verdict)
+    assert headline.answer_sentence(found) == f"{answer}: the simulation is off by 1.186 N, the noise is 0.120 N"
+
+
+def test_a_confidence_is_the_number_of_the_json_and_never_one_when_it_is_not() -> None:
+    assert [words.confidence(value) for value in (0.985, 0.71, 0.9951, 1.0, nan)] == [
+        "0.98",
+        "0.71",
+        "> 0.99",
+        "1.00",
+        "–",
     ]
-    assert sentences == [
-        "A cause is found, but it does not explain everything.",
-        "A cause is found that explains the error; to confirm it, record rests, repeat a cycle or give the noise floor.",
-        "A cause is found, but this recording cannot tell it from others that look alike.",
-        "Causes are found, but they do not explain everything.",
-        "Causes are found, but this recording cannot tell them from others that look alike.",
-        "The causes are found, and nothing is left above the noise floor.",
-    ]
+
+
+def test_where_the_residual_is_largest_is_said_beside_it_and_below() -> None:
+    one = trace(rows=3000)
+    spike = one.measurement.force_n.copy()
+    spike[1234] += 40.0
+    html = page(diagnosis(traces=(replace(one, measurement=replace(one.measurement, force_n=spike)),)))
+    assert re.search(r">before: \+(38|39)\.\d\d N</text>", html)
+    assert re.search(r"Largest before: \+(38|39)\.\d\d N at 6\.17 s, (while|with|within)", html)
 
 
 def test_a_size_that_the_plant_had_already_is_told_beside_the_new_one() -> None:

@@ -50,7 +50,7 @@ def test_a_good_fit_is_offered_under_the_users_name_with_its_error_on_all_points
     assert stored.rms_n == pytest.approx(document["measured"]["rms_n"])
     report = Path(result["report"]).read_text(encoding="utf-8")
     assert f"<title>left cell · calibration {result['stored']}</title>" in report
-    assert "<h1>left cell</h1>" in report
+    assert f"Calibration {result['stored']} · left cell" in report
     assert f"{stored.rms_n:.3f}" in report
     assert "reversals included" in report
 

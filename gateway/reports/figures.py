@@ -2,9 +2,29 @@
 
 from dataclasses import dataclass
 from html import escape
-from typing import Protocol
+from typing import Final, Protocol
 
-from gateway.reports.diagnosis.charts import Drawing
+from gateway.reports.svg_chart import Chart
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A chart and its legend, as HTML; words: what its caption says of its peak or step."""
+
+    svg: str
+    key: str
+    words: str = ""
+
+    def __bool__(self) -> bool:
+        return bool(self.svg)
+
+
+NOTHING: Final = Drawing("", "")
+
+
+def drawing(chart: Chart, words: str = "") -> Drawing:
+    """Return what a chart shows."""
+    return Drawing(chart.svg(), chart.key, words)
 
 
 class Draw(Protocol):
@@ -23,9 +43,10 @@ class Panel:
 
 
 def figure(title: str, drawing: Drawing, caption: str = "", style: str = "") -> str:
-    """Return one figure as HTML; empty where there is nothing to draw."""
+    """Return one figure as HTML; empty where there is nothing to draw. What the drawing says stands before the caption."""
     if not drawing:
         return ""
+    caption = " ".join(part for part in (drawing.words, caption) if part)
     text = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f"<figure class='{style}'><h3>{escape(title)}</h3>{drawing.key}{drawing.svg}{text}</figure>"
 
@@ -39,4 +60,4 @@ def grid(*panels: Panel) -> str:
     if len(drawings) % 2:
         last = drawings[-1][0]
         figures[-1] = figure(last.title, last.draw(wide=True), last.caption, "across")
-    return f"<div class='pair'>{''.join(figures)}</div>"
+    return f"<section class='pair'>{''.join(figures)}</section>"

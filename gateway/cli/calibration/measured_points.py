@@ -1,0 +1,64 @@
+"""The measured points that a stored calibration was made from, where its recording is still there and says the same."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gateway.bsfm import Calibration
+
+if TYPE_CHECKING:
+    from gateway.bsfm.ladder.measured_ladder import Ladder
+
+_RECORDINGS = "recordings"
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredPoints:
+    """The stairs of a ladder, or why there are none to show."""
+
+    ladder: "Ladder | None"
+    why: str = ""
+
+    def error_rms_n(self, model: Calibration) -> float:
+        """Return how far a calibration is off at these points, each by its own branch."""
+        import numpy as np
+
+        from gateway.bsfm.ladder.measured_ladder import RISING
+
+        assert self.ladder is not None
+        branches = model.model().branches
+        volts = self.ladder.voltage_v
+        expected_n = np.where(
+            self.ladder.direction == RISING, branches.rising.value(volts), branches.falling.value(volts)
+        )
+        return float(np.sqrt(np.mean((self.ladder.force_n - expected_n) ** 2)))
+
+
+def measured_points(calibration: Calibration, state: Path) -> MeasuredPoints:
+    """Return the points whose hash the calibration carries. state: the directory that its recordings may be in."""
+    if not calibration.data_sha256:
+        return MeasuredPoints(None, "it names no data that it was made from")
+    file = _recording_of(calibration, state)
+    if file is None:
+        return MeasuredPoints(None, f"its recording is not here ({calibration.source or 'not named'})")
+    from gateway.bsfm.ladder.ladder_error import LadderError
+    from gateway.recording.errors import RecordingError
+    from gateway.service.fitting.ladder_fit import data_sha256
+    from gateway.service.fitting.ladder_source import RigContext, check_source, read_source
+
+    try:
+        checked = check_source(read_source(file), RigContext(state=state))
+    except (LadderError, RecordingError, OSError, ValueError) as error:
+        return MeasuredPoints(None, f"{file} cannot be read as it was: {error}")
+    if data_sha256(checked) != calibration.data_sha256:
+        return MeasuredPoints(None, f"{file} holds other data than it was made from")
+    return MeasuredPoints(checked.ladder)
+
+
+def _recording_of(calibration: Calibration, state: Path) -> Path | None:
+    """The file that the source names, `recording NAME: ...`: among the gateway's recordings, else in this directory."""
+    name = calibration.source.removeprefix("recording ").partition(":")[0]
+    if not name or Path(name).name != name:
+        return None
+    candidates = (state / _RECORDINGS / name, Path(name))
+    return next((path for path in candidates if path.is_file()), None)
