@@ -9,11 +9,13 @@ Coordinates are rounded to a tenth of a pixel, which keeps a report of 2000 dots
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from typing import Final
 
 from gateway.reports.axis import Axis
 
 RIGHT, TOP, BOTTOM = 14, 28, 40  # room around the drawing, px
 _LEAST_LEFT, _SIGN_PX, _TICK_GAP = 34, 7, 14  # room at the left for the longest number at a tick
+_MANY_POINTS: Final = 600  # are drawn as small dots
 _WORDS_ABOVE, _WORDS_BELOW, _ROOM_ABOVE = -10.0, 20.0, 16.0  # of a marked point, px
 
 
@@ -46,6 +48,14 @@ class Chart:
         strokes = "".join(f"M{px:.1f} {py:.1f}h0" for px, py in self._places(xs, ys))
         self._parts.append(f'<path class="dots {style}" d="{strokes}"/>')
         self._note(name, "dot", style)
+
+    def points(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str = "") -> None:
+        """Draw measured points so that they are seen on a line: as rings, as small dots where they are many."""
+        if len(xs) > _MANY_POINTS:
+            self.dots(xs, ys, f"{style} many", name)
+            return
+        self.dots(xs, ys, f"{style} rim", name)
+        self.dots(xs, ys, "core")
 
     def bar(self, x: float, low: float, high: float, style: str) -> None:
         """Draw a vertical bar between two values."""

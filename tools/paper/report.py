@@ -8,6 +8,7 @@ from typing import Final
 from rich.console import Console
 from rich.table import Table
 
+from gateway.reports.frame import Head, page, section, tiles
 from paper.comparison import Interval
 from paper.experiments import exercises, rigs
 from paper.experiments.laws import FASTEST_N_PER_S, LEAD, RESPONSE_LAG_S, TRIM
@@ -15,21 +16,9 @@ from paper.experiments.trials import settled_s
 from paper.figures.all_figures import FIGURES
 from paper.goals import MET, MISSED, GoalResult, judge_goals, summary
 from paper.study import Study
-from paper.verdicts.all_verdicts import counts, verdicts
+from paper.verdicts.all_verdicts import counts, numbers, verdicts
 from paper.verdicts.verdict import NO, OUTSIDE, YES, Verdict
 
-CSS: Final = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; background: #fff; }
-body { max-width: 1200px; margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.6rem; margin-bottom: .3rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; border-bottom: 1px solid #dde3ea; }
-p.lead { color: #55606e; margin-top: 0; } figure { margin: 1.2rem 0; } figcaption { color: #55606e; font-size: .9rem; }
-img { max-width: 100%; height: auto; } table { border-collapse: collapse; width: 100%; font-size: .86rem; }
-.scroll { overflow-x: auto; }
-th, td { text-align: left; vertical-align: top; padding: .35rem .55rem; border-bottom: 1px solid #e6eaf0; }
-th { color: #55606e; } td.number { white-space: nowrap; font-variant-numeric: tabular-nums; }
-.yes { color: #12703a; } .no { color: #b23b3b; } .out { color: #7a6a2f; }
-td.verdict { white-space: nowrap; font-weight: 600; }
-"""
 CLASS: Final = {YES: "yes", NO: "no", OUTSIDE: "out", MET: "yes", MISSED: "no", "": ""}
 TABLE_HEAD: Final = ("where", "statement of the paper", "its value", "ours (twin)", "verdict", "why")
 RATIO_HEAD: Final = (
@@ -146,10 +135,11 @@ def _exercises(quick: bool) -> list[str]:
 
 
 def html_table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as HTML."""
+    """Return a table as HTML, which scrolls within itself."""
     titles = "".join(f"<th>{escape(title)}</th>" for title in head)
     body = "\n".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>" for row in rows)
-    return f'<div class="scroll"><table><thead><tr>{titles}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+    whole = f"<table class='verdicts'><thead><tr>{titles}</tr></thead><tbody>\n{body}\n</tbody></table>"
+    return f"<div class='wide' tabindex='0'>{whole}</div>"
 
 
 def _cell(text: str) -> str:
@@ -164,47 +154,63 @@ def _cell(text: str) -> str:
 
 
 def html_figure(name: str, png: bytes) -> str:
-    """Return a picture with its caption as HTML."""
+    """Return a picture with its caption as HTML; on a narrow page it scrolls within itself."""
     caption, data = escape(FIGURES[name][0]), base64.b64encode(png).decode("ascii")
-    image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
-    return f'<figure id="{name}">{image}<figcaption>{caption}</figcaption></figure>'
+    image = f'<div class="picture" tabindex="0"><img alt="{caption}" src="data:image/png;base64,{data}"></div>'
+    return f'<figure id="{name}" class="full">{image}<figcaption>{caption}</figcaption></figure>'
 
 
 def html(study: Study, pictures: dict[str, bytes]) -> str:
     """Return the whole page. pictures: PNG bytes by short name."""
-    lines, rows = verdicts(study), judge_goals(study)
+    lines = verdicts(study)
     shown = {name: html_figure(name, png) for name, png in pictures.items()}
-    paper_figures = "\n".join(text for name, text in shown.items() if name.startswith("fig"))
     items = "".join(f"<li>{escape(text)}</li>" for text in assumptions(study))
-    goals = "".join(f"<p>{escape(text)}</p>" for text in summary(study))
+    parts = [
+        tiles(*((word, str(number), "statements of the paper") for word, number in numbers(lines).items())),
+        section("Statement by statement", html_table(TABLE_HEAD, map(verdict_cells, lines))),
+        section("Ours beside the paper's law", _ratios(study, shown["ratios"])),
+        section("What the regulator's physics allows", _limits(study, shown["limit"])),
+        section("The figures, redrawn", _paper_figures(shown)),
+        section("What was run, and what is assumed", f"<ul>{items}</ul>"),
+    ]
     mode = "quick run: few seeds and orders" if study.quick else f"{len(study.seeds)} seeds, all orders"
-    return f"""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>The paper on the twin</title><style>{CSS}</style></head><body>
-<h1>The paper on the twin</h1>
-<p class="lead">BSFM for a pneumatic constant-force device: each claim run again on a simulated copy of its rig.
-{counts(lines)}. {mode}.</p>
-<h2>Statement by statement</h2>
-{html_table(TABLE_HEAD, map(verdict_cells, lines))}
-<h2>Ours beside the paper's law</h2>
-{goals}
-{shown["ratios"]}
-{html_table(RATIO_HEAD, map(ratio_cells, rows))}
-<p>Ratios: geometric mean over {len(study.seeds)} copies of the rig, 95 % bootstrap interval.
-A goal is met when the whole interval lies within it.
-Settling times: mean over the targets at which both settle; the paper's law never comes within 1 N at 5 N, ours does.</p>
-<h2>What the regulator's physics allows</h2>
-<p>Dead time 80 ms, two lags of 72 ms, 0 .. 10 V in 10-bit steps, supply 0.85 MPa, pulses no shorter than a 9600-baud command.
-The first bound holds for every command; the second is the best of all bang-bang commands on a grid.</p>
-{shown["limit"]}
-{html_table(LIMIT_HEAD, limit_cells(study))}
-<h2>The figures, redrawn</h2>
-{paper_figures}
-<p>Fig. 10 (surface, roughness) is a result of the process, outside what software can reproduce.</p>
-<h2>What was run, and what is assumed</h2>
-<ul>{items}</ul>
-</body></html>
-"""
+    head = Head(
+        kind="The paper on the twin",
+        answer=answer_sentence(lines),
+        sentences=tuple(summary(study)),
+        facts=("BSFM for a pneumatic constant-force device: each claim run again on a simulated copy of its rig", mode),
+        title="The paper on the twin",
+    )
+    return page(head, parts, {"recording": "none: the twin of profiles/plants/paper-slide.yaml", "run": mode})
+
+
+def answer_sentence(lines: Sequence[Verdict]) -> str:
+    """Return how many of the paper's statements hold on the twin, as a sentence."""
+    count = numbers(lines)
+    return (
+        f"{count[YES]} of {len(lines)} statements of the paper are reproduced on the twin, {count[NO]} are not, "
+        f"{count[OUTSIDE]} lies outside software"
+    )
+
+
+def _ratios(study: Study, picture: str) -> str:
+    text = f"""Ratios: geometric mean over {len(study.seeds)} copies of the rig, 95 % bootstrap interval. A goal is met when the
+whole interval lies within it. Settling times: mean over the targets at which both settle; the paper's law never comes within
+1 N at 5 N, ours does."""
+    return f"{picture}{html_table(RATIO_HEAD, map(ratio_cells, judge_goals(study)))}<p>{text}</p>"
+
+
+def _limits(study: Study, picture: str) -> str:
+    text = """Dead time 80 ms, two lags of 72 ms, 0 .. 10 V in 10-bit steps, supply 0.85 MPa, pulses no shorter than a 9600-baud
+command. The first bound holds for every command; the second is the best of all bang-bang commands on a grid."""
+    return f"<p>{text}</p>{picture}{html_table(LIMIT_HEAD, limit_cells(study))}"
+
+
+def _paper_figures(shown: dict[str, str]) -> str:
+    figures = "\n".join(text for name, text in shown.items() if name.startswith("fig"))
+    return (
+        f"{figures}<p>Fig. 10 (surface, roughness) is a result of the process, outside what software can reproduce.</p>"
+    )
 
 
 # -- terminal

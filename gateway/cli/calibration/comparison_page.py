@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
+from gateway.bsfm.ladder.measured_ladder import Ladder
 from gateway.cli.calibration.comparison import Comparison, answer_sentence, title
 from gateway.cli.calibration.measured_points import MeasuredPoints
 from gateway.reports.axis import Axis, spread
@@ -10,7 +10,7 @@ from gateway.reports.figures import drawing, figure
 from gateway.reports.frame import Head, notes, page, section, table, tiles
 from gateway.reports.svg_chart import Chart
 
-_WAYS = ((RISING, "rising"), (FALLING, "falling"))
+_STYLES = {"A": "measured", "B": "walk"}  # of the points that each was made from
 _TICKS_SHOWN = 9
 
 
@@ -20,10 +20,14 @@ def comparison_page(comparison: Comparison, points: dict[str, MeasuredPoints]) -
     head = Head(
         kind="Two calibrations compared",
         answer=answer_sentence(comparison),
-        sentences=tuple(_describe_points(comparison, points)),
+        sentences=tuple(
+            f"{said}."
+            for letter, each in points.items()
+            if (said := each.describe(letter, (comparison.a, comparison.b)))
+        ),
         facts=(first, second),
     )
-    missing = [f"No measured points of {name}: {each.why}." for name, each in points.items() if each.ladder is None]
+    missing = [f"No measured points of {name}: {each.why}." for name, each in points.items() if each.checked is None]
     parts = [
         tiles(*_figures(comparison)),
         f"<div class='pair'>{_loops(comparison, points)}{_differences(comparison)}</div>",
@@ -42,37 +46,31 @@ def _figures(comparison: Comparison) -> Iterator[tuple[str, str, str]]:
         yield f"B − A, {name}", f"{branch.rms_n:.3f}", place
 
 
-def _describe_points(comparison: Comparison, points: dict[str, MeasuredPoints]) -> Iterator[str]:
-    """How far both are off at the points that were measured, where there are any."""
-    for name, each in points.items():
-        if each.ladder is not None:
-            errors = (each.error_rms_n(model) for model in (comparison.a, comparison.b))
-            first, second = (f"{error_n:.3f} N RMS" for error_n in errors)
-            yield f"At the {len(each.ladder)} points that {name} was made from, A is off by {first} and B by {second}."
-
-
 def _loops(comparison: Comparison, points: dict[str, MeasuredPoints]) -> str:
     volts = comparison.voltage_v
-    ladders = {name: each.ladder for name, each in points.items() if each.ladder is not None}
+    ladders = {name: each.checked.ladder for name, each in points.items() if each.checked is not None}
     forces = [force for branch in comparison.branches.values() for force in (*branch.a_n, *branch.b_n)]
     measured = [force for ladder in ladders.values() for force in ladder.force_n.tolist()]
     chart = Chart(_across(volts), Axis(*spread([*forces, *measured]), "force (N)"), "Both loops, and measured points")
-    for name, ladder in ladders.items():
-        _draw_points(chart, ladder, name, (volts[0], volts[-1]))
     for name, branch in comparison.branches.items():
         chart.line(volts, branch.a_n, f"{name} dash", f"A, {name}")
         chart.line(volts, branch.b_n, name, f"B, {name}")
-    shown = "Dots: measured. " if ladders else ""
-    return figure("Both loops", drawing(chart), f"{shown}Broken lines: A. Whole lines: B.")
+    for name, ladder in ladders.items():
+        _draw_points(chart, ladder, name, (volts[0], volts[-1]))
+    shown = "Rings: measured. " if ladders else ""
+    stops = " Just after a turn the slip stops hold the force between the branches." if _has_stops(comparison) else ""
+    return figure("Both loops", drawing(chart), f"{shown}Broken lines: A. Whole lines: B.{stops}")
+
+
+def _has_stops(comparison: Comparison) -> bool:
+    return bool(comparison.a.slip_radii_v or comparison.b.slip_radii_v)
 
 
 def _draw_points(chart: Chart, ladder: Ladder, name: str, ends_v: tuple[float, float]) -> None:
     inside = (ladder.voltage_v >= ends_v[0]) & (ladder.voltage_v <= ends_v[1])
-    for way, word in _WAYS:
-        mask = inside & (ladder.direction == way)
-        style = f"measured {'few' if name == 'B' else 'many'}"
-        said = f"measured for {name}" if way == RISING else ""
-        chart.dots(ladder.voltage_v[mask].tolist(), ladder.force_n[mask].tolist(), f"{style} of-{word}", said)
+    chart.points(
+        ladder.voltage_v[inside].tolist(), ladder.force_n[inside].tolist(), _STYLES[name], f"measured for {name}"
+    )
 
 
 def _differences(comparison: Comparison) -> str:

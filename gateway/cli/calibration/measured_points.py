@@ -7,31 +7,30 @@ from typing import TYPE_CHECKING
 from gateway.bsfm import Calibration
 
 if TYPE_CHECKING:
-    from gateway.bsfm.ladder.measured_ladder import Ladder
+    from gateway.bsfm.ladder.check import CheckedLadder
 
 _RECORDINGS = "recordings"
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredPoints:
-    """The stairs of a ladder, or why there are none to show."""
+    """A ladder and its partial reversals, or why there are none to show."""
 
-    ladder: "Ladder | None"
+    checked: "CheckedLadder | None"
     why: str = ""
 
-    def error_rms_n(self, model: Calibration) -> float:
-        """Return how far a calibration is off at these points, each by its own branch."""
-        import numpy as np
+    def describe(self, letter: str, models: tuple[Calibration, Calibration]) -> str:
+        """Return how far A and B are off at these points, each with the memory of its own reversals; empty without points.
+        letter: of the calibration that was made from them."""
+        if self.checked is None:
+            return ""
+        from gateway.bsfm.fit.model_error import Error, measured_error_n
 
-        from gateway.bsfm.ladder.measured_ladder import RISING
-
-        assert self.ladder is not None
-        branches = model.model().branches
-        volts = self.ladder.voltage_v
-        expected_n = np.where(
-            self.ladder.direction == RISING, branches.rising.value(volts), branches.falling.value(volts)
+        first, second = (Error.of(measured_error_n(each.model(), self.checked)) for each in models)
+        return (
+            f"At the {first.points} points that {letter} was made from, A is off by {first.rms_n:.3f} N RMS and B by "
+            f"{second.rms_n:.3f} N RMS"
         )
-        return float(np.sqrt(np.mean((self.ladder.force_n - expected_n) ** 2)))
 
 
 def measured_points(calibration: Calibration, state: Path) -> MeasuredPoints:
@@ -52,7 +51,7 @@ def measured_points(calibration: Calibration, state: Path) -> MeasuredPoints:
         return MeasuredPoints(None, f"{file} cannot be read as it was: {error}")
     if data_sha256(checked) != calibration.data_sha256:
         return MeasuredPoints(None, f"{file} holds other data than it was made from")
-    return MeasuredPoints(checked.ladder)
+    return MeasuredPoints(checked)
 
 
 def _recording_of(calibration: Calibration, state: Path) -> Path | None:

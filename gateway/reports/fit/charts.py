@@ -24,7 +24,6 @@ _ORDER_MARGIN: Final = 0.4  # of an order, left and right of the first and last 
 _BELOW_LEAST, _ABOVE_MOST = 0.7, 1.5  # the error axis over its data
 _LEAST_BAR: Final = 0.01  # of its height: a shorter error bar is hidden by its mark
 _ERROR_MARGIN: Final = 0.15  # of the spread of the errors along the walk
-_MANY_POINTS: Final = 600  # are drawn as smaller dots
 _WIDE, _WIDE_HIGH = 1064, 220  # of the drawing, px
 
 
@@ -57,18 +56,13 @@ def draw_loop(evaluation: Evaluation) -> Drawing:
         Axis(*spread(ladder.force_n.tolist()), "force (N)"),
         "Force against command, measured and model",
     )
-    for way, name in _WAYS:
-        mask = ladder.direction == way
-        style = f"{name} {_dot_size(int(mask.sum()))}".strip()
-        chart.dots(ladder.voltage_v[mask].tolist(), ladder.force_n[mask].tolist(), style, f"measured, {name}")
     model = spell_model(result.model, result.order)
     for curve, name in ((rising, "rising"), (falling, "falling")):
         chart.line(volts.tolist(), np.asarray(curve.value(volts)).tolist(), name, f"{model}, {name}")
+    for way, name in _WAYS:
+        mask = ladder.direction == way
+        chart.points(ladder.voltage_v[mask].tolist(), ladder.force_n[mask].tolist(), name, f"measured, {name}")
     return drawing(chart, _describe_gap(rising, falling, volts))
-
-
-def _dot_size(count: int) -> str:
-    return "many" if count > _MANY_POINTS else ""
 
 
 def _describe_gap(rising: RationalBezier, falling: RationalBezier, volts: Floats) -> str:
@@ -89,8 +83,7 @@ def draw_residuals(evaluation: Evaluation) -> Drawing:
     chart.level(0.0)
     for way, name in _WAYS:
         mask = ladder.direction == way
-        style = f"{name} {_dot_size(int(mask.sum()))}".strip()
-        chart.dots(ladder.voltage_v[mask].tolist(), left_n[mask].tolist(), style, name)
+        chart.points(ladder.voltage_v[mask].tolist(), left_n[mask].tolist(), name, name)
     worst = int(np.argmax(np.abs(left_n)))
     side = dict(_WAYS)[int(ladder.direction[worst])]
     volts, error = float(ladder.voltage_v[worst]), _signed(float(left_n[worst]))
@@ -118,7 +111,11 @@ def draw_order_sweep(document: Document) -> Drawing:
         line = list(same)
         chart.line([fit["order"] for fit in line], [fit["heldout_rms_n"] for fit in line], model, model.upper())
         _draw_marks(chart, line, model)
-    return drawing(chart)
+    chosen = document["chosen"]
+    named = f"Chosen: {spell_model(chosen['model'], chosen['order'])}"
+    return drawing(
+        chart, f"{named}, held to what may drive a plant: no mark here." if chosen["constrained"] else f"{named}."
+    )
 
 
 def _draw_marks(chart: Chart, fits: list[Document], model: str) -> None:

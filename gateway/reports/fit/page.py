@@ -24,7 +24,7 @@ def fit_page(evaluation: Evaluation, document: Document, raw: RawLadder | None =
             figure(
                 "Hysteresis loop",
                 charts.draw_loop(evaluation),
-                "Dots: settled readings, one for each stair. Lines: the two branches of the chosen model.",
+                "Rings: settled readings, one for each stair. Lines: the two branches of the chosen model.",
             ),
             figure("Residuals", charts.draw_residuals(evaluation), "Measured minus model at each stair."),
         ),
@@ -65,7 +65,7 @@ def _head(document: Document) -> Head:
         facts=(
             f"rig {document['rig']}" if document["rig"] else "unnamed rig",
             name,
-            f"{ladder['points']} stairs in {ladder['groups']} groups, {low_v:g} to {high_v:g} V",
+            f"{ladder['points']} stairs in {ladder['groups']} group{'s' * (ladder['groups'] > 1)}, {low_v:g} to {high_v:g} V",
         ),
         title=f"{document['name']} · {number or 'fit of ' + name}",
     )

@@ -23,7 +23,11 @@ def verdicts(study: Study) -> list[Verdict]:
     return [line for part in parts for line in part(study)] + [judge_roughness()]
 
 
-def counts(lines: Sequence[Verdict]) -> str:
+def numbers(lines: Sequence[Verdict]) -> dict[str, int]:
     """Return how many of each word there are."""
-    numbers = {word: sum(line.verdict == word for line in lines) for word in (YES, NO, OUTSIDE)}
-    return ", ".join(f"{number} {word}" for word, number in numbers.items())
+    return {word: sum(line.verdict == word for line in lines) for word in (YES, NO, OUTSIDE)}
+
+
+def counts(lines: Sequence[Verdict]) -> str:
+    """Return how many of each word there are, as text."""
+    return ", ".join(f"{number} {word}" for word, number in numbers(lines).items())
