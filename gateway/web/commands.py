@@ -1,0 +1,194 @@
+"""What the page may do to the force: Modbus requests of the master `web`, checked, owned and audited as any other's.
+
+A rig with a lease wants a heartbeat. The browser that commands says once a second that it is there; while it does, this process
+changes the heartbeat register four times in a lease. When the browser goes (closed, asleep, off the network), the beat ends
+within GRACE_S and the lease does its work: no force is held for nobody. A reload within that time loses nothing.
+
+Disabling is granted to every master, whoever owns the setpoint, and to nobody else's harm: that is what `stop` is.
+"""
+
+import asyncio
+import contextlib
+import struct
+import time
+from collections.abc import Callable
+from math import isfinite
+from typing import Any, Final
+
+from gateway.modbus import pdu as P  # noqa: N812
+from gateway.registers.map.register_map import Register
+from gateway.registers.words import ControlBit
+from gateway.web.context import WebContext
+
+GRACE_S: Final = 2.5
+_BEATS_PER_LEASE: Final = 4.0
+_MOST_WORDS: Final = 120
+_PROOF: Final = 1234.5
+Words = dict[str, list[int]]
+
+
+class RefusedCommand(ValueError):  # noqa: N818  reads as what it is
+    """The gateway refused; the sentence is its own."""
+
+
+class Commands:
+    """clock: monotonic seconds. commander: the browser that enabled last, empty for none."""
+
+    def __init__(self, context: WebContext, clock: Callable[[], float] = time.monotonic) -> None:
+        self.commander = ""
+        self._context, self._clock = context, clock
+        self._seen_s = -GRACE_S
+        self._present: set[str] = set()
+        self._beat: asyncio.Task[None] | None = None
+        self._number = 0
+
+    # -- who is there
+
+    def join(self, viewer: str) -> None:
+        """Note that a browser has opened the stream of events."""
+        self._present.add(viewer)
+        self.note_alive(viewer)
+
+    def leave(self, viewer: str) -> None:
+        """Note that a browser's last stream has ended."""
+        self._present.discard(viewer)
+
+    def note_alive(self, viewer: str) -> None:
+        """Note that a browser has said that it is there."""
+        if viewer and viewer == self.commander and viewer in self._present:
+            self._seen_s = self._clock()
+
+    @property
+    def is_attended(self) -> bool:
+        """Decide whether the browser that commands is still there."""
+        return self._clock() - self._seen_s < GRACE_S
+
+    # -- what it wants
+
+    async def enable(self, viewer: str, force_n: float) -> None:
+        """Enable, with this setpoint. RefusedCommand says why not."""
+        self._begin_to_beat(viewer)
+        if self._context.profile.network.require_byte_order_echo:
+            await self._write("byte_order_echo@proof", _PROOF)
+        word = await self._control_word() | ControlBit.ENABLE
+        await self._write_command(word, self._checked(force_n))
+
+    async def set_force(self, viewer: str, force_n: float) -> None:
+        """Change the setpoint, N."""
+        self._begin_to_beat(viewer)
+        await self._write("force_setpoint", self._checked(force_n))
+
+    async def stop(self) -> None:
+        """Switch the output off, whoever owns the setpoint; ends a run, too. The safe voltage is out before the answer."""
+        self._end_beat()
+        self.commander = ""
+        await self._write("control_word", 0)
+
+    async def take_ownership(self, viewer: str) -> None:
+        """Take the setpoint over from whoever owns it."""
+        self._begin_to_beat(viewer)
+        await self._set_bit(ControlBit.TAKE_OWNERSHIP)
+
+    async def reset(self, viewer: str) -> None:
+        """Reset a latched fault: with setpoint 0, disabled, and a fresh heartbeat."""
+        self._begin_to_beat(viewer)
+        await self.beat_once()
+        await self._write_command(int(ControlBit.RESET_FAULT), 0.0)
+
+    async def tare(self) -> None:
+        """Take the force that rests on the cell now as 0."""
+        await self._set_bit(ControlBit.TARE)
+
+    async def beat_once(self) -> None:
+        """Change the heartbeat register."""
+        self._number = self._number % 65535 + 1
+        await self._write("heartbeat", self._number)
+
+    async def words(self, block: str) -> list[int]:
+        """Return the registers of a block as they are now."""
+        place = self._context.profile.register_map.block(block)
+        words: list[int] = []
+        for first in range(place.first, place.last + 1, _MOST_WORDS):
+            count = min(_MOST_WORDS, place.last + 1 - first)
+            answer = await self._send(P.read_request(P.READ_HOLDING_REGISTERS, first, count))
+            words += struct.unpack(f">{count}H", answer[2:])
+        return words
+
+    async def close(self) -> None:
+        """End the heartbeat."""
+        beat, self._beat = self._beat, None
+        if beat:
+            beat.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await beat
+
+    # -- as requests
+
+    def _checked(self, force_n: float) -> float:
+        if not isfinite(force_n):
+            raise RefusedCommand("a force in newtons is expected")
+        return force_n
+
+    async def _control_word(self) -> int:
+        word = int.from_bytes(await self._read("control_word"), "big")
+        return word & ~(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
+
+    async def _write_command(self, control_word: int, force_n: float) -> None:
+        """Word and setpoint in one write: control decides about both together."""
+        word, force = self._find("control_word"), self._find("force_setpoint")
+        if force.address != word.address + 1:
+            raise RefusedCommand("this register map has the setpoint elsewhere than behind the control word")
+        data = word.encode(control_word) + self._encode(force, force_n)
+        await self._send(P.write_registers_request(word.address, data))
+
+    async def _set_bit(self, bit: ControlBit) -> None:
+        address = self._find("control_word").address
+        await self._send(P.mask_write_request(address, 0xFFFF & ~int(bit), int(bit)))
+
+    async def _read(self, name: str) -> bytes:
+        register = self._find(name)
+        return (await self._send(P.read_request(P.READ_HOLDING_REGISTERS, register.address, register.words)))[2:]
+
+    async def _write(self, name: str, value: float) -> None:
+        register = self._find(name)
+        await self._send(P.write_registers_request(register.address, self._encode(register, value)))
+
+    def _encode(self, register: Register, value: float) -> bytes:
+        try:
+            return register.encode(value)
+        except (ValueError, OverflowError, struct.error):
+            raise RefusedCommand(
+                f"{register.name} = {value:g} {register.unit}: {register.minimum:g} .. {register.maximum:g} can be sent"
+            ) from None
+
+    def _find(self, name: str) -> Register:
+        return self._context.profile.register_map.find(name)
+
+    async def _send(self, pdu: bytes) -> bytes:
+        unit = self._context.profile.network.units[0]
+        request: dict[str, Any] = {"do": "modbus", "via": "web", "unit": unit, "pdu": pdu.hex()}
+        answer = bytes.fromhex((await self._context.control.ask(request))["pdu"])
+        if answer[0] & 0x80:
+            told = await self._context.control.ask({"do": "last-refusal"})
+            raise RefusedCommand(str(told["sentence"]) or f"refused with exception {answer[1]:02d}")
+        return answer
+
+    # -- the lease
+
+    def _begin_to_beat(self, viewer: str) -> None:
+        self.commander = viewer
+        self._seen_s = self._clock()
+        lease_s = self._context.profile.control.supervision.lease_s
+        if lease_s is not None and (self._beat is None or self._beat.done()):
+            self._beat = asyncio.create_task(self._keep_beating(lease_s / _BEATS_PER_LEASE))
+
+    def _end_beat(self) -> None:
+        if self._beat:
+            self._beat.cancel()
+            self._beat = None
+
+    async def _keep_beating(self, every_s: float) -> None:
+        while self.is_attended:
+            with contextlib.suppress(OSError, ValueError):  # a restarted control is off; another owner says so
+                await self.beat_once()
+            await asyncio.sleep(every_s)

@@ -1,0 +1,36 @@
+"""What the page's parts share: where the gateway keeps its state, which rig it runs, and the way to it."""
+
+import asyncio
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from gateway.live.control_link import ControlLink
+from gateway.profiles import Rig, load_rig
+
+
+@dataclass
+class WebContext:
+    """state: directory; rig: name or file, as `run` was given it; simulated: its devices are; control: the way to control's
+    socket, for questions and commands. jobs: long work that a tab has begun, by a name of its own; it outlives a reload, and
+    `tasks` keeps what must not be collected while it runs."""
+
+    state: Path
+    rig: str
+    simulated: bool
+    control: ControlLink
+    jobs: dict[str, Any] = field(default_factory=dict)
+    tasks: set["asyncio.Task[Any]"] = field(default_factory=set)
+
+    @cached_property
+    def profile(self) -> Rig:
+        """The rig as its files say; read once, when it is first needed."""
+        return load_rig(self.rig, simulated=self.simulated)
+
+    def begin(self, work: Any) -> "asyncio.Task[Any]":
+        """Run a coroutine beside the requests, and keep it until it has ended."""
+        task: asyncio.Task[Any] = asyncio.create_task(work)
+        self.tasks.add(task)
+        task.add_done_callback(self.tasks.discard)
+        return task

@@ -1,0 +1,184 @@
+"""Who may use the page: checks that stand before every route.
+
+Decisions
+- Host: an address or `localhost` (the machine's own name, too, where a token is asked for). A name that an attacker points at
+  this machine (DNS rebinding) is none of these.
+- Whatever changes something is POST, must come from the page's own origin where a browser names one, and carries the session's
+  CSRF token in a header, which no foreign page can read or set.
+- The session is a cookie that scripts cannot read and other sites cannot send. With a token configured it exists after a
+  login only; tools send `Authorization: Bearer TOKEN` instead, which needs no CSRF token because no browser adds it by itself.
+- A failed login costs a second, one at a time: a token of 16 characters is not guessed.
+"""
+
+import asyncio
+import hmac
+import secrets
+from dataclasses import dataclass, field
+from hashlib import sha256
+from ipaddress import ip_address
+from socket import gethostname
+from typing import Final
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+CSRF_HEADER: Final = "x-csrf-token"
+LONGEST_BODY: Final = 1 << 16
+_OPEN: Final = ("/login", "/healthz", "/static/style.css", "/static/page.css", "/static/login.js")
+"""Reached without a session: what the login itself needs."""
+_FAILED_LOGIN_S: Final = 1.0
+_SAFE_METHODS: Final = ("GET", "HEAD")
+HEADERS: Final = {
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; frame-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'self'",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "SAMEORIGIN",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-store",
+}
+"""Sent with each answer, unless its route says otherwise."""
+
+
+@dataclass
+class Door:
+    """The rules of one page. host, port: where it listens; token: what a browser must know, None on loopback alone."""
+
+    host: str
+    port: int
+    token: str | None = None
+    key: bytes = field(default_factory=lambda: secrets.token_bytes(32))
+    login_turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    @property
+    def cookie(self) -> str:
+        """Name of the session's cookie: ports of one host share their cookies."""
+        return f"force_gateway_{self.port}"
+
+    def new_session(self) -> str:
+        """Return a session that this process knows as its own."""
+        name = secrets.token_urlsafe(18)
+        return f"{name}.{self._sign('session', name)}"
+
+    def is_session(self, value: str) -> bool:
+        """Decide whether a cookie is one of ours."""
+        name, _, signature = value.partition(".")
+        return hmac.compare_digest(signature.encode(), self._sign("session", name).encode())
+
+    def csrf_token(self, session: str) -> str:
+        """Return the token that a session's commands must carry."""
+        return self._sign("csrf", session)
+
+    def is_token(self, given: str) -> bool:
+        """Decide whether this is the page's token."""
+        return self.token is not None and hmac.compare_digest(given.encode(), self.token.encode())
+
+    def admits_host(self, host: str) -> bool:
+        """Decide whether a Host header names this machine in a way that no foreign name can."""
+        bare = host.rpartition(":")[0] if host.rpartition(":")[2].isdecimal() and not host.endswith("]") else host
+        bare = bare.removeprefix("[").removesuffix("]").lower()
+        if bare == "localhost" or (self.token is not None and bare == gethostname().lower()):
+            return True
+        try:
+            return ip_address(bare).is_loopback or self.token is not None
+        except ValueError:
+            return False
+
+    def _sign(self, purpose: str, text: str) -> str:
+        return hmac.new(self.key, f"{purpose} {text}".encode(), sha256).hexdigest()
+
+
+class Guard:
+    """ASGI middleware: lets a request through to the routes, or answers why not."""
+
+    def __init__(self, app: ASGIApp, door: Door) -> None:
+        self._app, self._door = app, door
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Check one request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        request = Request(scope)
+        refusal = self._refusal(request)
+        await (refusal or self._app)(scope, receive, send_with_headers)
+
+    def _refusal(self, request: Request) -> Response | None:
+        """Return why a request is not let through, None where it is."""
+        door, headers, path = self._door, request.headers, request.url.path
+        if not door.admits_host(headers.get("host", "")):
+            return refuse(403, "this page answers to its address only, not to the name in the address bar")
+        if headers.get("sec-fetch-site") == "cross-site" and path not in ("/", "/login"):
+            return refuse(403, "another site asked for this")
+        is_bearer = door.is_token(headers.get("authorization", "").removeprefix("Bearer "))
+        session = request.cookies.get(door.cookie, "")
+        has_session = door.is_session(session)
+        if door.token is not None and not (is_bearer or has_session) and path not in _OPEN:
+            return RedirectResponse("/login", 303) if path == "/" else refuse(401, "log in first: /login", "login")
+        if request.method in _SAFE_METHODS:
+            return None
+        if not _is_small(headers):
+            return refuse(413, f"a request has at most {LONGEST_BODY} bytes")
+        if not _is_own_origin(headers):
+            return refuse(403, "another site sent this command")
+        if is_bearer or path == "/login":
+            return None
+        if has_session and hmac.compare_digest(headers.get(CSRF_HEADER, ""), door.csrf_token(session)):
+            return None
+        return refuse(403, "the session is over: reload the page", "session")
+
+
+async def session(request: Request) -> Response:
+    """Return the token that commands carry, and begin a session where there is none yet."""
+    door: Door = request.app.state.door
+    value = request.cookies.get(door.cookie, "")
+    is_new = not door.is_session(value)
+    value = door.new_session() if is_new else value
+    response = JSONResponse({"csrf": door.csrf_token(value)})
+    if is_new:
+        _set_session(response, door, value)
+    return response
+
+
+async def login(request: Request) -> Response:
+    """Take the token of a form; begin a session where it is right."""
+    door: Door = request.app.state.door
+    given = (await request.body()).decode("utf-8", "replace").strip()
+    if not door.is_token(given):
+        async with door.login_turn:
+            await asyncio.sleep(_FAILED_LOGIN_S)
+        return refuse(401, "that is not the token; it stands in the rig file under web.token")
+    response = JSONResponse({"ok": True})
+    _set_session(response, door, door.new_session())
+    return response
+
+
+def refuse(status: int, sentence: str, reason: str = "") -> JSONResponse:
+    """Return an answer that says why not. reason: one word for the page's script, where it can do something about it."""
+    return JSONResponse({"error": sentence, "reason": reason}, status)
+
+
+def _set_session(response: Response, door: Door, value: str) -> None:
+    response.set_cookie(door.cookie, value, httponly=True, samesite="strict", path="/")
+
+
+def _is_small(headers: Headers) -> bool:
+    length = headers.get("content-length", "")
+    return length.isdecimal() and int(length) <= LONGEST_BODY
+
+
+def _is_own_origin(headers: Headers) -> bool:
+    """A browser names the origin of whatever changes something; a tool names none."""
+    origin = headers.get("origin")
+    return origin is None or origin in (f"http://{headers.get('host')}", f"https://{headers.get('host')}")

@@ -1,0 +1,91 @@
+// The way to the gateway: requests with the session's token, and one stream of events that all parts of the page share.
+//
+//   api.get(path)            the answer's JSON; an Error with the gateway's sentence where it refuses
+//   api.post(path, body)     the same for what changes something; the CSRF token goes with it
+//   api.on(name, listener)   `state` (twice a second), `samples`, `history`, `note`, `gone`, `open`; returns a function that ends it
+//   api.last(name)           what came last under that name, or undefined
+//   api.say(sentence)        tells the user, and a screen reader
+
+const listeners = new Map();
+const latest = new Map();
+let csrf = "";
+
+export const viewer = (() => {
+  // of this browser tab: a reload keeps it, and with it the command
+  let name = sessionStorage.getItem("viewer");
+  if (!name) {
+    name = Array.from(crypto.getRandomValues(new Uint8Array(12)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+    sessionStorage.setItem("viewer", name);
+  }
+  return name;
+})();
+
+async function beginSession() {
+  const answer = await fetch("/api/v1/session");
+  if (answer.status === 401) location.assign("/login");
+  csrf = (await answer.json()).csrf;
+}
+
+async function request(path, options) {
+  const answer = await fetch(path, options);
+  const kind = answer.headers.get("content-type") || "";
+  const body = kind.includes("json") ? await answer.json() : await answer.text();
+  if (answer.ok) return body;
+  if (answer.status === 401 && body.reason === "login") location.assign("/login");
+  const error = new Error(body.error || `the gateway answered ${answer.status}`);
+  error.reason = body.reason;
+  error.status = answer.status;
+  throw error;
+}
+
+async function post(path, body) {
+  const send = () =>
+    request(path, {
+      method: "POST",
+      headers: { "content-type": "application/json", "x-csrf-token": csrf, "x-viewer": viewer },
+      body: JSON.stringify(body ?? {}),
+    });
+  if (!csrf) await beginSession();
+  try {
+    return await send();
+  } catch (error) {
+    if (error.reason !== "session") throw error;
+    await beginSession(); // the page's process has been started anew
+    return send();
+  }
+}
+
+export function tell(name, data) {
+  latest.set(name, data);
+  for (const listener of listeners.get(name) ?? []) listener(data);
+}
+
+export function listen() {
+  const source = new EventSource(`/events?viewer=${viewer}`);
+  for (const name of ["history", "samples", "state", "note", "gone"]) {
+    source.addEventListener(name, (event) => tell(name, JSON.parse(event.data)));
+  }
+  source.onopen = () => tell("open", true);
+  source.onerror = () => {
+    tell("gone", { sentence: "The page has lost the gateway; it tries again by itself. What you see is old." });
+    if (source.readyState === EventSource.CLOSED) setTimeout(listen, 2000);
+  };
+}
+
+export const api = {
+  get: (path) => request(path),
+  post,
+  viewer,
+  on(name, listener) {
+    if (!listeners.has(name)) listeners.set(name, new Set());
+    listeners.get(name).add(listener);
+    if (name === "state" && latest.has(name)) listener(latest.get(name));
+    return () => listeners.get(name).delete(listener);
+  },
+  last: (name) => latest.get(name),
+  say(sentence, isBad = false) {
+    const said = document.getElementById("said");
+    said.textContent = sentence;
+    said.classList.toggle("bad-text", isBad);
+  },
+};

@@ -1,0 +1,90 @@
+// The page's frame: header, Stop force, tabs. Each tab is a module of static/tabs with `mount(element, api)`, loaded when it is
+// first opened; its element gets the events `shown` and `hidden` after that.
+
+import { api, listen } from "./api.js";
+
+const NAMES = ["live", "calibrate", "recordings", "calibrations", "diagnosis", "wiring", "configuration"];
+const BADGES = { fault: "bad", holding: "good", ramping: "warn", calibrating: "warn", ready: "good" };
+const mounted = new Set();
+const at = (id) => document.getElementById(id);
+let aliveAt = 0;
+
+function ageInWords(seconds) {
+  if (seconds === null || seconds === undefined) return "";
+  const steps = [[86400 * 2, 86400, "days"], [3600 * 2, 3600, "h"], [120, 60, "min"], [0, 1, "s"]];
+  const [, unit, name] = steps.find(([least]) => seconds >= least);
+  return `${Math.floor(seconds / unit)} ${name}`;
+}
+
+function showState(state) {
+  at("gone").hidden = true;
+  at("rig").textContent = state.rig + (state.simulated ? " (simulated)" : "");
+  document.title = `${state.state} · ${state.rig} · force-gateway`;
+  const badge = at("state");
+  if (badge.textContent !== state.state) badge.textContent = state.state; // a screen reader says it once
+  badge.className = `badge ${BADGES[state.state] ?? ""}`;
+  const age = ageInWords(state.calibration.age_s);
+  at("calibration").textContent =
+    `${state.calibration.number} ${state.calibration.name}, ${state.calibration.kind}` + (age ? `, ${age} old` : "");
+  at("owner").textContent = state.owner === "web" ? (state.commander === api.viewer ? "you" : "another page") : state.owner ?? "nobody";
+  at("masters").textContent = state.peers.length;
+  at("viewers").textContent = state.viewers;
+  at("recording").hidden = !state.recording.on;
+  at("version").textContent = `force-gateway ${state.version}`;
+  if (state.commander === api.viewer && performance.now() - aliveAt > 900) {
+    aliveAt = performance.now(); // driven by events, not by a timer: a tab in the background has slow timers
+    api.post("/api/v1/alive").catch(() => {});
+  }
+}
+
+async function stopForce() {
+  try {
+    await api.post("/api/v1/command/stop");
+    api.say("Stopped: the safe voltage is out.");
+  } catch (error) {
+    api.say(`Not stopped from here: ${error.message}. Use the emergency stop.`, true);
+  }
+}
+
+async function openTab() {
+  const name = NAMES.includes(location.hash.slice(1)) ? location.hash.slice(1) : "live";
+  for (const other of NAMES) {
+    const element = at(`tab-${other}`);
+    if (!element.hidden && other !== name) element.dispatchEvent(new Event("hidden"));
+    element.hidden = other !== name;
+    const link = document.querySelector(`#tabs a[href="#${other}"]`);
+    if (other === name) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  const element = at(`tab-${name}`);
+  if (!mounted.has(name)) {
+    mounted.add(name);
+    try {
+      (await import(`./tabs/${name}.js`)).mount(element, api);
+    } catch (error) {
+      mounted.delete(name);
+      element.textContent = `This section could not be loaded: ${error.message}`;
+    }
+  }
+  element.dispatchEvent(new Event("shown"));
+}
+
+at("stop").addEventListener("click", stopForce);
+document.addEventListener(
+  "keydown",
+  (event) => {
+    if (event.key === "Escape" && !event.repeat) stopForce(); // types nothing anywhere, so it may mean this everywhere
+  },
+  true,
+);
+api.on("state", showState);
+api.on("gone", ({ sentence }) => {
+  at("gone").textContent = sentence;
+  at("gone").hidden = false;
+});
+addEventListener("hashchange", () => {
+  openTab();
+  at("main").focus({ preventScroll: true });
+});
+openTab();
+listen();

@@ -1,0 +1,69 @@
+"""The page as a process: `python -m gateway.web.web_process LINK '{"rig": ..., "state": ..., "listen": descriptor, ...}'`.
+
+It shares with control nothing but the sample ring, which it can only read, and control's socket: all its callers have a
+tenth of that loop. Its priority is below control's; it ends with the guardian, and one that dies is started again on the same
+listening socket, which the guardian keeps.
+"""
+
+import asyncio
+import contextlib
+import json
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from gateway.extras import MissingExtraError
+from gateway.processes import exit_codes
+from gateway.processes.beside_control import exit_with_guardian, serve_behind_control
+
+
+async def serve(options: dict[str, Any]) -> None:
+    """Serve the page until the process ends. options: as the guardian gives them."""
+    import uvicorn
+
+    from gateway.live.control_link import ControlLink
+    from gateway.live.ring_rows import RingRows
+    from gateway.web.context import WebContext
+    from gateway.web.security import Door
+    from gateway.web.server import make_app
+
+    class QuietServer(uvicorn.Server):
+        """A signal ends the process at once: open streams never end by themselves."""
+
+        @contextlib.contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            yield
+
+    state = Path(options["state"])
+    context = WebContext(state, options["rig"], options["simulated"], ControlLink(state))
+    web = context.profile.web
+    door = Door(options["settings"]["host"], options["settings"]["port"], web.token if web else None)
+    rows = None if options["ring"] is None else RingRows(options["ring"])
+    config = uvicorn.Config(
+        make_app(context, door, rows),
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        date_header=False,
+        ws="none",
+        limit_concurrency=256,
+        timeout_keep_alive=30,
+    )
+    await QuietServer(config).serve(sockets=[socket.socket(fileno=options["listen"])])
+
+
+def main(arguments: list[str]) -> int:
+    """Serve until the guardian ends. arguments: descriptor of the link, options as JSON."""
+    serve_behind_control()
+    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
+    try:
+        asyncio.run(serve(json.loads(arguments[1])))
+    except MissingExtraError as missing:
+        sys.stderr.write(f"{missing}\n")
+    return exit_codes.DEVICE
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
