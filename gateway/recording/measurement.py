@@ -13,7 +13,7 @@ import numpy as np
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.recording.errors import RecordingError
 from gateway.recording.reader import Recording
-from gateway.recording.tables.column_mapping import EXAMPLE, join_names, quantity_of
+from gateway.recording.tables.column_mapping import EXAMPLE, join_names
 from gateway.recording.tables.column_names import SENT
 from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
 from gateway.recording.tables.even_rows import resample_evenly
@@ -72,26 +72,10 @@ def _check_columns(recording: Recording) -> None:
     if missing:
         raise RecordingError(
             f"{recording.path}: no column {' and no column '.join(missing)}; there: {join_names(list(names))}."
-            f"{_suggest_columns(recording, missing)} Say which is which: {EXAMPLE}"
+            f" {recording.suggestion or f'Say which is which: {EXAMPLE}'}"
         )
     if recording.rows < FEWEST_ROWS:
         raise RecordingError(f"{recording.path}: {recording.rows} rows: {_NEEDED}")
-
-
-def _suggest_columns(recording: Recording, missing: list[str]) -> str:
-    """Return a hint to columns that have the name in another unit: time_ms for time_s."""
-    wanted = {name.split(" ")[0] for name in missing} | (
-        {"pressure_kpa"} if "command_v (or pressure_kpa)" in missing else set()
-    )
-    near = []
-    for name in recording.columns:
-        match = quantity_of(name)
-        for target in sorted(wanted):
-            quantity = quantity_of(target)
-            stem = target.removesuffix(f"_{quantity[1]}") if quantity else target
-            if match and quantity and match[0] == quantity[0] and name.lower() == f"{stem}_{match[1]}":
-                near.append(f"{target}={name}:{match[1]}")
-    return f" Meant is probably --columns {','.join(near)}." if near else ""
 
 
 def _replace_absurd(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list[str]]:

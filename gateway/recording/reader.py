@@ -28,7 +28,7 @@ class Recording:
     """One recording: header as written, one float64 array per column, all of length rows.
 
     truncated: bytes were dropped, `notes` says which; a gap in the middle shows in time_s. lines: in a text file, the
-    line that each row stood on.
+    line that each row stood on. suggestion: the `--columns` that is probably meant where the headers are not ours.
     """
 
     path: Path
@@ -38,6 +38,7 @@ class Recording:
     truncated: bool
     notes: tuple[str, ...] = ()
     lines: "Sequence[int] | NDArray[np.int64] | None" = None
+    suggestion: str = ""
 
     def place(self, row: int) -> str:
         """Return where a row (from 0) stands, for messages: `file:line`, or the number of the row where there are no lines."""

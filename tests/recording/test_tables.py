@@ -125,10 +125,18 @@ def test_what_cannot_be_read_is_told_by_row_and_column(text: str, words: str, tm
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"\xb0C;N\n1;2\n", "no UTF-8"),
-        ("time_s,force_n\n0,1\n".encode("utf-16"), "UTF-16"),
         (gzip.compress(b"time_s,force_n\n", mtime=0), "gzip"),
-        (b"PK\x03\x04\x14\x00\x06\x00", "Excel"),
+        (b"PK\x03\x04\x14\x00\x06\x00", "damaged Excel workbook or zip file"),
+        (b"\x89PNG\r\n\x1a\n\x00", "is a PNG picture, not a recording (.fgr, CSV, Parquet or .xlsx)"),
+        (
+            b"TDSm\x0e\x00\x00\x00",
+            "TDMS file (LabVIEW, DIAdem), not a recording (.fgr, CSV, Parquet or .xlsx): export it",
+        ),
+        (b'{"verdict": "known"}', "is a JSON document, not a recording"),
+        (
+            b"MATLAB 5.0 MAT-file",
+            "MATLAB file (.mat), not a recording (.fgr, CSV, Parquet or .xlsx): in MATLAB: writetable",
+        ),
         (b"\x00\x01\x02\x03\n", "no text"),
         (b"PAR1 and nothing more", "damaged Parquet"),
         (b"\x89FGR1\r\n\n", "ends inside its header"),
@@ -262,7 +270,7 @@ def test_parquet_of_others_is_read_by_what_its_columns_are(tmp_path: Path) -> No
     np.testing.assert_array_equal(recording.columns["force_n"], [1000.0, np.nan])
     np.testing.assert_array_equal(recording.columns["on"], [1.0, 0.0])
     assert recording.notes == ("columns that hold no numbers: who",)
-    assert recording.header == {"rig": "cell 4"}
+    assert recording.header == {"rig": "cell 4", "force_unit": "N"}
     assert recording.place(1) == f"{path}, row 2"
     with pytest.raises(RecordingError, match="column force_n holds string, not numbers"):
         read_table(path, ColumnMapping.parse("force_n=who"))

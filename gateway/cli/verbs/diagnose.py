@@ -15,6 +15,7 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
+from gateway.cli.table_options import table_options
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class _Finite(click.FloatRange):
 @click.option(
     "--plan", "plan_file", type=_OUTPUT, metavar="PLAN.yaml", help="Write what to record next, for calibrate --plan."
 )
-@click.option("--columns", metavar="MAP", help="time_s=1:ms,force_n=7:n for foreign tables, or a YAML file.")
+@table_options
 @click.option("--fail-on", type=click.Choice(list(_FAILS)), help="Exit 1 on this verdict or a worse one.")
 @click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory, for numbers.")
 @click.option(

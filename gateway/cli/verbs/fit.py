@@ -11,6 +11,7 @@ from gateway.cli.command_line.completion_words import complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import json_option, name_option, state_directory
+from gateway.cli.table_options import table_options
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
     show_default=True,
     help="What to do.",
 )
-@click.option("--columns", metavar="MAP", help="time_s=1:ms,command_v=2,force_n=3:kgf, or a YAML file of such lines.")
+@table_options
 @click.option("--force-unit", metavar="UNIT", help="What the force is in (N, kgf, gf, lbf), if the table does not say.")
 @click.option(
     "--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML report; default beside the recording."
@@ -97,7 +98,7 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     """Return the fit; whatever is wrong with the data ends with exit code 65."""
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
-    from gateway.bsfm.ladder.ladder_error import LadderError
+    from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
     from gateway.recording.tables.mapping_file import column_mapping
     from gateway.service.fitting.ladder_fit import fit_recording
     from gateway.service.fitting.ladder_source import RigContext, find_source, read_source
@@ -111,10 +112,12 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
         models=models, orders=options["orders"], ties=Ties(options["ties"]), outliers=options["outliers"]
     )
     background = RigContext(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
+    recording = read_source(path, mapping)
     try:
-        return fit_recording(read_source(path, mapping), question, background, options["name"] or "")
+        return fit_recording(recording, question, background, options["name"] or "")
     except LadderError as error:
-        raise CliError(f"E421 {path}: {error}", exit_codes.DATA) from None
+        hint = f" {recording.suggestion}" if error.flaw is LadderFlaw.COLUMNS and recording.suggestion else ""
+        raise CliError(f"E421 {path}: {error}{hint}", exit_codes.DATA) from None
 
 
 def _beside(path: Path) -> Path:

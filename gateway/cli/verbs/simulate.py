@@ -9,6 +9,7 @@ import click
 from gateway.cli.command_line.completion_words import complete_plant_files, complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.options import json_option
+from gateway.cli.table_options import table_options
 
 if TYPE_CHECKING:
     from gateway.cli.diagnosis.inputs import Sources
@@ -34,7 +35,7 @@ _MOST_STEPS: Final = 2_000_000  # one plant alone may have many
     shell_complete=complete_plant_files,
     help="The plant to run, such as diagnose --extend writes; default the rig's.",
 )
-@click.option("--columns", metavar="MAP", help="time_s=1:ms,force_n=7:n for foreign tables, or a YAML file.")
+@table_options
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False), help="Write the simulated series.")
 @click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory, for numbers.")
 @json_option

@@ -1,8 +1,9 @@
-"""Any recording that a user may have, by its first bytes: our own format, Parquet, else CSV."""
+"""Any recording that a user may have, by its first bytes: our own format, Parquet, a workbook, else a table of text."""
 
 from pathlib import Path
 
 from gateway.recording.errors import RecordingError
+from gateway.recording.foreign.table_text import ZIP, refuse_other_kinds
 from gateway.recording.layout import MAGIC
 from gateway.recording.reader import Recording, read_recording
 from gateway.recording.tables.column_mapping import ColumnMapping, select_columns
@@ -27,6 +28,8 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
         return read_parquet(path, mapping)
     if not start:
         raise RecordingError(f"{path} is empty")
+    if not start.startswith(ZIP):
+        refuse_other_kinds(path)
     return read_csv(path, mapping, lenient=lenient)
 
 

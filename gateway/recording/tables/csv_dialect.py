@@ -1,37 +1,44 @@
-"""What kind of CSV this is, from its first lines: facts, separator, decimal sign, header or none, which columns are words.
+"""What kind of table of text this is, from its first lines: facts, separator, decimal sign, header, units, which are words.
 
 A tab is never part of a number, a semicolon hardly; so they are taken for the separator before the comma is, and then a
-comma inside a cell is a decimal one.
+comma inside a cell is a decimal one. Spaces separate where nothing else does. Lines before the header that have fewer cells
+(a title, who measured) are left out, and told; a row of units below the header belongs to it.
 """
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, TextIO
 
 from gateway.recording.errors import RecordingError
+from gateway.recording.foreign.headers import TableHeaders
+from gateway.recording.foreign.time_stamps import is_ambiguous_date, parse_stamp
+from gateway.recording.foreign.unit_names import is_unit
 
 MISSING: Final = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
 """What stands, in lower case, where no number was taken."""
+MOST_COLUMNS: Final = 4096
+LONGEST_LINE: Final = 1 << 20
 _SAMPLE_LINES: Final = 200
+_MOST_TITLE_LINES: Final = 60
 _DECIMAL_COMMA: Final = re.compile(r"\d,\d")
+_QUOTED_DECIMAL_COMMA: Final = re.compile(r'"\s*[-+]?\d+,\d+(?:[eE][-+]?\d+)?\s*"')
+_DECIMAL_POINT: Final = re.compile(r"(?<![\d.:])\d+\.\d+(?![\d.])")
+_QUOTED: Final = re.compile(r'"[^"]*"')
+_NAMED_SEPARATOR: Final = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0e-\x1f]")
-_OTHER_FORMATS: Final = (
-    (b"PK\x03\x04", "an Excel or zip file: save the sheet as CSV"),
-    (b"\x1f\x8b", "a gzip file: unpack it first"),
-    (b"\xff\xfe", "UTF-16 text: save it as UTF-8"),
-    (b"\xfe\xff", "UTF-16 text: save it as UTF-8"),
-    (b"\xd0\xcf\x11\xe0", "an old Excel file: save the sheet as CSV"),
-)
 
 
 @dataclass(frozen=True, slots=True)
 class CsvDialect:
-    """names: one per column, "" where the header has none; skip: lines before the first row; sample: the first rows."""
+    """names: one per column, "" where the header has none; skip: lines before the first row; sample: the first rows;
+    file: where the text lies, path itself or what was made of it; units: of the row below the header."""
 
     path: Path
+    file: Path
     facts: dict[str, str]
     names: tuple[str, ...]
     separator: str
@@ -39,6 +46,8 @@ class CsvDialect:
     has_header: bool
     skip: int
     sample: tuple[tuple[str, ...], ...]
+    units: tuple[str, ...] = ()
+    notes: list[str] = field(default_factory=list)
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line as they stand; empty ones beyond the last column are a trailing separator, and dropped."""
@@ -49,16 +58,40 @@ class CsvDialect:
 
     def parse_number(self, cell: str) -> float | None:
         """Return the value of a cell, NaN where nothing was taken; None when it is no number."""
-        return parse_number(cell, self.decimal)
+        return parse_number(cell, "," if self.decimal == "," or self.separator != "," else ".")
 
     def is_words(self, index: int) -> bool:
         """Return whether no filled cell of the first rows is a number."""
-        cells = [row[index] for row in self.sample if index < len(row) and row[index].strip().lower() not in MISSING]
+        cells = self._filled(index)
         return bool(cells) and all(self.parse_number(cell) is None for cell in cells)
+
+    def is_stamps(self, index: int) -> bool:
+        """Return whether every filled cell of the first rows is a stamp of time. RecordingError for 11/12/2026 alone."""
+        cells = self._filled(index)
+        return bool(cells) and all(parse_stamp(cell) is not None for cell in cells)
+
+    def refuse_ambiguous_date(self, index: int) -> None:
+        """Refuse stamps whose day and month cannot be told apart."""
+        cells = self._filled(index)
+        if cells and is_ambiguous_date(cells[0]):
+            raise RecordingError(
+                f"{self.path}, column {index + 1}: {cells[0].strip()[:24]!r} may be two days: write dates as "
+                "2026-11-22T10:31:47.5 (in Excel: cell format yyyy-mm-dd hh:mm:ss.000), or name a column of seconds with "
+                "--columns time_s=..."
+            )
+
+    def headers(self) -> TableHeaders:
+        """Return what the headers say, with the units below them."""
+        return TableHeaders.of(self.names, self.units, [k for k in range(len(self.names)) if self.is_stamps(k)])
+
+    def _filled(self, index: int) -> list[str]:
+        return [row[index] for row in self.sample if index < len(row) and row[index].strip().lower() not in MISSING]
 
 
 def split_cells(line: str, separator: str) -> list[str]:
-    """Return the cells of a line; quotes are heeded where there are any."""
+    """Return the cells of a line; quotes are heeded where there are any. A space stands for any number of them."""
+    if separator == " ":
+        return line.split()
     return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
 
 
@@ -73,25 +106,20 @@ def parse_number(cell: str, decimal: str) -> float | None:
         return None
 
 
-def detect_dialect(path: Path) -> CsvDialect:
-    """Read the first lines. RecordingError for what is no table, OSError as usual."""
-    _refuse_other_formats(path)
-    with path.open(encoding="utf-8-sig") as stream:
-        try:
-            facts, lines = _first_lines(stream)
-        except UnicodeDecodeError as error:
-            raise RecordingError(
-                f"{path} is neither a recording nor a CSV: byte 0x{error.object[error.start]:02X} near its beginning "
-                "is no UTF-8 text; a table from another program: save it as UTF-8"
-            ) from error
+def detect_dialect(path: Path, file: Path | None = None) -> CsvDialect:
+    """Read the first lines. RecordingError for what is no table, OSError as usual. file: the text, path itself without it."""
+    with (file or path).open(encoding="utf-8-sig", errors="replace") as stream:
+        facts, lines = _first_lines(stream, path)
     if not lines:
         raise RecordingError(f"{path} holds no table: no row with numbers")
-    return _make_dialect(path, facts, lines)
+    return _make_dialect(path, file or path, facts, lines)
 
 
-def rows_of(stream: TextIO, facts: dict[str, str]) -> Iterator[tuple[int, str]]:
+def rows_of(stream: TextIO, facts: dict[str, str], path: Path) -> Iterator[tuple[int, str]]:
     """Yield (line number, line) of every line that is neither blank nor a comment; `# key: value` goes into facts."""
-    for at, line in enumerate(stream, start=1):
+    for at, line in enumerate(iter(lambda: stream.readline(LONGEST_LINE), ""), start=1):
+        if len(line) == LONGEST_LINE:
+            raise RecordingError(f"{path}: line {at} has a million characters or more: no table of rows and columns")
         stripped = line.strip()
         if stripped.startswith("#"):
             key, colon, value = stripped[1:].partition(":")
@@ -100,36 +128,75 @@ def rows_of(stream: TextIO, facts: dict[str, str]) -> Iterator[tuple[int, str]]:
             yield at, line.rstrip("\r\n")
 
 
-def _refuse_other_formats(path: Path) -> None:
-    with path.open("rb") as stream:
-        start = stream.read(8)
-    for magic, what in _OTHER_FORMATS:
-        if start.startswith(magic):
-            raise RecordingError(f"{path} is neither a recording nor a CSV but {what}")
-
-
-def _first_lines(stream: TextIO) -> tuple[dict[str, str], list[tuple[int, str]]]:
+def _first_lines(stream: TextIO, path: Path) -> tuple[dict[str, str], list[tuple[int, str]]]:
     facts: dict[str, str] = {}
     lines: list[tuple[int, str]] = []
-    for line in rows_of(stream, facts):
+    for line in rows_of(stream, facts, path):
         lines.append(line)
         if len(lines) == _SAMPLE_LINES:
             break
     return facts, lines
 
 
-def _make_dialect(path: Path, facts: dict[str, str], lines: Sequence[tuple[int, str]]) -> CsvDialect:
+def _make_dialect(path: Path, file: Path, facts: dict[str, str], lines: list[tuple[int, str]]) -> CsvDialect:
+    named = _NAMED_SEPARATOR.fullmatch(lines[0][1].strip())
+    lines = lines[1:] if named and len(lines) > 1 else lines
+    if _UNPRINTABLE.search(lines[0][1]):
+        raise RecordingError(f"{path} is neither a recording nor a CSV: line {lines[0][0]} is no text")
+    separator = named[1] if named else _separator([line for _, line in lines])
+    lines, notes = _without_title(lines, separator)
     (at, first), rest = lines[0], [line for _, line in lines[1:]]
-    if _UNPRINTABLE.search(first):
-        raise RecordingError(f"{path} is neither a recording nor a CSV: line {at} is no text")
-    separator = _separator(first)
-    decimal = "," if separator != "," and any(_DECIMAL_COMMA.search(line) for line in rest or [first]) else "."
+    decimal = _decimal(separator, rest or [first])
     names = tuple(cell.strip() for cell in split_cells(first, separator))
-    has_header = any(parse_number(name, decimal) is None for name in names)
-    rows = rest if has_header else [first, *rest]
+    _refuse_wide(path, len(names))
+    has_header = any(parse_number(name, decimal) is None and parse_stamp(name) is None for name in names)
+    units = _units_below(rest[0] if has_header and rest else "", separator, len(names))
+    skip = lines[1][0] if units else at if has_header else at - 1
+    rows = rest[1:] if units else rest if has_header else [first, *rest]
     sample = tuple(tuple(split_cells(row, separator)) for row in rows)
     shown = names if has_header else ("",) * _width(names)
-    return CsvDialect(path, facts, shown, separator, decimal, has_header, at if has_header else at - 1, sample)
+    return CsvDialect(path, file, facts, shown, separator, decimal, has_header, skip, sample, units, notes)
+
+
+def _refuse_wide(path: Path, columns: int) -> None:
+    if columns > MOST_COLUMNS:
+        raise RecordingError(f"{path}: {columns} columns: at most {MOST_COLUMNS} are read; write the ones that matter")
+
+
+def _decimal(separator: str, rows: Sequence[str]) -> str:
+    """Return the decimal sign. In a table with commas between cells, one inside a cell is quoted; beside decimal points it
+    would be one of thousands, and is no number."""
+    if separator != ",":
+        return "," if any(_DECIMAL_COMMA.search(line) for line in rows) else "."
+    quoted = any(_QUOTED_DECIMAL_COMMA.search(line) for line in rows)
+    return "," if quoted and not any(_DECIMAL_POINT.search(line) for line in rows) else "."
+
+
+def _without_title(lines: list[tuple[int, str]], separator: str) -> tuple[list[tuple[int, str]], list[str]]:
+    """Leave out lines before the header that have fewer cells than most, where a header follows them."""
+    widths = [_filled_width(line, separator) for _, line in lines]
+    usual = Counter(widths).most_common(1)[0][0]
+    title = next((k for k, width in enumerate(widths) if width >= usual), 0)
+    if usual < 2 or not 0 < title <= _MOST_TITLE_LINES:
+        return lines, []
+    cells = split_cells(lines[title][1], separator)
+    if all(parse_number(cell, ",") is not None or parse_stamp(cell) is not None for cell in cells):
+        return lines, []  # rows come first: the lines before are a header that is too short, or rows
+    return lines[title:], [f"{title} lines before the header (line {lines[title][0]}) were left out"]
+
+
+def _filled_width(line: str, separator: str) -> int:
+    cells = split_cells(line, separator)
+    while cells and not cells[-1].strip():
+        cells.pop()
+    return len(cells)
+
+
+def _units_below(line: str, separator: str, columns: int) -> tuple[str, ...]:
+    """Return the cells of a row of units; nothing for a row of anything else."""
+    cells = tuple(cell.strip() for cell in split_cells(line, separator)) if line else ()
+    filled = [cell for cell in cells if cell.lower() not in MISSING]
+    return cells if filled and len(cells) <= columns + 1 and all(map(is_unit, filled)) else ()
 
 
 def _width(cells: Sequence[str]) -> int:
@@ -137,5 +204,14 @@ def _width(cells: Sequence[str]) -> int:
     return len(cells) - 1 if len(cells) > 1 and not cells[-1] else len(cells)
 
 
-def _separator(line: str) -> str:
-    return next((sign for sign in ("\t", ";") if sign in line), ",")
+def _separator(lines: Sequence[str]) -> str:
+    """Return what stands, outside of quotes, in most lines; a space where no other does and numbers stand between them."""
+    plain = [_QUOTED.sub("", line) for line in lines]
+    for sign in ("\t", ";", ","):
+        if sum(sign in line for line in plain) * 2 > len(plain):
+            return sign
+    rows = [line.split() for line in plain]
+    numbers = [cells for cells in rows if len(cells) > 1 and all(parse_number(cell, ".") is not None for cell in cells)]
+    if len(numbers) * 2 > len(rows):
+        return " "
+    return next((sign for sign in ("\t", ";") if sign in lines[0]), ",")

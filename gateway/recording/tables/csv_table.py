@@ -17,8 +17,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.extras import is_installed
 from gateway.recording.errors import RecordingError
+from gateway.recording.foreign.table_text import TableText, as_text
+from gateway.recording.foreign.time_stamps import parse_stamp, seconds_from_stamps
 from gateway.recording.reader import Recording
-from gateway.recording.tables.column_mapping import EXAMPLE, ColumnMapping, SelectedColumn, join_names, select_columns
+from gateway.recording.tables.column_mapping import (
+    EXAMPLE,
+    ColumnMapping,
+    SelectedColumn,
+    describe_understood,
+    join_names,
+    select_columns,
+    unit_facts,
+)
 from gateway.recording.tables.csv_dialect import MISSING, CsvDialect, detect_dialect, rows_of
 
 if TYPE_CHECKING:
@@ -40,26 +50,38 @@ _QUALITY_WORDS: Final = {
 
 
 def read_csv(path: Path, mapping: ColumnMapping | None = None, *, lenient: bool = False) -> Recording:
-    """Read header facts and columns of a CSV.
+    """Read header facts and columns of a table of text, or of a sheet.
     RecordingError with what was seen when it is none, OSError as usual."""
-    form = detect_dialect(path)
-    if mapping is None and not form.has_header:
+    with as_text(path, mapping.sheet if mapping else None) as text:
+        return _read_text(text, path, mapping, lenient)
+
+
+def _read_text(text: TableText, path: Path, mapping: ColumnMapping | None, lenient: bool) -> Recording:
+    form = detect_dialect(path, text.file)
+    if not form.has_header and not (mapping and mapping.sources):
         raise RecordingError(
             f"{path}:{form.skip + 1}: no header row; it names the columns, such as time_s,command_v,force_n. "
             f"Or say which is which: {EXAMPLE} (the table has {len(form.names)} columns)"
         )
-    selected = select_columns(form.names, mapping, str(path))
+    headers = form.headers()
+    selected = select_columns(form.names, mapping, str(path), headers)
     chosen = [pick for pick in selected if pick.is_contract or not form.is_words(pick.index)]
     words = [pick.name for pick in selected if pick not in chosen]
+    chosen = [SelectedColumn(pick.index, pick.name) if _is_stamps(form, pick) else pick for pick in chosen]
     if not chosen:
         raise RecordingError(
             f"{path}: no column of numbers; a recording is a table with a header such as time_s,command_v,force_n"
         )
+    _check_size(form, len(chosen))
     table = _read_fast(form, chosen) or _LineReader(form, chosen, lenient).read()
-    notes = [*table.notes, *([f"columns of words, not numbers: {join_names(words)}"] if words else [])]
+    notes = [*text.notes, *form.notes, *describe_understood(form.names, selected, mapping), *table.notes]
+    notes += [f"columns of words, not numbers: {join_names(words)}"] if words else []
     columns = {pick.name: _convert(table.columns[k], pick) for k, pick in enumerate(chosen) if k in table.columns}
+    facts = dict(table.facts) | unit_facts(headers, selected, mapping)
     rows = len(table.lines)
-    return Recording(path, dict(table.facts), columns, rows, table.dropped, tuple(notes), lines=table.lines)
+    return Recording(
+        path, facts, columns, rows, table.dropped, tuple(notes), lines=table.lines, suggestion=headers.suggest()
+    )
 
 
 @dataclass(slots=True)
@@ -81,19 +103,20 @@ def _read_fast(form: CsvDialect, chosen: Sequence[SelectedColumn]) -> NumberTabl
     """All rows at once; None when there is anything between them that is no row of numbers, and without pyarrow."""
     if not chosen or not form.sample or not is_installed("pyarrow"):
         return None
+    if form.separator == " " or any(_is_stamps(form, pick) for pick in chosen):
+        return None
     import pyarrow as pa
     from pyarrow import csv
 
     pa.enable_signal_handlers(False)  # they would hold a pipe open from now on, and Ctrl-C is Python's
     names = [str(k) for k in range(len(form.names))]
     wanted_names = [names[pick.index] for pick in chosen]
-    with form.path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        _check_size(form, data, len(chosen))
+    with form.file.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
         if data.find(b"\n#", 1) >= 0 and _is_comment_between(form, data):
             return None
         try:
             table = csv.read_csv(
-                pa.BufferReader(pa.memory_map(str(form.path)).read_buffer().slice(0, _end(data))),
+                pa.BufferReader(pa.memory_map(str(form.file)).read_buffer().slice(0, _end(data))),
                 read_options=csv.ReadOptions(skip_rows=form.skip, column_names=names, block_size=8 << 20),
                 parse_options=csv.ParseOptions(delimiter=form.separator, ignore_empty_lines=False),
                 convert_options=csv.ConvertOptions(
@@ -133,12 +156,21 @@ def _end(data: mmap.mmap) -> int:
     return end
 
 
-def _check_size(form: CsvDialect, data: mmap.mmap, columns: int) -> None:
-    if len(data) < LARGEST_CELLS:  # every cell takes two bytes at least
+def _check_size(form: CsvDialect, columns: int) -> None:
+    """Refuse more numbers than the program takes, before they are read."""
+    if form.file.stat().st_size < LARGEST_CELLS:  # every cell takes two bytes at least
         return
-    step = 1 << 24
-    rows = sum(data[at : at + step].count(b"\n") for at in range(0, len(data), step))
+    with form.file.open("rb") as stream:
+        rows = sum(piece.count(b"\n") for piece in iter(lambda: stream.read(1 << 24), b""))
     refuse_too_large(form.path, rows, columns)
+
+
+def _is_stamps(form: CsvDialect, pick: SelectedColumn) -> bool:
+    """Decide whether this is the column of time, and holds stamps."""
+    if pick.name != "time_s":
+        return False
+    form.refuse_ambiguous_date(pick.index)
+    return form.is_stamps(pick.index)
 
 
 def refuse_too_large(path: Path, rows: int, columns: int) -> None:
@@ -157,6 +189,7 @@ class _LineReader:
         self._form = form
         self._chosen = chosen
         self._lenient = lenient
+        self._stamps = frozenset(k for k, pick in enumerate(chosen) if _is_stamps(form, pick))
         self._findings: list[str] = []
         self._ragged: tuple[int, int] | None = None  # (line, cells) of a row that may be the torn last one
         self._wrong: dict[int, int] = {}  # column -> cells that were no number
@@ -170,8 +203,8 @@ class _LineReader:
         lines: list[int] = []
         blocks: list[Any] = []
         rows: list[list[float]] = []
-        with self._form.path.open(encoding="utf-8-sig", errors="replace") as stream:
-            for at, line in rows_of(stream, facts):
+        with self._form.file.open(encoding="utf-8-sig", errors="replace") as stream:
+            for at, line in rows_of(stream, facts, self._form.path):
                 values = self._values(at, line) if at > self._form.skip else None
                 if values is not None:
                     lines.append(at)
@@ -183,6 +216,7 @@ class _LineReader:
         self._end_of_file()
         table = np.concatenate(blocks)
         columns = {k: table[:, k].copy() for k in range(len(self._chosen)) if not self._is_words(k, len(table))}
+        columns |= {k: seconds_from_stamps(columns[k]) for k in self._stamps if k in columns}
         notes = self._notes(columns)
         return NumberTable(facts, columns, np.array(lines, dtype=np.int64), notes, dropped=bool(self._findings))
 
@@ -204,6 +238,8 @@ class _LineReader:
 
     def _value(self, at: int, k: int, cell: str) -> float:
         value = self._form.parse_number(cell)
+        if k in self._stamps and value is None:
+            value = parse_stamp(cell)
         if value is None and self._chosen[k].name == "quality":
             value = _QUALITY_WORDS.get(cell.strip().lower())
         return self._no_number(at, k, cell.strip()) if value is None else value

@@ -1,5 +1,6 @@
 """A column mapping as a YAML file: `time_s: 1:ms`, one line for each column; the keys are those of `--columns`."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,16 +10,22 @@ from gateway.recording.errors import RecordingError
 from gateway.recording.tables.column_mapping import ColumnMapping
 
 _SUFFIXES: Final = (".yaml", ".yml")
+_SHEET: Final = "sheet="
 _KEYS: Final = {"column", "unit"}
 
 
 def column_mapping(text: str | None) -> ColumnMapping | None:
     """Return the mapping of an option's value: a YAML file's name, else `NAME=COLUMN:UNIT,...`; None for None.
+    `sheet=NAME` before either names the sheet of a workbook.
 
     RecordingError in the user's words, for a file with its line and column.
     """
     if text is None:
         return None
+    first, _, rest = text.partition(",")
+    if first.strip().startswith(_SHEET):
+        mapping = column_mapping(rest.strip() or None) or ColumnMapping(())
+        return replace(mapping, sheet=first.strip().removeprefix(_SHEET).strip())
     return read_mapping(Path(text)) if text.lower().endswith(_SUFFIXES) else ColumnMapping.parse(text)
 
 

@@ -12,8 +12,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.extras import import_library
 from gateway.recording.errors import RecordingError
+from gateway.recording.foreign.headers import TableHeaders
 from gateway.recording.reader import Recording
-from gateway.recording.tables.column_mapping import ColumnMapping, SelectedColumn, join_names, select_columns
+from gateway.recording.tables.column_mapping import (
+    ColumnMapping,
+    SelectedColumn,
+    describe_understood,
+    join_names,
+    select_columns,
+    unit_facts,
+)
 from gateway.recording.tables.csv_table import refuse_too_large
 
 if TYPE_CHECKING:
@@ -36,17 +44,30 @@ def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
 
     try:
         with parquet.ParquetFile(path) as file:
-            chosen = select_columns(file.schema_arrow.names, mapping, str(path))
+            names = file.schema_arrow.names
+            headers = TableHeaders.of(names, stamps=_stamps(file.schema_arrow))
+            chosen = select_columns(names, mapping, str(path), headers)
             refuse_too_large(path, file.metadata.num_rows, len(chosen))
-            table = file.read(columns=list({file.schema_arrow.names[pick.index]: None for pick in chosen}))
+            table = file.read(columns=list({names[pick.index]: None for pick in chosen}))
     except (pa.ArrowException, OSError) as error:
         raise RecordingError(f"{path} is a damaged Parquet file: {str(error).splitlines()[0]}") from error
-    columns, words = _columns(path, table, chosen, file.schema_arrow.names)
-    facts = _facts(table.schema.metadata or {})
+    columns, words = _columns(path, table, chosen, names)
+    facts = _facts(table.schema.metadata or {}) | unit_facts(headers, chosen, mapping)
     dropped = facts.pop("dropped", [])
     notes = [str(note) for note in dropped] if isinstance(dropped, list) else [str(dropped)]
+    notes += describe_understood(names, chosen, mapping)
     notes += [f"columns that hold no numbers: {join_names(words)}"] if words else []
-    return Recording(path, facts, columns, table.num_rows, bool(dropped), tuple(notes))
+    suggestion = headers.suggest()
+    return Recording(path, facts, columns, table.num_rows, bool(dropped), tuple(notes), suggestion=suggestion)
+
+
+def _stamps(schema: Any) -> list[int]:
+    """Return the places of columns whose type is a time."""
+    import pyarrow as pa
+
+    return [
+        k for k, field in enumerate(schema) if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type)
+    ]
 
 
 def _columns(

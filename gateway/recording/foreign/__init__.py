@@ -1,0 +1,1 @@
+"""What other programs write: their encodings, workbooks, stamps of time and headers, turned into what our readers take."""
