@@ -182,10 +182,10 @@ def describe_understood(
 
 def unit_facts(headers: TableHeaders, picks: Sequence[SelectedColumn], mapping: ColumnMapping | None) -> dict[str, str]:
     """Return what is known besides: that the force is in newtons, where a mapping or the header said what it was in."""
-    said = {source.name for source in mapping.sources if source.unit} if mapping else set()
+    asked = {source.name for source in mapping.sources if source.unit} if mapping else set()
     written = {pick.name for pick in picks if pick.name in WORDS and headers.headers[pick.index].text != pick.name}
     read = {pick.name for pick in picks if headers.headers[pick.index].unit_for(pick.name)}
-    return {"force_unit": "N"} if "force_n" in said | (written & read) else {}
+    return {"force_unit": "N"} if "force_n" in asked | (written & read) else {}
 
 
 def _select_column(source: ColumnSource, names: Sequence[str], file: str, headers: TableHeaders) -> SelectedColumn:
