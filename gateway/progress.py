@@ -1,7 +1,8 @@
 """What a long calculation is at, for whoever shows it: `report` and `advance` inside, `listen` around.
 
 Nobody listens as a rule, and then a report costs a look at a variable. It belongs to the context (contextvars), so that two
-calculations in one process do not hear each other.
+calculations in one process do not hear each other. A process that does nothing but one calculation may hear everything
+besides (`hear_everything`), whoever listens inside.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,20 +28,40 @@ Listener = Callable[[Progress], None]
 _listener: Final[ContextVar[Listener | None]] = ContextVar("listener", default=None)
 _NOTHING: Final = Progress("")
 _stage: Final[ContextVar[Progress]] = ContextVar("stage", default=_NOTHING)
+_everything: Final[list[Listener]] = []
 _NAMED: Final = 3
 
 
 def report(stage: str, done: int = 0, of: int = 0) -> None:
     """Tell what is begun now. A listener may raise KeyboardInterrupt."""
-    if listener := _listener.get():
+    listeners = _listeners()
+    if listeners:
         _stage.set(Progress(stage, done, of))
-        listener(_stage.get())
+        _tell(listeners)
 
 
 def advance(done: int, of: int) -> None:
     """Tell how far the present stage is."""
-    if listener := _listener.get():
+    listeners = _listeners()
+    if listeners:
         _stage.set(replace(_stage.get(), done=done, of=of))
+        _tell(listeners)
+
+
+def hear_everything(listener: Listener) -> None:
+    """Have everything that is reported in this process told to this listener, too, from now on."""
+    _everything.append(listener)
+
+
+def _listeners() -> tuple[Listener, ...]:
+    listener = _listener.get()
+    if listener is None and not _everything:
+        return ()
+    return (*_everything, listener) if listener else tuple(_everything)
+
+
+def _tell(listeners: tuple[Listener, ...]) -> None:
+    for listener in listeners:
         listener(_stage.get())
 
 

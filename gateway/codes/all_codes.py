@@ -10,6 +10,7 @@ from gateway.codes.explanation import Explanation
 from gateway.codes.face_errors import FACE_ERRORS
 from gateway.codes.faults import FaultCode
 from gateway.codes.notices import NOTICES
+from gateway.codes.page_errors import PAGE_ERRORS
 from gateway.codes.refusals import SPECIAL_REFUSALS, RefusalReason
 from gateway.codes.warning_bits import WarningBit
 
@@ -39,7 +40,7 @@ def _describe(explanation: Explanation, name: str = "", exception: int = 0) -> C
 
 
 def _entries() -> Iterator[CatalogueEntry]:
-    yield from map(_describe, (*ERRORS, *FACE_ERRORS))
+    yield from map(_describe, (*ERRORS, *FACE_ERRORS, *PAGE_ERRORS))
     yield from (_describe(reason.explanation, reason.name, reason.exception) for reason in RefusalReason)
     yield from (_describe(special.explanation, exception=special.reason.exception) for special in SPECIAL_REFUSALS)
     yield from map(_describe, NOTICES)

@@ -18,11 +18,6 @@ from gateway.processes import exit_codes
 if TYPE_CHECKING:
     from gateway.cli.master.wires import Wire
 
-_QUESTIONS: Final = (
-    "Does the tool press on the workpiece, or on a stop, that takes {force:.0f} N?",
-    "Are hands and people away, and does nothing else command this tool?",
-    "Is the air on, with supply enough for {top:g} V?",
-)
 _GO_ON: Final = "; force-gateway calibrate --resume goes on"
 _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 
@@ -197,8 +192,11 @@ def _ask(preview: dict[str, Any], yes: bool) -> None:
             click.echo(f"  {note}", err=True)
     if yes:
         return
-    for question in (*(_QUESTIONS if preview.get("check", True) else _QUESTIONS[:2]), *preview.get("questions", ())):
-        words = question.format(force=preview.get("force_max_n", 60.0), top=preview.get("v_max_v", 8.0))
+    from gateway.control.runs.preconditions import preconditions
+
+    force_n, top_v = preview.get("force_max_n", 60.0), preview.get("v_max_v", 8.0)
+    asked = preconditions(force_n, top_v, has_check=preview.get("check", True))
+    for words in (*asked, *preview.get("questions", ())):
         if not click.confirm(words, err=True):
             raise CliError("not begun: nothing has moved")
 

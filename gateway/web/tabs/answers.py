@@ -1,0 +1,126 @@
+"""How a tab answers: JSON, or a sentence that says why not, with the status that fits; and how it reads a request's body.
+
+What a person did wrong, or control refuses, is a TabRefusedError or a ValueError (409); no gateway is an OSError (503). The
+body of an error is always {"error": sentence}.
+"""
+
+import json
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Any, Final, Protocol, TypeVar
+
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, Response
+
+from gateway.profiles.strict_yaml.text import Document
+from gateway.profiles.strict_yaml.typed import build
+
+Shape = TypeVar("Shape")
+Endpoint = Callable[[Request], Awaitable[Response]]
+
+BAD_REQUEST: Final = 400
+NOT_FOUND: Final = 404
+CONFLICT: Final = 409
+UNAVAILABLE: Final = 503
+_LONGEST_BODY: Final = 65536
+_LARGEST_NUMBER: Final = 999_999
+REPORT_POLICY: Final = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'self'; base-uri 'none'; sandbox"
+)
+"""Of a report: its own style and drawings, no script, nothing from anywhere."""
+
+
+class TabContext(Protocol):
+    """What a tab knows of the page's process."""
+
+    @property
+    def state(self) -> Path:
+        """The state directory."""
+
+    @property
+    def rig(self) -> str:
+        """The rig, as `run` was told: a shipped name or a file."""
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its devices are simulated."""
+
+
+class TabRefusedError(Exception):
+    """A request that is not answered. str: the sentence for people."""
+
+    def __init__(self, sentence: str, status: int = CONFLICT) -> None:
+        super().__init__(sentence)
+        self.status = status
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nothing:
+    """A body without a field."""
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012  read by pydantic
+
+
+def answers(handler: Callable[[Request], Awaitable[Any]]) -> Endpoint:
+    """Make an endpoint of a function: its value as JSON, or the Response that it returns; what it raises as a sentence."""
+
+    @wraps(handler)
+    async def endpoint(request: Request) -> Response:
+        try:
+            answer = await handler(request)
+        except TabRefusedError as refusal:
+            return JSONResponse({"error": str(refusal)}, refusal.status)
+        except OSError as error:
+            return JSONResponse({"error": _unreachable(error)}, UNAVAILABLE)
+        except ValueError as error:
+            return JSONResponse({"error": str(error)}, CONFLICT)
+        return answer if isinstance(answer, Response) else JSONResponse(answer)
+
+    return endpoint
+
+
+async def read_body(request: Request, shape: type[Shape]) -> Shape:
+    """Return the request's JSON as `shape`, read strictly. TabRefusedError names the first key that does not fit."""
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > _LONGEST_BODY:
+            raise TabRefusedError(f"a request of more than {_LONGEST_BODY} bytes", BAD_REQUEST)
+    try:
+        fields = json.loads(body or b"{}")
+    except (ValueError, RecursionError):
+        raise TabRefusedError("the request is no JSON", BAD_REQUEST) from None
+    shaped, faults = build(shape, Document("request", fields, {}))
+    if shaped is None or faults:
+        raise TabRefusedError(f"{faults[0].path} {faults[0].message}".strip(), BAD_REQUEST)
+    return shaped
+
+
+def number_in_path(request: Request, name: str = "number") -> int:
+    """Return a number of the address. TabRefusedError for anything but digits: files are named by numbers only."""
+    return number_of(request.path_params[name])
+
+
+def number_in_query(request: Request, name: str) -> int:
+    """Return a number of the query (?a=3). TabRefusedError where it is missing or none."""
+    return number_of(request.query_params.get(name, ""))
+
+
+def number_of(text: str) -> int:
+    """Return a plain decimal number. TabRefusedError for anything else."""
+    if not (text.isascii() and text.isdecimal() and int(text[:7]) <= _LARGEST_NUMBER and len(text) <= len("999999")):
+        raise TabRefusedError(f"{text[:40]!r} is no number of the list", NOT_FOUND)
+    return int(text)
+
+
+def report_page(text: str) -> Response:
+    """Return a report, which is a whole page of its own, for a frame of the page."""
+    return HTMLResponse(text, headers={"Content-Security-Policy": REPORT_POLICY, "X-Frame-Options": "SAMEORIGIN"})
+
+
+def _unreachable(error: OSError) -> str:
+    if isinstance(error, (ConnectionError, FileNotFoundError, TimeoutError)):
+        return "the gateway does not answer: it is being started, or has ended"
+    return error.strerror or str(error)

@@ -1,0 +1,134 @@
+"""The recordings of a state directory for the page: the list, whole files in other forms, and a picture.
+
+Everything here reads from the disk and runs in worker threads. An entry is read again only when its file has changed.
+"""
+
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.recording import Recording, find_recording, list_recordings, read_recording
+from gateway.recording.errors import RecordingError
+from gateway.web.tabs.answers import NOT_FOUND, TabRefusedError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from gateway.recording import RecordingEntry
+
+FORMS: Final = ("csv", "parquet")
+_DRAWN: Final = 700
+"""Places along a curve; each shows the lowest and the highest value there."""
+
+
+def recording_path(state: Path, number: int) -> Path:
+    """Return the file of a number. TabRefusedError where there is none."""
+    try:
+        return find_recording(state, number)
+    except RecordingError as error:
+        raise TabRefusedError(f"E403 {error}", NOT_FOUND) from None
+
+
+def recording_facts(state: Path) -> list[dict[str, Any]]:
+    """Return every recording, the newest first."""
+    return [_facts(entry) for entry in reversed(list_recordings(state))]
+
+
+def _facts(entry: "RecordingEntry") -> dict[str, Any]:
+    header = entry.header
+    return {
+        "number": entry.number,
+        "file": entry.path.name,
+        "started_utc": header.get("started_utc"),
+        "rig": header.get("rig"),
+        "calibration": header.get("calibration"),
+        "kind": "ladder" if header.get("ladder") else "experiment" if header.get("experiment") else "run",
+        "rows": entry.rows,
+        "duration_s": entry.duration_s,
+        "size_bytes": entry.size_bytes,
+        "truncated": entry.truncated,
+        "fault": entry.fault,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFile:
+    """A recording in another form, in a folder that is to be removed when it was sent."""
+
+    path: Path
+    folder: TemporaryDirectory[str]
+
+
+_one_at_a_time: Final = threading.Lock()
+
+
+def export_recording(state: Path, number: int, form: str) -> ExportedFile:
+    """Write a recording as CSV or Parquet into a folder of its own. One at a time: a long one takes memory."""
+    from gateway.recording import export_csv, export_parquet
+
+    source = recording_path(state, number)
+    with _one_at_a_time:
+        recording = _read(source)
+        folder = TemporaryDirectory(prefix="force-gateway-export-")
+        target = Path(folder.name) / f"{recording.header.get('rig', 'recording')}-{number:04d}.{form}"
+        try:
+            (export_parquet if form == "parquet" else export_csv)(recording, target)
+        except BaseException:
+            folder.cleanup()
+            raise
+    return ExportedFile(target, folder)
+
+
+def draw_recording(state: Path, number: int) -> str:
+    """Return two drawings, one above the other: forces and the voltage against time."""
+    from gateway.reports.svg_chart import Axis, Chart, spread
+
+    with _one_at_a_time:
+        recording = _read(recording_path(state, number))
+    columns = recording.columns
+    if recording.rows < 2:
+        raise TabRefusedError(f"recording {number} has {recording.rows} rows: nothing to draw")
+    time_s = columns["time_s"]
+    across = Axis(float(time_s[0]), float(time_s[-1]), "time (s)")
+    charts = []
+    for title, label, names in _PANELS:
+        curves = {words: _thinned(time_s, columns[name]) for name, _, words in names if name in columns}
+        values = [value for _, ys in curves.values() for value in ys]
+        if not values:
+            continue
+        chart = Chart(across, Axis(*spread(values), label), title)
+        for _, style, words in names:
+            if words in curves and curves[words][0]:
+                chart.line(*curves[words], style, words)
+        charts.append(f"<figure><h3>{title}</h3>{chart.svg()}</figure>")
+    return "".join(charts)
+
+
+_PANELS: Final = (
+    ("Force", "force (N)", (("force_n", "measured", "measured"), ("force_applied_n", "after", "setpoint"))),
+    ("Command", "command (V)", (("command_v", "before", "command"),)),
+)
+
+
+def _thinned(time_s: "NDArray[np.float64]", values: "NDArray[np.float64]") -> tuple[list[float], list[float]]:
+    """Return a curve in few points that looks the same: of each stretch its lowest and its highest value, in order of time."""
+    import numpy as np
+
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) <= 2 * _DRAWN:
+        return time_s[known].tolist(), values[known].tolist()
+    kept: list[int] = []
+    for part in np.array_split(known, _DRAWN):
+        low, high = int(part[values[part].argmin()]), int(part[values[part].argmax()])
+        kept += [low, high] if low < high else [high, low]
+    return time_s[kept].tolist(), values[kept].tolist()
+
+
+def _read(path: Path) -> Recording:
+    try:
+        return read_recording(path)
+    except RecordingError as error:
+        raise TabRefusedError(f"E403 {error}") from None

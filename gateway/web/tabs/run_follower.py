@@ -1,0 +1,85 @@
+"""Follows a calibration run that was begun on the page, so that it goes on while the page is loaded again.
+
+Control stops a run that nobody has asked about for three seconds: a closed terminal must not leave a tool climbing stairs. The
+page's process asks instead of the browser, for as long as some browser has asked it within ABANDONED_S; after that it falls
+silent, and control stops the run with the data kept (A330). A run that was begun elsewhere is looked at without being kept
+alive.
+"""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.live.control_link import ask_once
+
+ABANDONED_S: Final = 90.0
+"""Browsers let a page in the background ask once a minute."""
+_ASKED_EVERY_S: Final = 0.3
+_BUSY: Final = ("zero", "check", "ladder", "minor_loops", "fitting", "experiment")
+_BEGUN_WITHIN_S: Final = 2.0
+Status = dict[str, Any]
+
+
+class RunFollower:
+    """The run that the page has begun, if any. clock: monotonic seconds."""
+
+    def __init__(self, state: Path, clock: Callable[[], float] = time.monotonic) -> None:
+        self._state = state
+        self._clock = clock
+        self._seen_s = clock()
+        self._last: Status = {}
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def is_following(self) -> bool:
+        """Whether a run of the page's own is under way."""
+        return self._task is not None and not self._task.done()
+
+    async def preview(self, plan: Status) -> Status:
+        """Return what the gateway would do, without a motion. ValueError with control's refusal."""
+        return await self._ask({"plan": plan, "dry_run": True})
+
+    async def begin(self, plan: Status, name: str) -> Status:
+        """Begin a run and follow it. ValueError with control's refusal."""
+        if self.is_following:
+            raise ValueError("E177 a run of this page is under way: stop it first, or wait for its end")
+        self._seen_s = self._clock()
+        self._last = await self._ask({"plan": plan, "name": name})
+        self._task = asyncio.create_task(self._follow())
+        return self._last
+
+    async def stop(self) -> Status:
+        """Stop the run, whoever has begun it; the force goes to 0 and the data are kept."""
+        return await self._ask({"stop": True})
+
+    async def look(self) -> Status:
+        """Return how the run is, as control answers `calibrate`, with `mine`: it was begun on the page."""
+        self._seen_s = self._clock()
+        if self.is_following:
+            return self._last | {"mine": True}
+        run = (await ask_once(self._state, {"do": "state"}))["run"]
+        if run["running"]:
+            return {
+                "mine": False,
+                "running": True,
+                "phase": run["phase"],
+                "progress": run["share"],
+                "eta_s": run["eta_s"],
+            }
+        return await self._ask({}) | {"mine": False}
+
+    async def _follow(self) -> None:
+        began_s = self._clock()
+        while self._clock() - self._seen_s < ABANDONED_S:
+            with contextlib.suppress(OSError, ValueError):  # control is restarted: it has ended the run then
+                self._last = await self._ask({})
+            is_starting = self._last["phase"] == "idle" and self._clock() - began_s < _BEGUN_WITHIN_S
+            if not (self._last["running"] or self._last["phase"] in _BUSY or is_starting):
+                return
+            await asyncio.sleep(_ASKED_EVERY_S)
+
+    async def _ask(self, request: Status) -> Status:
+        return await ask_once(self._state, {"do": "calibrate"} | request)

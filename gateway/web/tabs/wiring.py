@@ -1,0 +1,32 @@
+"""Tab Wiring: the page of `force-gateway wiring` for the rig that runs."""
+
+import asyncio
+from dataclasses import asdict
+from typing import Any
+
+from starlette.requests import Request
+from starlette.routing import Route
+
+from gateway.web.tabs.answers import TabContext, TabRefusedError, answers
+
+
+def routes(context: TabContext) -> list[Route]:
+    """Return the addresses of this tab."""
+
+    async def wiring(request: Request) -> dict[str, Any]:
+        return await asyncio.to_thread(wiring_document, context)
+
+    return [Route("/api/v1/wiring", answers(wiring))]
+
+
+def wiring_document(context: TabContext) -> dict[str, Any]:
+    """Return title and sections as `wiring --json` has them. TabRefusedError where the rig cannot be read any more."""
+    from gateway.clients import MissingRegisterError
+    from gateway.clients.wiring import wiring_page
+    from gateway.profiles import ProfileError, load_rig
+
+    try:
+        title, sections = wiring_page(load_rig(context.rig, simulated=context.simulated), context.rig)
+    except (ProfileError, MissingRegisterError) as error:
+        raise TabRefusedError(str(error)) from None
+    return {"title": title, "sections": [asdict(each) for each in sections]}
