@@ -4,6 +4,7 @@ Everything here reads from the disk and runs in worker threads. An entry is read
 """
 
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from gateway.recording import RecordingEntry
+    from gateway.reports.svg_chart import Chart
 
 FORMS: Final = ("csv", "parquet")
 _DRAWN: Final = 700
@@ -83,33 +85,50 @@ def export_recording(state: Path, number: int, form: str) -> ExportedFile:
 
 
 def draw_recording(state: Path, number: int) -> str:
-    """Return two drawings, one above the other: forces and the voltage against time."""
-    from gateway.reports.svg_chart import Axis, Chart, spread
+    """Return a page with two drawings: forces and the voltage against time."""
+    from gateway.reports import frame
+    from gateway.reports.figures import drawing, figure
 
     with _one_at_a_time:
         recording = _read(recording_path(state, number))
-    columns = recording.columns
     if recording.rows < 2:
         raise TabRefusedError(f"recording {number} has {recording.rows} rows: nothing to draw")
-    time_s = columns["time_s"]
-    across = Axis(float(time_s[0]), float(time_s[-1]), "time (s)")
-    charts = []
-    for title, label, names in _PANELS:
-        curves = {words: _thinned(time_s, columns[name]) for name, _, words in names if name in columns}
-        values = [value for _, ys in curves.values() for value in ys]
-        if not values:
-            continue
-        chart = Chart(across, Axis(*spread(values), label), title)
-        for _, style, words in names:
-            if words in curves and curves[words][0]:
-                chart.line(*curves[words], style, words)
-        charts.append(f"<figure><h3>{title}</h3>{chart.svg()}</figure>")
-    return "".join(charts)
+    charts = [(title, _chart(recording, title, label, names)) for title, label, names in _PANELS]
+    figures = "".join(figure(title, drawing(chart), "", "full") for title, chart in charts if chart)
+    header, time_s = recording.header, recording.columns["time_s"]
+    head = frame.Head(
+        kind="Recording",
+        answer=f"Recording {number}: {time_s[-1] - time_s[0]:.1f}\u00a0s, {recording.rows}\u00a0rows",
+        facts=(f"rig {header.get('rig')}", f"started {header.get('started_utc')}", *recording.notes),
+    )
+    return frame.page(head, [figures], {"recording": recording.path.name, "calibration": header.get("calibration")})
+
+
+def _chart(recording: Recording, title: str, label: str, names: "Sequence[tuple[str, str, str]]") -> "Chart | None":
+    """Return the curves of a panel; None where no value is known."""
+    from gateway.reports.axis import Axis, spread
+    from gateway.reports.svg_chart import Chart
+
+    time_s = recording.columns["time_s"]
+    known = [
+        (_thinned(time_s, recording.columns[name]), style, words)
+        for name, style, words in names
+        if name in recording.columns
+    ]
+    values = [value for (_, ys), _, _ in known for value in ys]
+    if not values:
+        return None
+    across = Axis(float(time_s[0]), max(float(time_s[-1]), float(time_s[0]) + 1e-3), "time (s)")
+    chart = Chart(across, Axis(*spread(values), label), title, width=1200)
+    for (xs, ys), style, words in known:
+        if xs:
+            chart.line(xs, ys, style, words)
+    return chart
 
 
 _PANELS: Final = (
-    ("Force", "force (N)", (("force_n", "measured", "measured"), ("force_applied_n", "after", "setpoint"))),
-    ("Command", "command (V)", (("command_v", "before", "command"),)),
+    ("Force", "force (N)", (("force_applied_n", "before", "setpoint"), ("force_n", "after", "measured"))),
+    ("Command", "command (V)", (("command_v", "bsfm", "command"),)),
 )
 
 

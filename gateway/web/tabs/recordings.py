@@ -10,7 +10,16 @@ from starlette.routing import Route
 
 from gateway.extras import is_installed, missing_note
 from gateway.live.control_link import ask_once
-from gateway.web.tabs.answers import NOT_FOUND, Nothing, TabContext, TabRefusedError, answers, number_in_path, read_body
+from gateway.web.tabs.answers import (
+    NOT_FOUND,
+    Nothing,
+    TabContext,
+    TabRefusedError,
+    answers,
+    number_in_path,
+    read_body,
+    report_page,
+)
 from gateway.web.tabs.recording_files import FORMS, draw_recording, export_recording, recording_facts
 
 _TYPES: Final = {"csv": "text/csv; charset=utf-8", "parquet": "application/vnd.apache.parquet"}
@@ -51,10 +60,9 @@ class RecordingsTab:
         remove = BackgroundTask(exported.folder.cleanup)
         return FileResponse(exported.path, media_type=_TYPES[form], filename=exported.path.name, background=remove)
 
-    async def plot(self, request: Request) -> dict[str, Any]:
-        """Return the drawings of a recording as HTML."""
-        number = number_in_path(request)
-        return {"number": number, "html": await asyncio.to_thread(draw_recording, self._state, number)}
+    async def plot(self, request: Request) -> Response:
+        """Return the drawings of a recording, as a page."""
+        return report_page(await asyncio.to_thread(draw_recording, self._state, number_in_path(request)))
 
 
 def routes(context: TabContext) -> list[Route]:

@@ -31,8 +31,8 @@ const CALIBRATIONS = {
     one.made, one.model, one.reversal, `${number(one.forces_n[0], 1)} to ${number(one.forces_n[1], 1)}`,
     number(one.rms_n, 3), number(one.max_n),
   ],
-  compare: async (shelf, a, b) => report(`Calibration ${a} (A) and calibration ${b} (B)`, `/api/v1/calibrations/compare?a=${a}&b=${b}`),
-  look: (one) => (one.has_report ? async () => report(`Report of calibration ${one.number}`, `/api/v1/calibrations/${one.number}/report`) : null),
+  compare: async (shelf, a, b) => report(`Calibration ${a} (A) and calibration ${b} (B)`, `/api/v1/calibrations/compare?a=${a}&b=${b}`, shelf.close),
+  look: (one) => (one.has_report ? async (shelf) => report(`Report of calibration ${one.number}`, `/api/v1/calibrations/${one.number}/report`, shelf.close) : null),
   lookWords: "Report",
 };
 
@@ -58,6 +58,7 @@ class Shelf {
     this.list = h("div");
     this.shown = h("div", { "aria-live": "polite" });
     this.tools = h("div", { class: "row end" });
+    this.close = () => this.shown.replaceChildren();
     this.elements = [this.list, this.tools, this.shown];
   }
 
@@ -115,8 +116,10 @@ class Shelf {
   }
 
   async show(what) {
-    const close = button("Close", async () => this.shown.replaceChildren(), this.told);
-    this.shown.replaceChildren(h("div", { class: "row" }, close), await what);
+    const element = await what;
+    const close = h("button", { type: "button", onclick: this.close }, "Close");
+    this.shown.replaceChildren(element, element.matches(".report") ? "" : h("div", { class: "row" }, close));
+    this.shown.scrollIntoView({ block: "nearest" });
   }
 }
 

@@ -48,7 +48,7 @@ function fileView(file, wanted, onlySet) {
   const values = file.values.filter((one) => (!onlySet || one.line !== null) && (!wanted || fits(one)));
   const set = values.filter((one) => one.line !== null).length;
   const count = file.is_rig ? `${set} set, ${values.length - set} by default` : `${values.length} values`;
-  const details = h("details", { open: file.is_rig || (wanted && values.length > 0) }, h("summary", {}, h("strong", {}, file.file), ` · ${count}`));
+  const details = h("details", { open: file.is_rig ? true : Boolean(wanted && values.length) }, h("summary", {}, h("strong", {}, file.file), ` · ${count}`));
   const fill = () => details.childElementCount > 1 || details.append(valuesTable(file, values));
   details.addEventListener("toggle", () => details.open && fill());
   if (details.open) fill();

@@ -2,6 +2,8 @@
 
 import { Told, button, duration, h, moment, prepare, report, showOnce, table, whileShown } from "./dom.js";
 
+const VERDICTS = { identified: "identified", partial: "part of it found", unknown: "cause unknown", "nothing-found": "as simulated" };
+
 /** Builds the tab. api: get(path), post(path, body). */
 export function mount(element, api) {
   new DiagnosisTab(element, api);
@@ -91,13 +93,13 @@ class DiagnosisTab {
   }
 
   open(recording) {
-    this.shown.replaceChildren(report(`Diagnosis of recording ${recording}`, `/api/v1/diagnosis/${recording}/report`));
+    this.shown.replaceChildren(report(`Diagnosis of recording ${recording}`, `/api/v1/diagnosis/${recording}/report`, () => this.shown.replaceChildren()));
   }
 
   list(kept) {
     if (!kept.length) return [];
     const rows = kept.map((one) => [
-      String(one.recording), one.verdict, h("span", { class: "long" }, one.causes.map((cause) => cause.name).join(", ") || "no cause"),
+      String(one.recording), VERDICTS[one.verdict] ?? one.verdict, h("span", { class: "long" }, one.causes.map((cause) => cause.name).join(", ") || "no cause"),
       moment(one.made_unix_s * 1000),
       h("span", { class: "buttons" }, button("Show", async () => this.open(one.recording), this.told, { "aria-label": `Show the diagnosis of recording ${one.recording}` })),
     ]);

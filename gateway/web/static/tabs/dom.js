@@ -98,26 +98,28 @@ export function button(words, act, told, properties = {}) {
 
 /** A table that scrolls inside itself. heads: texts; rows: lists of texts or elements, or {cells, class}. */
 export function table(caption, heads, rows, style = "") {
-  const body = rows.map((row) => {
-    const cells = row.cells ?? row;
-    return h("tr", { class: row.class || null }, cells.map((cell, place) => h(place ? "td" : "th", place ? {} : { scope: "row" }, cell)));
-  });
-  const head = h("thead", {}, h("tr", {}, heads.map((text) => h("th", { scope: "col" }, text))));
+  const cellOf = (cell, place) =>
+    h(place ? "td" : "th", { role: place ? "cell" : "rowheader", "data-label": heads[place] || null, scope: place ? null : "row" }, cell);
+  const body = rows.map((row) => h("tr", { role: "row", class: row.class || null }, (row.cells ?? row).map(cellOf)));
+  const head = h("tr", { role: "row" }, heads.map((text) => h("th", { scope: "col", role: "columnheader" }, text || h("span", { class: "unseen" }, "actions"))));
   return h(
     "div",
     { class: "wide", tabindex: "0", role: "region", "aria-label": caption },
-    h("table", { class: style }, h("caption", { class: "unseen" }, caption), head, h("tbody", {}, body)),
+    h(
+      "table",
+      { class: style, role: "table", "aria-label": caption },
+      h("thead", { role: "rowgroup" }, head),
+      h("tbody", { role: "rowgroup" }, body),
+    ),
   );
 }
 
-/** A report within the page: a whole page of its own, which runs nothing. */
-export function report(title, address) {
-  return h(
-    "section",
-    { class: "report" },
-    h("p", { class: "report-bar" }, h("strong", {}, title), h("a", { href: address, target: "_blank", rel: "noopener" }, "Open in a tab of its own")),
-    h("iframe", { src: address, title, loading: "lazy" }),
-  );
+/** A report within the page: a whole page of its own, which runs nothing. close: what closes it, if anything does. */
+export function report(title, address, close = null) {
+  const open = h("a", { href: address, target: "_blank", rel: "noopener" }, "Open in a tab of its own");
+  const shut = close && h("button", { type: "button", onclick: close, "aria-label": `Close: ${title}` }, "Close");
+  const bar = h("div", { class: "report-bar" }, h("strong", {}, title), h("span", { class: "row" }, open, shut));
+  return h("section", { class: "report", "aria-label": title }, bar, h("iframe", { src: address, title }));
 }
 
 /** Shows one of several things in a place, and leaves it alone while nothing has changed. */

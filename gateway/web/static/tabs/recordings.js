@@ -1,6 +1,6 @@
 // Tab Recordings: start and stop, what there is, pictures, downloads, and the way to a diagnosis.
 
-import { Told, button, bytes, duration, h, moment, number, prepare, showOnce, table, whileShown } from "./dom.js";
+import { Told, button, bytes, duration, h, moment, number, prepare, report, showOnce, table, whileShown } from "./dom.js";
 
 /** Builds the tab. api: get(path), post(path, body). */
 export function mount(element, api) {
@@ -70,10 +70,8 @@ class RecordingsTab {
   }
 
   async draw(recording) {
-    const answer = await this.api.get(`/api/v1/recordings/${recording}/plot`);
-    const drawn = new DOMParser().parseFromString(answer.html, "text/html").body;
-    const close = button("Close", async () => this.picture.replaceChildren(), this.told);
-    this.picture.replaceChildren(h("div", { class: "row" }, h("h3", {}, `Recording ${recording}`), close), h("div", { class: "picture" }, ...drawn.children));
+    const close = () => this.picture.replaceChildren();
+    this.picture.replaceChildren(report(`Recording ${recording}`, `/api/v1/recordings/${recording}/plot`, close));
     this.picture.scrollIntoView({ block: "nearest" });
   }
 
