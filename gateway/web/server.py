@@ -5,7 +5,6 @@ module each, and the style is the reports' own (gateway.reports.style.css) with 
 """
 
 import json
-import pkgutil
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from importlib import import_module
@@ -61,7 +60,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
 
 
 def _tab_modules() -> list[Any]:
-    return [import_module(f"{tabs.__name__}.{module.name}") for module in pkgutil.iter_modules(tabs.__path__)]
+    return [import_module(f"{tabs.__name__}.{name}") for name in tabs.NAMES]
 
 
 def _page_routes() -> list[BaseRoute]:

@@ -8,8 +8,7 @@ import json
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import wraps
-from pathlib import Path
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Final, TypeVar
 
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, Response
@@ -30,22 +29,6 @@ REPORT_POLICY: Final = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'self'; base-uri 'none'; sandbox"
 )
 """Of a report: its own style and drawings, no script, nothing from anywhere."""
-
-
-class TabContext(Protocol):
-    """What a tab knows of the page's process."""
-
-    @property
-    def state(self) -> Path:
-        """The state directory."""
-
-    @property
-    def rig(self) -> str:
-        """The rig, as `run` was told: a shipped name or a file."""
-
-    @property
-    def simulated(self) -> bool:
-        """Whether its devices are simulated."""
 
 
 class TabRefusedError(Exception):

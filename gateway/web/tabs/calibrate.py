@@ -17,7 +17,8 @@ from starlette.routing import Route
 from gateway import defaults
 from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.control.runs.preconditions import preconditions
-from gateway.web.tabs.answers import Nothing, TabContext, TabRefusedError, answers, read_body
+from gateway.web.context import WebContext
+from gateway.web.tabs.answers import Nothing, TabRefusedError, answers, read_body
 from gateway.web.tabs.run_follower import RunFollower
 
 _LONGEST_NAME: Final = 60
@@ -37,7 +38,7 @@ class WantedRun:
 class CalibrateTab:
     """What the wizard asks of the server."""
 
-    def __init__(self, context: TabContext) -> None:
+    def __init__(self, context: WebContext) -> None:
         self._state = context.state
         self._follower = RunFollower(context.state)
 
@@ -67,7 +68,7 @@ class CalibrateTab:
         return await self._follower.stop()
 
 
-def routes(context: TabContext) -> list[Route]:
+def routes(context: WebContext) -> list[Route]:
     """Return the addresses of this tab."""
     tab = CalibrateTab(context)
     return [

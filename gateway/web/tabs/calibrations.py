@@ -14,9 +14,9 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from gateway.web.context import WebContext
 from gateway.web.tabs.answers import (
     NOT_FOUND,
-    TabContext,
     TabRefusedError,
     answers,
     number_in_path,
@@ -30,7 +30,7 @@ from gateway.web.tabs.stored_documents import Change, calibration_facts, change_
 class CalibrationsTab:
     """What the tab asks of the server."""
 
-    def __init__(self, context: TabContext) -> None:
+    def __init__(self, context: WebContext) -> None:
         self._context = context
         self._state = context.state
 
@@ -77,7 +77,7 @@ class CalibrationsTab:
         return {"said": answer.get("said", ""), "reference": answer.get("reference", "")}
 
 
-def routes(context: TabContext) -> list[Route]:
+def routes(context: WebContext) -> list[Route]:
     """Return the addresses of this tab."""
     tab = CalibrationsTab(context)
     return [

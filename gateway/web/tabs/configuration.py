@@ -6,11 +6,12 @@ from typing import Any
 from starlette.requests import Request
 from starlette.routing import Route
 
-from gateway.web.tabs.answers import TabContext, TabRefusedError, answers
+from gateway.web.context import WebContext
+from gateway.web.tabs.answers import TabRefusedError, answers
 from gateway.web.tabs.rig_values import rig_document
 
 
-def routes(context: TabContext) -> list[Route]:
+def routes(context: WebContext) -> list[Route]:
     """Return the addresses of this tab."""
 
     async def configuration(request: Request) -> dict[str, Any]:
@@ -19,7 +20,7 @@ def routes(context: TabContext) -> list[Route]:
     return [Route("/api/v1/configuration", answers(configuration))]
 
 
-def _configuration(context: TabContext) -> dict[str, Any]:
+def _configuration(context: WebContext) -> dict[str, Any]:
     from gateway.profiles import ProfileError
 
     try:

@@ -11,9 +11,9 @@ from starlette.routing import Route
 
 from gateway import defaults
 from gateway.extras import is_installed, missing_note
+from gateway.web.context import WebContext
 from gateway.web.tabs.answers import (
     Nothing,
-    TabContext,
     TabRefusedError,
     answers,
     number_in_path,
@@ -36,7 +36,7 @@ class WantedDiagnosis:
 class DiagnosisTab:
     """What the tab asks of the server."""
 
-    def __init__(self, context: TabContext) -> None:
+    def __init__(self, context: WebContext) -> None:
         self._state = context.state
         self._jobs = DiagnosisJobs(context.state)
 
@@ -66,7 +66,7 @@ class DiagnosisTab:
         return report_page(await asyncio.to_thread(read_report, self._state, number_in_path(request)))
 
 
-def routes(context: TabContext) -> list[Route]:
+def routes(context: WebContext) -> list[Route]:
     """Return the addresses of this tab."""
     tab = DiagnosisTab(context)
     return [

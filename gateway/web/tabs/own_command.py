@@ -11,7 +11,8 @@ import subprocess
 import sys
 from typing import Any, Final
 
-from gateway.web.tabs.answers import CONFLICT, UNAVAILABLE, TabContext, TabRefusedError
+from gateway.web.context import WebContext
+from gateway.web.tabs.answers import CONFLICT, UNAVAILABLE, TabRefusedError
 
 _PATIENCE_S: Final = 60.0
 
@@ -21,14 +22,14 @@ async def run_verb(*words: str) -> str:
     return await asyncio.to_thread(_run, words)
 
 
-async def ask_verb(context: TabContext, *words: str) -> dict[str, Any]:
+async def ask_verb(context: WebContext, *words: str) -> dict[str, Any]:
     """Return the JSON of a verb that takes --state, --rig and --json."""
     printed = await run_verb(*words, "--json", *state_words(context))
     answer: dict[str, Any] = json.loads(printed)
     return answer
 
 
-def state_words(context: TabContext) -> tuple[str, ...]:
+def state_words(context: WebContext) -> tuple[str, ...]:
     """Return the options that name this gateway."""
     return "--state", str(context.state), "--rig", context.rig
 

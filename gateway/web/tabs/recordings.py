@@ -10,10 +10,10 @@ from starlette.routing import Route
 
 from gateway.extras import is_installed, missing_note
 from gateway.live.control_link import ask_once
+from gateway.web.context import WebContext
 from gateway.web.tabs.answers import (
     NOT_FOUND,
     Nothing,
-    TabContext,
     TabRefusedError,
     answers,
     number_in_path,
@@ -28,7 +28,7 @@ _TYPES: Final = {"csv": "text/csv; charset=utf-8", "parquet": "application/vnd.a
 class RecordingsTab:
     """What the tab asks of the server."""
 
-    def __init__(self, context: TabContext) -> None:
+    def __init__(self, context: WebContext) -> None:
         self._state = context.state
 
     async def list(self, request: Request) -> dict[str, Any]:
@@ -65,7 +65,7 @@ class RecordingsTab:
         return report_page(await asyncio.to_thread(draw_recording, self._state, number_in_path(request)))
 
 
-def routes(context: TabContext) -> list[Route]:
+def routes(context: WebContext) -> list[Route]:
     """Return the addresses of this tab."""
     tab = RecordingsTab(context)
     return [

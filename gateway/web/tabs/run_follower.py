@@ -35,7 +35,7 @@ class RunFollower:
 
     @property
     def is_following(self) -> bool:
-        """Whether a run of the page's own is under way."""
+        """Decide whether a run of the page's own is under way."""
         return self._task is not None and not self._task.done()
 
     async def preview(self, plan: Status) -> Status:

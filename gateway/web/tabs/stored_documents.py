@@ -11,7 +11,8 @@ from gateway.calibrations.store import CalibrationStore
 from gateway.numbered_documents.store import StoredDocument
 from gateway.plants.store import NumberedPlant, PlantStore
 from gateway.profiles import ProfileError, Rig, load_rig
-from gateway.web.tabs.answers import BAD_REQUEST, TabContext, TabRefusedError, read_body
+from gateway.web.context import WebContext
+from gateway.web.tabs.answers import BAD_REQUEST, TabRefusedError, read_body
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration
@@ -43,7 +44,7 @@ def change_words(noun: str, change: Change) -> tuple[str, ...]:
     return ("use", str(change.use), *forced)
 
 
-def calibration_facts(context: TabContext) -> dict[str, Any]:
+def calibration_facts(context: WebContext) -> dict[str, Any]:
     """Return the calibrations, the newest first, the rig's own last."""
     rig = _rig(context)
     store = CalibrationStore(context.state, rig.calibration if rig else None)
@@ -81,7 +82,7 @@ def _calibration_row(entry: "StoredDocument[Calibration]", active: int | None) -
     }
 
 
-def plant_facts(context: TabContext) -> dict[str, Any]:
+def plant_facts(context: WebContext) -> dict[str, Any]:
     """Return the plants, the newest first, the rig's own (number 0) last."""
     store = PlantStore(context.state)
     selected = store.find_selected()
@@ -112,7 +113,7 @@ def _plant_row(entry: StoredDocument[NumberedPlant], active: int) -> dict[str, A
     }
 
 
-def _rig(context: TabContext) -> Rig | None:
+def _rig(context: WebContext) -> Rig | None:
     """None for a rig that cannot be read any more: its file has been changed since the start."""
     try:
         return load_rig(context.rig, simulated=context.simulated)

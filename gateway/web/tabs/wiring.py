@@ -7,10 +7,11 @@ from typing import Any
 from starlette.requests import Request
 from starlette.routing import Route
 
-from gateway.web.tabs.answers import TabContext, TabRefusedError, answers
+from gateway.web.context import WebContext
+from gateway.web.tabs.answers import TabRefusedError, answers
 
 
-def routes(context: TabContext) -> list[Route]:
+def routes(context: WebContext) -> list[Route]:
     """Return the addresses of this tab."""
 
     async def wiring(request: Request) -> dict[str, Any]:
@@ -19,7 +20,7 @@ def routes(context: TabContext) -> list[Route]:
     return [Route("/api/v1/wiring", answers(wiring))]
 
 
-def wiring_document(context: TabContext) -> dict[str, Any]:
+def wiring_document(context: WebContext) -> dict[str, Any]:
     """Return title and sections as `wiring --json` has them. TabRefusedError where the rig cannot be read any more."""
     from gateway.clients import MissingRegisterError
     from gateway.clients.wiring import wiring_page

@@ -1,4 +1,4 @@
-"""The tabs served as the page serves them: a real web server in a thread, on a free port, with the tabs' addresses and scripts."""
+"""The page served in a thread of a test, on a free port: the real application behind its guard, without a guardian."""
 
 import asyncio
 import contextlib
@@ -7,31 +7,18 @@ import socket
 import threading
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from http.cookiejar import CookieJar
 from pathlib import Path
 from typing import Any
 
 import uvicorn
-from starlette.applications import Starlette
-from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response
-from starlette.routing import Mount, Route
-from starlette.staticfiles import StaticFiles
 
-import gateway.web
-from gateway.reports.style import read_style
-from gateway.web.tabs import calibrate, calibrations, configuration, diagnosis, recordings, wiring
-
-TABS = (calibrate, recordings, calibrations, diagnosis, wiring, configuration)
-STATIC = Path(gateway.web.__file__).parent / "static"
-
-
-@dataclass(frozen=True)
-class TabsContext:
-    state: Path
-    rig: str = "demo"
-    simulated: bool = True
+from gateway.live.control_link import ControlLink
+from gateway.web.context import WebContext
+from gateway.web.security import CSRF_HEADER, Door
+from gateway.web.server import make_app
 
 
 @dataclass
@@ -45,21 +32,27 @@ class Answer:
         return json.loads(self.body)
 
 
-@dataclass
-class ServedTabs:
-    address: str
+class ServedPage:
+    """A browser's requests: with its session, and with the token that commands need. context: what the page shares."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self._browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
+        self.csrf = ""
 
     def get(self, path: str) -> Answer:
         return self._ask(urllib.request.Request(self.address + path))
 
-    def post(self, path: str, body: Any = None) -> Answer:
+    def post(self, path: str, body: Any = None, *, csrf: bool = True) -> Answer:
+        if csrf and not self.csrf:
+            self.csrf = self.get("/api/v1/session").json["csrf"]
         data = body if isinstance(body, bytes) else json.dumps({} if body is None else body).encode()
-        request = urllib.request.Request(self.address + path, data, {"Content-Type": "application/json"})
-        return self._ask(request)
+        headers = {"Content-Type": "application/json"} | ({CSRF_HEADER: self.csrf} if csrf else {})
+        return self._ask(urllib.request.Request(self.address + path, data, headers))
 
     def _ask(self, request: urllib.request.Request) -> Answer:
         try:
-            with urllib.request.urlopen(request, timeout=60) as answer:
+            with self._browser.open(request, timeout=60) as answer:
                 return Answer(answer.status, answer.read(), dict(answer.headers))
         except urllib.error.HTTPError as error:
             with error:
@@ -67,25 +60,24 @@ class ServedTabs:
 
 
 @contextlib.contextmanager
-def serve(context: TabsContext, index: Callable[[], str] = str) -> Iterator[ServedTabs]:
-    """Serve the tabs of this state directory until the block ends."""
-
-    async def show_index(request: Request) -> Response:
-        return HTMLResponse(index())
-
-    async def style(request: Request) -> Response:
-        return Response(read_style(), media_type="text/css")
-
-    routes = [route for tab in TABS for route in tab.routes(context)]
-    own = [Route("/", show_index), Route("/static/style.css", style), Mount("/static", StaticFiles(directory=STATIC))]
-    server = uvicorn.Server(uvicorn.Config(Starlette(routes=[*routes, *own]), log_level="warning", lifespan="off"))
+def serve(state: Path, rig: str = "demo") -> Iterator[ServedPage]:
+    """Serve the page of this state directory until the block ends."""
     listener = socket.create_server(("127.0.0.1", 0))
-    thread = threading.Thread(target=lambda: asyncio.run(server.serve([listener])))
+    host, port = listener.getsockname()
+    servers: list[uvicorn.Server] = []
+
+    async def run() -> None:
+        context = WebContext(state, rig, True, ControlLink(state))
+        config = uvicorn.Config(make_app(context, Door(host, port), None), log_config=None, timeout_graceful_shutdown=2)
+        servers.append(uvicorn.Server(config))
+        await servers[0].serve([listener])
+
+    thread = threading.Thread(target=lambda: asyncio.run(run()))
     thread.start()
     try:
-        yield ServedTabs(f"http://127.0.0.1:{listener.getsockname()[1]}")
+        yield ServedPage(f"http://{host}:{port}")
     finally:
-        server.should_exit = True
+        servers[0].should_exit = True
         thread.join(30)
         listener.close()
         assert not thread.is_alive()

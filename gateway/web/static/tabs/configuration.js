@@ -59,11 +59,16 @@ function valuesTable(file, values) {
   const rows = values.map((one) => ({
     class: one.line === null ? "unset" : "",
     cells: [
-      one.path, `${one.value}${one.unit && one.value !== "null" ? ` ${one.unit}` : ""}`, place(file, one),
+      brokenAtDots(one.path), `${one.value}${one.unit && one.value !== "null" ? ` ${one.unit}` : ""}`, place(file, one),
       h("small", {}, one.about),
     ],
   }));
   return table(`Values of ${file.file}`, ["value of", "is", "from", "what it means"], rows, "values");
+}
+
+/** A long name may go on in the next line where a group ends, and nowhere else. */
+function brokenAtDots(path) {
+  return h("span", {}, path.split(".").flatMap((part, at) => (at ? [h("wbr"), `.${part}`] : [part])));
 }
 
 function place(file, one) {

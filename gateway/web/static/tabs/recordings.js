@@ -77,8 +77,7 @@ class RecordingsTab {
 
   async diagnose(recording) {
     await this.api.post("/api/v1/diagnosis/begin", { recording });
-    document.dispatchEvent(new CustomEvent("open-tab", { detail: "diagnosis" }));
-    this.told.good(`Recording ${recording} is being diagnosed: see the tab Diagnosis.`);
+    location.hash = "diagnosis";
   }
 }
 
