@@ -6,6 +6,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from gateway.reports.fit.headline import answer_sentence, policy
+from gateway.reports.fit.names import describe_model, spell_model
+
 
 def fit_table(document: dict[str, Any]) -> Table:
     """Return one row per model and order; the chosen one stands out, those that may not drive a plant step back."""
@@ -63,12 +66,14 @@ def summary(document: dict[str, Any]) -> list[Text]:
         ),
         Text(),
         Text(
+            f"{answer_sentence(document)}.", style="bold green" if not document["measured"]["rejected"] else "bold red"
+        ),
+        Text(),
+        Text(
             f"ladder    {ladder['points']} stairs in {_groups(ladder['groups'])}, {low_v:g} .. {high_v:g} V, rig {rig}"
         ),
-        Text(
-            f"chosen    {chosen['model'].upper()} of order {chosen['order']}, {low_n:.1f} .. {high_n:.1f} N",
-            style="bold",
-        ),
+        Text(f"chosen    {spell_model(chosen['model'], chosen['order'])}, {low_n:.1f} .. {high_n:.1f} N", style="bold"),
+        Text(f"          {describe_model(chosen['model'])}"),
         Text(f"error     {_describe_error(document['measured'])}", style="bold"),
         Text(f"          {_reason(chosen)}"),
         Text(f"reversal  {_reversal(reversal)}"),
@@ -110,9 +115,7 @@ def _reason(chosen: dict[str, Any]) -> str:
 
 def _reversal(reversal: dict[str, Any]) -> str:
     if not reversal["identified"]:
-        return f"linear blend over {reversal['span_n']:g} N, assumed"
-    slip = reversal["policy"] == "slip-stops"
-    policy = "slip stops" if slip else f"linear blend over {reversal['span_n']:g} N"
+        return f"{policy(reversal)}, assumed"
     other = (
         ""
         if reversal["slip_heldout_n"] is None
@@ -121,7 +124,7 @@ def _reversal(reversal: dict[str, Any]) -> str:
         )
     )
     return (
-        f"{policy}: {reversal['rms_n']:.2f} N RMS on {reversal['points']} minor-loop points, "
+        f"{policy(reversal)}: {reversal['rms_n']:.2f} N RMS on {reversal['points']} minor-loop points, "
         f"{reversal['switched_rms_n']:.2f} N if branches were switched{other}"
     )
 

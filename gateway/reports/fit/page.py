@@ -8,7 +8,8 @@ from gateway.bsfm.fit.evaluation import Evaluation
 from gateway.reports.figures import figure
 from gateway.reports.fit import charts
 from gateway.reports.fit.document import Document
-from gateway.reports.fit.names import describe_model, spell_model, spell_reversal
+from gateway.reports.fit.headline import answer_sentence, policy, reversal_sentence
+from gateway.reports.fit.names import describe_model, spell_model
 from gateway.reports.fit.raw_ladder import RawLadder
 from gateway.reports.frame import Head, notes, page, section, table, tiles
 
@@ -61,36 +62,13 @@ def _head(document: Document) -> Head:
         kind=f"{number.capitalize() or 'Fit of a ladder'} · {document['name']}",
         answer=answer_sentence(document),
         badge=("rejected", "bad") if why else ("may drive the rig", "good"),
-        sentences=(f"Rejected, not offered for use: {why}" if why else "", _reversal_sentence(document["reversal"])),
+        sentences=(f"Rejected, not offered for use: {why}" if why else "", reversal_sentence(document["reversal"])),
         facts=(
             f"rig {document['rig']}" if document["rig"] else "unnamed rig",
             name,
             f"{ladder['points']} stairs in {ladder['groups']} group{'s' * (ladder['groups'] > 1)}, {low_v:g} to {high_v:g} V",
         ),
         title=f"{document['name']} · {number or 'fit of ' + name}",
-    )
-
-
-def answer_sentence(document: Document) -> str:
-    """Return `BSFM, order 2, with 2 slip stops describes this machine to 0.21 N RMS, 0.80 N at most`."""
-    measured = document["measured"]
-    return (
-        f"{_model(document['chosen'])}, with {_policy(document['reversal'])} describes this machine to "
-        f"{measured['rms_n']:.3f} N RMS, {measured['max_n']:.2f} N at most"
-    )
-
-
-def _policy(reversal: Document) -> str:
-    return spell_reversal(reversal.get("stops", 0), reversal["span_n"])
-
-
-def _reversal_sentence(reversal: Document) -> str:
-    """Say how well the reversal policy holds inside the loop, and that of nothing but switching branches."""
-    if not reversal["identified"]:
-        return f"Reversals were not measured: {_policy(reversal)} is assumed."
-    return (
-        f"Reversals inside the loop: {_policy(reversal)}, off by {reversal['rms_n']:.2f} N RMS and {reversal['max_n']:.2f} N "
-        f"at most; switching branches at once would be off by {reversal['switched_rms_n']:.2f} N RMS."
     )
 
 
@@ -108,7 +86,7 @@ def _figures(document: Document) -> str:
         ("Error", f"{measured['rms_n']:.3f}", f"N RMS on all {measured['points']} points, {reversals}"),
         ("Largest", f"{measured['max_n']:.2f}", "N at one of them"),
         ("Held out", heldout, "N RMS by branch, on a group not seen"),
-        ("Reversals", off, f"{'N RMS, ' if reversal['identified'] else ''}{_policy(reversal)}"),
+        ("Reversals", off, f"{'N RMS, ' if reversal['identified'] else ''}{policy(reversal)}"),
         ("Range", f"{low_n:.1f} – {high_n:.1f}", "N on both branches"),
     )
 
