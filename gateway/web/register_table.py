@@ -2,15 +2,20 @@
 
 from typing import Any
 
+from gateway import defaults
 from gateway.profiles import Rig
 from gateway.registers.map.register_map import Register
 
 
-def register_table(rig: Rig) -> dict[str, Any]:
-    """Return {"blocks": [...], "registers": [...]} of the rig's map. name4x: as PLC people count, 40001 for address 0."""
-    map_ = rig.register_map
+def register_table(rig: Rig, port: int | None) -> dict[str, Any]:
+    """Return {"blocks": [...], "registers": [...]} of the rig's map, and where plain Modbus TCP is served: port, None for
+    nowhere; host, empty where it is the page's own; unit."""
+    map_, network = rig.register_map, rig.network
     return {
         "map": map_.name,
+        "port": port,
+        "host": "" if network.bind in ("0.0.0.0", "::") else network.bind,
+        "unit": defaults.UNIT_ID if defaults.UNIT_ID in network.units else network.units[0],
         "blocks": [
             {"name": block.name, "first": block.first, "last": block.last, "text": block.text} for block in map_.blocks
         ],

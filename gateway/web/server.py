@@ -107,7 +107,8 @@ def _api_routes(context: WebContext, commands: Commands, events: EventSource) ->
         return JSONResponse({"ok": True, "version": VERSION})
 
     async def registers(request: Request) -> Response:
-        return JSONResponse(register_table(context.profile))
+        port = (await context.control.ask({"do": "running"}))["port"]
+        return JSONResponse(register_table(context.profile, port))
 
     async def words(request: Request) -> Response:
         block = request.path_params["block"]

@@ -2,6 +2,7 @@
 // first opened; its element gets the events `shown` and `hidden` after that.
 
 import { api, listen } from "./api.js";
+import "./live/samples.js";
 
 const NAMES = ["live", "calibrate", "recordings", "calibrations", "diagnosis", "wiring", "configuration"];
 const BADGES = { fault: "bad", holding: "good", ramping: "warn", calibrating: "warn", ready: "good" };

@@ -1,0 +1,68 @@
+// The voltage-force loop: the model's two branches, what was measured in the last minute, and where it stands now.
+
+import { Plot, axis, colour, dots, figure } from "./plots.js";
+
+export function makeLoop(samples, api) {
+  const element = figure("Voltage and force", [
+    ["rising", "model, rising"], ["falling", "model, falling"], ["measured dot", "measured"], ["walk dot", "now"],
+  ]);
+  let model = { voltage_v: [0, 1], rising_n: [0, 0], falling_n: [0, 0], number: null };
+  let shown = null;
+
+  const plot = new Plot(element, () => ({
+    data: [model.voltage_v, model.rising_n, model.falling_n],
+    options: {
+      scales: {
+        x: { time: false },
+        y: { range: (chart, low, high) => [Math.min(-1, low ?? 0), Math.max(5, (high ?? 5) * 1.05)] },
+      },
+      axes: [axis("V"), axis("N", { upright: true })],
+      series: [
+        {},
+        { stroke: colour("rising"), width: 2, points: { show: false } },
+        { stroke: colour("falling"), width: 2, points: { show: false } },
+      ],
+      hooks: { draw: [drawMeasured] },
+    },
+  }));
+
+  function drawMeasured(chart) {
+    const { command_v = [], force_n = [] } = samples.columns;
+    dots(chart, command_v, force_n, { fill: colour("measured"), size: 2.4 });
+    if (!force_n.length) return;
+    const x = chart.valToPos(command_v.at(-1), "x", true);
+    const y = chart.valToPos(force_n.at(-1), "y", true);
+    const context = chart.ctx;
+    context.save();
+    context.fillStyle = colour("bsfm");
+    context.strokeStyle = colour("paper");
+    context.lineWidth = 2 * devicePixelRatio;
+    context.beginPath();
+    context.arc(x, y, 6 * devicePixelRatio, 0, 7);
+    context.fill();
+    context.stroke();
+    context.restore();
+  }
+
+  async function load(number) {
+    shown = number;
+    try {
+      model = await api.get("/api/v1/model");
+      plot.rebuild();
+    } catch {
+      shown = null; // the next state tries again
+    }
+  }
+
+  return {
+    element,
+    draw() {
+      plot.fit();
+      if (plot.isShown) plot.chart.redraw(false);
+    },
+    state(state) {
+      const key = `${state.calibration.number} ${state.calibration.name}`;
+      if (key !== shown) load(key);
+    },
+  };
+}
