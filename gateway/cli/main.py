@@ -43,6 +43,7 @@ VERBS: Final = (
     "effects",
     "backup",
     "restore",
+    "service",
     "completion",
     "version",
 )

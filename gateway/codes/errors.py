@@ -52,6 +52,21 @@ ERRORS: Final = (
         "df -h and ls -ld of the path in the message show which.",
     ),
     Explanation(
+        "E107",
+        "the service cannot be installed",
+        "A systemd unit for this rig could not be written, or would not work.",
+        "Only root may write /etc, the program or the rig lies below /home, which the service does not see, or there is "
+        "no such unit.",
+        "Do what the message says; force-gateway service install RIG --dry-run shows everything without changing anything.",
+    ),
+    Explanation(
+        "E108",
+        "systemd has refused",
+        "A command of systemd failed or is not there; its last words stand in the message.",
+        "No systemd on this machine (a container), no root, or a unit that does not start.",
+        "journalctl -u UNIT shows why a unit does not start; without systemd run `force-gateway run` under any supervisor.",
+    ),
+    Explanation(
         "E110",
         "bytes arrive, no valid line",
         "The line carries bytes, none of which form a message of this device at this baud rate.",

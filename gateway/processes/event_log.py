@@ -1,4 +1,5 @@
-"""What a process has to say to people: on stderr and in the state directory's event file, and the loop waits for neither.
+"""What a process has to say to people: on stderr (of a service: in the journal) and in the state directory's event file, and
+the loop waits for neither.
 
 A paused terminal blocks its writer, and so may a disk; each has a queue and a thread of its own. At most 10 lines a
 second per cause: a flooding client cannot fill a disk, and the number of lines left out is said. Causes carry addresses,
@@ -18,6 +19,7 @@ from typing import Final, Self
 
 from gateway.processes.event import EventRecord, encode_event, format_event, make_event
 from gateway.processes.event_file import EventFile
+from gateway.processes.journal import journal_writer
 
 LINES_PER_S: Final = 10
 _LONGEST_QUEUE: Final = 1000
@@ -44,10 +46,7 @@ class EventLog:
         self._clock, self._wall, self._source = clock, wall, source
         self._windows: dict[str, _RateWindow] = {}
         self._lock = threading.Lock()
-        to_terminal = write or sys.stderr.write
-        self._terminal = QueuedWriter(
-            "terminal", lambda event: to_terminal(format_event(event) + "\n"), self._tell_left_out
-        )
+        self._terminal = QueuedWriter("terminal", _terminal_writer(write), self._tell_left_out)
         self._file = file
         self._disk = QueuedWriter("events", _EventFileWriter(file, self._terminal.put, self._event)) if file else None
 
@@ -179,6 +178,13 @@ class QueuedWriter:
                 return
             with contextlib.suppress(OSError, ValueError):
                 self._write(event)
+
+
+def _terminal_writer(write: Callable[[str], object] | None) -> Callable[[EventRecord], object]:
+    """Where people look: `write`, else the journal where stderr is its stream, else stderr."""
+    to_journal = None if write else journal_writer()
+    to_terminal = write or sys.stderr.write
+    return to_journal or (lambda event: to_terminal(format_event(event) + "\n"))
 
 
 class _EventFileWriter:

@@ -22,6 +22,7 @@ from gateway.processes import exit_codes, message_link, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.service_manager import ServiceManager, service_manager
 from gateway.service.supervisor import guardian_sentences as words
 from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
 from gateway.service.supervisor.child_starter import ChildStarter
@@ -52,7 +53,7 @@ def run(options: RunOptions) -> int:
         priority.set_nice(priority.LOOP_NICE)
         with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
             starter = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
-            return Guardian(options, state, starter, signals, log).watch()
+            return Guardian(options, state, starter, signals, log, manager=service_manager()).watch()
 
 
 @dataclass
@@ -67,6 +68,7 @@ class Guardian:
     log: EventLog
     clock: Callable[[], float] = time.monotonic
     wait: Callable[[list[int], float], set[int]] = wait_readable
+    manager: ServiceManager = field(default_factory=ServiceManager)
 
     control: ControlChild = field(init=False)
     leaving: Child | None = None  # killed and not gone yet: until then no other is started, for there are never two
@@ -105,6 +107,7 @@ class Guardian:
         control = self.control
         if control.has_spoken(readable):
             control.read_messages()
+            self.manager.feed(control.heartbeat.heard_s)
             if control.is_link_ended and not (control.process and control.process.pid):
                 self.starter.on_not_born()
                 return self._on_death(Ending(EndCause.NOT_STARTED, "control process ended before its first word"))
@@ -139,6 +142,7 @@ class Guardian:
         self.stops += count
         is_up = self.control.safe_line is not None or self.control.heartbeat.is_up
         self.stop_deadline_s = self.clock() + (STOP_BOUND_S if self.stops == 1 and is_up else 0.0)
+        self.manager.stopping()
         if self.stops == 1:
             self.control.tell(message_link.STOP)
 
@@ -160,6 +164,7 @@ class Guardian:
         elif not self.announced:
             words.print_ready(banner)
         self.log.note("start", f"ready: rig {self.options.rig}, {where}, processes {self._pids()}")
+        self.manager.ready(f"rig {self.options.rig}, {where}")
         self.announced = True
         self.restarts.came_up()
 
@@ -236,6 +241,7 @@ class Guardian:
             self.log("restart", words.too_many_sentence(self.restarts.causes))
             return exit_codes.FAILED
         self.next_start, self.control.asked_s = ending, now_s + pause_s
+        self.manager.starting(f"control is started again: {ending.text}", pause_s + 2.0 * START_GRACE_S)
         if self.leaving:
             self.log("restart", words.leaving_sentence(self.leaving.pid))
             return None

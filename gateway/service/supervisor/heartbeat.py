@@ -31,6 +31,11 @@ class Heartbeat:
         return self._beat_s is not None
 
     @property
+    def heard_s(self) -> float:
+        """Time of the last beat, s; 0 before the first."""
+        return self._heard_s
+
+    @property
     def due_s(self) -> float:
         """Time at which the silence has lasted too long, s."""
         return (self._beat_s or 0.0) + self.stall_s

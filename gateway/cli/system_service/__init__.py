@@ -1,0 +1,1 @@
+"""A gateway that systemd keeps: the unit, the udev rule, and what is asked of systemctl."""

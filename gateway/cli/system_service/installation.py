@@ -1,0 +1,155 @@
+"""What `service install` writes, and what it asks systemd for: a plan first, so that it can be shown and then done.
+
+Files go below a root, which is `/` on a running machine, and a folder where an image is built; only on `/` is systemd asked
+for anything.
+"""
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from gateway.cli.errors import CliError
+from gateway.cli.system_service import unit_file
+from gateway.processes import exit_codes
+from gateway.profiles.rigs.faces import RtuFace, TlsFace
+
+if TYPE_CHECKING:
+    from gateway.profiles import Rig
+
+UNITS: Final = "etc/systemd/system"
+_HIDDEN: Final = ("/home", "/root", "/run/user")  # ProtectHome=yes
+
+
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """files: path below the root -> text; commands: what is run behind them, in order."""
+
+    unit: str
+    files: dict[str, str]
+    commands: tuple[tuple[str, ...], ...]
+
+
+def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], command: Path | None) -> Installation:
+    """Return the plan for a rig that `check` has accepted. CliError E107 where the service could not run it."""
+    program = (command or _own_command()).absolute()
+    is_file = Path(rig_name).suffix in (".yaml", ".yml") or "/" in rig_name
+    named = str(Path(rig_name).absolute()) if is_file else rig_name
+    for path in (str(program), *([named] if is_file else [])):
+        _refuse_hidden(path)
+    lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
+    faces = [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
+    ports = [line.port for line in lines] + faces
+    options = unit_file.UnitOptions(
+        command=program,
+        rig=named,
+        stem=Path(named).stem,
+        ports=_ports_of(rig),
+        devices=() if rig.simulated else tuple(dict.fromkeys(port for port in ports if port)),
+        networks=tuple(networks) or _networks_of(rig),
+        compiles=rig.is_watched,
+    )
+    return Installation(
+        options.name,
+        {
+            f"{UNITS}/{options.name}": unit_file.unit_text(options),
+            "etc/sysusers.d/force-gateway.conf": unit_file.sysusers_text(),
+            "etc/udev/rules.d/70-force-gateway.rules": unit_file.udev_text(),
+        },
+        (
+            ("systemd-sysusers", "force-gateway.conf"),
+            ("udevadm", "control", "--reload"),
+            ("udevadm", "trigger", "--subsystem-match=tty"),
+            ("systemctl", "daemon-reload"),
+            ("systemctl", "enable", "--now", options.name),
+        ),
+    )
+
+
+def install(plan: Installation, root: Path) -> list[Path]:
+    """Write the plan's files below the root and, on a running machine, start the service. CliError where that is refused."""
+    written = []
+    for name, text in plan.files.items():
+        path = root / name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            beside = path.with_name(f".{path.name}.new")
+            beside.write_text(text, encoding="utf-8")
+            beside.replace(path)
+        except PermissionError:
+            raise CliError(
+                f"E107 {path}: only root may write there; sudo {' '.join(sys.argv)}, or --root DIR for an image",
+                exit_codes.PERMISSION,
+            ) from None
+        written.append(path)
+    if root == Path("/"):
+        for words in plan.commands:
+            run_command(words)
+    return written
+
+
+def uninstall(stem: str, root: Path) -> Path:
+    """Stop and remove the unit of a rig; its state directory, the user and the udev rule stay."""
+    path = root / UNITS / unit_file.unit_name(stem)
+    if not path.exists():
+        raise CliError(f"E107 {path}: there is no such unit; {_others(root)}", exit_codes.DATA)
+    if root == Path("/"):
+        run_command(("systemctl", "disable", "--now", path.name))
+    path.unlink()
+    if root == Path("/"):
+        run_command(("systemctl", "daemon-reload"))
+    return path
+
+
+def installed_units(root: Path) -> list[str]:
+    """Return the names of the units that are there."""
+    return sorted(path.name for path in (root / UNITS).glob(f"{unit_file.NAME}-*.service"))
+
+
+def run_command(words: Sequence[str], *, quiet: bool = False) -> str:
+    """Run a command of systemd and return what it says. CliError E108 with its own words where it fails."""
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        raise CliError(
+            f"E108 {words[0]} is not on this machine: without systemd the gateway runs by "
+            "`force-gateway run`, in a container or under another supervisor",
+            exit_codes.DEVICE,
+        ) from None
+    if done.returncode and not quiet:
+        said = (done.stderr or done.stdout).strip().splitlines()
+        raise CliError(f"E108 {' '.join(words)}: {said[-1] if said else f'exit code {done.returncode}'}")
+    return done.stdout
+
+
+def _own_command() -> Path:
+    beside = Path(sys.executable).with_name("force-gateway")
+    return beside if beside.exists() else Path(sys.argv[0])
+
+
+def _refuse_hidden(path: str) -> None:
+    if hidden := next((home for home in _HIDDEN if path.startswith(f"{home}/")), None):
+        raise CliError(
+            f"E107 {path}: the service sees nothing below {hidden}; install into /opt/force-gateway (python3 -m venv, "
+            "pip install) and keep the rig in /etc/force-gateway, or give --command",
+            exit_codes.CONFIGURATION,
+        )
+    if not Path(path).is_absolute():
+        raise CliError(f"E107 {path}: the service needs an absolute path", exit_codes.CONFIGURATION)
+
+
+def _others(root: Path) -> str:
+    units = installed_units(root)
+    return f"installed: {', '.join(units)}" if units else "none is installed"
+
+
+def _ports_of(rig: "Rig") -> tuple[int, ...]:
+    secure = [face.port for face in rig.fieldbus if isinstance(face, TlsFace)]
+    return (*([rig.network.port] if rig.network.plain else []), *secure)
+
+
+def _networks_of(rig: "Rig") -> tuple[str, ...]:
+    """Who may connect by the rig itself may by the kernel; a rig that names nobody is reached from this machine alone."""
+    return ("localhost", *map(str, rig.network.allow))

@@ -1,0 +1,104 @@
+"""`service`: a gateway that systemd keeps: install, uninstall, status, logs."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gateway.cli.errors import CliError
+from gateway.processes import exit_codes
+
+_ROOT = click.option(
+    "--root",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("/"),
+    help="Write below this folder, and start nothing: for an image.",
+)
+
+
+@click.group(name="service")
+def command() -> None:
+    """Keep a gateway running by systemd."""
+
+
+@command.command(name="install")
+@click.argument("rig")
+@click.option("--dry-run", is_flag=True, help="Print the files and commands, change nothing.")
+@click.option(
+    "--allow", "networks", multiple=True, metavar="NETWORK", help="Who may reach it, such as 192.168.125.0/24."
+)
+@click.option("--command", "program", type=click.Path(path_type=Path), help="The program  [default: this one]")
+@_ROOT
+def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], program: Path | None, root: Path) -> None:
+    """Write a hardened unit for RIG, the udev rule and the service's user, and start it.
+
+    The rig is checked first. The unit is restarted when its control loop stands still, and not when its configuration is
+    at fault (exit codes 2, 65, 77, 78). Recordings, calibrations and events are kept in /var/lib/force-gateway/RIG.
+    """
+    from gateway.cli.system_service.installation import install, plan_installation
+    from gateway.profiles import load_rig
+
+    plan = plan_installation(rig, load_rig(rig), networks=networks, command=program)
+    if dry_run:
+        click.echo("\n".join(f"# /{name}\n{text}" for name, text in plan.files.items()))
+        click.echo("\n".join(" ".join(words) for words in plan.commands))
+        return
+    for path in install(plan, root):
+        click.echo(f"wrote {path}")
+    if root == Path("/"):
+        click.echo(f"{plan.unit} runs; force-gateway service status, force-gateway service logs")
+
+
+@command.command(name="uninstall")
+@click.argument("rig")
+@_ROOT
+def uninstall_command(*, rig: str, root: Path) -> None:
+    """Stop the service of RIG and remove its unit; what it has recorded stays."""
+    from gateway.cli.system_service.installation import uninstall
+
+    try:
+        click.echo(f"removed {uninstall(Path(rig).stem, root)}; /var/lib/force-gateway/{Path(rig).stem} stays")
+    except PermissionError as error:
+        raise CliError(f"E107 {error.filename}: only root may remove it", exit_codes.PERMISSION) from None
+
+
+@command.command(name="status")
+@click.argument("rig", required=False)
+@_ROOT
+def status_command(*, rig: str | None, root: Path) -> None:
+    """Show each service: whether it runs, since when, how often it was started again, what it says of itself.
+
+    Exit code 1 when one of them does not run.
+    """
+    from gateway.cli.system_service.installation import installed_units
+    from gateway.cli.system_service.unit_file import unit_name
+    from gateway.cli.system_service.unit_status import read_status
+
+    units = [unit_name(Path(rig).stem)] if rig else installed_units(root)
+    if not units:
+        raise CliError("E107 no service is installed: force-gateway service install RIG", exit_codes.DATA)
+    found = [read_status(unit) for unit in units]
+    for one in found:
+        click.echo(one.sentence)
+    if not all(one.is_running for one in found):
+        raise click.exceptions.Exit(exit_codes.FAILED)
+
+
+@command.command(name="logs", context_settings={"ignore_unknown_options": True})
+@click.argument("rig")
+@click.argument("options", nargs=-1, type=click.UNPROCESSED)
+def logs_command(*, rig: str, options: tuple[str, ...]) -> None:
+    """Show the journal of RIG's service. OPTIONS go to journalctl: -f, --since -1h, FORCE_GATEWAY_CODE=A310.
+
+    `force-gateway events` shows the same events from the state directory, without systemd.
+    """
+    from gateway.cli.system_service.unit_file import unit_name
+
+    words: list[Any] = ["journalctl", "--unit", unit_name(Path(rig).stem), *options]
+    try:
+        os.execvp(words[0], words)
+    except FileNotFoundError:
+        raise CliError(
+            "E108 journalctl is not on this machine; force-gateway events reads the gateway's own", exit_codes.DEVICE
+        ) from None

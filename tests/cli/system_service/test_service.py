@@ -1,0 +1,116 @@
+"""The unit is what systemd accepts and judges safe; nothing is written but what is said."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from gateway.cli.main import command
+from gateway.cli.system_service.unit_file import UnitOptions, device_classes, unit_text
+from gateway.cli.system_service.unit_status import parse_status
+
+ANALYZE = shutil.which("systemd-analyze")
+needs_systemd = pytest.mark.skipif(ANALYZE is None, reason="systemd-analyze is not here: nobody judges the unit")
+
+
+def gateway(*words: str | Path) -> Result:
+    return CliRunner().invoke(command, [*map(str, words)])
+
+
+def options(**others: object) -> UnitOptions:
+    facts = {"command": Path("/usr/bin/true"), "rig": "irc5-cell", "stem": "irc5-cell", "ports": (5020,)} | others
+    return UnitOptions(**facts)  # type: ignore[arg-type]
+
+
+def exposure(text: str, folder: Path) -> float:
+    unit = folder / "force-gateway-x.service"
+    unit.write_text(text)
+    done = subprocess.run(
+        [str(ANALYZE), "security", "--offline=true", "--no-pager", str(unit)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    found = re.search(r"Overall exposure level for .*: ([0-9.]+)", done.stdout)
+    assert found, done.stdout + done.stderr
+    return float(found[1])
+
+
+@needs_systemd
+@pytest.mark.parametrize("compiles", [False, True])
+def test_systemd_judges_the_unit_with_its_devices_at_most_1_5(tmp_path: Path, compiles: bool) -> None:
+    assert exposure(unit_text(options(devices=("/dev/ttyUSB0",), compiles=compiles)), tmp_path) <= 1.5
+
+
+@needs_systemd
+def test_systemd_understands_every_line(tmp_path: Path) -> None:
+    unit = tmp_path / "force-gateway-x.service"
+    unit.write_text(unit_text(options(ports=(502,), devices=("/dev/ttyUSB0",), networks=("192.168.125.0/24",))))
+    done = subprocess.run([str(ANALYZE), "verify", str(unit)], capture_output=True, text=True, check=False)
+    assert str(unit) not in done.stderr, done.stderr
+
+
+def test_a_port_of_a_cabinet_is_allowed_by_its_class_and_one_by_id_as_any_usb_adapter() -> None:
+    assert device_classes(("/dev/ttyS0", "/dev/ttyS1", "/dev/ttyAMA0")) == ["char-ttyS", "char-ttyAMA"]
+    assert device_classes(("/dev/serial/by-id/usb-FTDI-port0",)) == ["char-ttyUSB", "char-ttyACM"]
+
+
+def test_a_port_below_1024_has_the_one_privilege_that_it_needs_and_no_other_rig_has_it() -> None:
+    assert "AmbientCapabilities=CAP_NET_BIND_SERVICE\n" in unit_text(options(ports=(502,)))
+    assert "AmbientCapabilities=\n" in unit_text(options())
+
+
+def test_no_exit_code_that_says_it_would_fail_again_starts_it_again() -> None:
+    assert "RestartPreventExitStatus=2 65 77 78\n" in unit_text(options())
+
+
+def test_a_dry_run_shows_the_unit_of_the_rig_and_writes_nothing(tmp_path: Path) -> None:
+    done = gateway(
+        "service", "install", "irc5-cell", "--dry-run", "--root", tmp_path, "--command", "/opt/force-gateway"
+    )
+    assert done.exit_code == 0, done.stderr
+    assert "ExecStart=/opt/force-gateway run irc5-cell --state %S/force-gateway/irc5-cell" in done.stdout
+    assert "IPAddressAllow=localhost 192.168.125.0/24" in done.stdout, "as the rig's own `allow` says"
+    assert not any(tmp_path.iterdir())
+
+
+def test_an_image_gets_the_files_and_one_unit_a_rig(tmp_path: Path) -> None:
+    for rig in ("irc5-cell", "demo"):
+        assert gateway("service", "install", rig, "--root", tmp_path, "--command", "/opt/force-gateway").exit_code == 0
+    units = sorted(path.name for path in (tmp_path / "etc/systemd/system").iterdir())
+    assert units == ["force-gateway-demo.service", "force-gateway-irc5-cell.service"]
+    assert gateway("service", "uninstall", "demo", "--root", tmp_path).exit_code == 0
+    again = gateway("service", "uninstall", "demo", "--root", tmp_path)
+    assert again.exit_code == 65 and "E107" in again.stderr and "force-gateway-irc5-cell.service" in again.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("nowhere",), 78, "nowhere"),
+        (("irc5-cell", "--command", "/home/me/venv/bin/force-gateway"), 78, "E107 /home/me/venv/bin/force-gateway"),
+        (("demo", "--allow"), 2, "--allow"),
+    ],
+)
+def test_what_cannot_work_is_refused_before_anything_is_written(
+    tmp_path: Path, words: tuple[str, ...], code: int, said: str
+) -> None:
+    done = gateway("service", "install", *words[:1], "--root", tmp_path, *words[1:])
+    assert (done.exit_code, said in done.stderr) == (code, True), done.stderr
+    assert not any(tmp_path.iterdir())
+
+
+RUNNING = (
+    "ActiveState=active\nActiveEnterTimestamp=Mon 2026-11-23 05:00:00 UTC\nNRestarts=1\nStatusText=rig demo, x=1\n"
+)
+FAILED = "ActiveState=failed\nNRestarts=0\nResult=exit-code\nExecMainStatus=78\n"
+
+
+def test_the_status_is_a_sentence() -> None:
+    runs, failed = parse_status("a.service", RUNNING), parse_status("a.service", FAILED)
+    assert runs.is_running and not failed.is_running
+    assert runs.sentence == "a.service: runs since Mon 2026-11-23 05:00:00 UTC, started again 1 time; rig demo, x=1"
+    assert failed.sentence == "a.service: failed (exit-code, exit code 78); force-gateway service logs shows why"

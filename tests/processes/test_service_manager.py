@@ -1,0 +1,81 @@
+"""What systemd hears: by a socket of our own in its place."""
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.processes.service_manager import ServiceManager, take_service_manager
+
+
+class Heard:
+    """Datagrams as systemd would read them."""
+
+    def __init__(self, path: Path) -> None:
+        self.address = str(path)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(self.address)
+        self._socket.setblocking(False)
+
+    def all(self) -> list[dict[str, str]]:
+        found = []
+        while True:
+            try:
+                text = self._socket.recv(4096).decode()
+            except BlockingIOError:
+                return found
+            found.append(dict(line.split("=", 1) for line in text.splitlines()))
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@pytest.fixture
+def systemd(tmp_path: Path) -> Iterator[Heard]:
+    heard = Heard(tmp_path / "notify")
+    yield heard
+    heard.close()
+
+
+def test_the_watchdog_hears_of_heartbeats_only_and_of_each_third_of_its_time(systemd: Heard) -> None:
+    manager = ServiceManager(systemd.address, 9.0)
+    for beat in range(1000):
+        manager.feed(100.0 + 0.01 * beat)
+    assert systemd.all() == [{"WATCHDOG": "1"}] * 4, "at 0, 3, 6 and 9 s of ten"
+    manager.feed(109.5)
+    manager.feed(109.5)
+    assert systemd.all() == [], "a heartbeat that was passed on is not passed on again, however often it is asked"
+
+
+def test_a_start_asks_for_its_time_and_ready_takes_it_back(systemd: Heard) -> None:
+    manager = ServiceManager(systemd.address, 10.0)
+    manager.starting("control is started again: it died", 60.0)
+    manager.ready("rig demo")
+    manager.stopping()
+    start, ready, stop = systemd.all()
+    assert (start["WATCHDOG_USEC"], start["STATUS"]) == ("60000000", "control is started again: it died")
+    assert ready == {"READY": "1", "STATUS": "rig demo", "WATCHDOG_USEC": "10000000"}
+    assert stop["STOPPING"] == "1"
+
+
+def test_without_a_manager_or_with_one_that_is_gone_nothing_happens(systemd: Heard, tmp_path: Path) -> None:
+    for silent in (ServiceManager(), ServiceManager(str(tmp_path / "nobody"), 1.0)):
+        silent.ready("rig demo")
+        silent.feed(1.0)
+    assert systemd.all() == []
+
+
+def test_children_do_not_inherit_the_service(systemd: Heard) -> None:
+    environment = {"NOTIFY_SOCKET": systemd.address, "WATCHDOG_USEC": "6000000", "WATCHDOG_PID": "42", "HOME": "/x"}
+    take_service_manager(environment, 42).feed(1.0)
+    assert environment == {"HOME": "/x"}
+    assert systemd.all() == [{"WATCHDOG": "1"}]
+
+
+def test_a_watchdog_that_is_meant_for_another_process_is_not_fed(systemd: Heard) -> None:
+    manager = take_service_manager(
+        {"NOTIFY_SOCKET": systemd.address, "WATCHDOG_USEC": "6000000", "WATCHDOG_PID": "7"}, 42
+    )
+    manager.feed(1.0)
+    assert systemd.all() == []
