@@ -9,6 +9,7 @@ from gateway.codes.errors import ERRORS
 from gateway.codes.explanation import Explanation
 from gateway.codes.face_errors import FACE_ERRORS
 from gateway.codes.faults import FaultCode
+from gateway.codes.machine_errors import MACHINE_ERRORS
 from gateway.codes.notices import NOTICES
 from gateway.codes.page_errors import PAGE_ERRORS
 from gateway.codes.refusals import SPECIAL_REFUSALS, RefusalReason
@@ -40,7 +41,7 @@ def _describe(explanation: Explanation, name: str = "", exception: int = 0) -> C
 
 
 def _entries() -> Iterator[CatalogueEntry]:
-    yield from map(_describe, (*ERRORS, *FACE_ERRORS, *PAGE_ERRORS))
+    yield from map(_describe, (*MACHINE_ERRORS, *ERRORS, *FACE_ERRORS, *PAGE_ERRORS))
     yield from (_describe(reason.explanation, reason.name, reason.exception) for reason in RefusalReason)
     yield from (_describe(special.explanation, exception=special.reason.exception) for special in SPECIAL_REFUSALS)
     yield from map(_describe, NOTICES)

@@ -19,7 +19,7 @@ from typing import Final, Self
 
 from gateway.processes.event import EventRecord, encode_event, format_event, make_event
 from gateway.processes.event_file import EventFile
-from gateway.processes.journal import journal_writer
+from gateway.processes.systemd.journal import journal_writer
 
 LINES_PER_S: Final = 10
 _LONGEST_QUEUE: Final = 1000

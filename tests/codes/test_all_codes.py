@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import gateway
-from gateway.codes import alarms, errors, face_errors, notices, page_errors, refusals
+from gateway.codes import alarms, errors, face_errors, machine_errors, notices, page_errors, refusals
 from gateway.codes.all_codes import CATALOGUE, find_codes
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason, SpecialRefusal
@@ -66,6 +66,7 @@ def test_a_code_stands_once_in_the_table() -> None:
     """A fault and a warning may share one explanation: the lease's end is either, by the rig's choice."""
     tables = (
         errors.ERRORS,
+        machine_errors.MACHINE_ERRORS,
         face_errors.FACE_ERRORS,
         page_errors.PAGE_ERRORS,
         notices.NOTICES,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.processes.event import make_event
-from gateway.processes.journal import encode_fields, is_journal, journal_writer
+from gateway.processes.systemd.journal import encode_fields, is_journal, journal_writer
 
 
 def read_fields(data: bytes) -> dict[str, str]:

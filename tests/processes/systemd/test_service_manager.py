@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.processes.service_manager import ServiceManager, take_service_manager
+from gateway.processes.systemd.service_manager import ServiceManager, take_service_manager
 
 
 class Heard:

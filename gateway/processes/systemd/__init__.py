@@ -1,0 +1,1 @@
+"""What a service says to systemd: that it is ready and alive, and its events for the journal. Standard library only."""
