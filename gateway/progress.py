@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeVar
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,7 @@ class Progress:
         return f"{self.stage}: {self.done} of {self.of}" if self.of else self.stage
 
 
+Item = TypeVar("Item")
 Listener = Callable[[Progress], None]
 _listener: Final[ContextVar[Listener | None]] = ContextVar("listener", default=None)
 _NOTHING: Final = Progress("")
@@ -63,6 +64,13 @@ def _listeners() -> tuple[Listener, ...]:
 def _tell(listeners: tuple[Listener, ...]) -> None:
     for listener in listeners:
         listener(_stage.get())
+
+
+def reported(stage: str, items: Sequence[Item]) -> Iterator[Item]:
+    """Yield the items of a stage, and tell before each how many are done; every item of a long calculation is worth a look."""
+    for done, item in enumerate(items):
+        report(stage, done, len(items))
+        yield item
 
 
 @contextmanager

@@ -15,8 +15,10 @@ from typing import Final
 
 import numpy as np
 
+from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.diagnosis import Diagnosis, Measurement, diagnose
 from gateway.diagnosis.measurement import Floats
+from gateway.progress import reported
 from gateway.recording import read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.mapping_file import column_mapping
@@ -111,7 +113,7 @@ def table(results: Iterable[CylinderResult]) -> Iterator[str]:
 
 def measurements_in(folder: Path, columns: str) -> Iterator[Measurement]:
     """Yield every table of a folder and of those in it, by name."""
-    for path in sorted(folder.rglob("*.csv")):
+    for path in reported("recordings", sorted(folder.rglob("*.csv"))):
         yield measurement_of(read_table(path, column_mapping(columns)))
 
 
@@ -121,8 +123,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--columns", default=COLUMNS, help="as diagnose --columns")
     given = parser.parse_args()
-    for line in table(judge(each) for each in measurements_in(given.folder, given.columns)):
-        print(line, flush=True)
+    with show_progress("cylinders"):
+        for line in table(judge(each) for each in measurements_in(given.folder, given.columns)):
+            print(line, flush=True)
 
 
 if __name__ == "__main__":

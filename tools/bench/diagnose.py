@@ -25,7 +25,9 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from gateway.cli.diagnosis.progress_line import show_progress  # noqa: E402
 from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT  # noqa: E402
+from gateway.progress import report, reported  # noqa: E402
 from gateway.twin.plant import with_value  # noqa: E402
 from gateway.twin.replay.replay import Drive, Replay  # noqa: E402
 
@@ -124,7 +126,7 @@ def measure(files: Sequence[Path]) -> Spent:
 def measure_effects(folder: Path, wanted: Sequence[Sequence[str]]) -> list[Spent]:
     """Diagnose a recording of each set of effects, and say what was named."""
     found = []
-    for effects in wanted:
+    for effects in reported("recordings with hidden effects", wanted):
         found.append(measure([write_recording(folder / f"{'+'.join(effects)}.csv", effects)]))
         tell(" and ".join(effects), found[-1])
     return found
@@ -138,12 +140,13 @@ def tell(what: str, spent: Spent) -> None:
 
 def measure_all(folder: Path) -> list[Figure]:
     """Return every figure; what is compiled once has been."""
+    report("compiling what is compiled once")
     measure([write_recording(folder / "first.csv", ["creep"])])
     figures = [
         Figure("one effect, 60 s at 200 Hz", measure_effects(folder, [(name,) for name in EFFECTS]), 2.0, 5.0),
         Figure("two or three effects", measure_effects(folder, TOGETHER), 0.0, 6.0),
     ]
-    for (kind, seed, lasts_s), most_s in zip(OWN, (4.0, 8.0), strict=True):
+    for (kind, seed, lasts_s), most_s in reported("own recordings", list(zip(OWN, (4.0, 8.0), strict=True))):
         own = measure([own_recording(folder, kind, seed, lasts_s)])
         tell(f"own recording, {kind}, {lasts_s:.0f} s", own)
         figures.append(Figure(f"own recording of {lasts_s:.0f} s", [own], 0.0, most_s))
@@ -159,7 +162,7 @@ def main() -> None:
     parser.add_argument("--busy", action="store_true", help="other work stretches wall times here: leave them out")
     options = parser.parse_args()
     given, busy = options.recordings, options.busy
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, show_progress("timing diagnoses"):
         figures = [Figure("given", [measure(given)], 0.0, 0.0)] if given else measure_all(Path(folder))
     heads = ["`force-gateway diagnose`, median / worst", "wall", "of processor", "memory", f"bound: {MOST_MB} MB and"]
     heads = [head for head in heads if not (busy and head == "wall")]

@@ -23,6 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from gateway.bsfm.fit.branch_fit import fit_orders
 from gateway.bsfm.fit.projected_problem import Floats, bernstein
 from gateway.bsfm.ladder.measured_ladder import Ladder
+from gateway.cli.diagnosis.progress_line import show_progress
+from gateway.progress import report, reported
 
 ORDERS: Final = range(1, 6)
 GROUPS, STAIRS, SEED = 10, 51, 13
@@ -80,9 +82,11 @@ def main() -> None:
     chosen = parser.parse_args()
     ladder = made_up_ladder()
     ours_s = lowest_s(lambda: fit_orders(ladder, "bsfm", ORDERS), chosen.rounds)
-    scipy_s = lowest_s(lambda: [fit_by_scipy(ladder, order) for order in ORDERS], chosen.rounds)
-    ours_n = [result.rms_n for result in fit_orders(ladder, "bsfm", ORDERS)]
-    scipy_n = [fit_by_scipy(ladder, order) for order in ORDERS]
+    with show_progress("fit benchmark"):
+        report("scipy least_squares: timing")
+        scipy_s = lowest_s(lambda: [fit_by_scipy(ladder, order) for order in ORDERS], chosen.rounds)
+        ours_n = [result.rms_n for result in fit_orders(ladder, "bsfm", ORDERS)]
+        scipy_n = [fit_by_scipy(ladder, order) for order in reported("scipy least_squares: orders", ORDERS)]
     facts = {"points": len(ladder), "ours_s": ours_s, "scipy_s": scipy_s, "ratio": ours_s / scipy_s}
     if chosen.json:
         print(json.dumps(facts | {"ours_rms_n": ours_n, "scipy_rms_n": scipy_n}))

@@ -32,6 +32,9 @@ from pathlib import Path
 import psutil
 from running_gateway import RunningGateway, running_gateway
 
+from gateway.cli.diagnosis.progress_line import show_progress
+from gateway.progress import report
+
 GOAL_ABOVE_HOP_S = 250e-6
 GOAL_MISSED = 0.005
 GOAL_IDLE_SHARE = 0.03
@@ -242,9 +245,13 @@ def main() -> None:
     options = parser.parse_args()
     if options.far_end:
         serve_far_end()
-    bench_latency(100, options.setpoints)
-    bench_idle(100, options.seconds)
-    bench_load(250, options.seconds)
+    with show_progress("loop benchmark"):
+        report(f"setpoint to the wire, {options.setpoints} setpoints (1 of 3)")
+        bench_latency(100, options.setpoints)
+        report(f"idle for {options.seconds:g} s (2 of 3)")
+        bench_idle(100, options.seconds)
+        report(f"under load for {options.seconds:g} s (3 of 3)")
+        bench_load(250, options.seconds)
     wire_s = 9 * 10 / 9600
     print(
         f"on a real wire at 9600 baud the nine bytes of `SET 512` alone take {wire_s * 1e3:.1f} ms more to arrive whole"

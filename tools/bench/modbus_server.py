@@ -24,6 +24,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
+from gateway.cli.diagnosis.progress_line import show_progress
+from gateway.progress import report, reported
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT)]
@@ -175,13 +178,12 @@ def measure_servers(
     load: Path, servers: list[Contender], arguments: argparse.Namespace, kind: str
 ) -> list[dict[str, object]]:
     """Measure every server and return one row for each. The first, short round warms up and is thrown away."""
-    for server in servers:
+    for server in reported(f"{kind}: warming up", servers):
         server.clear()
         server.round(load, 0.3, arguments.connections, kind)
         server.clear()
-    for _ in range(arguments.rounds):
-        for server in servers:
-            server.round(load, arguments.seconds / arguments.rounds, arguments.connections, kind)
+    for server in reported(f"{kind}: rounds of all servers", servers * arguments.rounds):
+        server.round(load, arguments.seconds / arguments.rounds, arguments.connections, kind)
     yardstick = next((server for server in servers if server.name == YARDSTICK), None)
     return [row(server, yardstick, kind) for server in servers]
 
@@ -240,7 +242,8 @@ def main() -> int:
 def compare(arguments: argparse.Namespace) -> int:
     """Compare all servers and print what was measured."""
     started_s = monotonic()
-    with ExitStack() as stack:
+    with ExitStack() as stack, show_progress("modbus servers"):
+        report("compiling the load generator and the C server")
         into = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         load = compile_c("modbus_load.c", into)
         if load is None:

@@ -25,6 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import model_c
 
 from gateway.bsfm import RationalBezier
+from gateway.cli.diagnosis.progress_line import show_progress
+from gateway.progress import reported
 
 ORDERS = (2, 5, 15)
 ELEMENTS = 10_000
@@ -143,7 +145,7 @@ SOURCES: tuple[Callable[[int], Iterator[Cost]], ...] = (
 
 def measure(rounds: int) -> list[Cost]:
     """Measure everything."""
-    costs = [cost for source in SOURCES for cost in source(rounds)]
+    costs = [cost for source in reported("ways to calculate", SOURCES) for cost in source(rounds)]
     base = costs[0].nanoseconds
     return [Cost(cost.way, cost.what, cost.order, cost.nanoseconds, cost.nanoseconds / base) for cost in costs]
 
@@ -154,7 +156,8 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--rounds", type=int, default=7)
     arguments = parser.parse_args()
-    costs = measure(arguments.rounds)
+    with show_progress("model benchmark"):
+        costs = measure(arguments.rounds)
     if arguments.json:
         print(json.dumps([asdict(cost) for cost in costs]))
         return

@@ -21,7 +21,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from gateway.bsfm.c_export.code import c_source
 from gateway.bsfm.model import Calibration
+from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.profiles import load_calibration
+from gateway.progress import reported
 
 ORDERS = (1, 2, 3, 5, 15)
 ROUNDS = 40
@@ -150,9 +152,8 @@ def costs(compiler: str = "gcc") -> list[Cost]:
     """Return the costs of all orders. FileNotFoundError without the compiler."""
     if shutil.which(compiler) is None:
         raise FileNotFoundError(f"{compiler} is not installed: the C part of the benchmark needs a C compiler")
-    return [
-        cost(calibration, compiler) for calibration in (load_calibration("demo"), *map(make_up_calibration, ORDERS))
-    ]
+    calibrations = [load_calibration("demo"), *map(make_up_calibration, ORDERS)]
+    return [cost(calibration, compiler) for calibration in reported("compiling and timing", calibrations)]
 
 
 def table(rows: list[Cost]) -> str:
@@ -173,7 +174,8 @@ def main() -> int:
     options.add_argument("--compiler", default="gcc")
     chosen = options.parse_args()
     try:
-        rows = costs(chosen.compiler)
+        with show_progress("model in C"):
+            rows = costs(chosen.compiler)
     except FileNotFoundError as missing:
         print(missing, file=sys.stderr)
         return 2

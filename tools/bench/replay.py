@@ -17,7 +17,9 @@ from itertools import product
 
 import numpy as np
 
+from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.profiles import load_plant
+from gateway.progress import report, reported
 from gateway.twin import Drive, Plant, Replay, Twin
 from gateway.twin.experiment import Floats
 from gateway.twin.plant import with_value
@@ -130,14 +132,14 @@ def print_accuracy(base: Plant) -> None:
         print(f"{name:28}" + "".join(f"{worst:9.4f}" for worst in errors_n))
 
 
-def main() -> None:
+def print_all() -> None:
     """Print times of replays, and how exact they are."""
     base, even, uneven = load_plant("paper-slide").plant, rich_drive(), rich_drive(JITTER_S)
     Replay(even).run([base])  # imports scipy
     step_us = twin_us_per_step(base)
     print(f"real-time twin: {step_us:.2f} us per step of 1 ms, {step_us * 60.0:.0f} ms for the minute\n")
     print(f"{'ms for one call, lanes:':28}" + "".join(f"{n:>9}" for n in LANES) + f"{'us/lane':>10}{'jitter':>9}")
-    for name, make in CASES.items():
+    for name, make in reported("cases of friction", list(CASES.items())):
         best = [best_ms(lambda: Replay(even), make(base, lanes)) for lanes in LANES]
         jittered = best_ms(lambda: Replay(uneven), make(base, LANES[-1]))
         us_per_lane = best[-1] / LANES[-1] * 1.0e3
@@ -149,7 +151,14 @@ def main() -> None:
         fresh = with_value(base, "friction", "coulomb_n", 1.2345)
         again_ms, new_ms = (spent_s(partial(replay.run, some)) * 1.0e3 for some in (plants, [*plants[1:], fresh]))
         print(f"{'again, ' + name:28}{'':18}{again_ms:9.1f} all known{new_ms:9.1f} one new")
+    report("fine steps, to compare with")
     print_accuracy(base)
+
+
+def main() -> None:
+    """Print it all, shown meanwhile."""
+    with show_progress("replays"):
+        print_all()
 
 
 if __name__ == "__main__":

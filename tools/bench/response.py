@@ -15,7 +15,8 @@ physics allows (tests/control/foreign/course.py says which bound). Never run on 
 import argparse
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -24,8 +25,10 @@ import numpy as np
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 from gateway.bsfm import Bsfm
 from gateway.bsfm.ladder.ladder_error import LadderError
+from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.control.settings import ControlSettings, LeadSettings, Trim
 from gateway.profiles import load_rig
+from gateway.progress import reported
 from tests.control.foreign.course import Course, allowed_s, course
 from tests.control.foreign.kept_calibrations import KEPT, kept, stored
 from tests.control.foreign.machine import drawn
@@ -86,9 +89,9 @@ def format_row(result: dict[str, object]) -> str:
     return f"  {result['way']!s:<18}{cells}{result['never']!s:>7}"
 
 
-def write(seeds: Iterable[int], demo: Bsfm) -> None:
+def write(seeds: Sequence[int], demo: Bsfm) -> None:
     """Calibrate these machines anew; the others stay as they were."""
-    for seed in seeds:
+    for seed in reported("calibrating machines", seeds):
         try:
             one = calibrated(drawn(seed), demo)
         except LadderError as error:
@@ -96,6 +99,20 @@ def write(seeds: Iterable[int], demo: Bsfm) -> None:
             continue
         KEPT.write_text(stored(dict(sorted((kept() | {seed: one}).items()))), encoding="utf-8")
         print(describe_machine(one), flush=True)
+
+
+def measure_all(seeds: Sequence[int], demo: Bsfm, *, quiet: bool) -> list[dict[str, object]]:
+    """Return a row for each way on each machine; unless quiet it is printed as it comes."""
+    known, rows = kept(), []
+    say = (lambda text: None) if quiet else partial(print, flush=True)
+    say(" " * 22 + "hold    1 s   still  settled of bound <=1.5   0.5 Hz   0.2 Hz     ramp  never")
+    for seed in reported("machines", seeds):
+        one = known.get(seed) or calibrated(drawn(seed), demo)
+        say(describe_machine(one))
+        for name, (control, measured) in ways().items():
+            rows.append(row(name, one, course(one.machine, one.calibration, control, measured=measured)))
+            say(format_row(rows[-1]))
+    return rows
 
 
 def main() -> None:
@@ -109,19 +126,11 @@ def main() -> None:
     seeds = range(options.first, options.first + options.seeds)
     demo = load_rig("demo").calibration.model()
     if options.write:
-        write(seeds, demo)
+        with show_progress("drawn machines"):
+            write(seeds, demo)
         return
-    known, rows = kept(), []
-    if not options.json:
-        print(" " * 22 + "hold    1 s   still  settled of bound <=1.5   0.5 Hz   0.2 Hz     ramp  never")
-    for seed in seeds:
-        one = known.get(seed) or calibrated(drawn(seed), demo)
-        if not options.json:
-            print(describe_machine(one), flush=True)
-        for name, (control, measured) in ways().items():
-            rows.append(row(name, one, course(one.machine, one.calibration, control, measured=measured)))
-            if not options.json:
-                print(format_row(rows[-1]), flush=True)
+    with show_progress("drawn machines"):
+        rows = measure_all(seeds, demo, quiet=options.json)
     if options.json:
         print(json.dumps(rows))
 

@@ -41,6 +41,8 @@ from gateway.bsfm import Bsfm
 from gateway.bsfm.fit.branch_fit import fit
 from gateway.bsfm.ladder.measured_ladder import ladder_plan
 from gateway.bsfm.slip.slip_fit import Walk, compare_policies, fit_joint, fit_stops, walk_of
+from gateway.cli.diagnosis.progress_line import show_progress
+from gateway.progress import reported
 from gateway.twin import Plant
 from gateway.twin.experiment import Dwell, Floats, settle, staircase
 
@@ -117,7 +119,7 @@ def scores(seeds: Sequence[int]) -> list[Score]:
     """Return every policy's score over the copies."""
     errors: dict[str, list[list[Floats]]] = {policy: [] for policy in FIRST_STUDY}
     steps_v = dict.fromkeys(FIRST_STUDY, 0.0)
-    for seed in seeds:
+    for seed in reported("copies of the rig", seeds):
         plant = copy_of(seed)
         for policy, model in calibrate_policies(plant, seed).items():
             exercise_errors, step_v = run(model, plant)
@@ -154,7 +156,8 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4], help="copies of the rig; 0 is the rig")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    rows = scores(arguments.seeds)
+    with show_progress("reversal policies"):
+        rows = scores(arguments.seeds)
     if arguments.json:
         print(json.dumps({"seeds": arguments.seeds, "scores": [asdict(row) for row in rows]}, indent=2))
     else:

@@ -22,6 +22,9 @@ from pathlib import Path
 from pymodbus.client import ModbusTcpClient
 from running_gateway import running_gateway
 
+from gateway.cli.diagnosis.progress_line import show_progress
+from gateway.progress import reported
+
 STEPS_N = (5, 10, 15, 20, 25, 30, 35, 40, 35, 30, 25, 20, 15, 10, 5, 20, 12, 26, 16, 30, 8)
 DWELL_S = 2.0
 BAND_N = 1.0
@@ -79,7 +82,8 @@ def demo_rig(directory: Path, gain: float) -> Path:
 def run(gain: float) -> list[Settling]:
     """Return how every setpoint settles with this gain."""
     with tempfile.TemporaryDirectory() as directory, connect(demo_rig(Path(directory), gain)) as client:
-        return [settle(client, setpoint_n) for setpoint_n in STEPS_N]
+        stage = "with trim (1/2)" if gain else "feedforward alone (2/2)"
+        return [settle(client, setpoint_n) for setpoint_n in reported(stage, STEPS_N)]
 
 
 def format_settling(result: Settling) -> str:
@@ -93,7 +97,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    with_trim, alone = run(0.3), run(0.0)
+    with show_progress("steps"):
+        with_trim, alone = run(0.3), run(0.0)
     if options.json:
         print(json.dumps({"trim": [asdict(one) for one in with_trim], "feedforward": [asdict(one) for one in alone]}))
         return

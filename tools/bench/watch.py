@@ -25,7 +25,9 @@ import numpy as np
 from running_gateway import running_gateway
 
 import gateway.diagnosis  # noqa: F401  # all steps, before the first loop is compiled
+from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.profiles import load_rig
+from gateway.progress import report
 from gateway.recording import Recorder
 from gateway.recording.ring import RingReader, SampleRing
 from gateway.service.running_rig.recorded_row import COLUMNS
@@ -90,6 +92,7 @@ def run_virtual(hours: float, state: str, *, with_reference: bool) -> None:
     print(f"{'hours':>6} {'looks':>6} {'searches':>8} {'processor':>10} {'share':>7} {'memory':>8} {'peak':>8}")
     half_s = first_s + hours * 1800.0 if with_reference else math.inf
     while machine.now_s < first_s + hours * 3600.0:
+        report("virtual time, s", round(machine.now_s - first_s), round(hours * 3600.0))
         if machine.now_s >= half_s:
             half_s = math.inf
             machine.wear()
@@ -156,7 +159,7 @@ def main() -> None:
     if options.live:
         run_live(options.live)
         return
-    with tempfile.TemporaryDirectory() as state:
+    with tempfile.TemporaryDirectory() as state, show_progress("watch"):
         run_virtual(options.hours, state, with_reference=options.reference)
 
 

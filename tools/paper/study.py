@@ -1,12 +1,12 @@
 """All of it in order: ladder and fits of the paper's rig, calibrations of all copies, the exercises, the limit, the ratios."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 from gateway.bsfm.fit.result import FitResult
 from gateway.bsfm.ladder.measured_ladder import Ladder
+from gateway.progress import report, reported
 from paper import comparison
 from paper.comparison import Comparison
 from paper.experiments import exercises
@@ -39,18 +39,17 @@ class Study:
     took_s: float
 
 
-def study(seed_count: int, quick: bool, say: Callable[[str], None] = lambda text: None) -> Study:
-    """Run all of it in virtual time; `say` hears what is going on. quick: fewer groups and orders."""
+def study(seed_count: int, quick: bool) -> Study:
+    """Run all of it in virtual time. quick: fewer groups and orders."""
     started_s, seeds = time.monotonic(), tuple(range(seed_count))
-    say("ladder of the paper's rig, and fits of all orders")
+    report("ladder of the paper's rig, fits of all orders (1/4)")
     ladder = paper_ladder(paper_plant(), 0, FEW_GROUPS if quick else GROUPS)
     fits = sweep(ladder, FEW_ORDERS if quick else ORDERS)
-    say(f"ladders and minor loops of {seed_count} copies")
-    copies = [calibrate(copy_of(seed), seed) for seed in seeds]
-    say("validation, steps, tracking")
+    copies = [calibrate(copy_of(seed), seed) for seed in reported("calibrating copies (2/4)", seeds)]
+    report("validation, steps, tracking (3/4)")
     validation, steps = exercises.validation(copies, quick), exercises.steps(copies)
     in_contact, tracking = exercises.steps_in_contact(copies), exercises.tracking(copies)
-    say("partial reversals, and what the regulator allows")
+    report("partial reversals, the regulator's limit (4/4)")
     reversals = exercises.partial_reversals(copies, quick)
     comparisons = compare(validation, reversals, steps, in_contact, tracking)
     fastest = limits(paper_plant(), TARGETS_N, tuple(SETTLING_S))

@@ -22,6 +22,7 @@ from gateway.bsfm.fit.result import NOT_IDENTIFIABLE, FitResult, ModelForm, Mode
 from gateway.bsfm.fit.solution import Solution, explore_starts, refine_solution
 from gateway.bsfm.fit.statistics import estimate_covariance, paper_norm, summarize_residuals
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING, Ladder
+from gateway.progress import reported
 
 HUBER_ROUNDS = 8  # of reweighting, each from the solution before
 
@@ -61,7 +62,7 @@ def fit_orders(
     used = ladder.part(inlier_mask(ladder)) if fit_settings.outliers == "reject" else ladder
     results: list[FitResult] = []
     lower: Floats | None = None
-    for order in sorted(orders):
+    for order in reported(f"fitting {ModelName(model).value}", sorted(orders)):
         form = ModelForm(ModelName(model), order, Ties(ties))
         solution, weight = solve_robustly(used, form, fit_settings, lower)
         lower = solution.log_weights

@@ -22,6 +22,7 @@ from gateway.bsfm.fit.outliers import inlier_mask
 from gateway.bsfm.fit.result import FitResult, ModelName, Ties
 from gateway.bsfm.fit.solution import refine_solution
 from gateway.bsfm.ladder.measured_ladder import Ladder
+from gateway.progress import reported
 
 CERTAIN: Final = 2.0  # standard errors of the difference: nobody prefers more coefficients for less
 
@@ -63,7 +64,7 @@ def score_orders(
     fit_settings, ascending = settings or FitSettings(), sorted(orders)
     used = ladder.part(inlier_mask(ladder)) if fit_settings.outliers == "reject" else ladder
     results = [result for model in models for result in fit_orders(ladder, model, ascending, ties, fit_settings)]
-    return [_score(used, result, fit_settings) for result in results]
+    return [_score(used, result, fit_settings) for result in reported("holding groups out", results)]
 
 
 def choose(scores: Sequence[Score], usable_only: bool = True) -> Score:

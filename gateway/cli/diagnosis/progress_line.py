@@ -1,13 +1,16 @@
-"""How far a long calculation is, on stderr from its first second on: one line that is rewritten on a terminal, else a line
-now and then; and a Ctrl-C that ends it wherever it is."""
+"""How far a long calculation is, on stderr from its first second on: what is done, its share and the time left, in one line
+that is rewritten on a terminal, else a line for each stage; and a Ctrl-C that ends it wherever it is. Standard library only:
+the set-up shows itself by it before anything is installed.
+"""
 
+import os
 import shutil
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from types import FrameType
 from typing import IO, Any, Final
 
@@ -15,35 +18,47 @@ from gateway.progress import Progress, listen
 
 _QUIET_S: Final = 1.0  # what is shorter needs no words
 _REWRITTEN_S: Final = 0.2
-_NOW_AND_THEN_S: Final = 5.0
+_TOLD_S: Final = 1.0  # of a stage, before its speed says anything
 _CLEAR: Final = "\r\x1b[2K"
 
 
 @contextmanager
 def show_progress(task: str) -> Iterator[None]:
-    """Show what the calculation in this block reports. task: what it does, in a word. KeyboardInterrupt at Ctrl-C."""
+    """Show what the calculation in this block reports. task: what it does, in a word. KeyboardInterrupt at Ctrl-C.
+
+    What it prints meanwhile on the same terminal stands above the line.
+    """
     line = ProgressLine(task, sys.stderr)
     with _interruptible() as check, line.keep_writing():
 
         def show(progress: Progress) -> None:
             check()
-            line.text = str(progress)
+            line.tell(progress)
 
-        with listen(show):
+        with listen(show), redirect_stdout(_AboveLine(sys.stdout, line)):
             yield
 
 
 class ProgressLine:
-    """Writes the newest text beside the task and its seconds. text: what it is at; may be set at any time."""
+    """Writes the newest stage beside the task and its seconds."""
 
     def __init__(self, task: str, stream: IO[str], clock: Callable[[], float] = time.monotonic) -> None:
-        self.text = ""
         self._task = task
         self._stream = stream
-        self._is_terminal = stream.isatty()
+        self._is_terminal = stream.isatty() and os.environ.get("TERM") != "dumb"
         self._clock = clock
         self._began_s = clock()
+        self._progress = Progress("")
+        self._stage_began = (self._began_s, 0)
         self._is_over = threading.Event()
+        self._writing = threading.Lock()
+        self._is_shown = False
+
+    def tell(self, progress: Progress) -> None:
+        """Take what it is at; from any thread, at any time."""
+        if (progress.stage, progress.of) != (self._progress.stage, self._progress.of):
+            self._stage_began = (self._clock(), progress.done)
+        self._progress = progress
 
     @contextmanager
     def keep_writing(self) -> Iterator[None]:
@@ -57,21 +72,42 @@ class ProgressLine:
             writer.join()
 
     def sentence(self) -> str:
-        """Return what is shown now."""
-        spent_s = self._clock() - self._began_s
-        return f"{self._task}, {spent_s:.0f} s" + (f": {self.text}" if self.text else "")
+        """Return what is shown now: `fitting, 12 s, 40 %, 0:18 left: models and orders: 16 of 40`."""
+        now_s, progress = self._clock(), self._progress
+        words = f"{self._task}, {now_s - self._began_s:.0f} s"
+        if progress.of:
+            words += f", {100 * progress.done // progress.of} %{self._time_left(now_s)}"
+        return words + (f": {progress}" if progress.stage else "")
+
+    def _time_left(self, now_s: float) -> str:
+        """Return what the stage still takes at its present speed; nothing before that can be told."""
+        began_s, done_then = self._stage_began
+        spent_s, done = now_s - began_s, self._progress.done - done_then
+        if done <= 0 or spent_s < _TOLD_S:
+            return ""
+        left_s = round(spent_s / done * (self._progress.of - self._progress.done))
+        return f", {left_s // 60}:{left_s % 60:02d} left"
+
+    def clear(self) -> None:
+        """Remove the line, for what is printed where it stands; it comes back by itself."""
+        with self._writing:
+            if self._is_shown:
+                self._write(_CLEAR)
+                self._is_shown = False
 
     def _write_on(self) -> None:
-        pause_s, is_written = _QUIET_S, False
+        pause_s, told = _QUIET_S, ""
         while not self._is_over.wait(pause_s):
+            pause_s = _REWRITTEN_S
             if self._is_terminal:
                 width = shutil.get_terminal_size().columns - 1
-                self._write(f"{_CLEAR}{self.sentence()[:width]}")
-            else:
+                with self._writing:
+                    self._is_shown = True
+                    self._write(f"{_CLEAR}{_shortened(self.sentence(), width)}")
+            elif self._progress.stage != told:
+                told = self._progress.stage
                 self._write(f"{self.sentence()}\n")
-            pause_s, is_written = _REWRITTEN_S if self._is_terminal else _NOW_AND_THEN_S, True
-        if is_written and self._is_terminal:
-            self._write(_CLEAR)
+        self.clear()
 
     def _write(self, text: str) -> None:
         try:
@@ -79,6 +115,27 @@ class ProgressLine:
             self._stream.flush()
         except (OSError, ValueError):  # nobody reads any more
             self._is_over.set()
+
+
+def _shortened(sentence: str, width: int) -> str:
+    return sentence if len(sentence) <= width else f"{sentence[: max(0, width - 1)]}…"
+
+
+class _AboveLine:
+    """A stream that has the line removed before something else stands there, where both are on the terminal."""
+
+    def __init__(self, stream: IO[str], line: ProgressLine) -> None:
+        self._stream = stream
+        self._line = line
+
+    def write(self, text: str) -> int:
+        """Write the text where the line was."""
+        if self._stream.isatty():
+            self._line.clear()
+        return self._stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 @contextmanager

@@ -72,9 +72,9 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
 
     RECORDING is a number of `recordings list`, a .fgr file, or a CSV or Parquet table with time_s, command_v, force_n.
     """
-    from rich.console import Console
+    from gateway.cli.diagnosis.progress_line import show_progress
 
-    with Console(stderr=True).status("fitting"):
+    with show_progress("fitting"):
         fit = _fit(recording, options)
     target = None if options["no_report"] else options["report"] or _beside(fit.recording.path)
     if store:

@@ -21,6 +21,7 @@ from gateway import progress
 from gateway.cli.diagnosis import progress_line
 from gateway.cli.diagnosis.outputs import write_all
 from gateway.cli.diagnosis.progress_line import ProgressLine, show_progress
+from gateway.progress import Progress
 from tests.cli.verbs.test_diagnose import table
 from tests.reports.fake_diagnosis import diagnosis
 
@@ -42,22 +43,67 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("_QUIET_S", "_REWRITTEN_S", "_NOW_AND_THEN_S"):
+    for name in ("_QUIET_S", "_REWRITTEN_S"):
         monkeypatch.setattr(progress_line, name, 0.001)
 
 
-@pytest.mark.parametrize("is_terminal", [True, False])
-def test_the_newest_stage_is_shown_as_it_is_asked_for(at_once: None, is_terminal: bool) -> None:
-    stream = Terminal(is_terminal=is_terminal)
+def test_on_a_terminal_the_newest_stage_its_share_and_the_time_left_are_shown_in_one_line(
+    at_once: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    stream = Terminal(is_terminal=True)
     line = ProgressLine("diagnosing", stream, iter(range(10_000)).__next__)
-    line.text = "refining leak: 3 of 16"
+    line.tell(Progress("refining leak", 3, 16))
     with line.keep_writing():
         assert all(stream.was_written.acquire(timeout=10) for _ in range(2))
-    if is_terminal:
-        assert stream.getvalue().startswith("\r\x1b[2Kdiagnosing, 1 s: refining leak: 3 of 16\r\x1b[2Kdiagnosing, 2 s")
-        assert stream.getvalue().endswith("\r\x1b[2K"), "nothing of it stays"
-    else:
-        assert stream.getvalue().startswith("diagnosing, 1 s: refining leak: 3 of 16\ndiagnosing, 2 s")
+    shown = stream.getvalue()
+    assert shown.startswith("\r\x1b[2Kdiagnosing, 2 s, 18 %: refining leak: 3 of 16\r\x1b[2Kdiagnosing, ")
+    assert shown.endswith("\r\x1b[2K"), "nothing of it stays"
+
+
+def test_a_pipe_gets_a_line_for_each_stage(at_once: None) -> None:
+    stream = Terminal(is_terminal=False)
+    line = ProgressLine("fitting", stream, iter(range(10_000)).__next__)
+    line.tell(Progress("loading"))
+    with line.keep_writing():
+        assert stream.was_written.acquire(timeout=10)
+        line.tell(Progress("solving", 1, 2))
+        assert stream.was_written.acquire(timeout=10)
+        line.tell(Progress("solving", 2, 2))
+        assert not stream.was_written.acquire(timeout=0.02)
+    assert [words.partition(": ")[2] for words in stream.getvalue().splitlines()] == ["loading", "solving: 1 of 2"]
+
+
+def test_the_time_left_is_that_of_the_stage_at_its_present_speed() -> None:
+    now_s = [0.0]
+    line = ProgressLine("fitting", Terminal(is_terminal=True), lambda: now_s[0])
+    line.tell(Progress("loading", 0, 4))
+    now_s[0] = 100.0
+    line.tell(Progress("solving", 0, 40))
+    assert line.sentence() == "fitting, 100 s, 0 %: solving: 0 of 40", "nothing is done of it yet"
+    now_s[0] = 110.0
+    line.tell(Progress("solving", 4, 40))
+    assert line.sentence() == "fitting, 110 s, 10 %, 1:30 left: solving: 4 of 40"
+
+
+def test_what_is_printed_meanwhile_stands_above_the_line(
+    at_once: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    terminal = Terminal(is_terminal=True)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    with show_progress("measuring"):
+        assert terminal.was_written.acquire(timeout=10)
+        print("a row of the table")
+    assert "\r\x1b[2Ka row of the table\n" in terminal.getvalue()
+
+
+def test_items_are_told_of_before_each() -> None:
+    told: list[str] = []
+    with progress.listen(lambda each: told.append(str(each))):
+        assert list(progress.reported("servers", ["ours", "theirs"])) == ["ours", "theirs"]
+    assert told == ["servers: 0 of 2", "servers: 1 of 2"]
 
 
 def test_what_is_quick_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:

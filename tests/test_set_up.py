@@ -1,0 +1,96 @@
+"""The set-up of .venv: half of it never passes for a whole one, and the next call finishes what was interrupted."""
+
+import sys
+from collections.abc import Callable, Sequence
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway import progress
+
+FILE = Path(__file__).parents[1] / "tools" / "set_up.py"
+
+
+@pytest.fixture
+def set_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The module, working in a folder of its own."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    loader = SourceFileLoader("set_up", str(FILE))
+    specification = spec_from_loader("set_up", loader)
+    assert specification
+    module = module_from_spec(specification)
+    loader.exec_module(module)
+    for name, place in (("ROOT", ""), ("ENVIRONMENT", ".venv"), ("PYTHON", ".venv/bin/python")):
+        monkeypatch.setattr(module, name, tmp_path / place)
+    (tmp_path / "lock").write_text("one==1 \\\n    --hash=x\ntwo[extra]==2 ; sys_platform == 'linux'\n# three==3\n")
+    return module
+
+
+def steps_of(set_up: Any, monkeypatch: pytest.MonkeyPatch, fails_at: str = "nothing") -> list[str]:
+    """Have no command run; return what is asked for as it comes. fails_at: a word of the command that is interrupted."""
+    asked: list[str] = []
+
+    def run_step(command: Sequence[str], on_text: Callable[[str], None]) -> None:
+        asked.append(" ".join(command))
+        if "venv" in command:
+            (set_up.ENVIRONMENT / "bin").mkdir(parents=True)
+            set_up.PYTHON.symlink_to(sys.executable)
+        on_text("Collecting one==1\nCollecting two==2\nInstalling collected packages: one, two\n")
+        if fails_at in command:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(set_up, "run_step", run_step)
+    return asked
+
+
+@pytest.mark.parametrize("interrupted", ["venv", "-r", "compileall", "-e"])
+def test_a_set_up_that_is_interrupted_leaves_no_stamp_and_is_finished_by_the_next(
+    interrupted: str, set_up: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stamp = set_up.ENVIRONMENT / "stamp-lock"
+    steps_of(set_up, monkeypatch, interrupted)
+    assert set_up.main("lock", ".venv/stamp-lock", "wanted") == 130
+    assert "goes on where it was" in capsys.readouterr().err
+    assert not stamp.exists()
+    asked = steps_of(set_up, monkeypatch)
+    if set_up.PYTHON.exists():  # the tests' own Python stands for it, and is in an environment: pip works there
+        (set_up.ENVIRONMENT / "bin").rename(set_up.ENVIRONMENT / "gone")
+    assert set_up.main("lock", ".venv/stamp-lock", "wanted") == 0
+    assert stamp.read_text() == "wanted\n"
+    assert "finishing the set-up" in capsys.readouterr().err
+    assert [word for line in asked for word in ("venv", "-r", "compileall", "-e") if f" {word} " in line] == [
+        "venv", "-r", "compileall", "-e",
+    ]  # fmt: skip
+
+
+def test_a_broken_environment_is_made_anew_and_a_sound_one_kept(set_up: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    (set_up.ENVIRONMENT / "bin").mkdir(parents=True)
+    set_up.PYTHON.write_text("#!/bin/sh\nexit 1\n")
+    set_up.PYTHON.chmod(0o755)
+    asked = steps_of(set_up, monkeypatch)
+    monkeypatch.setattr(set_up, "PYTHON", set_up.PYTHON)
+    with pytest.raises(FileExistsError):  # as far as the stand-in of venv, which clears nothing
+        set_up.make_environment()
+    assert "venv --clear" in asked[0]
+    set_up.PYTHON.write_text("#!/bin/sh\nexit 0\n")
+    asked.clear()
+    set_up.make_environment()
+    assert asked == []
+
+
+def test_the_share_is_told_of_what_pip_says(set_up: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    told: list[str] = []
+    steps_of(set_up, monkeypatch)
+    with progress.listen(lambda each: told.append(str(each))):
+        set_up.install_packages(tmp_path / "lock")
+    assert told == ["fetching (2/5): 0 of 2", "installing (3/5): 0 of 2"]
+
+
+def test_a_step_that_fails_says_what_it_said_last(set_up: Any) -> None:
+    heard: list[str] = []
+    with pytest.raises(set_up.StepError, match=r"(?s)no such package.*ended with 3"):
+        set_up.run_step([sys.executable, "-c", "print('no such package'); raise SystemExit(3)"], heard.append)
+    assert heard[-1] == "no such package\n"
