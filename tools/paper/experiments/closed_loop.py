@@ -6,11 +6,13 @@ from typing import Final
 
 import numpy as np
 
+from gateway.progress import advance
 from gateway.twin.experiment import Floats
 from paper.experiments.laws import OFF_TICKS, TICK_S, Law
 from paper.experiments.rigs import RigLanes
 
 STEP_S: Final = 1.0e-3
+_TOLD_TICKS: Final = 50  # between two words on how far it is
 STEPS: Final = round(TICK_S / STEP_S)
 LEAD_IN_S: Final = (OFF_TICKS + 10) * TICK_S  # nothing is wanted yet; laws that listen to the cell wake up
 
@@ -67,6 +69,8 @@ def run(rig: RigLanes, laws: Sequence[Law], desired_n: Floats, around: Surroundi
     noise = rig.readings(len(wanted))
     measured, command, force = np.zeros_like(wanted), np.zeros_like(wanted), np.zeros((len(wanted) * STEPS, len(laws)))
     for tick, row in enumerate(wanted):
+        if tick % _TOLD_TICKS == 0:
+            advance(tick, len(wanted))
         measured[tick] = rig.twin.read() + noise[tick]
         wishes_and_readings = zip(laws, row.tolist(), measured[tick].tolist(), strict=True)
         command[tick] = [law.command_v(want, measured_n) for law, want, measured_n in wishes_and_readings]
