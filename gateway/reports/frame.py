@@ -4,6 +4,7 @@ One HTML file without scripts, nothing loaded; light and dark, and fit for paper
 """
 
 import platform
+import re
 import shlex
 import sys
 from collections.abc import Iterable, Mapping
@@ -24,6 +25,7 @@ _FRAME: Final = """<!doctype html>
 {body}
 </main></body></html>
 """
+_UNIT: Final = re.compile(r"(\d) (?=(?:N|V|s|Hz|%)\b)")
 _COMMANDS: Final = ("force-gateway", "reproduce")  # programs whose words are worth repeating
 _COUNTED: Final = ("numpy", "scipy")  # packages that numbers come from
 
@@ -52,10 +54,17 @@ def _header(head: Head) -> str:
     word, colour = head.badge
     badge = f"<span class='badge {colour}'>{escape(word)}</span> " if word else ""
     facts = " · ".join(fact for fact in head.facts if fact)
-    lines = "".join(f"<p class='verdict'>{escape(sentence)}</p>" for sentence in head.sentences if sentence)
+    lines = "".join(
+        f"<p class='verdict'>{_keep_units(escape(sentence))}</p>" for sentence in head.sentences if sentence
+    )
     about = f"<p>{escape(facts)}</p>" if facts else ""
     kicker = f"<p class='kicker'>{badge}{escape(head.kind)}</p>"
-    return f"<header>{kicker}<h1>{escape(head.answer)}</h1>{lines}{about}</header>"
+    return f"<header>{kicker}<h1>{_keep_units(escape(head.answer))}</h1>{lines}{about}</header>"
+
+
+def _keep_units(text: str) -> str:
+    """Return the text with every number on one line with its unit."""
+    return _UNIT.sub("\\1\N{NO-BREAK SPACE}", text)
 
 
 def tiles(*figures: tuple[str, str, str]) -> str:

@@ -1,9 +1,10 @@
 """A diagnosis for a terminal: what is off, the ranked causes with their gains, what is left, what to record next."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from rich import box
-from rich.console import RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -18,6 +19,7 @@ _COLOUR = {
     Verdict.PARTIAL: "yellow",
     Verdict.UNKNOWN: "red",
 }
+_LEAST_WIDTH = 90  # of the table of causes with a column for each figure
 _MOST_REJECTED = 3
 _MOST_PROPOSALS = 4
 _MOST_NAMES = 4
@@ -89,14 +91,8 @@ def _remaining_error(diagnosis: Diagnosis) -> str:
 def _cause_table(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     if not diagnosis.causes:
         return
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
-    table.add_column("cause", min_width=23)
-    for name in ("confidence", "held out N RMS", "gain N [95 %]", "excess"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for cause in diagnosis.causes:
-        table.add_row(*_cells(cause))
     yield Text()
-    yield table
+    yield _CauseTable(diagnosis.causes)
     yield Text()
     for cause in diagnosis.causes:
         for name, estimate in cause.parameters.items():
@@ -105,21 +101,48 @@ def _cause_table(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     yield Text()
 
 
-def _cells(cause: Cause) -> tuple[str | Text, ...]:
-    gain = cause.gain
+@dataclass(frozen=True, slots=True)
+class _CauseTable:
+    """The causes with their gains: a column for each figure, on a narrow terminal one above the other."""
+
+    causes: tuple[Cause, ...]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield the table that fits."""
+        is_narrow = options.max_width < _LEAST_WIDTH
+        table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, header_style="dim")
+        table.add_column("cause", overflow="fold", min_width=0 if is_narrow else 23)
+        for name in ("held out N RMS",) if is_narrow else ("confidence", "held out N RMS", "gain N [95 %]", "excess"):
+            table.add_column(name, justify="left" if is_narrow else "right", no_wrap=True)
+        for cause in self.causes:
+            cells = _cells(cause)
+            table.add_row(_name(cause), *((_stack(*cells),) if is_narrow else cells))
+        yield table
+
+
+def _name(cause: Cause) -> Text:
     group = words.others(cause)
     name = Text(cause.name, style="bold")
     if group:
         name.append(f"\nor {', or '.join(group)}", style="not bold yellow")
+    return name
+
+
+def _cells(cause: Cause) -> tuple[str, str, str, str]:
+    """Confidence, held-out errors, gain with its interval, share of the excess."""
+    gain = cause.gain
     won_n = gain.held_out_rms_before_n - gain.held_out_rms_after_n
     low_n, high_n = gain.ci95
     return (
-        name,
         words.confidence(cause.confidence),
         words.gain_text(cause).removesuffix(" N"),
         f"{words.force(won_n)} [{words.force(low_n)}, {words.force(high_n)}]",
         words.percent(gain.share_of_excess),
     )
+
+
+def _stack(confidence: str, held_out: str, gain: str, excess: str) -> str:
+    return f"{held_out}\ngain {gain}\n{excess} of the excess\nconfidence {confidence}"
 
 
 def _rejected_line(diagnosis: Diagnosis) -> Iterator[RenderableType]:

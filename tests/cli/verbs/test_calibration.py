@@ -130,7 +130,7 @@ def test_compare_tells_the_differences_of_the_branches(state, call, tmp_path):
     plot = tmp_path / "plot.html"
     text = call("calibration", "compare", "2", "demo", "--state", state, "--plot", plot)
     assert text.output.startswith("A  calibration 2 (mark 16, 2026-11-21), blend 5 N\nB  calibration 1 (demo, ")
-    html = plot.read_text(encoding="utf-8")
+    html = plot.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert html.count('class="plot"') == 2
     answer = re.search(r"<h1>(.*?)</h1>", html)
     assert answer and f"{answer[1]}.\n" in text.output

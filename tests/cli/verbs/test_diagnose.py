@@ -45,7 +45,7 @@ def test_the_terminal_says_verdict_cause_gain_and_what_to_record_next(
         assert text in answer.stdout
 
 
-@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize("width", [60, 80, 120])
 def test_nothing_is_wider_than_the_terminal(
     tmp_path: Path, call: Call, engine: Engine, monkeypatch: pytest.MonkeyPatch, width: int
 ) -> None:
@@ -53,7 +53,8 @@ def test_nothing_is_wider_than_the_terminal(
     engine.answer = diagnosis(causes=(FRICTION, WARMTH))
     answer = call("diagnose", str(table(tmp_path / "a.csv")))
     assert max(map(len, answer.stdout.splitlines())) <= width
-    assert "0.929 [0.871, 0.986]" in answer.stdout and "96 %" in answer.stdout
+    for figure in ("0.98", "1.186 → 0.257", "0.929 [0.871, 0.986]", "96 %", FRICTION.name, f"or {WARMTH.group[1]}"):
+        assert figure in answer.stdout, "cut off"
 
 
 def test_files_are_written_and_the_plant_is_a_plant(tmp_path: Path, call: Call, engine: Engine) -> None:

@@ -24,7 +24,7 @@ def page(answer: Diagnosis) -> str:
     circumstances = ReportContext(
         rig="demo", plant="paper-slide", made_utc="2026-11-21 15:50 UTC", runtime_s=2.3, about=ABOUT
     )
-    return diagnosis_page(answer, circumstances)
+    return diagnosis_page(answer, circumstances).replace("\N{NO-BREAK SPACE}", " ")
 
 
 class Balance(HTMLParser):
