@@ -11,7 +11,7 @@ import asyncio
 import contextlib
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from math import isfinite
 from typing import Any, Final
 
@@ -32,11 +32,16 @@ class RefusedCommand(ValueError):  # noqa: N818  reads as what it is
 
 
 class Commands:
-    """clock: monotonic seconds. commander: the browser that enabled last, empty for none."""
+    """clock: monotonic seconds; sleep: waits for seconds of it. commander: the browser that enabled last, empty for none."""
 
-    def __init__(self, context: WebContext, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        context: WebContext,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+    ) -> None:
         self.commander = ""
-        self._context, self._clock = context, clock
+        self._context, self._clock, self._sleep = context, clock, sleep
         self._seen_s = -GRACE_S
         self._present: set[str] = set()
         self._beat: asyncio.Task[None] | None = None
@@ -90,10 +95,13 @@ class Commands:
         await self._set_bit(ControlBit.TAKE_OWNERSHIP)
 
     async def reset(self, viewer: str) -> None:
-        """Reset a latched fault: with setpoint 0, disabled, and a fresh heartbeat."""
+        """Reset a latched fault: with setpoint 0, disabled, and another heartbeat, all in one write."""
+        first, beat = self._find("control_word").address, self._find("heartbeat").address
+        words = (await self.words("command"))[: beat + 1 - first]
+        words[0], words[self._find("force_setpoint").address - first] = int(ControlBit.RESET_FAULT), 0
+        words[-1] = self._number = words[-1] % 65535 + 1
+        await self._send(P.write_registers_request(first, struct.pack(f">{len(words)}H", *words)))
         self._begin_to_beat(viewer)
-        await self.beat_once()
-        await self._write_command(int(ControlBit.RESET_FAULT), 0.0)
 
     async def tare(self) -> None:
         """Take the force that rests on the cell now as 0."""
@@ -191,4 +199,4 @@ class Commands:
         while self.is_attended:
             with contextlib.suppress(OSError, ValueError):  # a restarted control is off; another owner says so
                 await self.beat_once()
-            await asyncio.sleep(every_s)
+            await self._sleep(every_s)

@@ -1,0 +1,151 @@
+"""The page in a real browser (Debian's chromium) on a whole running gateway: what it draws moves, and Stop stops."""
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.end_to_end.conftest import RunningGateway, start, stop
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+pytestmark = pytest.mark.skipif(
+    not Path(CHROMIUM).exists(),
+    reason="no chromium here (apt-get install chromium): THE PAGE IS NOT TRIED IN A BROWSER",
+)
+OFF, HOLDING = 0, 3
+SERIOUS = ("serious", "critical")
+
+
+@pytest.fixture(scope="module")
+def gateway(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGateway]:
+    running = start(tmp_path_factory.mktemp("page") / "state", "--web", "127.0.0.1:0")
+    yield running
+    stop(running)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def page(gateway: RunningGateway, browser: Any) -> Iterator[Any]:
+    page = browser.new_page(viewport={"width": 1280, "height": 900}, reduced_motion="reduce")
+    page.complaints = []
+    page.on("console", lambda message: page.complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    page.goto(url_of(gateway))
+    shows(page, "#state", "off")
+    yield page
+    page.close()
+
+
+def url_of(gateway: RunningGateway) -> str:
+    host, port = gateway.ready["web"]
+    return f"http://{host}:{port}/"
+
+
+def shows(page: Any, selector: str, text: str) -> None:
+    until(page, lambda: page.text_content(selector) == text)
+
+
+def until(page: Any, condition: Callable[[], bool], within_s: float = 5.0) -> None:
+    """Wait in the test, not in the page: its own policy forbids it to evaluate texts."""
+    deadline_s = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < deadline_s, f"not within {within_s} s; the page says {page.text_content('#said')!r}"
+        page.wait_for_timeout(20)
+
+
+def in_state(number: int) -> Callable[[dict[str, int]], bool]:
+    return lambda status: status["state"] == number
+
+
+def enable(page: Any, force: str) -> None:
+    page.fill("#setpoint", force)
+    page.click("text=Enable")
+
+
+def test_a_force_is_commanded_seen_and_stopped_by_one_key_out_of_an_input(gateway: RunningGateway, page: Any) -> None:
+    canvas = page.locator(".trend canvas")
+    canvas.wait_for()
+    before = canvas.evaluate("canvas => canvas.toDataURL()")
+    enable(page, "12")
+    gateway.wait_until(in_state(HOLDING))
+    shows(page, "#state", "holding")
+    shows(page, "#owner", "you")
+    until(page, lambda: canvas.evaluate("canvas => canvas.toDataURL()") != before)
+    until(page, lambda: abs(float(page.text_content(".figures dd")) - 12.0) < 1.5)
+    page.focus("#setpoint")
+    page.keyboard.press("Escape")
+    gateway.wait_until(in_state(OFF))
+    assert page.complaints == []
+
+
+def test_stop_ends_what_another_master_holds(gateway: RunningGateway, page: Any) -> None:
+    gateway.rest()
+    gateway.write(0, 1, 1000)
+    gateway.wait_until(in_state(HOLDING))
+    shows(page, "#owner", "127.0.0.1")
+    page.click("#stop")
+    gateway.wait_until(in_state(OFF))
+    shows(page, "#said", "Stopped: the safe voltage is out.")
+
+
+def test_a_reload_loses_neither_the_force_nor_the_minute(gateway: RunningGateway, page: Any) -> None:
+    gateway.rest()
+    enable(page, "9")
+    gateway.wait_until(in_state(HOLDING))
+    page.reload()
+    shows(page, "#owner", "you")
+    assert (
+        page.evaluate("import('/static/live/samples.js').then(({samples}) => samples.time.at(-1) - samples.time[0])")
+        > 1.0
+    )
+    assert gateway.status()["state"] == HOLDING
+    page.keyboard.press("Escape")
+    gateway.wait_until(in_state(OFF))
+
+
+@pytest.mark.long
+def test_a_refusal_is_told_in_the_gateway_s_words(gateway: RunningGateway, page: Any) -> None:
+    gateway.rest()
+    enable(page, "70")
+    until(page, lambda: "force_setpoint = 70.00 N, allowed 0 .. 60 N" in page.text_content("#said"))
+    assert gateway.status()["state"] == OFF
+    page.complaints.clear()  # the browser itself says that 409 came
+
+
+def serious_violations(page: Any) -> list[str]:
+    from axe_playwright_python.sync_playwright import Axe
+
+    found = Axe().run(page).response["violations"]
+    return [
+        f"{one['id']}: {[node['html'][:120] for node in one['nodes']][:3]}" for one in found if one["impact"] in SERIOUS
+    ]
+
+
+def test_who_cannot_see_or_point_can_use_the_live_view(page: Any) -> None:
+    assert serious_violations(page) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(
+    "tab", ["live", "calibrate", "recordings", "calibrations", "diagnosis", "wiring", "configuration"]
+)
+def test_every_tab_in_both_themes(gateway: RunningGateway, browser: Any, tab: str, theme: str) -> None:
+    with browser.new_context(viewport={"width": 400, "height": 860}, color_scheme=theme) as context:
+        narrow = context.new_page()
+        narrow.goto(f"{url_of(gateway)}#{tab}")
+        until(narrow, lambda: narrow.locator(f"#tab-{tab} > *").count() > 0)
+        assert serious_violations(narrow) == []
+        assert narrow.evaluate("document.documentElement.scrollWidth") <= 400

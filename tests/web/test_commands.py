@@ -1,0 +1,157 @@
+"""What the page may do to the force, on a whole gateway in virtual time: as any master, for as long as its browser is there."""
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from gateway.profiles import Rig
+from gateway.registers.words import State
+from gateway.web.commands import GRACE_S, Commands, RefusedCommand
+from gateway.web.context import WebContext
+from tests.service.rigs import demo
+from tests.service.test_hostile_requests import Stage
+from tests.service.wired import Wired
+
+Scene = Callable[[Commands, Stage], Awaitable[None]]
+
+
+class Link:
+    """Control's socket without the socket."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+
+    async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        answer = self._stage.ask(json.dumps(request).encode())
+        if not answer.pop("ok"):
+            raise ValueError(answer["error"])
+        return answer
+
+
+def play(tmp_path: Path, scene: Scene, rig: Rig | None = None) -> Stage:
+    stage = Stage(tmp_path, Wired(rig or demo()).ready())
+    context = WebContext(tmp_path, "demo", True, Link(stage))  # type: ignore[arg-type]
+    context.__dict__["profile"] = stage.wired.rig
+
+    async def sleep(seconds: float) -> None:
+        stage.wired.run(seconds)
+        await asyncio.sleep(0)
+
+    async def run() -> None:
+        commands = Commands(context, lambda: stage.wired.now_s, sleep)
+        try:
+            await scene(commands, stage)
+        finally:
+            await commands.close()
+
+    asyncio.run(run())
+    stage.close()
+    return stage
+
+
+def test_a_force_is_held_changed_and_stopped(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        wired.until(lambda: wired.state is State.HOLDING, 3.0)
+        assert wired.bank.owner == "web"
+        await commands.set_force("me", 8.0)
+        wired.until(lambda: abs(wired.force_n - 8.0) < 1.0, 3.0)
+        await commands.stop()
+        wired.run(0.05)
+        assert wired.state is State.OFF and wired.exchange.sent_v == 0.0
+
+    play(tmp_path, scene)
+
+
+def test_stop_ends_the_force_of_another_master_and_nothing_else_does(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        wired.write(0, 1, 1000)
+        wired.run(0.5)
+        with pytest.raises(RefusedCommand, match=r"10\.0\.0\.5"):
+            await commands.set_force("me", 20.0)
+        assert wired.state in (State.RAMPING, State.HOLDING)
+        await commands.stop()
+        wired.run(0.05)
+        assert wired.state is State.OFF
+
+    play(tmp_path, scene)
+
+
+def test_stop_ends_a_calibration_too(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        wired.write(0, 1 << 5)
+        wired.until(lambda: wired.state is State.CALIBRATING, 1.0)
+        await commands.stop()
+        assert wired.until(lambda: wired.state is State.OFF, 2.0) < 2.0
+
+    play(tmp_path, scene)
+
+
+@pytest.mark.parametrize("force_n", [70.0, -1.0, 1e9, float("nan"), float("inf")])
+def test_a_force_that_is_not_allowed_is_refused_in_the_gateway_s_words(tmp_path: Path, force_n: float) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        with pytest.raises(RefusedCommand, match=r"force_setpoint|newtons"):
+            await commands.enable("me", force_n)
+        assert stage.wired.state is State.OFF
+
+    play(tmp_path, scene)
+
+
+def leased() -> Rig:
+    rig = demo()
+    return replace(rig, control=replace(rig.control, supervision=replace(rig.control.supervision, lease_s=0.2)))
+
+
+def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than_said(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        for _ in range(20):  # 4 s: longer than the grace
+            for _ in range(4):
+                await asyncio.sleep(0)
+            commands.note_alive("me")
+        assert wired.now_s > 2.0 and wired.state is State.HOLDING
+        commands.leave("me")
+        left_s = wired.now_s
+        while wired.state is not State.FAULT:
+            commands.note_alive("me")  # a browser that has no stream of events open is not there
+            commands.note_alive("another")
+            assert wired.now_s - left_s < GRACE_S + 1.0
+            if commands.is_attended:
+                await asyncio.sleep(0)
+            else:
+                wired.run(0.05)
+        assert wired.fault_code is FaultCode.MASTER_LOST
+        await commands.reset("me")
+        wired.run(0.1)
+        assert wired.state is State.OFF
+
+    play(tmp_path, scene, leased())
+
+
+def test_a_reload_within_the_grace_loses_nothing(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        commands.leave("me")
+        began_s = wired.now_s
+        while wired.now_s < began_s + 1.5:
+            await asyncio.sleep(0)
+        commands.join("me")
+        while wired.now_s < began_s + 3.5:
+            await asyncio.sleep(0)
+        assert wired.state is State.HOLDING
+
+    play(tmp_path, scene, leased())

@@ -1,0 +1,160 @@
+"""One reader for all viewers: each gets every row, one that does not read is dropped, and nothing is read for nobody."""
+
+import asyncio
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.live.ring_rows import RingRows
+from gateway.processes.event_file import EventFile
+from gateway.processes.event_log import EventLog
+from gateway.recording.ring import SampleRing
+from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.web import events
+from gateway.web.events import EventSource
+
+
+class Control:
+    """Answers a state; counts how often it was asked."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+        self.is_gone = False
+
+    async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        self.asked += 1
+        if self.is_gone:
+            raise ConnectionError("no gateway answers")
+        return {"state": "off", "residual": float("nan")}
+
+
+class Context:
+    def __init__(self, state: Path) -> None:
+        self.state, self.control = state, Control()
+
+
+class Commands:
+    commander = ""
+
+    def __init__(self) -> None:
+        self.present: list[str] = []
+
+    def join(self, name: str) -> None:
+        self.present.append(name)
+
+    def leave(self, name: str) -> None:
+        self.present.remove(name)
+
+    async def words(self, block: str) -> list[int]:
+        return [1, 2]
+
+
+@pytest.fixture
+def ring() -> Iterator[tuple[int, SampleRing]]:
+    number = os.memfd_create("ring")
+    ring = SampleRing(number, COLUMNS, 4096)
+    yield number, ring
+    ring.close()
+    os.close(number)
+
+
+def put(ring: SampleRing, first: int, count: int) -> None:
+    for number in range(first, first + count):
+        ring.append((number / 100, *(float(number) for _ in COLUMNS[1:])))
+
+
+def read(event: bytes) -> tuple[str, Any]:
+    head, _, data = event.decode().partition("\ndata: ")
+    return head.removeprefix("event: "), json.loads(data) if data else None
+
+
+async def collect(source: EventSource, name: str, until: int) -> list[float]:
+    """Times of the rows that one viewer was sent, history included, until it has had as many samples."""
+    times: list[float] = []
+    stream = source.stream(name)
+    async for event in stream:
+        kind, data = read(event)
+        if kind in ("history", "samples"):
+            times += data.get("time_s", [])
+        if len(times) >= until:
+            break
+    await stream.aclose()
+    return times
+
+
+def test_every_viewer_gets_every_row_and_control_is_asked_once_for_all(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(events, "_SAMPLES_S", 0.005)
+
+    async def scene() -> None:
+        context, commands = Context(tmp_path), Commands()
+        source = EventSource(context, RingRows(ring[0]), commands)  # type: ignore[arg-type]
+        put(ring[1], 0, 50)
+
+        async def feed() -> None:
+            for number in range(60):
+                put(ring[1], 50 + number, 1)
+                await asyncio.sleep(0.003)
+
+        viewers = [collect(source, f"viewer {number}", 90) for number in range(5)]
+        times, *_ = await asyncio.gather(asyncio.gather(*viewers), feed())
+        for each in times:
+            assert sorted(set(each)) == [pytest.approx(number / 100) for number in range(len(set(each)))]
+        asked = context.control.asked
+        assert 1 <= asked < 30, "twice a second for all, not for each"
+        assert source.viewers == 0 and commands.present == []
+        await asyncio.sleep(0.03)
+        assert context.control.asked == asked, "nothing is read while nobody looks"
+        await source.close()
+
+    asyncio.run(scene())
+
+
+def test_a_viewer_that_does_not_read_is_dropped_and_the_others_go_on(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(events, "_SAMPLES_S", 0.001)
+
+    async def scene() -> None:
+        source = EventSource(Context(tmp_path), RingRows(ring[0]), Commands())  # type: ignore[arg-type]
+        put(ring[1], 0, 5)
+        stuck = source.stream("stuck")
+        await anext(stuck)
+        for number in range(150):
+            put(ring[1], 5 + number, 1)
+            await asyncio.sleep(0.0015)
+        rest = [event async for event in stuck]
+        assert 0 < len(rest) <= 110, "what waited is still sent, and then the stream ends"
+        assert len(await collect(source, "reads", 50)) >= 50
+        await source.close()
+
+    asyncio.run(scene())
+
+
+def test_a_gateway_that_does_not_answer_is_said_and_what_it_logged_is_shown(
+    tmp_path: Path, ring: tuple[int, SampleRing]
+) -> None:
+    async def scene() -> list[tuple[str, Any]]:
+        context = Context(tmp_path)
+        context.control.is_gone = True
+        source = EventSource(context, RingRows(ring[0]), Commands())  # type: ignore[arg-type]
+        told = []
+        stream = source.stream("me")
+        async for event in stream:
+            told.append(read(event))
+            if told[-1][0] == "gone":
+                break
+        await stream.aclose()
+        await source.close()
+        return told
+
+    with EventLog(lambda line: None, source="control", file=EventFile(tmp_path)) as log:
+        log("control", "A310 master lost")
+    told = asyncio.run(scene())
+    assert [(data["code"], data["text"]) for kind, data in told if kind == "note"] == [("A310", "master lost")]
+    assert "does not answer" in told[-1][1]["sentence"]

@@ -1,0 +1,133 @@
+"""Who may use the page: no foreign name, no foreign site, no command without the session's token, nobody without a login."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.web import security
+from tests.web.asgi import Answer, call, page
+
+TOKEN = "a-token-of-some-length"
+ALIVE = "/api/v1/alive"
+
+
+def answer(app: Any, method: str, path: str, headers: dict[str, str] | None = None, body: bytes = b"") -> Answer:
+    return asyncio.run(call(app, method, path, headers, body))
+
+
+def session_of(app: Any) -> dict[str, str]:
+    """Headers of a browser that has opened the page."""
+    opened = answer(app, "GET", "/api/v1/session")
+    return {"cookie": opened.cookie, "x-csrf-token": opened.json["csrf"]}
+
+
+@pytest.fixture
+def app(tmp_path: Path) -> Any:
+    return page(tmp_path)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:1", "LOCALHOST", "[::1]:8080", "127.8.8.8"])
+def test_the_page_answers_to_this_machine(app: Any, host: str) -> None:
+    assert answer(app, "GET", "/healthz", {"host": host}).status == 200
+
+
+@pytest.mark.parametrize(
+    "host",
+    ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "192.168.1.5:8080", "", "[", "localhost.", "0"],
+)
+def test_a_name_that_leads_here_is_not_this_machine(app: Any, host: str) -> None:
+    """DNS rebinding: the browser of a visitor believes that evil.example has this address."""
+    assert answer(app, "GET", "/", {"host": host}).status == 403
+
+
+def test_a_command_needs_the_token_of_its_own_session(app: Any) -> None:
+    mine, other = session_of(app), session_of(app)
+    assert answer(app, "POST", ALIVE, mine).status == 200
+    assert answer(app, "POST", ALIVE).json["reason"] == "session"
+    assert answer(app, "POST", ALIVE, {"cookie": mine["cookie"]}).status == 403
+    assert answer(app, "POST", ALIVE, mine | {"x-csrf-token": other["x-csrf-token"]}).status == 403
+    forged = mine["cookie"].partition("=")[0] + "=anything.0000"
+    assert answer(app, "POST", ALIVE, mine | {"cookie": forged}).status == 403
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"origin": "http://127.0.0.1:8080"}, 200),
+        ({"origin": "http://evil.example"}, 403),
+        ({"origin": "http://127.0.0.1:9999"}, 403),
+        ({"origin": "null"}, 403),
+        ({"sec-fetch-site": "cross-site"}, 403),
+        ({"sec-fetch-site": "same-origin"}, 200),
+        ({"content-length": "100000"}, 413),
+        ({"content-length": "lots"}, 413),
+    ],
+)
+def test_another_site_commands_nothing_even_with_a_stolen_session(
+    app: Any, headers: dict[str, str], status: int
+) -> None:
+    assert answer(app, "POST", ALIVE, session_of(app) | headers).status == status
+
+
+def test_another_site_reads_nothing(app: Any) -> None:
+    for path in ("/api/v1/session", "/events", "/api/v1/state", "/static/app.js"):
+        assert answer(app, "GET", path, {"sec-fetch-site": "cross-site"}).status == 403
+    assert "access-control-allow-origin" not in answer(app, "GET", "/api/v1/session").headers
+
+
+def test_every_answer_forbids_what_the_page_does_not_need(app: Any) -> None:
+    for path, headers in (
+        ("/", {}),
+        ("/nothing-here", {}),
+        ("/", {"host": "evil.example"}),
+        ("/static/uplot/LICENSE", {}),
+    ):
+        told = answer(app, "GET", path, headers).headers
+        assert "default-src 'none'" in told["content-security-policy"]
+        assert "script-src 'self';" in told["content-security-policy"], "no script of the page's own text"
+        assert told["x-content-type-options"] == "nosniff"
+
+
+@pytest.mark.parametrize(
+    "path", ["../security.py", "..%2f", "tabs/../../security.py", "", ".", "uplot", "app.js/", "/etc/passwd"]
+)
+def test_nothing_but_the_page_s_own_files_is_served(app: Any, path: str) -> None:
+    assert answer(app, "GET", f"/static/{path}").status == 404
+
+
+def test_the_style_is_that_of_the_reports(app: Any) -> None:
+    told = answer(app, "GET", "/static/style.css")
+    assert b"--on-stop" in told.body and told.headers["content-type"].startswith("text/css")
+
+
+def test_with_a_token_nothing_is_told_before_the_login(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(security, "_FAILED_LOGIN_S", 0.0)
+    app = page(tmp_path, TOKEN)
+    assert answer(app, "GET", "/").headers["location"] == "/login"
+    for path in ("/events", "/api/v1/state", "/api/v1/session", "/static/app.js"):
+        assert answer(app, "GET", path).json["reason"] == "login"
+    assert answer(app, "GET", "/login").status == 200
+    for wrong in (b"", b"wrong", TOKEN[:-1].encode(), b"\xff\xfe"):
+        refused = answer(app, "POST", "/login", body=wrong)
+        assert refused.status == 401 and "set-cookie" not in refused.headers
+    entered = answer(app, "POST", "/login", body=TOKEN.encode())
+    assert "HttpOnly" in entered.headers["set-cookie"] and "SameSite=strict" in entered.headers["set-cookie"]
+    told = answer(app, "GET", "/api/v1/session", {"cookie": entered.cookie}).json
+    assert answer(app, "POST", ALIVE, {"cookie": entered.cookie, "x-csrf-token": told["csrf"]}).status == 200
+
+
+def test_a_tool_sends_the_token_itself(tmp_path: Path) -> None:
+    app = page(tmp_path, TOKEN)
+    assert answer(app, "POST", ALIVE, {"authorization": f"Bearer {TOKEN}"}).status == 200
+    assert answer(app, "POST", ALIVE, {"authorization": "Bearer wrong"}).status == 401
+    assert answer(app, "GET", "/healthz", {"host": "10.0.0.5:8080"}).status == 200, "reached over the network"
+    assert answer(app, "GET", "/healthz", {"host": "evil.example"}).status == 403
+
+
+def test_a_page_without_its_gateway_says_so(app: Any) -> None:
+    told = answer(app, "POST", "/api/v1/command/stop", session_of(app))
+    assert told.status == 503 and told.json["reason"] == "gone"
+    assert answer(app, "POST", "/api/v1/command/explode", session_of(app)).status == 404
+    assert answer(app, "POST", "/api/v1/command/enable", session_of(app), b'{"force_n": "x"}').status == 400
