@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.end_to_end.conftest import RunningGateway, start, stop
+from tests.end_to_end.conftest import OWNER_IP, RunningGateway, start, stop
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 pytestmark = pytest.mark.skipif(
@@ -97,7 +97,8 @@ def test_stop_ends_what_another_master_holds(gateway: RunningGateway, page: Any)
     shows(page, "#owner", "127.0.0.1")
     page.click("#stop")
     gateway.wait_until(in_state(OFF))
-    shows(page, "#said", "Stopped: the safe voltage is out.")
+    until(page, lambda: "safe voltage is out" in page.text_content("#said"))
+    assert gateway.words(OWNER_IP, 2) == [0, 0]
 
 
 def test_a_reload_loses_neither_the_force_nor_the_minute(gateway: RunningGateway, page: Any) -> None:
