@@ -44,6 +44,7 @@ VERBS: Final = (
     "backup",
     "restore",
     "service",
+    "report",
     "completion",
     "version",
 )

@@ -1,0 +1,120 @@
+"""What somebody who helps from afar needs to know of a gateway, in one file, and nothing that they must not.
+
+In it: versions, the machine, the rig's files as `check` reads them, the newest events, the loop's figures and the live state
+where a gateway runs, which calibrations, plants and recordings there are (not their content), and the unit of a service.
+Not in it: keys, certificates, passwords, tokens, addresses of masters (they become `master-1` ...), recordings. A secret is
+found by the name of its key in a rig file, and by its looks in any text; who packs it is shown the list before it is sent.
+"""
+
+import io
+import json
+import platform
+import re
+import sys
+import tarfile
+from collections import deque
+from collections.abc import Callable, Iterable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+from gateway import VERSION
+from gateway.cli.errors import CliError
+
+EVENT_LINES: Final = 2000
+_LIBRARIES: Final = ("numpy", "scipy", "pymodbus", "pyserial", "pydantic", "uvloop", "numba", "pyarrow", "starlette")
+_SECRET_KEY: Final = re.compile(
+    r"^(\s*(?:-\s*)?\"?(?:[\w.-]*(?:password|token|secret|passphrase|credential)[\w.-]*)\"?\s*[:=]\s*)\S.*$",
+    re.I | re.M,
+)
+_PEM: Final = re.compile(r"-----BEGIN [^-]+-----.*?(?:-----END [^-]+-----|\Z)", re.S)
+_IPV4: Final = re.compile(r"(?<![\d.])(?:\d{1,3}\.){3}\d{1,3}(?![\d.])")
+_OURS: Final = frozenset({"127.0.0.1", "0.0.0.0"})
+
+
+class Redaction:
+    """Takes secrets out of texts; the same address becomes the same name in all of them."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, str] = {}
+
+    def __call__(self, text: str) -> str:
+        text = _PEM.sub("(a key or certificate, left out)", text)
+        text = _SECRET_KEY.sub(r"\1(left out)", text)
+        return _IPV4.sub(lambda found: self._name_of(found[0]), text)
+
+    def _name_of(self, address: str) -> str:
+        if address in _OURS:
+            return address
+        return self._names.setdefault(address, f"master-{len(self._names) + 1}")
+
+
+def collect(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> dict[str, str]:
+    """Return name -> text of what goes in, redacted. Whatever cannot be read is in it as a sentence: the rest helps too.
+
+    rig_texts: name and content of each file that the rig was read from.
+    """
+    redact = Redaction()
+    parts: dict[str, Callable[[], str]] = {
+        "versions.json": lambda: json.dumps(_versions(), indent=2),
+        "rig.txt": lambda: "\n".join(f"# {name}\n{text}" for name, text in rig_texts()),
+        "events.jsonl": lambda: _newest_events(state),
+        "live.json": lambda: json.dumps(_ask(state, "state"), indent=2),
+        "health.json": lambda: json.dumps(_ask(state, "health"), indent=2),
+        "state.txt": lambda: _listing(state),
+    }
+    return {name: redact(_or_sentence(make)) for name, make in parts.items()}
+
+
+def pack_bundle(parts: dict[str, str], target: Path) -> None:
+    """Write the parts as a tar.gz; OSError when the disk does not take it. Nothing half stays behind."""
+    beside = target.with_name(f".{target.name}.part")
+    try:
+        with tarfile.open(beside, "w:gz") as archive:
+            for name, text in parts.items():
+                data = text.encode()
+                member = tarfile.TarInfo(f"force-gateway-report/{name}")
+                member.size = len(data)
+                archive.addfile(member, io.BytesIO(data))
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _or_sentence(make: Callable[[], str]) -> str:
+    try:
+        return make()
+    except (CliError, OSError, ValueError) as error:
+        return f"not in it: {getattr(error, 'message', None) or error}"
+
+
+def _versions() -> dict[str, Any]:
+    libraries = {}
+    for name in _LIBRARIES:
+        try:
+            libraries[name] = version(name)
+        except ModuleNotFoundError:
+            libraries[name] = "not installed"
+    return {"force-gateway": VERSION, "python": sys.version, "machine": platform.platform(), "libraries": libraries}
+
+
+def _newest_events(state: Path) -> str:
+    from gateway.processes.event_file import EventReader
+
+    reader = EventReader(state)
+    try:
+        newest = deque(reader.read_stored(), EVENT_LINES)
+    finally:
+        reader.close()
+    return "\n".join(json.dumps(event._asdict()) for event in newest)
+
+
+def _ask(state: Path, what: str) -> dict[str, Any]:
+    from gateway.cli.control_socket import ask
+
+    return ask(state, {"do": what})
+
+
+def _listing(state: Path) -> str:
+    files = sorted(path for path in state.rglob("*") if path.is_file() and not path.is_symlink())
+    return "\n".join(f"{path.stat().st_size:>12} {path.relative_to(state)}" for path in files)

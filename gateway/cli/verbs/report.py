@@ -1,0 +1,32 @@
+"""`report`: what somebody who helps from afar needs, in one file without secrets."""
+
+from pathlib import Path
+
+import click
+
+from gateway.cli.errors import already_exists
+from gateway.cli.options import StateChoice, state_options
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path, dir_okay=False), default=Path("force-gateway-report.tar.gz"))
+@click.option("--force", is_flag=True, help="Overwrite FILE.")
+@click.option("--show", is_flag=True, help="Print what would go in instead.")
+@state_options
+def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
+    """Pack a support bundle into FILE (tar.gz): versions, rig, events, live state, lists of files.
+
+    No keys, passwords, tokens or recordings; addresses of masters become master-1, master-2 ... Look at it before you send
+    it: --show prints all of it. The gateway may be running or not.
+    """
+    from gateway.cli.support_bundle import collect, pack_bundle
+    from gateway.profiles import load_rig
+
+    if file.exists() and not (force or show):
+        raise already_exists(file)
+    parts = collect(state.directory, lambda: load_rig(state.rig).texts.items())
+    if show:
+        click.echo("\n".join(f"== {name}\n{text}" for name, text in parts.items()))
+        return
+    pack_bundle(parts, file)
+    click.echo(f"packed {', '.join(parts)} into {file}, {file.stat().st_size / 1e3:.1f} kB; look at it with --show")

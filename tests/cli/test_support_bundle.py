@@ -1,0 +1,67 @@
+"""A bundle tells how it is, and no secret: whatever stands in the rig's files and the events."""
+
+import json
+import tarfile
+from pathlib import Path
+
+from click.testing import CliRunner, Result
+
+from gateway.cli.main import command
+from gateway.cli.support_bundle import Redaction, collect
+from gateway.processes.event import encode_event, make_event
+from gateway.processes.event_file import EventFile
+
+SECRETS = """web:
+  token: s3cr3t-t0ken
+mqtt: {"password_file": "/etc/secret/mqtt", user: robot}
+  - api_secret = hunter2
+key: |
+  -----BEGIN PRIVATE KEY-----
+  MIIEvQIBADANBg
+  -----END PRIVATE KEY-----
+force_max_n: 50
+"""
+
+
+def gateway(*words: str | Path) -> Result:
+    return CliRunner().invoke(command, [*map(str, words)])
+
+
+def with_events(state: Path, *sentences: str) -> Path:
+    state.mkdir()
+    file = EventFile(state)
+    for sentence in sentences:
+        file.append(encode_event(make_event(0.0, "control", "refusal", sentence)))
+    file.close()
+    return state
+
+
+def test_no_secret_of_a_rig_goes_in_and_all_else_stays() -> None:
+    text = Redaction()(SECRETS)
+    for secret in ("s3cr3t", "hunter2", "MIIEvQ", "PRIVATE"):
+        assert secret not in text
+    assert "force_max_n: 50" in text and "token: (left out)" in text
+
+
+def test_a_master_has_the_same_name_in_every_part_and_never_its_address(tmp_path: Path) -> None:
+    state = with_events(tmp_path / "state", "W204 10.1.2.3 asked for 72 N", "W204 10.1.2.4", "W204 10.1.2.3 again")
+    parts = collect(state, lambda: [("rig.yaml", "allow: [10.1.2.4/32]\nbind: 127.0.0.1\n")])
+    told = [json.loads(line)["text"] for line in parts["events.jsonl"].splitlines()]
+    owners = [text.split()[0] for text in told]
+    assert owners[0] == owners[2] != owners[1]
+    assert f"allow: [{owners[1]}/32]" in parts["rig.txt"] and "bind: 127.0.0.1" in parts["rig.txt"]
+    assert "10.1.2." not in "".join(parts.values())
+
+
+def test_what_cannot_be_read_is_said_and_the_rest_is_packed(tmp_path: Path) -> None:
+    state, target = with_events(tmp_path / "state", "A310 master lost"), tmp_path / "bundle.tar.gz"
+    done = gateway("report", target, "--state", state, "--rig", "demo")
+    assert done.exit_code == 0, done.stderr
+    with tarfile.open(target) as archive:
+        texts = {Path(name).name: archive.extractfile(name).read().decode() for name in archive.getnames()}  # type: ignore[union-attr]
+    assert "A310" in texts["events.jsonl"] and "force-gateway" in json.loads(texts["versions.json"])
+    assert "name: demo" in texts["rig.txt"]
+    assert texts["live.json"].startswith("not in it: E140"), "no gateway runs"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bundle.tar.gz", "state"], "nothing half beside it"
+    again = gateway("report", target, "--state", state, "--rig", "demo")
+    assert again.exit_code == 1 and "E405" in again.stderr
