@@ -1,4 +1,4 @@
-"""The Containerfile, as far as it can be asked without a builder: what it copies is there, what it runs is a command of ours."""
+"""The Containerfile, as far as it can be asked without a builder: what it copies is there, what it runs is a verb."""
 
 import json
 import re
