@@ -83,7 +83,7 @@ class RefusalReason(IntEnum):
             "value out of range",
             "A value beyond the register's or the rig's limits; it is refused, never clipped.",
             "The scale was forgotten (12.00 N is 1200 in block 0), or the rig's force_max_n is lower than you think.",
-            "Read unit and scale in `force-gateway registers`; the rig's limit is in the gateway's log line.",
+            "Stay within what is allowed; unit and scale: `force-gateway registers NAME`, the rig's limit: the gateway's log.",
         ),
     )
     WORDS_SWAPPED = (

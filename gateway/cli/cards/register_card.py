@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 from gateway import defaults
 from gateway.cli.cards.card import Fact
+from gateway.cli.master.value_text import limits_of
 from gateway.registers import Register, RegisterMap
-from gateway.registers.values import RAW_LIMITS, WordOrder
+from gateway.registers.values import WordOrder
 
 
 def find_registers(register_map: RegisterMap, name: str) -> list[Register]:
@@ -69,16 +70,6 @@ def _describe_limits(register: Register) -> str:
     rig = "; the rig's own may be narrower" if register.is_writable and register.block == "command" else ""
     missing = "; 0x8000 (-32768): not available" if register.type == "int16" and not register.is_writable else ""
     return f"{low:.10g} .. {high:.10g} {register.unit}".rstrip() + rig + missing
-
-
-def limits_of(register: Register) -> tuple[float | None, float | None]:
-    """Return the least and the largest value in the register's unit; what the map leaves open, its type decides."""
-    raw = RAW_LIMITS.get(register.type)
-    low, high = (raw[0] * register.scale, raw[1] * register.scale) if raw else (None, None)
-    return (
-        low if register.minimum is None else register.minimum,
-        high if register.maximum is None else register.maximum,
-    )
 
 
 def _same(register_map: RegisterMap, register: Register) -> list[Register]:

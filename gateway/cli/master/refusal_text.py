@@ -35,9 +35,27 @@ def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], 
     if reason is RefusalReason.NONE:
         return f"{exception} to {refused.request}"
     entry = reason.explanation
-    values = f"{entry.code} {entry.title}: {exception} to {refused.request}; {where}"
-    own = _own_sentence(client, at, reason, state).removeprefix(f"{entry.code} ")
-    return "\n  ".join(part for part in (values, own, f"{entry.do} (force-gateway explain {entry.code})") if part)
+    own = _own_sentence(client, at, reason, state).removeprefix(f"{entry.code} ") or _known_limit(client, at, reason)
+    values = f"{entry.title}: {exception} to {refused.request}; {where}"
+    cure = f"{entry.do} (force-gateway explain {entry.code})"
+    return "\n  ".join([f"{entry.code} {own}", values, cure] if own else [f"{entry.code} {values}", cure])
+
+
+def _known_limit(client: GatewayClient, address: int, reason: RefusalReason) -> str:
+    """Return what the registers tell of a limit where the gateway is elsewhere: the calibration's force, if it was that."""
+    register = client.register_map.find("force_setpoint")
+    if reason is not RefusalReason.OUT_OF_RANGE or address != register.address:
+        return ""
+    try:
+        value, high = client.read_values([client.register_map.find(n) for n in ("refusal_value", "force_high@active")])
+    except (CliError, RefusedError, LookupError):
+        return ""
+    if not high.is_available or high.value <= 0.0:
+        return ""
+    asked = f"force_setpoint = {value.value:.2f} N"
+    if value.value > high.value:
+        return f"{asked}: allowed 0 .. {high.value:.4g} N by the calibration in use; the rig's own limit may be lower"
+    return f"{asked}: beyond the rig's own limit, which no register tells; the calibration in use goes to {high.value:.4g} N"
 
 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:

@@ -4,8 +4,10 @@ from difflib import get_close_matches
 from ipaddress import IPv4Address
 from math import isnan
 
+from gateway.cli.command_line.numbers import describe_allowed
 from gateway.cli.master.client import RegisterReading
 from gateway.registers import Register
+from gateway.registers.values import RAW_LIMITS
 from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_host
 
 
@@ -17,7 +19,24 @@ def parse_value(register: Register, text: str) -> bytes:
         number = _choice(register, text)
     else:
         number = _number(text, f"a number in {register.unit}" if register.unit else "a number")
-    return register.encode(number)
+    return encode_within(register, number)
+
+
+def encode_within(register: Register, number: float) -> bytes:
+    """Return the words of a number; ValueError with what is allowed where the register cannot carry it. Narrower limits of the
+    rig are the gateway's to tell."""
+    try:
+        return register.encode(number)
+    except ValueError:
+        low, high = limits_of(register)
+        raise ValueError(describe_allowed(f"{number:.10g}", low, high, register.unit)) from None
+
+
+def limits_of(register: Register) -> tuple[float | None, float | None]:
+    """Return the least and the largest value in the register's unit; what the map leaves open, its type decides."""
+    raw = RAW_LIMITS.get(register.type)
+    low, high = (raw[0] * register.scale, raw[1] * register.scale) if raw else (None, None)
+    return low if register.minimum is None else register.minimum, high if register.maximum is None else register.maximum
 
 
 def format_value(reading: RegisterReading) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.numbers import Quantity, Whole
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, json_option, name_option, state_options, wire_options
 from gateway.processes import exit_codes
@@ -25,26 +26,26 @@ _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 @click.command()
 @click.option(
     "--groups",
-    type=click.IntRange(1, 100),
+    type=Whole(1, 100),
     help=f"How often the ladder is climbed  [default: {defaults.LADDER_GROUPS}]",
 )
 @click.option(
     "--step",
     "step_v",
-    type=click.FloatRange(min=0.01),
+    type=Quantity(0.01, unit="V"),
     help=f"Height of a stair in V  [default: {defaults.LADDER_STEP_V}]",
 )
-@click.option("--v-max", "v_max_v", type=click.FloatRange(min=0.1), help="Top in V  [default: as the rig allows]")
+@click.option("--v-max", "v_max_v", type=Quantity(0.1, unit="V"), help="Top in V  [default: as the rig allows]")
 @click.option(
     "--minor",
     "minor_points",
-    type=click.IntRange(0, 2000),
+    type=Whole(0, 2000),
     help=f"Points of the reversal part  [default: {defaults.LADDER_MINOR_POINTS}]",
 )
 @click.option(
     "--response",
     "response_steps",
-    type=click.IntRange(0, 200),
+    type=Whole(0, 200),
     help=f"Large steps for dead time and lags  [default: {defaults.LADDER_RESPONSE_STEPS}]",
 )
 @click.option(

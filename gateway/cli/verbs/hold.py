@@ -1,6 +1,7 @@
 """`hold`: hold a force from this terminal: enable, heartbeat, one line of state, and a ramp to 0 when told to stop."""
 
 import json
+import re
 import signal
 import sys
 import time
@@ -33,7 +34,18 @@ def _parse_time(context: click.Context, parameter: click.Parameter, text: str | 
     return seconds
 
 
-@click.command()
+class _TakesNegative(click.Command):
+    """Takes -3 for a number, to say what is allowed; for click it is an option that does not exist."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put a negative number behind `--`."""
+        negative = [word for word in args if re.fullmatch(r"-\d+\.?\d*", word)]
+        if negative and "--" not in args:
+            args = [*(word for word in args if word not in negative), "--", *negative]
+        return super().parse_args(ctx, args)
+
+
+@click.command(cls=_TakesNegative)
 @click.argument("newton", type=float)
 @click.option("--for", "for_s", callback=_parse_time, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
 @click.option("--reset", "resets", is_flag=True, help="Reset a latched fault first.")
@@ -61,14 +73,13 @@ def command(
     from gateway.cli.master.refusal_text import explain_refusals
     from gateway.profiles import load_register_map
 
-    if not (isfinite(newton) and newton >= 0.0):
-        raise click.UsageError(f"{newton:g} N is no force to hold")
     lease = _read_rig_lease(rig) if rig is not None else _find_gateway_lease(wire)
     register_map = load_register_map(options["map_name"])
+    force_n = _check_force(register_map, newton)
     with GatewayClient(wire, options["unit"], register_map) as client:
         with explain_refusals(client):
             (heartbeat,) = client.read_values([register_map.find("heartbeat")])
-        run = HoldRun(_check_force(register_map, newton), heartbeat=int(heartbeat.value), resets=options["resets"])
+        run = HoldRun(force_n, heartbeat=int(heartbeat.value), resets=options["resets"])
         beat = HeartbeatThread(client, run, lease, time.monotonic)
         _show_until_end(beat, for_s, as_json=as_json)
     _report_end(beat, client.where, as_json=as_json)
@@ -97,8 +108,15 @@ def _find_gateway_lease(wire: "Wire") -> "KnownLease | None":
 
 def _check_force(register_map: Any, newton: float) -> float:
     """Return a force that the register can carry; the rig's own limits are the gateway's to tell."""
+    from gateway.cli.command_line.numbers import describe_allowed
+    from gateway.cli.master.value_text import encode_within, limits_of
+
+    register = register_map.find("force_setpoint")
+    low, high = limits_of(register)
     try:
-        register_map.find("force_setpoint").encode(newton)
+        if not (isfinite(newton) and newton >= 0.0):
+            raise ValueError(describe_allowed(f"{newton:g}", low, high, register.unit))
+        encode_within(register, newton)
     except ValueError as error:
         raise click.UsageError(f"NEWTON: {error}") from None
     return newton

@@ -106,7 +106,7 @@ def test_values_are_written_as_people_say_them(text: str, words: tuple[int, tupl
         ("force_measured=1", "force_measured is read only"),
         ("mode=volts", "did you mean voltage?"),
         ("control_word=enabel", "did you mean enable?"),
-        ("force_setpoint=5000", "does not fit"),
+        ("force_setpoint=5000", "force_setpoint: 5000 N: allowed 0 .. 327.67 N"),
     ],
 )
 def test_what_cannot_be_meant_is_a_usage_error_and_sends_nothing(text: str, sentence: str, fake, call) -> None:

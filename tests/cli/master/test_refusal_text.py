@@ -61,7 +61,7 @@ def test_on_its_machine_the_gateway_says_it_itself(
     options = ("--state", str(tmp_path / "force-gateway" / "demo")) if given else ()
     answer = call("write", "control_word=tare", "--gateway", gateway, *options)
     assert answer.exit_code == 1
-    assert answer.stderr.split("\n")[1] == f"  {OWN}"
+    assert answer.stderr.split("\n")[0] == f"W303 {OWN}"
     assert "another gateway" not in answer.stderr
 
 
@@ -75,3 +75,41 @@ def test_only_a_gateway_of_this_machine_is_asked_for_its_words(tmp_path: Path) -
     assert all(is_asked(TcpWire(host, 5020)) for host in ("127.0.0.1", "::1", "localhost"))
     assert not any(is_asked(TcpWire(host, 5020)) for host in ("10.0.0.7", "cell-3"))
     assert is_asked(RtuWire("/dev/ttyS9", SerialSettings(baud=19200))), "the other end of a line is not known"
+
+
+@pytest.mark.parametrize(
+    ("high_n", "said"),
+    [
+        (50.0, "W204 force_setpoint = 65.00 N: allowed 0 .. 50 N by the calibration in use"),
+        (65.2, "W204 force_setpoint = 65.00 N: beyond the rig's own limit"),
+        (0.0, "W204 value out of range: exception 03"),
+    ],
+)
+def test_a_limit_that_only_registers_can_tell_is_told(
+    high_n: float, said: str, fake, call, monkeypatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    fake.bank.refuse[1] = (3, RefusalReason.OUT_OF_RANGE)
+    fake.bank.set("force_high@active", high_n)
+    answer = call("write", "force_setpoint=65", "--gateway", fake.address)
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("hold", "400"), "400 N: allowed 0 .. 327.67 N"),
+        (("hold", "-3"), "-3 N: allowed 0 .. 327.67 N"),
+        (("hold", "--", "nan"), "nan N: allowed 0 .. 327.67 N"),
+        (("write", "force_setpoint=400"), "force_setpoint: 400 N: allowed 0 .. 327.67 N"),
+        (("write", "voltage_setpoint=99999"), "voltage_setpoint: 99999 mV: allowed 0 .. 10000 mV"),
+        (("calibrate", "--groups", "500"), "500: allowed 1 .. 100"),
+        (("calibrate", "--step", "0.001"), "0.001 V: allowed at least 0.01 V"),
+        (("calibrate", "--v-max", "nan"), "nan V: allowed at least 0.1 V"),
+    ],
+)
+def test_what_no_gateway_can_take_is_refused_with_what_is_allowed(words: tuple[str, ...], said: str, call) -> None:
+    answer = call(*words)
+    assert answer.exit_code == 2
+    assert said in answer.stderr

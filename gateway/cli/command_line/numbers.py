@@ -1,0 +1,45 @@
+"""Numbers of the command line with bounds: a refusal says what is allowed, as the gateway's own refusals do."""
+
+from typing import Any
+
+import click
+
+
+def describe_allowed(value: str, low: float | None, high: float | None, unit: str = "") -> str:
+    """Return `65 N: allowed 0 .. 60 N`; one bound may be open."""
+    unit = f" {unit}" if unit else ""
+    if low is None or high is None:
+        bound = f"at least {low:g}" if low is not None else f"at most {high:g}"
+        return f"{value}{unit}: allowed {bound}{unit}"
+    return f"{value}{unit}: allowed {low:.10g} .. {high:.10g}{unit}"
+
+
+class Whole(click.IntRange):
+    """A whole number within bounds."""
+
+    def __init__(self, low: int | None = None, high: int | None = None, unit: str = "") -> None:
+        super().__init__(low, high)
+        self._unit = unit
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number; BadParameter with the bounds."""
+        number = click.INT.convert(value, param, ctx)
+        if (self.min is not None and number < self.min) or (self.max is not None and number > self.max):
+            self.fail(describe_allowed(str(value), self.min, self.max, self._unit), param, ctx)
+        return number
+
+
+class Quantity(click.FloatRange):
+    """A number within bounds, in a unit."""
+
+    def __init__(self, low: float | None = None, high: float | None = None, unit: str = "") -> None:
+        super().__init__(low, high)
+        self._unit = unit
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number; BadParameter with the bounds."""
+        number = click.FLOAT.convert(value, param, ctx)
+        low, high = self.min, self.max
+        if not ((low is None or number >= low) and (high is None or number <= high)):  # so that nan is none
+            self.fail(describe_allowed(str(value), low, high, self._unit), param, ctx)
+        return number
