@@ -34,3 +34,9 @@ class WebContext:
         self.tasks.add(task)
         task.add_done_callback(self.tasks.discard)
         return task
+
+    async def end_work(self) -> None:
+        """Cancel what runs beside the requests, and wait for its end."""
+        for task in tuple(self.tasks):
+            task.cancel()
+        await asyncio.gather(*self.tasks, return_exceptions=True)

@@ -49,6 +49,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
         yield
         await events.close()
+        await context.end_work()
         await commands.close()
         await context.control.close()
 

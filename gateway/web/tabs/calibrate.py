@@ -40,7 +40,7 @@ class CalibrateTab:
 
     def __init__(self, context: WebContext) -> None:
         self._state = context.state
-        self._follower = RunFollower(context.state)
+        self._follower = RunFollower(context)
 
     async def status(self, request: Request) -> dict[str, Any]:
         """Return how the run is, what plans there are, and the fit's table once there is one."""

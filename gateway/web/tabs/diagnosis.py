@@ -38,7 +38,7 @@ class DiagnosisTab:
 
     def __init__(self, context: WebContext) -> None:
         self._state = context.state
-        self._jobs = DiagnosisJobs(context.state)
+        self._jobs = DiagnosisJobs(context)
 
     async def status(self, request: Request) -> dict[str, Any]:
         """Return the diagnosis under way or the last one, and the reports that are kept."""

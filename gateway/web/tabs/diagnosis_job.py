@@ -8,7 +8,6 @@ import asyncio
 import contextlib
 import json
 import shutil
-import signal
 import socket
 import sys
 import time
@@ -17,10 +16,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.web.context import WebContext
 from gateway.web.tabs.answers import NOT_FOUND, TabRefusedError
 from gateway.web.tabs.own_command import child_environment, last_sentence
 
 FOLDER: Final = "diagnoses"
+PROGRAM: Final = "gateway"
+"""Module of the command line whose verb diagnoses."""
 _LONGEST_SAID: Final = 20_000
 
 
@@ -44,8 +46,9 @@ class RunningDiagnosis:
 class DiagnosisJobs:
     """Starts, follows and cancels; one at a time. clock: monotonic seconds."""
 
-    def __init__(self, state: Path, clock: Callable[[], float] = time.monotonic) -> None:
-        self._state = state
+    def __init__(self, context: WebContext, clock: Callable[[], float] = time.monotonic) -> None:
+        self._context = context
+        self._state = context.state
         self._clock = clock
         self._job: RunningDiagnosis | None = None
         self._task: asyncio.Task[None] | None = None
@@ -77,7 +80,7 @@ class DiagnosisJobs:
             return
         finally:
             far_end.close()
-        self._task = asyncio.create_task(self._follow(job, folder, link))
+        self._task = self._context.begin(self._follow(job, folder, link))
 
     async def cancel(self) -> None:
         """End the diagnosis under way; return when it has ended."""
@@ -85,15 +88,14 @@ class DiagnosisJobs:
             raise TabRefusedError("no diagnosis is under way")
         self._job.ended = "cancelled"
         if self._job.process:
-            with contextlib.suppress(ProcessLookupError):
-                self._job.process.send_signal(signal.SIGKILL)
+            _kill(self._job.process)
         await self._task
 
     async def _spawn(self, job: RunningDiagnosis, folder: Path, far_end: socket.socket) -> asyncio.subprocess.Process:
         words = ["diagnose", str(job.recording), "--state", str(self._state)]
         words += ["--report", str(folder / "report.html"), "--json", str(folder / "document.json")]
         words += ["--save"] if job.keeps_plant else []
-        module = ("-m", "gateway.web.tabs.diagnosis_process", str(far_end.fileno()))
+        module = ("-m", "gateway.web.tabs.diagnosis_process", str(far_end.fileno()), PROGRAM)
         return await asyncio.create_subprocess_exec(
             sys.executable,
             *module,
@@ -107,16 +109,23 @@ class DiagnosisJobs:
 
     async def _follow(self, job: RunningDiagnosis, folder: Path, link: socket.socket) -> None:
         assert job.process and job.process.stdout
-        listening = asyncio.create_task(_hear(job, link))
-        said = (await job.process.stdout.read()).decode(errors="replace")[-_LONGEST_SAID:]
-        code = await job.process.wait()
-        await listening
-        job.took_s = self._clock() - job.began_s
-        if not job.ended:
-            whole = code == 0 and await asyncio.to_thread(_keep, folder, self._state / FOLDER, job.recording)
-            job.ended = "done" if whole else "failed"
-            job.said = _saved_plant(said) if whole else last_sentence(said) or f"the diagnosis ended with {code}"
+        try:
+            said, _ = await asyncio.gather(job.process.stdout.read(), _hear(job, link))
+            code = await job.process.wait()
+        except asyncio.CancelledError:  # the page ends, and its diagnosis with it
+            _kill(job.process)
+            await job.process.wait()
+            raise
+        self._end(job, code, said.decode(errors="replace")[-_LONGEST_SAID:], folder)
         await asyncio.to_thread(shutil.rmtree, folder, True)
+
+    def _end(self, job: RunningDiagnosis, code: int, said: str, folder: Path) -> None:
+        job.took_s = self._clock() - job.began_s
+        if job.ended:
+            return
+        whole = code == 0 and _keep(folder, self._state / FOLDER, job.recording)
+        job.ended = "done" if whole else "failed"
+        job.said = _saved_plant(said) if whole else last_sentence(said) or f"the diagnosis ended with {code}"
 
 
 def kept_diagnoses(state: Path) -> list[dict[str, Any]]:
@@ -160,6 +169,11 @@ async def _hear(job: RunningDiagnosis, link: socket.socket) -> None:
         writer.close()
         with contextlib.suppress(ConnectionError):
             await writer.wait_closed()
+
+
+def _kill(process: asyncio.subprocess.Process) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        process.kill()
 
 
 def _make_empty(folder: Path) -> None:

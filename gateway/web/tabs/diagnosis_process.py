@@ -1,7 +1,7 @@
-"""A diagnosis as a process of the page: `python -m gateway.web.tabs.diagnosis_process LINK WORD...`.
+"""A diagnosis as a process of the page: `python -m gateway.web.tabs.diagnosis_process LINK MODULE WORD...`.
 
-It is `force-gateway WORD...` behind everybody else, which tells over the link what it is at, one JSON line each time, and ends
-with the link: a page that is cancelled, stopped or killed leaves no search behind.
+It is `python -m MODULE WORD...` behind everybody else, which tells over the link what it is at, one JSON line each time, and
+ends with the link: a page that is cancelled, stopped or killed leaves no search behind.
 """
 
 import contextlib
@@ -52,15 +52,15 @@ def end_with(link: socket.socket) -> None:
 
 
 def main(arguments: list[str]) -> None:
-    """Run a verb. arguments: descriptor of the link, then the verb's words."""
+    """Run a verb. arguments: descriptor of the link, the module, its words."""
     priority.lower_priority()
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, _LAST_NICE)
     link = socket.socket(fileno=int(arguments[0]))
     end_with(link)
     progress.hear_everything(ProgressTeller(link).tell)
-    sys.argv = ["force-gateway", *arguments[1:]]
-    runpy.run_module("gateway", run_name="__main__")
+    sys.argv = ["force-gateway", *arguments[2:]]
+    runpy.run_module(arguments[1], run_name="__main__", alter_sys=False)
 
 
 if __name__ == "__main__":

@@ -10,10 +10,10 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final
 
 from gateway.live.control_link import ask_once
+from gateway.web.context import WebContext
 
 ABANDONED_S: Final = 90.0
 """Browsers let a page in the background ask once a minute."""
@@ -26,8 +26,9 @@ Status = dict[str, Any]
 class RunFollower:
     """The run that the page has begun, if any. clock: monotonic seconds."""
 
-    def __init__(self, state: Path, clock: Callable[[], float] = time.monotonic) -> None:
-        self._state = state
+    def __init__(self, context: WebContext, clock: Callable[[], float] = time.monotonic) -> None:
+        self._context = context
+        self._state = context.state
         self._clock = clock
         self._seen_s = clock()
         self._last: Status = {}
@@ -48,7 +49,7 @@ class RunFollower:
             raise ValueError("E177 a run of this page is under way: stop it first, or wait for its end")
         self._seen_s = self._clock()
         self._last = await self._ask({"plan": plan, "name": name})
-        self._task = asyncio.create_task(self._follow())
+        self._task = self._context.begin(self._follow())
         return self._last
 
     async def stop(self) -> Status:

@@ -1,0 +1,61 @@
+"""What the tests of the tabs share: a state directory with a recording, the page on it, and a browser."""
+
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.recording import Recorder
+from tests.web.tabs.scripted_control import ScriptedControl, scripted_control
+from tests.web.tabs.served_tabs import ServedPage, serve
+
+CHROMIUM = "/usr/bin/chromium"
+ROWS = 500
+
+
+def record(state: Path, **facts: Any) -> Path:
+    """Write the next recording: a force that follows a slow sine."""
+    columns = ("time_s", "command_v", "force_n", "force_applied_n")
+    recorder = Recorder(state / "recordings", {"rig": "demo", "calibration": 1, **facts}, columns)
+    for row in range(ROWS):
+        volts = 4.0 + 3.0 * math.sin(row / 80.0)
+        recorder.append((row / 100.0, volts, 7.0 * volts, 7.1 * volts))
+    recorder.close()
+    return recorder.path
+
+
+@pytest.fixture
+def state(tmp_path: Path) -> Path:
+    directory = tmp_path / "state"
+    directory.mkdir()
+    return directory
+
+
+@pytest.fixture
+def control(state: Path) -> Iterator[ScriptedControl]:
+    with scripted_control(state) as control:
+        yield control
+
+
+@pytest.fixture
+def page(state: Path) -> Iterator[ServedPage]:
+    with serve(state) as page:
+        yield page
+
+
+@pytest.fixture
+def chromium() -> Iterator[Any]:
+    """A browser without a window; skipped where Debian's chromium is absent."""
+    if not os.access(CHROMIUM, os.X_OK):
+        pytest.skip(f"{CHROMIUM} is not installed: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        try:
+            yield browser
+        finally:
+            browser.close()

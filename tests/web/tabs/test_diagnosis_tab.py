@@ -1,0 +1,115 @@
+"""A diagnosis of the page: one at a time, cancelled without a trace, and ended with the page's process."""
+
+import json
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from gateway import progress
+from gateway.web.tabs.diagnosis_process import ProgressTeller
+from tests.web.tabs.conftest import record
+from tests.web.tabs.served_tabs import serve
+
+FOREVER = "import gateway.progress as p\nwhile True: p.report('searching', 1, 3)\n"
+
+
+def ended(page, within_s: float = 60.0) -> dict:
+    deadline_s = time.monotonic() + within_s
+    while not (job := page.get("/api/v1/diagnosis").json["job"])["ended"]:
+        assert time.monotonic() < deadline_s, job
+        time.sleep(0.05)
+    return job
+
+
+@pytest.fixture
+def endless(monkeypatch, tmp_path) -> None:
+    """A command line that searches for ever, before the real one on the path of modules."""
+    package = tmp_path / "endless" / "gateway_of_test"
+    package.mkdir(parents=True)
+    (package / "__main__.py").write_text(FOREVER)
+    (package / "__init__.py").write_text("")
+    monkeypatch.setattr("gateway.web.tabs.diagnosis_job.PROGRAM", "gateway_of_test")
+    monkeypatch.setenv("PYTHONPATH", f"{package.parent}:{Path(__file__).parents[3]}")
+
+
+def test_a_second_one_is_refused_and_a_cancelled_one_leaves_nothing(page, state, endless) -> None:
+    record(state)
+    record(state)
+    assert page.post("/api/v1/diagnosis/begin", {"recording": 1}).status == 200
+    refused = page.post("/api/v1/diagnosis/begin", {"recording": 2})
+    assert refused.status == 409
+    assert refused.json["error"].startswith("E179 recording 1 is being diagnosed")
+    while (job := page.get("/api/v1/diagnosis").json["job"])["stage"] != "searching":
+        assert not job["ended"], job
+        time.sleep(0.02)
+    assert (job["done"], job["of"]) == (1, 3)
+    assert page.post("/api/v1/diagnosis/cancel").json["job"]["ended"] == "cancelled"
+    assert not list((state / "diagnoses").iterdir())
+    assert page.post("/api/v1/diagnosis/cancel").status == 409
+
+
+def test_the_end_of_the_page_ends_its_diagnosis(state, endless) -> None:
+    record(state)
+    with serve(state) as page:
+        page.post("/api/v1/diagnosis/begin", {"recording": 1})
+        while page.get("/api/v1/diagnosis").json["job"]["stage"] != "searching":
+            time.sleep(0.02)
+        assert searches_of(state)
+    assert not searches_of(state)
+
+
+def searches_of(state: Path) -> list[str]:
+    lines = []
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            line = entry.read_bytes().replace(b"\0", b" ").decode()
+        except OSError:  # ended meanwhile
+            continue
+        lines += [line] if "diagnosis_process" in line and str(state) in line else []
+    return lines
+
+
+def test_the_end_of_the_link_ends_the_process_in_the_middle_of_its_work(endless) -> None:
+    ours, far_end = socket.socketpair()
+    command = [sys.executable, "-m", "gateway.web.tabs.diagnosis_process", str(far_end.fileno()), "gateway_of_test"]
+    with subprocess.Popen(command, pass_fds=(far_end.fileno(),)) as process:
+        far_end.close()
+        with ours, ours.makefile("rb") as told:
+            assert json.loads(told.readline())["stage"] == "searching"
+        assert process.wait(20) == 1
+
+
+def test_what_cannot_be_diagnosed_is_told_in_the_verbs_words(page, state) -> None:
+    path = record(state)
+    path.write_bytes(path.read_bytes()[:200])
+    assert page.post("/api/v1/diagnosis/begin", {"recording": 1}).status == 200
+    job = ended(page)
+    assert job["ended"] == "failed"
+    assert job["said"].startswith("E403 ")
+    assert not list((state / "diagnoses").iterdir())
+
+
+def test_a_process_hears_everything_besides_who_listens(monkeypatch) -> None:
+    monkeypatch.setattr(progress, "_everything", [])
+    heard: list[str] = []
+    inside: list[str] = []
+    progress.hear_everything(lambda now: heard.append(str(now)))
+    progress.report("before")
+    with progress.listen(lambda now: inside.append(str(now))):
+        progress.report("search", 0, 3)
+        progress.advance(2, 3)
+    assert heard == ["before", "search: 0 of 3", "search: 2 of 3"]
+    assert inside == heard[1:]
+
+
+def test_a_full_link_does_not_stop_the_search() -> None:
+    ours, far_end = socket.socketpair()
+    with ours, far_end:
+        teller = ProgressTeller(far_end)
+        for stage in range(20_000):
+            teller.tell(progress.Progress(f"stage {stage}"))
+        assert b'"stage 0"' in ours.recv(1000)

@@ -1,0 +1,79 @@
+"""Recordings on the page: what is listed, and that a download is the recording."""
+
+import io
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.recording import read_recording, read_table
+from gateway.web.tabs.recording_files import _thinned
+from tests.web.tabs.conftest import ROWS, record
+
+
+def test_the_list_says_what_each_is_and_names_what_cannot_be_read(page, state) -> None:
+    record(state)
+    record(state, ladder={"groups": 1})
+    (state / "recordings" / "0003.fgr").write_bytes(b"no recording")
+    newest, ladder, run = page.get("/api/v1/recordings").json["recordings"]
+    assert (run["number"], run["kind"], run["rows"]) == (1, "run", ROWS)
+    assert run["duration_s"] == pytest.approx((ROWS - 1) / 100.0)
+    assert ladder["kind"] == "ladder"
+    assert "is not a recording" in newest["fault"]
+
+
+def test_starting_and_stopping_goes_to_control(page, control) -> None:
+    assert page.post("/api/v1/recordings/start").json["recording"].endswith("0001.fgr")
+    assert page.get("/api/v1/recordings").json["recording"]["recording"].endswith("0001.fgr")
+    assert page.post("/api/v1/recordings/stop").json["recording"] is None
+    assert [request["on"] for request in control.asked if "on" in request] == [True, False]
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_a_download_is_the_recording_and_leaves_no_file_behind(page, state, tmp_path, monkeypatch, form) -> None:
+    room = tmp_path / "room"
+    room.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(room))
+    original = read_recording(record(state))
+    answer = page.get(f"/api/v1/recordings/1/download.{form}")
+    assert answer.headers["content-disposition"] == f'attachment; filename="demo-0001.{form}"'
+    copy = tmp_path / f"copy.{form}"
+    copy.write_bytes(answer.body)
+    table = read_table(copy)
+    for name, column in original.columns.items():
+        assert np.array_equal(table.columns[name], column), name
+    page.get("/api/v1/recordings")  # whose answer comes after the other's end
+    assert not list(room.iterdir())
+
+
+def test_another_form_is_refused(page, state) -> None:
+    record(state)
+    assert "csv or parquet" in page.get("/api/v1/recordings/1/download.exe").json["error"]
+
+
+def test_a_picture_is_a_page_that_runs_nothing(page, state) -> None:
+    record(state, rig="<script>alert(1)</script>")
+    answer = page.get("/api/v1/recordings/1/plot")
+    assert "default-src 'none'" in answer.headers["content-security-policy"]
+    assert "sandbox" in answer.headers["content-security-policy"]
+    assert b"<script" not in answer.body
+    assert b"5.0\xc2\xa0s" in answer.body
+
+
+def test_a_thinned_curve_keeps_its_peaks() -> None:
+    time_s = np.arange(100_000) / 100.0
+    values = np.sin(time_s)
+    values[54_321] = 9.0
+    values[100] = np.nan
+    shown_s, shown = _thinned(time_s, values)
+    assert len(shown) <= 1400
+    assert max(shown) == 9.0
+    assert shown_s == sorted(shown_s)
+
+
+def test_a_download_of_the_right_size_is_sent_whole(page, state) -> None:
+    path = record(state)
+    body = page.get("/api/v1/recordings/1/download.csv").body
+    assert len([line for line in io.BytesIO(body) if not line.startswith(b"#")]) == ROWS + 1
+    assert Path(path).exists()

@@ -1,0 +1,59 @@
+"""Wiring and configuration: every value stands where the tab says, and secrets stay where they are."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import shipped_profiles_folder
+from gateway.web.tabs.rig_values import HIDDEN, rig_document
+from tests.web.tabs.served_tabs import serve
+
+
+@pytest.fixture
+def own_rig(tmp_path: Path) -> Path:
+    text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "own.yaml"
+    file.write_text(text + 'web: {listen: "127.0.0.1:0", token: a-secret-of-this-rig}\n', encoding="utf-8")
+    return file
+
+
+def test_each_value_that_is_set_stands_in_its_line(own_rig) -> None:
+    lines = own_rig.read_text(encoding="utf-8").splitlines()
+    rig = rig_document(str(own_rig), simulated=True)["files"][0]
+    set_values = [one for one in rig["values"] if one["line"] is not None]
+    assert len(set_values) > 30
+    for one in set_values:
+        assert one["path"].rpartition(".")[2] in lines[one["line"] - 1], one
+    by_path = {one["path"]: one for one in rig["values"]}
+    assert (by_path["output.baud"]["value"], by_path["output.baud"]["default"]) == ("9600", "9600")
+    assert by_path["network.idle_s"]["line"] is None  # nobody has written it
+
+
+def test_every_file_of_the_rig_is_told_with_a_numbers_source(own_rig) -> None:
+    files = {Path(one["file"]).name: one["values"] for one in rig_document(str(own_rig), simulated=True)["files"]}
+    assert {"own.yaml", "force-v1.yaml", "smc-itv-rc.yaml", "stream-st-gs.yaml", "paper-slide.yaml"} <= files.keys()
+    steps = {one["path"]: one for one in files["paper-slide.yaml"]}
+    assert "computed" in steps["regulator.command_step_v"]["about"]
+    assert steps["regulator.command_step_v"]["unit"] == "V"
+
+
+def test_a_token_is_not_shown(own_rig, state) -> None:
+    values = {one["path"]: one["value"] for one in rig_document(str(own_rig), simulated=True)["files"][0]["values"]}
+    assert values["web.token"] == HIDDEN
+    with serve(state, str(own_rig)) as page:
+        assert b"a-secret-of-this-rig" not in page.get("/api/v1/configuration").body
+
+
+def test_a_rig_file_that_has_become_faulty_is_told_in_words(own_rig, state) -> None:
+    with serve(state, str(own_rig)) as page:
+        own_rig.write_text("name: [", encoding="utf-8")
+        for path in ("configuration", "wiring"):
+            answer = page.get(f"/api/v1/{path}")
+            assert answer.status == 409
+            assert "own.yaml" in answer.json["error"]
+
+
+def test_the_wiring_is_that_of_the_verb(page) -> None:
+    answer = page.get("/api/v1/wiring").json
+    assert answer["title"].startswith("Wiring of rig demo")
+    assert any("mbpoll" in line for one in answer["sections"] for line in one["commands"])

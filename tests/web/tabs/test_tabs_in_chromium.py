@@ -1,0 +1,120 @@
+"""The tabs in a real browser: a wizard's run to its result with a reload in the middle, and a diagnosis to its report."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.end_to_end.conftest import start, stop
+from tests.web.tabs.conftest import record
+from tests.web.tabs.scripted_control import IDLE
+
+CALIBRATION_IN_USE = 122
+FIT = {
+    "fits": [
+        {
+            "model": "bsfm", "order": 1, "coefficients": 4, "rms_n": 0.4, "max_n": 0.8, "heldout_rms_n": 0.5,
+            "heldout_error_n": 0.1, "usable": True, "chosen": True, "verdicts": [],
+        }
+    ],
+    "chosen": {"model": "bsfm", "order": 1, "force_range_n": [1.0, 58.9]},
+    "measured": {"rms_n": 0.06, "max_n": 0.24, "points": 36, "in_use": 1, "in_use_rms_n": 0.08},
+    "notes": ["one group only"],
+    "calibration": 2,
+}  # fmt: skip
+
+
+def open_tab(browser: Any, address: str, tab: str) -> Any:
+    """A tab of the page; what its scripts complain about fails the test."""
+    window = browser.new_page()
+    window.on("pageerror", lambda error: pytest.fail(str(error)))
+    window.set_default_timeout(20_000)
+    window.goto(f"{address}/#{tab}")
+    return window
+
+
+def lead_to_the_run(window: Any) -> None:
+    window.get_by_role("button", name="Continue").click()
+    start_button = window.get_by_role("button", name="Start the run")
+    start_button.wait_for()
+    boxes = window.locator(".checks input")
+    for place in range(boxes.count()):
+        assert start_button.is_disabled()  # until every question is answered
+        boxes.nth(place).check()
+    start_button.click()
+    window.get_by_role("button", name="Stop the run").wait_for()
+
+
+def test_a_reload_in_the_middle_of_a_run_loses_nothing(page, control, state, chromium) -> None:
+    (state / "calibrations").mkdir()
+    (state / "calibrations" / "0002.json").write_text(json.dumps(FIT))
+    (state / "calibrations" / "0002.html").write_text("<!doctype html><title>report</title><h1>The report itself</h1>")
+    window = open_tab(chromium, page.address, "calibrate")
+    window.get_by_label("What to call it").fill("first")
+    lead_to_the_run(window)
+    assert control.asked[-1]["do"] in ("calibrate", "state")
+    begun = next(request for request in control.asked if request.get("plan") and not request.get("dry_run"))
+    assert (begun["name"], begun["plan"]["step_v"]) == ("first", 0.5)
+    control.status = control.status | {"progress": 0.42, "force_n": 31.5, "eta_s": 20.0}
+    window.reload()
+    window.get_by_text("42 %").wait_for()
+    window.get_by_text("31.50").wait_for()
+    control.status = IDLE | {"phase": "stored", "result": {"stored": 2, "document": "0002.json"}}
+    window.get_by_text("Calibration 2 is stored, not yet in use").wait_for()
+    assert window.get_by_role("button", name="Use calibration 2").is_enabled()
+    assert "0.060 N RMS" in window.locator("#tab-calibrate").inner_text()
+    window.frame_locator("iframe").get_by_text("The report itself").wait_for()
+    window.close()
+
+
+@pytest.mark.long
+def test_no_tab_is_wider_than_a_telephone_or_grave_for_a_screen_reader(page, control, state, chromium) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    record(state)
+    window = open_tab(chromium, page.address, "calibrate")
+    window.set_viewport_size({"width": 400, "height": 800})
+    for tab, words in (
+        ("calibrate", "Continue"),
+        ("recordings", "Parquet"),
+        ("calibrations", "rig's own"),
+        ("diagnosis", "Keep what it finds"),
+        ("wiring", "Wiring of rig demo"),
+        ("configuration", "demo.yaml:"),
+    ):
+        window.goto(f"{page.address}/#{tab}")
+        window.locator(f"#tab-{tab}").get_by_text(words).first.wait_for()
+        assert window.evaluate("document.documentElement.scrollWidth") <= 400, tab
+        found = Axe().run(window, context=f"#tab-{tab}").response["violations"]
+        grave = [(one["id"], one["nodes"][0]["html"]) for one in found if one["impact"] in ("serious", "critical")]
+        assert not grave, (tab, grave)
+    window.close()
+
+
+@pytest.mark.long
+def test_on_the_simulated_rig_a_run_is_stored_used_and_diagnosed(tmp_path: Path, chromium) -> None:
+    gateway = start(tmp_path / "state", "--sim", "--web", "127.0.0.1:0")
+    try:
+        host, port = gateway.ready["web"]
+        window = open_tab(chromium, f"http://{host}:{port}", "calibrate")
+        window.get_by_text("Set the height of a stair").click()
+        for label, value in (("Stair (V)", "1"), ("Groups", "1"), ("Points of reversals", "13"), ("Large steps", "2")):
+            window.get_by_label(label, exact=True).fill(value)
+        lead_to_the_run(window)
+        window.get_by_text("Ladder", exact=False).first.wait_for()
+        window.reload()
+        window.get_by_role("button", name="Stop the run").wait_for()
+        use = window.get_by_role("button", name="Use calibration 2")
+        use.wait_for(timeout=120_000)
+        use.click()
+        window.get_by_text("calibration 2").and_(window.locator(".told.good")).wait_for()
+        window.goto(f"http://{host}:{port}/#recordings")
+        window.get_by_role("button", name="Diagnose recording 1").click()
+        window.frame_locator("iframe[title^='Diagnosis']").locator("h1").wait_for(timeout=120_000)
+        window.close()
+        gateway.client.close()  # which has asked nothing for most of a minute, and may have been hung up on
+        assert gateway.client.connect()
+        assert gateway.words(CALIBRATION_IN_USE, 1) == [2]
+    finally:
+        stop(gateway)
