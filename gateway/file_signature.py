@@ -5,6 +5,7 @@ from typing import Final
 
 SIGNATURE_BYTES: Final = 520
 """As many first bytes are enough."""
+JSON: Final = "a JSON document"
 _SIGNATURES: Final[tuple[tuple[bytes, str, str], ...]] = (
     (b"\x89FGR1", "a recording of force-gateway", ""),
     (b"PAR1", "a Parquet table", ""),
@@ -46,7 +47,7 @@ _SIGNATURES: Final[tuple[tuple[bytes, str, str], ...]] = (
 _TEXTS: Final = (
     (re.compile(rb"<!doctype html|<html", re.IGNORECASE), "a web page (HTML)", ""),
     (re.compile(rb"<\?xml|<svg", re.IGNORECASE), "an XML file", ""),
-    (re.compile(rb"\{\s*(\"|\}|$)|\[\s*[\[{\"]"), "a JSON document", ""),
+    (re.compile(rb"\{\s*(\"|\}|$)|\[\s*[\[{\"]"), JSON, ""),
     (re.compile(rb"\\documentclass|\{\\rtf"), "a text document", ""),
     (re.compile(rb"#!"), "a script", ""),
 )

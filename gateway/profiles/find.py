@@ -46,6 +46,8 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
     for candidate in (path, folder / f"{name}.yaml", folder / FOLDERS[kind] / f"{name}.yaml"):
         if _is_file(candidate):
             return candidate
+    if _is_directory(path):
+        raise FileNotFoundError("is a directory: name the file in it")
     if "/" in name or name.endswith(_SUFFIXES):
         raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(path)}")
     near = closest(name, known)
@@ -57,6 +59,13 @@ def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):  # a name that is too long, or holds what no file name may
+        return False
+
+
+def _is_directory(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
         return False
 
 

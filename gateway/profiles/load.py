@@ -4,20 +4,21 @@ A fault in one file does not keep the others from being read: all are told toget
 `Findings.texts`, and so into the rig's fingerprint.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from gateway.bsfm.model import Calibration
 from gateway.devices import DeviceProfile
+from gateway.file_signature import JSON, SIGNATURE_BYTES, describe_signature
 from gateway.profiles.find import display, locate
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
-from gateway.profiles.kinds.file_kind import CALLED, kind_of
+from gateway.profiles.kinds.file_kind import CALLED, is_foreign, kind_of
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
-from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault
+from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault, one_of
 from gateway.profiles.strict_yaml.text import Document, parse
 from gateway.registers.map.register_map import RegisterMap
 
@@ -59,7 +60,17 @@ def open_profile(kind: str, reference: ProfileReference, findings: Findings) -> 
         mismatch = f"is {CALLED[actual_kind]}, {CALLED[kind]} is needed here: {command}"
         findings.faults.append(reference.place(mismatch))
         return None
+    if opened and not actual_kind and is_foreign(opened[0].value, kind):
+        keys = join_few(map(str, opened[0].value))
+        findings.faults.append(reference.place(f"is not {CALLED[kind]}: it holds {keys}, and no key that one has"))
+        return None
     return opened
+
+
+def join_few(words: Iterable[str], most: int = 4) -> str:
+    """Return the first few words of a list, for a sentence."""
+    known = [word[:20] for word in words]
+    return one_of(known[:most]) + (" ..." if len(known) > most else "")
 
 
 def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
@@ -73,12 +84,23 @@ def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tup
     except OSError as error:
         findings.faults.append(reference.place(f"cannot be read: {error.strerror}"))
         return None
+    if other := _other_kind(data):
+        findings.faults.append(reference.place(f"is {other}; {CALLED[kind]} is needed here, a YAML file"))
+        return None
     findings.texts[display(path)] = data
     try:
         return parse(data, display(path)), path
     except ProfileError as error:
         findings.faults += error.faults
         return None
+
+
+def _other_kind(data: bytes) -> str:
+    """Return what a file is that is no YAML; JSON is."""
+    if not data.strip():
+        return "an empty file"
+    found = describe_signature(data[:SIGNATURE_BYTES])
+    return found[0] if found and found[0] != JSON else ""
 
 
 def read_named(kind: str, reference: ProfileReference | None, read: Read[T], findings: Findings) -> T | None:

@@ -126,7 +126,7 @@ def _header(data: memoryview, path: Path) -> tuple[dict[str, Any], int]:
     length, crc = HEADER_PREFIX.unpack_from(data, len(MAGIC)) if len(data) >= start else (0, 0)
     if len(data) < start or (length <= LONGEST_HEADER and len(data) < start + length):
         raise RecordingError(
-            f"{path} ends inside its header, after {len(data)} bytes: the recorder was stopped as it began"
+            f"{path} is a recording that ends inside its header, after {len(data)} bytes: the recorder was stopped as it began"
         )
     document = data[start : start + length]
     if length > LONGEST_HEADER or crc32(document) != crc:

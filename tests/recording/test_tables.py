@@ -110,7 +110,7 @@ def test_other_numbers_stay_under_their_own_names_and_words_go(tmp_path: Path) -
         ("time_s,force_n\n0,1_0\n", "'1_0' is no number"),
         ("time_s,force_n\n0,1\n1,2\n2,\ufffd\n", "table.csv:4, column force_n"),
         ("# only: comments\n", "holds no table"),
-        ("", "is empty"),
+        ("", "is an empty file, not a recording"),
         ("\n\n", "holds no table"),
     ],
 )

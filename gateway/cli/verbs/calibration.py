@@ -13,6 +13,7 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_calibration_numbers, complete_calibrations
 from gateway.cli.errors import CliError, already_exists
+from gateway.cli.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
 
@@ -75,7 +76,7 @@ def show_command(*, which: str | None, state: StateChoice, as_json: bool) -> Non
 
 
 @command.command(name="use")
-@click.argument("number", metavar="N", type=click.IntRange(min=1), shell_complete=complete_calibration_numbers)
+@click.argument("number", metavar="N", type=ListedNumber("calibration"), shell_complete=complete_calibration_numbers)
 @click.option("--force", is_flag=True, help="Also one whose fit was rejected.")
 @state_options
 @json_option

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.completion_words import complete_plant_numbers, complete_recordings
+from gateway.cli.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def _line(entry: "StoredDocument[NumberedPlant]") -> str:
 
 
 @command.command(name="show")
-@click.argument("number", metavar="N", type=click.IntRange(min=1), shell_complete=complete_plant_numbers)
+@click.argument("number", metavar="N", type=ListedNumber("plant"), shell_complete=complete_plant_numbers)
 @state_options
 @json_option
 def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
@@ -108,7 +109,7 @@ def add_command(*, file: Path, state: StateChoice, as_json: bool) -> None:
 
 
 @command.command(name="use")
-@click.argument("number", metavar="N", type=click.IntRange(min=0), shell_complete=complete_plant_numbers)
+@click.argument("number", metavar="N", type=ListedNumber("plant", least=0), shell_complete=complete_plant_numbers)
 @click.option(
     "--before",
     metavar="RECORDING",

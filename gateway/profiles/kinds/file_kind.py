@@ -10,6 +10,7 @@ from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.devices import DeviceProfile
 from gateway.profiles.rigs.rig_file import RigFile
+from gateway.profiles.strict_yaml.faults import closest
 from gateway.twin import Plant
 
 CALLED: Final = {
@@ -29,14 +30,28 @@ _TYPES: Final[dict[str, tuple[type, ...]]] = {
     "calibration": (Calibration,),
     "plan": (ExperimentPlan, CalibrationPlan),
 }
+_ANYWHERE: Final = frozenset(("name", "description", "format", "version"))
 _MAP_KEYS: Final = frozenset(("blocks", "version"))
+
+
+@cache
+def _keys() -> Mapping[str, frozenset[str]]:
+    """Return the keys that each kind of file may have at its top."""
+    keys = {kind: frozenset(field.name for one in types for field in fields(one)) for kind, types in _TYPES.items()}
+    return keys | {"registers": _MAP_KEYS}
+
+
+def is_foreign(value: Any, wanted: str) -> bool:
+    """Decide whether a document has nothing of the wanted kind: no key of its own, and none that may be a slip of one."""
+    known, present = _keys()[wanted], set(map(str, value)) if isinstance(value, dict) else set()
+    others = present - _ANYWHERE
+    return bool(others) and not others & known and not any(closest(key, known - _ANYWHERE) for key in others)
 
 
 @cache
 def _own_keys() -> Mapping[str, frozenset[str]]:
     """Return the keys that only one kind of file has at its top."""
-    keys = {kind: {field.name for one in types for field in fields(one)} for kind, types in _TYPES.items()}
-    keys["registers"] = set(_MAP_KEYS)
+    keys = _keys()
     return {
         kind: frozenset(own - {key for other, theirs in keys.items() if other != kind for key in theirs})
         for kind, own in keys.items()

@@ -63,6 +63,20 @@ def refuse_other_kinds(path: Path) -> None:
         raise RecordingError(f"{path} is {what}, {_WANTED}{f': {cure}' if cure else ''}")
 
 
+def refuse_our_profiles(path: Path) -> None:
+    """Refuse a rig, calibration or plan that is given for a recording; nothing happens for what is none of ours."""
+    from gateway.profiles.kinds.file_kind import CALLED, kind_of
+    from gateway.profiles.strict_yaml.faults import ProfileError
+    from gateway.profiles.strict_yaml.text import parse
+
+    try:
+        kind = kind_of(parse(path.read_bytes(), str(path)).value)
+    except (ProfileError, OSError):
+        return
+    if kind:
+        raise RecordingError(f"{path} is {CALLED[kind]}, {_WANTED}")
+
+
 _WANTED: Final = "not a recording (.fgr, CSV, Parquet or .xlsx)"
 
 

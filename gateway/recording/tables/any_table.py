@@ -27,7 +27,7 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
     if start.startswith(PARQUET_MAGIC):
         return read_parquet(path, mapping)
     if not start:
-        raise RecordingError(f"{path} is empty")
+        raise RecordingError(f"{path} is an empty file, not a recording (.fgr, CSV, Parquet or .xlsx)")
     if not start.startswith(ZIP):
         refuse_other_kinds(path)
     return read_csv(path, mapping, lenient=lenient)

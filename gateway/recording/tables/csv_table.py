@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.extras import is_installed
 from gateway.recording.errors import RecordingError
-from gateway.recording.foreign.table_text import TableText, as_text
+from gateway.recording.foreign.table_text import TableText, as_text, refuse_our_profiles
 from gateway.recording.foreign.time_stamps import parse_stamp, seconds_from_stamps
 from gateway.recording.reader import Recording
 from gateway.recording.tables.column_mapping import (
@@ -69,6 +69,7 @@ def _read_text(text: TableText, path: Path, mapping: ColumnMapping | None, lenie
     words = [pick.name for pick in selected if pick not in chosen]
     chosen = [SelectedColumn(pick.index, pick.name) if _is_stamps(form, pick) else pick for pick in chosen]
     if not chosen:
+        refuse_our_profiles(path)
         raise RecordingError(
             f"{path}: no column of numbers; a recording is a table with a header such as time_s,command_v,force_n"
         )

@@ -82,7 +82,7 @@ def test_a_ladder_says_no_more_than_its_file(tmp_path: Path) -> None:
             [":5:9 parts[0].moves[0]: a step needs to_share", ":6:39 parts[0].moves[1].times: means nothing in a dwell"],
         ),
         ("name: x\nname: y\nparts: []\n", [":2:1 name: the key stands twice"]),
-        ("", ["the file is empty"]),
+        ("", ["is an empty file; a plan is needed here"]),
     ],
 )  # fmt: skip
 def test_a_bad_plan_is_refused_at_its_place(tmp_path: Path, text: str, faults: list[str]) -> None:

@@ -1,0 +1,94 @@
+"""A file of the wrong kind, given to any verb: one sentence that says what it is and what is wanted."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+
+from gateway.recording import Recorder
+
+Call = Callable[..., Result]
+PROFILES = Path(__file__).parents[3] / "profiles"
+WHAT = {
+    "calibration.yaml": "is a calibration",
+    "rig.yaml": "is a rig",
+    "picture.png": "is a PNG picture",
+    "folder": "is a directory: name the",
+    "empty": "is an empty file",
+    "begun.fgr": "ends inside its header",
+    "report.json": "",
+    "report.html": "is a web page (HTML)",
+    "table.tdms": "is a TDMS file (LabVIEW, DIAdem)",
+}
+RECORDING_VERBS = ("diagnose", "fit", "simulate", "recordings reference --state state")
+PROFILE_VERBS = {
+    "check": "rig",
+    "calibrate --state state --plan": "plan",
+    "calibration show --state state": "calibration",
+}
+
+
+@pytest.fixture
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One file of each kind, in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "calibration.yaml").write_bytes((PROFILES / "calibrations" / "demo.yaml").read_bytes())
+    (tmp_path / "rig.yaml").write_bytes((PROFILES / "rigs" / "demo.yaml").read_bytes())
+    (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(200))
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "empty").touch()
+    (tmp_path / "begun.fgr").write_bytes(whole_recording(tmp_path)[:30])
+    (tmp_path / "report.json").write_text(json.dumps({"format": 1, "verdict": "partial", "causes": []}, indent=2))
+    (tmp_path / "report.html").write_text("<!doctype html><html></html>")
+    (tmp_path / "table.tdms").write_bytes(b"TDSm\x0e\x00\x00\x00\x69\x12" + bytes(40))
+    return tmp_path
+
+
+def whole_recording(folder: Path) -> bytes:
+    recorder = Recorder(folder / "recordings", {"rig": "demo"}, ("time_s", "command_v", "force_n"))
+    for row in range(3000):
+        recorder.append((row * 0.01, 1.0 + row % 3, 4.0 * (row % 3)))
+    recorder.close()
+    return recorder.path.read_bytes()
+
+
+@pytest.mark.parametrize("verb", RECORDING_VERBS)
+@pytest.mark.parametrize("name", WHAT)
+def test_a_verb_that_wants_a_recording_says_what_it_got(verb: str, name: str, files: Path, call: Call) -> None:
+    answer = call(*verb.split(), name)
+    (sentence,) = [line for line in answer.output.splitlines() if line.startswith("E")]
+    assert answer.exit_code == 65
+    assert name in sentence
+    assert (WHAT[name] or "is a JSON document") in sentence
+    assert "recording" in sentence
+    assert "Traceback" not in answer.output
+
+
+RIGHT = {("check", "calibration.yaml"), ("calibration show --state state", "calibration.yaml")}
+
+
+@pytest.mark.parametrize(
+    ("verb", "name"),
+    [(verb, name) for verb in PROFILE_VERBS for name in WHAT if name != "rig.yaml" and (verb, name) not in RIGHT],
+)
+def test_a_verb_that_wants_a_profile_says_what_it_got(verb: str, name: str, files: Path, call: Call) -> None:
+    wanted = PROFILE_VERBS[verb]
+    answer = call(*verb.split(), name)
+    sentences = [line for line in answer.output.splitlines() if name in line and not line.startswith(("Usage", "Try"))]
+    assert len(sentences) == 1, answer.output
+    assert answer.exit_code in (2, 78)
+    what = {
+        "begun.fgr": "is a recording of force-gateway",
+        "report.json": f"is not a {wanted}: it holds format, verdict",
+    }
+    assert (what.get(name) or WHAT[name]).removesuffix(": name the") in sentences[0]
+    assert name == "folder" or wanted in sentences[0]
+
+
+@pytest.mark.parametrize("verb", ["calibration use", "plant use", "plant show"])
+def test_a_file_for_a_number_says_which_list_has_the_numbers(verb: str, files: Path, call: Call) -> None:
+    answer = call(*verb.split(), "--state", "state", "rig.yaml")
+    assert answer.exit_code == 2
+    assert f"rig.yaml is a file: a number of `force-gateway {verb.split()[0]} list` is wanted" in answer.output
