@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.completion_words import complete_calibration_numbers, complete_calibrations
+from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
-from gateway.cli.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
 

@@ -15,7 +15,7 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
-from gateway.cli.table_options import table_options
+from gateway.cli.command_line.table_options import table_options
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ import click
 from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
+from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import json_option, name_option, state_directory
-from gateway.cli.table_options import table_options
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.completion_words import complete_plant_numbers, complete_recordings
-from gateway.cli.listed_number import ListedNumber
+from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
 
 if TYPE_CHECKING:

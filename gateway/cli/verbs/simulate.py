@@ -8,8 +8,8 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_plant_files, complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
+from gateway.cli.command_line.table_options import table_options
 from gateway.cli.options import json_option
-from gateway.cli.table_options import table_options
 
 if TYPE_CHECKING:
     from gateway.cli.diagnosis.inputs import Sources
