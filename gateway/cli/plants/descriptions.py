@@ -9,6 +9,8 @@ from gateway.profiles import PlantProfile, Rig
 from gateway.profiles.rigs.compensated_effects import compensation_words
 from gateway.twin.plant import values
 
+_MOST_SHOWN = 3  # numbers that are told in the sentence on a comparison
+
 
 def describe_provenance(plant: NumberedPlant) -> Iterator[str]:
     """Yield where a plant comes from: its recordings and causes."""
@@ -52,10 +54,19 @@ def differing_numbers(a: PlantProfile, b: PlantProfile) -> dict[str, list[float]
     return {path: [float(first[path]), float(second[path])] for path in first if first[path] != second[path]}
 
 
+def answer_sentence(differing: dict[str, list[float]], a: str, b: str) -> str:
+    """Return the answer of a comparison, for terminal and page: how many numbers differ, and which if they are few."""
+    if not differing:
+        return f"plants {a} and {b} have the same numbers"
+    count = f"{len(differing)} number{'s' * (len(differing) > 1)}"
+    shown = ", ".join(f"{path} {first:.4g} -> {second:.4g}" for path, (first, second) in differing.items())
+    return f"B ({b}) differs from A ({a}) in {count}{f': {shown}' if len(differing) <= _MOST_SHOWN else ''}"
+
+
 def describe_difference(differing: dict[str, list[float]], a: str, b: str) -> Iterator[str]:
     """Yield a line for each number that differs."""
+    yield answer_sentence(differing, a, b)
     if not differing:
-        yield f"plants {a} and {b} have the same numbers"
         return
     yield f"{'':<36}{a:>14} {b:>14}"
     for path, (first, second) in differing.items():

@@ -15,8 +15,10 @@ from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
 
 if TYPE_CHECKING:
+    from gateway.cli.plants.comparison_page import SimulatedPair
     from gateway.numbered_documents.store import StoredDocument
     from gateway.plants.store import NumberedPlant
+    from gateway.profiles import PlantProfile
 
 
 @click.group(name="plant")
@@ -76,9 +78,16 @@ def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
 @command.command(name="compare")
 @click.argument("a", metavar="A", shell_complete=complete_plant_numbers)
 @click.argument("b", metavar="B", shell_complete=complete_plant_numbers)
+@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Write what differs into this HTML file.")
+@click.option(
+    "--recording",
+    metavar="RECORDING",
+    shell_complete=complete_recordings,
+    help="With --plot: run both over this recording.",
+)
 @state_options
 @json_option
-def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool) -> None:
+def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool, **drawn: Any) -> None:
     """Compare plants A and B: every number that differs.
 
     Numbers of the store (0: the rig's own), shipped names or files.
@@ -88,10 +97,31 @@ def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool) -> Non
 
     first, second = find_plant(state, a), find_plant(state, b)
     differing = differing_numbers(first, second)
+    plot, recording = drawn["plot"], drawn["recording"]
+    if plot:
+        from gateway.cli.plants.comparison_page import plant_comparison_page
+
+        pair = _simulate_both(recording, (first, second), state) if recording else None
+        if pair and not as_json:
+            click.echo(pair.sentence)
+        plot.write_text(plant_comparison_page(differing, (a, b), pair), encoding="utf-8")
+    elif recording:
+        raise click.UsageError("--recording is drawn into the file of --plot, which is missing")
     if as_json:
         click.echo(json.dumps({"a": a, "b": b, "differing": differing}, indent=2))
         return
     click.echo("\n".join(describe_difference(differing, a, b)))
+
+
+def _simulate_both(recording: str, plants: "tuple[PlantProfile, PlantProfile]", state: StateChoice) -> "SimulatedPair":
+    """Run both plants over a recording, a number of the state directory or a file."""
+    from gateway.cli.diagnosis.inputs import read_sources
+    from gateway.cli.plants.comparison_page import simulate_pair
+    from gateway.extras import require
+
+    require("numba")
+    sources = read_sources([recording], rig=None, columns=None, state=state.directory)
+    return simulate_pair(sources.measurements[0], plants)
 
 
 @command.command(name="add")

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,16 +14,8 @@ from gateway.cli.options import json_option
 if TYPE_CHECKING:
     from gateway.cli.diagnosis.inputs import Sources
     from gateway.diagnosis.measurement import Floats, Measurement
-    from gateway.profiles import PlantProfile
 
 FORMAT = 1
-_MOTION_NOTES = {
-    "inferred": "position_mm is not taken for the motion of the slide: inferred motion fits better",
-    "measured": "position_mm is taken for the motion of the slide",
-    "measured-reversed": "position_mm is taken for the motion of the slide, and counts down when the tool moves out",
-}
-
-_MOST_STEPS: Final = 2_000_000  # one plant alone may have many
 
 
 @click.command()
@@ -47,6 +39,7 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.cli.diagnosis.outputs import check_targets, write_all
     from gateway.cli.diagnosis.progress_line import show_progress
+    from gateway.cli.plants.simulated_reading import simulate_reading
     from gateway.extras import require
     from gateway.profiles import load_plant
 
@@ -56,7 +49,7 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
     measurement, profile = sources.measurements[0], profile or sources.plant
     check_targets([csv_file] if csv_file else [], [*sources.paths, *([Path(plant)] if plant else [])])
     with show_progress("simulating"):
-        simulated_n, notes = _simulate(measurement, profile)
+        simulated_n, notes = simulate_reading(measurement, profile)
     facts = _facts(measurement, simulated_n) | {
         "plant": profile.name,
         "notes": [*sources.notes, *measurement.notes, *notes],
@@ -69,24 +62,6 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
         _show(sources, facts)
     if csv_file:
         click.echo(f"wrote {csv_file}", err=True)
-
-
-def _simulate(measurement: "Measurement", profile: "PlantProfile") -> "tuple[Floats, list[str]]":
-    """Readings, N. Where a position was measured nobody says which way is out, or whether it is that of the slide at all
-    and not of the tool along the workpiece: as in a diagnosis, the way that fits best is taken."""
-    import numpy as np
-
-    from gateway.diagnosis.bench.recording_drive import MOTIONS, drive_of
-    from gateway.twin.replay.drive import Motion
-    from gateway.twin.replay.replay import Replay
-
-    ways: tuple[Motion, ...] = ("inferred",) if measurement.position_m is None else MOTIONS
-    replays = [Replay(drive_of(measurement, way), most_steps=_MOST_STEPS) for way in ways]
-    answers = [replay.run([profile.plant]).reading_n[0] for replay in replays]
-    errors = [float(np.mean((measurement.force_n - answer)[measurement.usable] ** 2)) for answer in answers]
-    best = int(np.argmin(errors))
-    notes = [_MOTION_NOTES[ways[best]]] if measurement.position_m is not None else []
-    return np.asarray(answers[best]), [*notes, *replays[best].notes]
 
 
 def _facts(measurement: "Measurement", simulated_n: "Floats") -> dict[str, Any]:

@@ -1,6 +1,8 @@
 """`plant` and `diagnose --save`, without a running gateway: what is said before, what is in use afterwards, and as JSON."""
 
 import json
+import re
+from html import escape
 from pathlib import Path
 
 import pytest
@@ -84,6 +86,21 @@ def test_show_and_compare(added):
     differing = json.loads(call(added, "compare", "0", "1", "--json").stdout)["differing"]
     assert differing == {"regulator.command_bow": [0.0, 0.06], "contact.spindle_n": [0.0, 1.0]}
     assert "same numbers" in call(added, "compare", "1", "1").stdout
+
+
+def test_compare_draws_both_plants_over_a_recording(added, tmp_path):
+    plot, recording = tmp_path / "plants.html", table(tmp_path / "run.csv")
+    told = call(added, "compare", "0", "1", "--plot", plot, "--recording", recording)
+    assert told.exit_code == 0, told.output
+    html = plot.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    answer = "B (1) differs from A (0) in 2 numbers: regulator.command_bow 0 -> 0.06, contact.spindle_n 0 -> 1"
+    assert f"\n{answer}\n" in told.stdout and f"<p class='verdict'>{escape(answer)}.</p>" in html
+    closer = re.search(
+        r"<h1>(On run\.csv, [AB] is closer than [AB]: A is off by \d+\.\d+ N RMS, B by \d+\.\d+ N RMS)</h1>", html
+    )
+    assert closer and told.stdout.startswith(f"{closer[1]}\n")
+    assert html.count('class="plot"') == 2 and "Largest of A: " in html
+    assert call(added, "compare", "0", "1", "--recording", recording).exit_code == exit_codes.USAGE
 
 
 @pytest.mark.parametrize(("words", "code"), [(("use", 7), "E433"), (("rollback",), "E433"), (("show", 3), "E433")])
