@@ -1,6 +1,6 @@
 """A fit's document as a table and a few sentences for the terminal."""
 
-from typing import Any
+from typing import Any, Final
 
 from rich import box
 from rich.table import Table
@@ -9,15 +9,24 @@ from rich.text import Text
 from gateway.reports.fit.headline import answer_sentence, policy
 from gateway.reports.fit.names import describe_model, spell_model
 
+_LEAST_WIDTH: Final = 90  # below it headings stand in two lines, and a held-out error below its RMS
+_CLOSE_WIDTH: Final = 76  # below it cells stand close together, too
+_COLUMNS: Final = ("order", "coeffs", "RMS N", "max N", "held-out RMS N")
+_NARROW_COLUMNS: Final = ("order", "coeffs", "RMS\nN", "max\nN", "held-out\nRMS N")
 
-def fit_table(document: dict[str, Any]) -> Table:
-    """Return one row per model and order; the chosen one stands out, those that may not drive a plant step back."""
+
+def fit_table(document: dict[str, Any], width: int = _LEAST_WIDTH) -> Table:
+    """Return one row per model and order; the chosen one stands out, those that may not drive a plant step back. width: of the
+    terminal, of which nothing may be beyond."""
+    is_narrow = width < _LEAST_WIDTH
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="dim", caption_justify="left")
-    table.add_column("model")
-    for name in ("order", "coeffs", "RMS N", "max N", "held-out RMS N"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("verdict")
-    table.add_column("paper's\nnorm *", justify="right", style="dim")
+    if width < _CLOSE_WIDTH:
+        table.padding = (0, 0)
+    table.add_column("model", min_width=6)
+    for name in _NARROW_COLUMNS if is_narrow else _COLUMNS:
+        table.add_column(name, justify="right", min_width=max(map(len, name.split("\n"))), no_wrap="out" not in name)
+    table.add_column("verdict", min_width=7)
+    table.add_column("paper's\nnorm *", justify="right", style="dim", min_width=7)
     before = ""
     for fit in document["fits"]:
         if before and fit["model"] != before:

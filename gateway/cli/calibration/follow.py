@@ -16,6 +16,7 @@ from gateway.cli.errors import CliError
 
 _POLL_S: Final = 0.2
 _BEGIN_S: Final = 2.0
+_LEAST_WIDTH: Final = 76
 _LOST: Final = (
     "the run has ended with it, at the safe voltage; what was recorded is kept: force-gateway calibrate --resume"
 )
@@ -70,16 +71,15 @@ def _signals_as_ctrl_c() -> Iterator[None]:
 
 
 def _progress() -> Progress:
-    return Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description:<22}"),
-        BarColumn(bar_width=None),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[force]:>18}"),
-        TextColumn("{task.fields[eta]:>9}"),
-        console=Console(stderr=True),
-        expand=True,
-    )
+    """Return the bar, with the force and the time left; on a narrow terminal without the bar."""
+    console = Console(stderr=True)
+    share, force = TaskProgressColumn(), TextColumn("{task.fields[force]:>18}")
+    left = TextColumn("{task.fields[eta]:>9}")
+    if console.width < _LEAST_WIDTH:
+        force, left = TextColumn("{task.fields[force]}"), TextColumn("{task.fields[eta]}")
+        return Progress(TextColumn("{task.description}"), share, force, left, console=console)
+    bar = (SpinnerColumn(), TextColumn("{task.description:<22}"), BarColumn(bar_width=None))
+    return Progress(*bar, share, force, left, console=console, expand=True)
 
 
 def _wait(run: LocalRun | RemoteRun, progress: Progress, task: TaskID) -> None:
@@ -96,7 +96,7 @@ def _wait(run: LocalRun | RemoteRun, progress: Progress, task: TaskID) -> None:
 
 
 def _force(look: RunStatus) -> str:
-    return "" if isnan(look.force_n) else f"{look.voltage_v:5.2f} V {look.force_n:7.2f} N"
+    return "" if isnan(look.force_n) else f"{look.voltage_v:.2f} V {look.force_n:.2f} N"
 
 
 def _eta(look: RunStatus) -> str:

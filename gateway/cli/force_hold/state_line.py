@@ -48,6 +48,12 @@ def document(status: StatusReading, time_s: float) -> dict[str, Any]:
     }
 
 
+def _within(line: str, width: int) -> str:
+    """Return a line that fits: on a narrow terminal with its columns close together. A line that goes on below itself could
+    not be written over."""
+    return (line if len(line) <= width else " ".join(line.split()))[:width]
+
+
 def _number(value: float, decimals: int) -> str:
     return "-" if isnan(value) else f"{value:.{decimals}f}"
 
@@ -69,7 +75,7 @@ class StateLine:
         if self._as_json:
             self._put(json.dumps(document(status, time_s)) + "\n")
         elif self._is_live:
-            self._put(_ERASE + describe_state(status)[: shutil.get_terminal_size().columns - 1])
+            self._put(_ERASE + _within(describe_state(status), shutil.get_terminal_size().columns - 1))
         elif time_s - self._last_s >= _PLAIN_S or _kind(status) != self._last_kind:
             self._last_s, self._last_kind = time_s, _kind(status)
             self._put(f"{time_s:7.1f} s  {describe_state(status)}\n")

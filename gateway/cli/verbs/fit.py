@@ -146,6 +146,6 @@ def show(document: dict[str, Any]) -> None:
     from gateway.cli.calibration.fit_table import fit_table, summary
 
     console = Console()
-    console.print(fit_table(document))
+    console.print(fit_table(document, console.width))
     for line in summary(document):
         console.print(line, highlight=False, soft_wrap=True)
