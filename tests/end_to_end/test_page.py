@@ -1,6 +1,8 @@
 """The page in a real browser (Debian's chromium) on a whole running gateway: what it draws moves, and Stop stops."""
 
 import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -150,3 +152,12 @@ def test_every_tab_in_both_themes(gateway: RunningGateway, browser: Any, tab: st
         until(narrow, lambda: narrow.locator(f"#tab-{tab} > *").count() > 0)
         assert serious_violations(narrow) == []
         assert narrow.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+@pytest.mark.long
+def test_twenty_viewers_leave_no_trace_in_the_loop() -> None:
+    """On a machine that is busy with something else ticks are missed without them, too: those do not count."""
+    bench = Path(__file__).parents[2] / "tools" / "bench" / "page_viewers.py"
+    told = subprocess.run([sys.executable, bench], capture_output=True, text=True, check=True).stdout.splitlines()
+    alone, watched = (float(line.partition("missed_percent ")[2].split()[0]) for line in told)
+    assert watched < max(0.1, alone), told

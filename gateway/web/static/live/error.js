@@ -3,6 +3,8 @@
 import { Plot, axis, colour, dots, figure } from "./plots.js";
 
 const LEAST_STEP_N = 0.02;
+const JUMP_N = 0.5; // from one sample to the next: what follows within LAG_S is the plant on its way, no error of the model
+const LAG_S = 0.6;
 const HELD = 3; // state holding, as the ring has it
 const RAMPING = 2;
 
@@ -36,15 +38,18 @@ export function makeError(samples) {
 
   function collect() {
     points = { rising: [[], []], falling: [[], []] };
-    const { applied_n = [], force_n = [], state = [] } = samples.columns;
+    const { applied_n = [], force_n = [], state = [], time_s = [] } = samples.columns;
     let direction = "rising";
     let turned_n = applied_n[0] ?? 0;
+    let settled_s = -Infinity;
     for (let place = 0; place < force_n.length; place++) {
       const step_n = applied_n[place] - turned_n;
       if (Math.abs(step_n) > LEAST_STEP_N) {
         direction = step_n > 0 ? "rising" : "falling";
         turned_n = applied_n[place];
       }
+      if (Math.abs(applied_n[place] - (applied_n[place - 1] ?? 0)) > JUMP_N) settled_s = time_s[place] + LAG_S;
+      if (time_s[place] < settled_s) continue;
       if ((state[place] !== HELD && state[place] !== RAMPING) || !(applied_n[place] > 0)) continue;
       points[direction][0].push(applied_n[place]);
       points[direction][1].push(force_n[place] - applied_n[place]);
