@@ -63,13 +63,13 @@ class CalibrateTab {
 
   questions(wanted, preview) {
     const boxes = preview.questions.map((text) => h("input", { type: "checkbox" }));
-    const start = button("Start the run", () => this.begin(wanted), this.told, { class: "main", disabled: boxes.length > 0 });
+    const start = button("Start the run", () => this.begin(wanted), this.told, { class: "primary", disabled: boxes.length > 0 });
     for (const box of boxes) {
       box.addEventListener("change", () => (start.disabled = !boxes.every((one) => one.checked)));
     }
     const back = button("Back", async () => this.showPlan(), this.told);
     const where = preview.simulated ? ", on a simulated rig" : "";
-    const what = `${preview.stairs} stairs up to ${number(preview.v_max_v, 1)} V (about ${number(preview.force_max_n, 0)} N), about ${duration(preview.eta_s)}${where}.`;
+    const what = `${preview.stairs} stairs up to ${number(preview.v_max_v)} V (about ${number(preview.force_max_n, 0)} N), about ${duration(preview.eta_s)}${where}.`;
     return [
       h("h3", { tabindex: "-1" }, "Before anything moves"),
       h("p", {}, what),
@@ -160,7 +160,7 @@ function planForm(plans, told, ask) {
     ownPart,
     h("label", { class: "field wide-field" }, "What to call it (may stay empty)", name),
     h("ul", { class: "checks" }, h("li", {}, h("label", {}, tare, "Take the force at rest as zero first (only with the tool unloaded)"))),
-    h("div", { class: "row" }, button("Continue", go, told, { class: "main" })),
+    h("div", { class: "row" }, button("Continue", go, told, { class: "primary" })),
   ];
 }
 

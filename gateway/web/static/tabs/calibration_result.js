@@ -12,8 +12,8 @@ export function resultOf(status, api, told, again) {
   const titles = { refused: "The fit is not offered", stopped: "The run was stopped", recorded: "The experiment is recorded" };
   return [
     h("h3", { tabindex: "-1" }, titles[status.phase] ?? "The run has ended"),
-    h("p", {}, String(why).replace(/^info /, "")),
-    h("p", { class: "small" }, kept),
+    h("p", {}, sentence(String(why).replace(/^info /, ""))),
+    h("p", { class: "small" }, kept, status.phase === "stopped" && kept ? " In a terminal, force-gateway calibrate --resume goes on with it." : ""),
     ...(status.fit ? [fits(status.fit)] : []),
     h("div", { class: "row" }, again),
     ...(rejected ? [report(`Report of calibration ${rejected}`, `/api/v1/calibrations/${rejected}/report`)] : []),
@@ -24,7 +24,7 @@ function storedResult(status, stored, api, told, again) {
   const use = button(`Use calibration ${stored}`, async () => {
     const answer = await api.post("/api/v1/calibrations/change", { use: stored });
     told.good(answer.said || `calibration ${stored} is in use`);
-  }, told, { class: "main" });
+  }, told, { class: "primary" });
   again.textContent = "Leave it and begin anew";
   return [
     h("h3", { tabindex: "-1" }, `Calibration ${stored} is stored, not yet in use`),
@@ -33,6 +33,11 @@ function storedResult(status, stored, api, told, again) {
     ...(status.fit ? [fits(status.fit)] : []),
     report(`Report of calibration ${stored}`, `/api/v1/calibrations/${stored}/report`),
   ];
+}
+
+function sentence(text) {
+  const whole = text.charAt(0).toUpperCase() + text.slice(1);
+  return /[.!?]$/.test(whole) ? whole : `${whole}.`;
 }
 
 function summary(fit) {

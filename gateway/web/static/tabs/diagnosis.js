@@ -61,7 +61,7 @@ class DiagnosisTab {
       this.wasRunning = true;
       await this.refresh();
       this.job.querySelector("button")?.focus();
-    }, this.told, { class: "main" });
+    }, this.told, { class: "primary" });
     return [
       h("div", { class: "row end" }, h("label", { class: "field" }, "Recording", select), begin),
       h("ul", { class: "checks" }, h("li", {}, h("label", {}, keep, "Keep what it finds as a numbered plant, for the tab Calibrations"))),

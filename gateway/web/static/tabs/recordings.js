@@ -32,7 +32,7 @@ class RecordingsTab {
 
   control(file) {
     if (!file) {
-      return [button("Start recording", async () => this.after(await this.api.post("/api/v1/recordings/start", {})), this.told, { class: "main" })];
+      return [button("Start recording", async () => this.after(await this.api.post("/api/v1/recordings/start", {})), this.told, { class: "primary" })];
     }
     const stop = button("Stop recording", async () => this.after(await this.api.post("/api/v1/recordings/stop", {})), this.told);
     return [stop, h("span", { class: "badge warn" }, `recording ${Number(file.split("/").pop().split(".")[0])}`), h("span", { class: "small rows" })];
