@@ -25,7 +25,7 @@ _FRAME: Final = """<!doctype html>
 {body}
 </main></body></html>
 """
-_UNIT: Final = re.compile(r"(\d) (?=(?:N|V|s|Hz|%)\b)")
+_UNIT: Final = re.compile(r"(\d) (?=(?:N|V|s|Hz)\b|%)")
 _COMMANDS: Final = ("force-gateway", "reproduce")  # programs whose words are worth repeating
 _COUNTED: Final = ("numpy", "scipy")  # packages that numbers come from
 

@@ -83,22 +83,35 @@ def _known_or_none(value: Any) -> Any:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
-def sentences(found: BeforeAfter) -> Iterator[str]:
-    """Yield the comparison in lines for a terminal."""
+def answer_sentence(found: BeforeAfter) -> str:
+    """Return the answer, for terminal and page."""
     whole = found.whole
-    yield f"error of the commanded force: {_run(found.before)} -> {_run(found.after)}"
-    for name, part in (("all", whole), ("held", found.held), ("on the way", found.moving)):
-        yield f"  {name:<11}{_line(part)}"
-    shares = " and ".join(f"{share:.0%}" for share in whole.comparable_share)
-    stretches = f"{whole.blocks[0]} and {whole.blocks[1]} stretches"
-    yield f"compared where the same was asked of both: {shares} of their rows, in {stretches}"
     if whole.verdict is GainVerdict.UNKNOWN:
-        yield f"cannot be told: {whole.why}"
-        return
+        return f"Whether the force is held better cannot be told: {whole.why}"
     low, high = whole.gain_ci95
     word, sign = ("gained", 1.0) if whole.verdict is GainVerdict.BETTER else ("lost", -1.0)
     ends = sorted((sign * low, sign * high))
-    yield f"{whole.verdict.value}: {sign * whole.gain_n:.2f} N {word}, 95 % interval {ends[0]:.2f} .. {ends[1]:.2f} N"
+    return (
+        f"The commanded force is held {whole.verdict.value}: {whole.before_rms_n:.2f} N before, {whole.after_rms_n:.2f} N after, "
+        f"{sign * whole.gain_n:.2f} N {word} (95 % interval {ends[0]:.2f} .. {ends[1]:.2f} N)"
+    )
+
+
+def comparable_sentence(found: BeforeAfter) -> str:
+    """Return how much of the runs could be compared."""
+    whole = found.whole
+    shares = " and ".join(f"{share:.0%}" for share in whole.comparable_share)
+    stretches = f"{whole.blocks[0]} and {whole.blocks[1]} stretches"
+    return f"Compared where the same was asked of both: {shares} of their rows, in {stretches}"
+
+
+def sentences(found: BeforeAfter) -> Iterator[str]:
+    """Yield the comparison in lines for a terminal, the answer first."""
+    yield answer_sentence(found)
+    yield comparable_sentence(found)
+    yield f"error of the commanded force: {_run(found.before)} -> {_run(found.after)}"
+    for name, part in (("all", found.whole), ("held", found.held), ("on the way", found.moving)):
+        yield f"  {name:<11}{_line(part)}"
 
 
 def _run(run: RecordedForce) -> str:

@@ -31,7 +31,6 @@ _OF_A_DIAGNOSIS: Final = (
     "without",
     "calibration",
     "noise_floor_n",
-    "report",
     "extend",
     "plan_file",
     "fail_on",
@@ -175,13 +174,14 @@ def _show_before_after(options: dict[str, Any]) -> None:
     from gateway.cli.diagnosis.outputs import STDOUT, write_all
 
     found = before_after.run(options["before"], options["after"], options["columns"], options["rig"], options["state"])
-    text = json.dumps(before_after.document(found), indent=2, allow_nan=False) + "\n"
-    if options["json_file"] == STDOUT:
-        click.echo(text, nl=False)
-        return
-    click.echo("\n".join(before_after.sentences(found)))
-    if options["json_file"]:
-        write_all({options["json_file"]: text})
+    texts = {options["json_file"]: json.dumps(before_after.document(found), indent=2, allow_nan=False) + "\n"}
+    if options["report"]:
+        from gateway.cli.diagnosis.before_after_page import before_after_page
+
+        texts[options["report"]] = before_after_page(found)
+    printed = texts.pop(STDOUT, None)
+    write_all({file: text for file, text in texts.items() if file})
+    click.echo("\n".join(before_after.sentences(found)) if printed is None else printed, nl=printed is None)
 
 
 def _check_effect(name: str | None) -> None:

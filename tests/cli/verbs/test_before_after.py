@@ -34,8 +34,10 @@ def test_a_gain_is_told_with_its_interval(tmp_path):
     before, after = table(tmp_path / "a.csv", 0.8, 1), table(tmp_path / "b.csv", 0.3, 2)
     told = diagnose("--before", before, "--after", after, "--json", tmp_path / "out.json")
     assert told.exit_code == 0, told.output
-    assert "better: 0.49 N gained, 95 % interval 0.48 .. 0.50 N" in told.output
-    assert "compared where the same was asked of both: 100% and 100% of their rows" in told.output
+    assert told.output.startswith(
+        "The commanded force is held better: 0.49 N gained, 95 % interval 0.48 .. 0.50 N, 0.8"
+    )
+    assert "Compared where the same was asked of both: 100% and 100% of their rows" in told.output
     document = json.loads((tmp_path / "out.json").read_text())
     assert (document["format"], document["verdict"]) == (1, "better")
     low, high = document["force_error"]["ratio_ci95"]
@@ -43,6 +45,17 @@ def test_a_gain_is_told_with_its_interval(tmp_path):
     assert document["force_error"]["ratio"] == pytest.approx(0.38, abs=0.03)
     back = json.loads(diagnose("--before", after, "--after", before, "--json", "-").stdout)
     assert back["verdict"] == "worse"
+
+
+def test_the_page_says_what_the_terminal_says_and_draws_both_runs(tmp_path):
+    before, after, report = table(tmp_path / "a.csv", 0.8, 1), table(tmp_path / "b.csv", 0.3, 2), tmp_path / "out.html"
+    told = diagnose("--before", before, "--after", after, "--report", report)
+    assert told.exit_code == 0, told.output
+    html = report.read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    answer = told.output.partition("\n")[0]
+    assert f"<h1>{answer}</h1>" in html
+    assert html.count('class="plot"') == 2 and html.count(">largest: ") == 2
+    assert "<th>on the way</th>" in html and ">nan" not in html
 
 
 def test_a_plant_that_bends_the_readings_cannot_be_judged_by_the_readings(tmp_path):
