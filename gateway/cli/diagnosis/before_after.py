@@ -92,8 +92,8 @@ def answer_sentence(found: BeforeAfter) -> str:
     word, sign = ("gained", 1.0) if whole.verdict is GainVerdict.BETTER else ("lost", -1.0)
     ends = sorted((sign * low, sign * high))
     return (
-        f"The commanded force is held {whole.verdict.value}: {whole.before_rms_n:.2f} N before, {whole.after_rms_n:.2f} N after, "
-        f"{sign * whole.gain_n:.2f} N {word} (95 % interval {ends[0]:.2f} .. {ends[1]:.2f} N)"
+        f"The commanded force is held {whole.verdict.value}: {whole.before_rms_n:.2f} N before, {whole.after_rms_n:.2f} N "
+        f"after, {sign * whole.gain_n:.2f} N {word} (95 % interval {ends[0]:.2f} .. {ends[1]:.2f} N)"
     )
 
 

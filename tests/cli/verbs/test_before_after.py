@@ -34,9 +34,10 @@ def test_a_gain_is_told_with_its_interval(tmp_path):
     before, after = table(tmp_path / "a.csv", 0.8, 1), table(tmp_path / "b.csv", 0.3, 2)
     told = diagnose("--before", before, "--after", after, "--json", tmp_path / "out.json")
     assert told.exit_code == 0, told.output
-    assert told.output.startswith(
-        "The commanded force is held better: 0.49 N gained, 95 % interval 0.48 .. 0.50 N, 0.8"
+    answer = (
+        "The commanded force is held better: 0.80 N before, 0.31 N after, 0.49 N gained (95 % interval 0.48 .. 0.50 N)"
     )
+    assert told.output.startswith(f"{answer}\n")
     assert "Compared where the same was asked of both: 100% and 100% of their rows" in told.output
     document = json.loads((tmp_path / "out.json").read_text())
     assert (document["format"], document["verdict"]) == (1, "better")
