@@ -3,6 +3,7 @@ and a verb's libraries cost only those who use it."""
 
 import os
 import sys
+from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, Final
@@ -54,6 +55,12 @@ HELP: Final = """Modbus gateway that holds a constant contact force, and says wh
 Begin with: force-gateway run demo --sim"""
 
 
+def format_examples(examples: Iterable[str]) -> str | None:
+    """Return the end of a verb's help; every example runs as it stands. None where there are none."""
+    lines = [f"  force-gateway {words}" for words in examples]
+    return "\n".join(["\b", "Examples:", *lines]) if lines else None
+
+
 class VerbGroup(click.Group):
     """Finds verbs by name, and turns whatever they raise into one message."""
 
@@ -65,7 +72,9 @@ class VerbGroup(click.Group):
         """Import a verb's module only when it is called."""
         if cmd_name not in VERBS:
             return None
-        command: click.Command = import_module(f"gateway.cli.verbs.{cmd_name.replace('-', '_')}").command
+        module = import_module(f"gateway.cli.verbs.{cmd_name.replace('-', '_')}")
+        command: click.Command = module.command
+        command.epilog = format_examples(getattr(module, "EXAMPLES", ()))
         return command
 
     def resolve_command(

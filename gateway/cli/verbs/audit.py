@@ -11,6 +11,8 @@ from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.cli.verbs.events import parse_since
 from gateway.processes import exit_codes
 
+EXAMPLES = ("audit show --since 1h", "audit verify")
+
 
 @click.group(name="audit")
 def command() -> None:

@@ -7,6 +7,8 @@ import click
 from gateway.cli.errors import already_exists, no_state_directory
 from gateway.cli.options import StateChoice, count_of, state_options
 
+EXAMPLES = ("backup cell.tar.gz", "backup today.tar.gz --rig demo")
+
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from gateway.numbered_documents.store import SelectedDocument, StoredDocument
 
 
+EXAMPLES = ("calibration list", "calibration compare 1 demo --plot loops.html")
+
+
 @click.group(name="calibration")
 def command() -> None:
     """List, show, use, compare and export calibrations."""

@@ -32,6 +32,12 @@ def parse_clients(context: click.Context, parameter: click.Parameter, values: tu
     return clients
 
 
+EXAMPLES = (
+    "certs keys --host 192.168.125.20 --client robot:setpoint",
+    "certs more-keys --host localhost --client panel:monitor",
+)
+
+
 @click.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False))
 @click.option(

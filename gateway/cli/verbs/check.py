@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from gateway.profiles import Checked, ProfileFault, Rig
 
 
+EXAMPLES = ("check demo", "check irc5-cell --json")
+
+
 @click.command()
 @click.argument("file", metavar="RIG", default=defaults.RIG, shell_complete=complete_profiles)
 @click.option(

@@ -4,6 +4,8 @@ import click
 
 from gateway.cli.errors import CliError
 
+EXAMPLES = ("completion bash", "completion fish")
+
 
 @click.command()
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))

@@ -48,6 +48,9 @@ class _Finite(click.FloatRange):
         return number if isfinite(number) else self.fail(f"{value} is no finite number.", param, ctx)
 
 
+EXAMPLES = ("diagnose press.csv --report why.html", "diagnose press.csv --rig demo --extend creeping.yaml")
+
+
 @click.command()
 @click.argument("recordings", metavar="RECORDING...", nargs=-1, shell_complete=complete_recordings)
 @rig_option("The rig whose plant is the start  [default: the recording's own]")

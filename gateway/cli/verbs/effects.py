@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 FORMAT = 1
 
 
+EXAMPLES = ("effects", "effects leak")
+
+
 @click.command()
 @click.argument("name", required=False, shell_complete=complete_effects)
 @json_option

@@ -35,6 +35,9 @@ def parse_since(context: click.Context, parameter: click.Parameter, value: str |
         raise click.BadParameter(f"{value} is neither 90s, 10m, 2h, 1d nor a time such as 2026-11-22T10:30") from None
 
 
+EXAMPLES = ("events --since 10m", "events --severity warning --code W204")
+
+
 @click.command()
 @click.option(
     "--since",

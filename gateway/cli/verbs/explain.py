@@ -9,6 +9,8 @@ import click
 from gateway.cli.command_line.completion_words import complete_codes
 from gateway.cli.options import json_option
 
+EXAMPLES = ("explain W204", "explain over_force")
+
 
 @click.command()
 @click.argument("code", required=False, shell_complete=complete_codes)

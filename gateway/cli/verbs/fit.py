@@ -42,6 +42,9 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
     return tuple(sorted(orders))
 
 
+EXAMPLES = ("fit ladder.csv --models bsfm --orders 1-3", "fit ladder.csv --models psfm --orders 2 --no-report --json")
+
+
 @click.command()
 @click.argument("recording", metavar="RECORDING", shell_complete=complete_recordings)
 @click.option("--models", callback=_models, default=",".join(MODELS), show_default=True, help="Which to compare.")

@@ -45,6 +45,9 @@ class _TakesNegative(click.Command):
         return super().parse_args(ctx, args)
 
 
+EXAMPLES = ("hold 12 --for 1s", "hold 8.5 --for 500ms --rig demo")
+
+
 @click.command(cls=_TakesNegative)
 @click.argument("newton", type=float)
 @click.option("--for", "for_s", callback=_parse_time, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
@@ -64,8 +67,6 @@ def command(
 
     The lease is read from a gateway on this machine (unless it runs with a --state of its own); for a remote one give
     --rig.
-
-    Example: force-gateway hold 12 --for 10s
     """
     from gateway.cli.force_hold.heartbeat import HeartbeatThread
     from gateway.cli.force_hold.sequence import HoldRun

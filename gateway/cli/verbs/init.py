@@ -9,6 +9,8 @@ import click
 
 from gateway.cli.errors import already_exists
 
+EXAMPLES = ("init left-cell", "init right-cell --no-guided")
+
 
 @click.command()
 @click.argument("name", default="my-cell")

@@ -32,6 +32,9 @@ _RESIDUAL: Final = (
 )
 
 
+EXAMPLES = ("metrics", "metrics --rig demo")
+
+
 @click.command()
 @state_options
 def command(*, state: StateChoice) -> None:

@@ -16,6 +16,9 @@ _PICTURE_SIZE: Final = (112, 34)
 _TEXT_SIZE: Final = (80, 24)
 
 
+EXAMPLES = ("monitor", "monitor --svg monitor.svg --seconds 1")
+
+
 @click.command()
 @click.option("--once", is_flag=True, help="Print one frame and end.")
 @click.option("--svg", type=click.Path(path_type=Path, dir_okay=False), help="Write one frame to FILE as a picture.")

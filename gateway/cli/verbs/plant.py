@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from gateway.profiles import PlantProfile
 
 
+EXAMPLES = ("plant list", "plant compare 0 paper-slide")
+
+
 @click.group(name="plant")
 def command() -> None:
     """List, show, compare, add and use plants."""

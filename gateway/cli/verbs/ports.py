@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 _SLOW_LATENCY_MS: Final = 16  # what FTDI adapters start with: at 9600 baud it costs half of the cycle
 
 
+EXAMPLES = ("ports", "ports --json")
+
+
 @click.command()
 @click.argument("paths", metavar="[PORT]...", nargs=-1)
 @click.option("--listen", is_flag=True, help="Listen at each port, without sending a byte: what comes, at which speed.")

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from gateway.registers import Register, RegisterMap
 
 
+EXAMPLES = ("read force_measured state", "read status --json")
+
+
 @click.command()
 @click.argument("names", metavar="NAME...", nargs=-1, required=True, shell_complete=complete_registers)
 @gateway_options
@@ -22,8 +25,6 @@ def command(*, names: tuple[str, ...], wire: "Wire", unit: int, map_name: str, a
     """Read registers by name, in engineering units.
 
     NAME, NAME@BLOCK, or a whole BLOCK (command, status, float_abcd, ...).
-
-    Example: force-gateway read force_measured state
     """
     from gateway.cli.master.client import GatewayClient
     from gateway.cli.master.refusal_text import explain_refusals

@@ -10,6 +10,9 @@ from gateway.cli.options import StateChoice, json_option, state_options
 _ON = {"on": True, "off": False}
 
 
+EXAMPLES = ("record on", "record off")
+
+
 @click.command()
 @click.argument("what", type=click.Choice(["on", "off", "status"]), default="status")
 @state_options

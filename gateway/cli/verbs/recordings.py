@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from gateway.watch.reference_recording import ReferenceRecording
 
 
+EXAMPLES = ("recordings list", "recordings export 1 --csv -o run.csv")
+
+
 @click.group(name="recordings")
 def command() -> None:
     """List and export recordings, and choose the reference."""

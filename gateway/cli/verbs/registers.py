@@ -16,6 +16,9 @@ TABLES: Final = ("markdown", "csv", "json")
 CLIENTS: Final = ("rapid", "scl", "st", "urscript", "c", "python")
 
 
+EXAMPLES = ("registers force_setpoint", "registers --format scl --rig irc5-cell")
+
+
 @click.command()
 @click.argument("name", required=False, shell_complete=complete_registers)
 @click.option(

@@ -7,6 +7,8 @@ import click
 from gateway.cli.errors import already_exists
 from gateway.cli.options import StateChoice, state_options
 
+EXAMPLES = ("report", "report mine.tar.gz --rig demo")
+
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False), default=Path("force-gateway-report.tar.gz"))

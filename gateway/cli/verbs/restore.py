@@ -11,6 +11,8 @@ from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, count_of, state_options
 from gateway.processes import exit_codes
 
+EXAMPLES = ("restore kept.tar.gz --state elsewhere --dry-run", "restore kept.tar.gz --state copy")
+
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False, exists=True))

@@ -9,6 +9,8 @@ from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_rigs
 from gateway.cli.options import endpoint, http_endpoint, serial_port
 
+EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
+
 
 @click.command()
 @click.argument("rig", default=defaults.RIG, shell_complete=complete_rigs)

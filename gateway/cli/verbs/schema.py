@@ -7,6 +7,9 @@ import click
 KINDS = ("rig", "device", "plant", "calibration", "registers", "plan")
 
 
+EXAMPLES = ("schema rig", "schema plant")
+
+
 @click.command()
 @click.argument("kind", type=click.Choice(KINDS), default="rig")
 def command(*, kind: str) -> None:

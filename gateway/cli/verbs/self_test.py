@@ -20,6 +20,9 @@ _LONGEST_S: Final = 30.0
 _PREFIX: Final = "self_test_"
 
 
+EXAMPLES = ("self-test", "self-test --json")
+
+
 @click.command()
 @gateway_options
 @json_option
@@ -28,8 +31,6 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
 
     Presses with no more than the rig's self_test.force_n, against whatever the tool touches, and goes back to 0; Ctrl-C ends it
     sooner. Begins from off or ready with force 0. Exit code 1 when an item failed, or the test did not come to its end.
-
-    Example: force-gateway self-test
     """
     from gateway.cli.master.client import GatewayClient
     from gateway.cli.master.refusal_text import explain_refusals

@@ -17,6 +17,9 @@ _ROOT = click.option(
 )
 
 
+EXAMPLES = ("service install demo --dry-run", "service install irc5-cell --dry-run --command /usr/bin/force-gateway")
+
+
 @click.group(name="service")
 def command() -> None:
     """Keep a gateway running by systemd."""

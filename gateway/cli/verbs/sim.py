@@ -14,6 +14,9 @@ from gateway.processes import exit_codes
 _COLUMN: Final = 32
 
 
+EXAMPLES = ("sim set creep=on", "sim list")
+
+
 @click.group(name="sim")
 def command() -> None:
     """Set faults and effects on a simulated rig while it runs.
@@ -32,8 +35,6 @@ def set_command(*, assignments: tuple[str, ...], as_json: bool, state: StateChoi
 
     An effect with a number gets it as its first parameter, with `on` the size of a demonstration; others by name
     (creep.creep_s=3). All of them are set, or none.
-
-    Example: force-gateway sim set cell.silent=true
     """
     _tell(_ask(state, {"set": dict(_split(one) for one in assignments)}), as_json=as_json)
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 FORMAT = 1
 
 
+EXAMPLES = ("simulate press.csv --rig demo", "simulate press.csv --plant paper-slide --csv simulated.csv")
+
+
 @click.command()
 @click.argument("recording", metavar="RECORDING", shell_complete=complete_recordings)
 @rig_option("The rig whose plant is run  [default: the recording's own]")

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from gateway.registers import RegisterMap
 
 
+EXAMPLES = ("upload demo --dry-run", "upload demo --print-frames --dry-run")
+
+
 @click.command()
 @click.argument("file", metavar="FILE", shell_complete=complete_calibration_files)
 @click.option("--slot", type=click.IntRange(0, 7), default=0, show_default=True, help="Recipe slot that it fills.")

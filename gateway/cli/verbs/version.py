@@ -9,6 +9,8 @@ import click
 from gateway import VERSION
 from gateway.cli.options import json_option
 
+EXAMPLES = ("version", "version --json")
+
 
 @click.command()
 @json_option

@@ -6,6 +6,8 @@ from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_rigs
 from gateway.cli.errors import CliError
 
+EXAMPLES = ("wiring demo", "wiring irc5-cell --format markdown")
+
 
 @click.command()
 @click.argument("rig_name", metavar="RIG", default=defaults.RIG, shell_complete=complete_rigs)

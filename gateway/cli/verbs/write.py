@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from gateway.registers import RegisterMap
 
 
+EXAMPLES = ("write force_setpoint=12 control_word=enable", "write mode=force --dry-run")
+
+
 @click.command()
 @click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=complete_assignments)
 @click.option("--dry-run", is_flag=True, help="Say what would be sent, and send nothing that writes.")
@@ -28,8 +31,6 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_jso
 
     NAME=VALUE in the register's unit; modes and bits by name. Those of one block go out in one request. A request that the
     gateway refuses ends with exit code 1, what it refused, why, and what to do.
-
-    Example: force-gateway write force_setpoint=12 control_word=enable
     """
     from gateway.cli.master.client import GatewayClient
     from gateway.cli.master.refusal_text import explain_refusals
