@@ -7,7 +7,15 @@ its module: `measurement.measurement_of` (numpy), `mapping_file.column_mapping` 
 
 from gateway.recording.errors import RecordingError
 from gateway.recording.export import export_csv, export_parquet, write_csv
-from gateway.recording.reader import Recording, RecordingEntry, find_recording, list_recordings, read_recording
+from gateway.recording.reader import (
+    Recording,
+    RecordingEntry,
+    find_recording,
+    list_recordings,
+    read_entry,
+    read_recording,
+    recording_paths,
+)
 from gateway.recording.recorder import Recorder
 from gateway.recording.tables.any_table import read_table
 from gateway.recording.tables.column_mapping import ColumnMapping, ColumnSource
@@ -23,7 +31,9 @@ __all__ = [
     "export_parquet",
     "find_recording",
     "list_recordings",
+    "read_entry",
     "read_recording",
     "read_table",
+    "recording_paths",
     "write_csv",
 ]

@@ -75,7 +75,7 @@ def read_recording(path: Path) -> Recording:
 
 def list_recordings(state_directory: Path) -> list[RecordingEntry]:
     """Return the recordings of one state directory by number; unreadable ones are listed with their fault."""
-    return [_entry(path) for path in recording_paths(state_directory)]
+    return [read_entry(path) for path in recording_paths(state_directory)]
 
 
 def recording_paths(state_directory: Path) -> list[Path]:
@@ -93,7 +93,8 @@ def find_recording(state_directory: Path, number: int) -> Path:
     raise RecordingError(f"no recording {number} in {path.parent}; there: {present}")
 
 
-def _entry(path: Path) -> RecordingEntry:
+def read_entry(path: Path) -> RecordingEntry:
+    """Return what a list says of one file; one that cannot be read has a fault."""
     number, size_bytes = int(path.stem), path.stat().st_size
     try:
         data = memoryview(path.read_bytes())

@@ -6,11 +6,13 @@ Everything here reads from the disk and runs in worker threads. An entry is read
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
-from gateway.recording import Recording, find_recording, list_recordings, read_recording
+from gateway.codes.faults import FaultCode
+from gateway.recording import Recording, find_recording, read_entry, read_recording, recording_paths
 from gateway.recording.errors import RecordingError
 from gateway.web.tabs.answers import NOT_FOUND, TabRefusedError
 
@@ -18,9 +20,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from gateway.recording import RecordingEntry
     from gateway.reports.svg_chart import Chart
 
+_LEAST_ROWS: Final = 2  # to say something of
 FORMS: Final = ("csv", "parquet")
 _DRAWN: Final = 700
 """Places along a curve; each shows the lowest and the highest value there."""
@@ -36,24 +38,65 @@ def recording_path(state: Path, number: int) -> Path:
 
 def recording_facts(state: Path) -> list[dict[str, Any]]:
     """Return every recording, the newest first."""
-    return [_facts(entry) for entry in reversed(list_recordings(state))]
+    rows = []
+    for path in reversed(recording_paths(state)):
+        status = path.stat()
+        rows.append(_facts(path, status.st_mtime_ns, status.st_size))
+    return rows
 
 
-def _facts(entry: "RecordingEntry") -> dict[str, Any]:
+@lru_cache(maxsize=4096)
+def _facts(path: Path, changed_ns: int, size_bytes: int) -> dict[str, Any]:
+    """Return what the list says of one file, as it was when it was changed last and had this size."""
+    entry = read_entry(path)
     header = entry.header
     return {
         "number": entry.number,
         "file": entry.path.name,
         "started_utc": header.get("started_utc"),
-        "rig": header.get("rig"),
         "calibration": header.get("calibration"),
-        "kind": "ladder" if header.get("ladder") else "experiment" if header.get("experiment") else "run",
+        "happened": "" if entry.fault or entry.rows < _LEAST_ROWS else _happened(entry.path),
         "rows": entry.rows,
         "duration_s": entry.duration_s,
         "size_bytes": entry.size_bytes,
         "truncated": entry.truncated,
         "fault": entry.fault,
     }
+
+
+def _happened(path: Path) -> str:
+    """Return in a few words what a recording holds: what was run, how often it was asked for another force, what was measured,
+    and which faults there were."""
+    import numpy as np
+
+    recording = read_recording(path)
+    columns, words = recording.columns, [_what_ran(recording.header)]
+    known = {name: values[np.isfinite(values)] for name, values in columns.items()}
+    setpoints = known.get("setpoint_n", np.empty(0))
+    changes = int((np.diff(setpoints) != 0.0).sum())
+    if changes:
+        words.append(f"{changes} {'change' if changes == 1 else 'changes'} of setpoint, up to {setpoints.max():.4g} N")
+    force_n = known.get("force_n", np.empty(0))
+    if len(force_n):
+        words.append(f"{force_n.min():.1f} to {force_n.max():.1f} N measured")
+    faults = sorted({int(code) for code in known.get("fault_code", ()) if code})
+    words += [f"fault {_name_of_fault(code)}" for code in faults]
+    return ", ".join(words)
+
+
+def _what_ran(header: dict[str, Any]) -> str:
+    if ladder := header.get("ladder"):
+        return f"calibration ladder of {ladder.get('groups', '?')} × {ladder.get('step_v', 0.0):g} V stairs"
+    if experiment := header.get("experiment"):
+        return f"experiment {experiment.get('name', '')}".strip()
+    return "run"
+
+
+def _name_of_fault(code: int) -> str:
+    try:
+        return FaultCode(code).explanation.code
+    except ValueError:
+        return str(code)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +134,7 @@ def draw_recording(state: Path, number: int) -> str:
 
     with _one_at_a_time:
         recording = _read(recording_path(state, number))
-    if recording.rows < 2:
+    if recording.rows < _LEAST_ROWS:
         raise TabRefusedError(f"recording {number} has {recording.rows} rows: nothing to draw")
     charts = [(title, _chart(recording, title, label, names)) for title, label, names in _PANELS]
     figures = "".join(figure(title, drawing(chart), "", "full") for title, chart in charts if chart)
@@ -127,7 +170,7 @@ def _chart(recording: Recording, title: str, label: str, names: "Sequence[tuple[
 
 
 _PANELS: Final = (
-    ("Force", "force (N)", (("force_applied_n", "before", "setpoint"), ("force_n", "after", "measured"))),
+    ("Force", "force (N)", (("setpoint_n", "before", "setpoint"), ("force_n", "after", "measured"))),
     ("Command", "command (V)", (("command_v", "bsfm", "command"),)),
 )
 

@@ -18,11 +18,11 @@ ROWS = 500
 
 def record(state: Path, **facts: Any) -> Path:
     """Write the next recording: a force that follows a slow sine."""
-    columns = ("time_s", "command_v", "force_n", "force_applied_n")
+    columns = ("time_s", "command_v", "force_n", "setpoint_n", "fault_code")
     recorder = Recorder(state / "recordings", {"rig": "demo", "calibration": 1, **facts}, columns)
     for row in range(ROWS):
         volts = 4.0 + 3.0 * math.sin(row / 80.0)
-        recorder.append((row / 100.0, volts, 7.0 * volts, 7.1 * volts))
+        recorder.append((row / 100.0, volts, 7.0 * volts, 20.0 if row < ROWS // 2 else 30.0, 0.0))
     recorder.close()
     return recorder.path
 

@@ -14,13 +14,23 @@ from tests.web.tabs.conftest import ROWS, record
 
 def test_the_list_says_what_each_is_and_names_what_cannot_be_read(page, state) -> None:
     record(state)
-    record(state, ladder={"groups": 1})
+    record(state, ladder={"groups": 3, "step_v": 0.5})
     (state / "recordings" / "0003.fgr").write_bytes(b"no recording")
     newest, ladder, run = page.get("/api/v1/recordings").json["recordings"]
-    assert (run["number"], run["kind"], run["rows"]) == (1, "run", ROWS)
+    assert (run["number"], run["rows"]) == (1, ROWS)
     assert run["duration_s"] == pytest.approx((ROWS - 1) / 100.0)
-    assert ladder["kind"] == "ladder"
+    assert run["happened"] == "run, 1 change of setpoint, up to 30 N, 7.0 to 49.0 N measured"
+    assert ladder["happened"].startswith("calibration ladder of 3 × 0.5 V stairs, ")
     assert "is not a recording" in newest["fault"]
+
+
+def test_a_recording_that_grows_is_read_again(page, state) -> None:
+    path = record(state)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    assert page.get("/api/v1/recordings").json["recordings"][0]["rows"] < ROWS
+    path.write_bytes(whole)
+    assert page.get("/api/v1/recordings").json["recordings"][0]["rows"] == ROWS
 
 
 def test_starting_and_stopping_goes_to_control(page, control) -> None:
@@ -59,6 +69,7 @@ def test_a_picture_is_a_page_that_runs_nothing(page, state) -> None:
     assert "sandbox" in answer.headers["content-security-policy"]
     assert b"<script" not in answer.body
     assert b"5.0\xc2\xa0s" in answer.body
+    assert answer.body.count(b"<polyline") == 3  # setpoint, measured, command
 
 
 def test_a_thinned_curve_keeps_its_peaks() -> None:

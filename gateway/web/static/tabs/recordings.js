@@ -1,6 +1,6 @@
 // Tab Recordings: start and stop, what there is, pictures, downloads, and the way to a diagnosis.
 
-import { Told, button, bytes, duration, h, moment, number, prepare, report, showOnce, table, whileShown } from "./dom.js";
+import { Told, button, bytes, duration, h, moment, prepare, report, showOnce, table, whileShown } from "./dom.js";
 
 /** Builds the tab. api: get(path), post(path, body). */
 export function mount(element, api) {
@@ -82,8 +82,7 @@ class RecordingsTab {
 }
 
 function words(one) {
-  if (one.summary) return one.summary;
-  const kinds = { ladder: "calibration ladder", experiment: "experiment", run: "run" };
   const torn = one.truncated ? ", torn tail dropped" : "";
-  return `${kinds[one.kind]}, ${number(one.rows, 0)} rows, calibration ${one.calibration ?? "unknown"}${torn}`;
+  const calibration = one.calibration === undefined || one.calibration === null ? "" : `, with calibration ${one.calibration}`;
+  return `${one.happened || "no rows yet"}${calibration}${torn}`;
 }
