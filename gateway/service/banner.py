@@ -94,10 +94,13 @@ def format_banner(ready: Ready) -> str:
 
 
 def _http_lines(ready: Ready) -> tuple[str, ...]:
-    """Return where a browser and a scraper find the gateway; a token is the reader's to know."""
+    """Return where a browser and a scraper on this machine find the gateway, and whether others do; a token is the reader's to
+    know."""
     paths = {"web": "/", "metrics": "/metrics"}
+    near = {"0.0.0.0": defaults.HOST, "::": "::1"}
     return tuple(
-        f"  {name:<12} http://{_in_url(_reachable_host(host, ready.rig))}:{port}{paths[name]}"
+        f"  {name:<12} http://{_in_url(near.get(host, host))}:{port}{paths[name]}"
+        + ("        (and on this machine's other addresses)" if host in near else "")
         for name, (host, port) in ready.http.items()
     )
 

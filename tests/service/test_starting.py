@@ -106,6 +106,16 @@ def test_the_json_line_is_json_and_tells_the_ports() -> None:
     assert ready_fields(ready(rig=replace(demo(), simulated=False)))["ptys"] == {}
 
 
+def test_the_page_is_told_where_a_browser_on_this_machine_finds_it() -> None:
+    near = ready(http={"web": ("127.0.0.1", 8080), "metrics": ("::1", 9464)})
+    assert "web          http://127.0.0.1:8080/\n" in format_banner(near)
+    assert "metrics      http://[::1]:9464/metrics\n" in format_banner(near)
+    assert ready_fields(near)["web"] == ["127.0.0.1", 8080]
+    everywhere = format_banner(ready(http={"web": ("0.0.0.0", 8080)}))
+    assert "http://127.0.0.1:8080/        (and on this machine's other addresses)" in everywhere
+    assert ready_fields(ready())["web"] is None
+
+
 def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
     flag = CleanShutdownMarker(tmp_path)
     assert not flag.mark_running()
