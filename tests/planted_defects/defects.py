@@ -1,0 +1,165 @@
+"""Defects that somebody could make, each a change of one place: what stands there, what is put there, whose tests must see it.
+
+They are chosen by what they would do on a rig (drop a force, exceed one, take a wrong command, lose data), not by how easy they
+are to find. `tests` are those near the change: a defect that only a far test sees is one that its author meets too late.
+"""
+
+from typing import NamedTuple
+
+
+class Defect(NamedTuple):
+    """file: below gateway/; before: stands in it once; tests: below tests/."""
+
+    name: str
+    file: str
+    before: str
+    after: str
+    tests: tuple[str, ...]
+
+
+_BANK = ("registers/test_bank_commands.py", "registers/test_bank_ownership.py", "registers/test_bank_refusals.py")
+_WIRED = ("service/running_rig/test_wired_faults.py", "service/running_rig/test_wired_invariants.py")
+_REACTIONS = ("faults/test_control_reactions.py", "faults/test_first_cause_and_reset.py", "control/test_states.py")
+_DETECTION = ("control/supervision/test_fault_detection.py", *_REACTIONS)
+
+DEFECTS = (
+    # -- what the voltage may do
+    Defect("the slew limit is dropped", "control/limits.py",
+           "        return highest_v, _VOLTAGE_SLEW\n", "        return target_v, _VOLTAGE_SLEW\n",
+           ("control/test_limits.py",)),
+    Defect("the voltage has no upper end", "control/limits.py",
+           "max(limits.voltage_min_v, min(limits.voltage_max_v, target_v))", "max(limits.voltage_min_v, target_v)",
+           ("control/test_limits.py",)),
+    Defect("NaN passes the limits", "control/limits.py",
+           "    if not isfinite(value):\n        raise", "    if False:\n        raise", ("control/test_limits.py",)),
+    Defect("a calibration's own limit is forgotten", "control/limits.py",
+           "force_max_n=min(limits.force_max_n, finite(own_n[1], \"force_high_n\"))", "force_max_n=limits.force_max_n",
+           ("control/test_limits.py", "control/test_settling.py")),
+    Defect("the trim ignores its limit", "control/force_loop/trim.py",
+           "trim_limited(wanted_v, self._settings.limit_v)", "trim_limited(wanted_v, 100.0)",
+           ("control/test_settling.py", "control/test_limits.py", "control/force_loop", "faults/test_control_schedules.py")),
+    Defect("the integrator is kept over a fault", "control/transitions.py",
+           "        self._parts.loop.rest()\n        self._parts.run.rest(self.fault)",
+           "        self._parts.run.rest(self.fault)", _REACTIONS),
+    # -- supervision
+    Defect("over-force is counted one sample late", "control/supervision/fault_detection.py",
+           "if self._over >= self._limits.over_force_samples", "if self._over > self._limits.over_force_samples", _DETECTION),
+    Defect("over-force is seen when pressed, not when pulled", "control/supervision/fault_detection.py",
+           "abs(reading.contact_n) >= self._limits.over_force_n", "reading.contact_n >= self._limits.over_force_n",
+           (*_DETECTION, "control/valve/test_valve.py")),
+    Defect("an overload of the amplifier is not counted", "control/supervision/fault_detection.py",
+           "is_over = reading.overload or abs", "is_over = abs", (*_DETECTION, "faults/test_wrong_cells.py")),
+    Defect("a silent output is waited for twice as long", "control/supervision/fault_detection.py",
+           "now_s - since_s > self._bounds.output_timeout_s", "now_s - since_s > 2 * self._bounds.output_timeout_s",
+           (*_DETECTION, *_WIRED)),
+    Defect("a stale sample is no fault", "control/supervision/fault_detection.py",
+           "        if not reading.is_fresh:\n            observation", "        if False:\n            observation",
+           _DETECTION),
+    Defect("a reading that is no number goes on", "control/supervision/fault_detection.py",
+           "        if not (reading.is_usable or reading.overload):", "        if False:", _DETECTION),
+    Defect("a stuck force does not keep an enable back", "control/supervision/fault_detection.py",
+           "or not reading.is_usable or self.is_stuck:", "or not reading.is_usable:",
+           (*_DETECTION, "service/running_rig/test_edges_in_every_state.py")),
+    Defect("an enable does not wait for the output's word", "control/supervision/fault_detection.py",
+           "if line.acknowledged_v is None or not", "if not", (*_DETECTION, *_WIRED)),
+    Defect("a frozen cell is believed", "control/supervision/stuck_sensor.py",
+           "if self._same_s >= self._frozen_s and must_have_moved:", "if False:",
+           ("control/supervision/test_stuck_sensor.py", "control/supervision/test_fault_detection.py")),
+    # -- the master
+    Defect("any write renews the lease", "control/supervision/lease.py",
+           "        if heartbeat != self._heartbeat:\n            self._heartbeat = heartbeat\n",
+           "        if True:\n            self._heartbeat = heartbeat\n", ("control/test_commands.py", *_REACTIONS)),
+    Defect("a closed connection is no loss", "control/supervision/lease.py",
+           "return not owner_connected or self.age_s(now_s) > self._length_s", "return self.age_s(now_s) > self._length_s",
+           ("control/test_commands.py", *_REACTIONS, "service/running_rig/test_running_rig.py")),
+    Defect("a reset needs no fresh heartbeat", "control/supervision/lease.py",
+           "return self._changed_s > since_s and now_s - self._changed_s <= self._length_s", "return True",
+           (*_REACTIONS, "service/running_rig/test_edges_in_every_state.py")),
+    Defect("a lost master keeps the ownership", "control/transitions.py",
+           "        self.outcome.release_owner = True\n", "", (*_REACTIONS, "service/running_rig/test_takeovers.py")),
+    Defect("a fault keeps the command", "control/transitions.py",
+           "        self.outcome.clear_command = True\n", "", _REACTIONS),
+    Defect("the owner is not asked", "registers/writes/ownership.py",
+           "return self.owner is None or self.owner == host", "return True", _BANK),
+    Defect("a takeover beats the rig's own owner", "registers/writes/ownership.py",
+           "return self._configured is None or self._configured == host", "return True", _BANK),
+    Defect("another master's stop is refused", "registers/writes/admission.py",
+           "        if is_stop:\n            return _PermittedWrite(commands.values.copy(), 0, True)\n", "", _BANK),
+    Defect("a setpoint just above the limit is taken", "registers/writes/command_field.py",
+           "if self.low <= value <= self.high or not value:", "if self.low <= value <= self.high + 1 or not value:",
+           _BANK),
+    Defect("a negative setpoint is taken", "registers/writes/command_field.py",
+           "if self.low <= value <= self.high or not value:", "if value <= self.high or not value:", _BANK),
+    Defect("swapped words that make a tiny number are taken", "registers/writes/command_field.py",
+           " and (value >= SMALLEST_MEANT or value <= -SMALLEST_MEANT):", ":", _BANK),
+    Defect("a read runs over the end of a block", "registers/bank.py",
+           "if not 0 < count <= self._room[address]:\n            raise self._note_refusal(no_such",
+           "if not 0 < count <= self._room[address] + 1:\n            raise self._note_refusal(no_such",
+           ("registers/test_bank_reading.py", "registers/test_bank_refusals.py")),
+    Defect("control is not asked", "registers/writes/admission.py",
+           "        self._ask(command, values, write)\n", "", ("service/running_rig/test_edges_in_every_state.py", *_BANK)),
+    Defect("the byte order need not be proven", "registers/writes/admission.py",
+           "if self._rules.require_byte_order_echo and not", "if False and not", _BANK),
+    # -- the wire to masters
+    Defect("a foreign unit is answered", "fieldbus/connection.py",
+           "if request.unit in shared.settings.units:", "if True:",
+           ("fieldbus/test_tcp_server.py", "fieldbus/test_connection_by_hand.py", "registers/test_framing_refusals.py")),
+    Defect("the transaction number is forgotten", "fieldbus/connection.py",
+           "encode(Adu(request.transaction, request.unit, pdu))", "encode(Adu(0, request.unit, pdu))",
+           ("fieldbus/test_tcp_server.py", "fieldbus/test_connection_by_hand.py", "fieldbus/test_oracle_pymodbus.py")),
+    Defect("a request is answered twice", "fieldbus/connection.py",
+           "answers.append(self._answer(request))", "answers += [self._answer(request)] * 2",
+           ("fieldbus/test_tcp_server.py", "fieldbus/test_connection_by_hand.py")),
+    Defect("a length beyond Modbus is believed", "modbus/mbap.py",
+           "if not _SHORTEST_LENGTH <= length <= _LONGEST_LENGTH:", "if length < _SHORTEST_LENGTH:",
+           ("modbus/test_mbap_framing.py", "fieldbus/test_connection_ends.py")),
+    Defect("the allow-list is not asked", "fieldbus/peers.py",
+           "if self._guarded and not any(address in network for network in settings.allow):", "if False:",
+           ("fieldbus/test_rate_limits_and_peers.py", "fieldbus/test_tcp_server.py")),
+    Defect("connections have no end", "fieldbus/peers.py",
+           "if sum(self._open.values()) >= settings.connections:", "if False:",
+           ("fieldbus/test_rate_limits_and_peers.py", "fieldbus/test_tcp_server.py")),
+    Defect("a coil takes any word", "modbus/server.py",
+           "    if word not in (0x0000, 0xFF00):", "    if False:", ("modbus", "registers/test_framing_refusals.py")),
+    Defect("the write of FC23 goes after its read", "modbus/server.py",
+           "    bank.write_registers(write_address, data, peer)\n    words = bank.read_registers(read_address, count, peer)\n",
+           "    words = bank.read_registers(read_address, count, peer)\n    bank.write_registers(write_address, data, peer)\n",
+           ("modbus", "registers/test_bank_commands.py")),
+    Defect("a serial frame ends in the middle of itself", "modbus/rtu_receiver.py",
+           "        self._silence_s = silence_s(baud, character_s)\n",
+           "        self._silence_s = 0.1 * silence_s(baud, character_s)\n", ("modbus/test_rtu_receiver.py",)),
+    Defect("a broadcast is answered", "fieldbus/rtu_server.py",
+           "if not request.is_answered or ", "if ", ("fieldbus/test_rtu_server.py",)),
+    # -- coefficients, calibrations, disk
+    Defect("the checksum of an upload is not compared", "registers/upload/staging.py",
+           "if given.crc != (own := set_crc(given.words)):", "if not (own := set_crc(given.words)) and given.crc:",
+           ("registers/test_bank_staging.py", "registers/test_staged_set.py")),
+    Defect("coefficients are not judged", "registers/upload/staging.py",
+           "for finding in validate_coefficients(used, limits):", "for finding in validate_coefficients(used, limits)[:0]:",
+           ("registers/test_bank_staging.py", "registers/test_staged_set.py")),
+    Defect("curves are not proven to rise", "bsfm/validate.py",
+           "return list(_curve_faults(branches, limits)) or list(", "return list(",
+           ("bsfm/test_validate_coefficients.py", "properties")),
+    Defect("a directory is not synchronised", "processes/durable_file.py",
+           "dst_dir_fd=directory)\n        os.fsync(directory)\n", "dst_dir_fd=directory)\n",
+           ("calibrations/test_store.py", "calibrations/test_damage.py")),
+    Defect("a damaged calibration is read", "processes/durable_file.py",
+           "if first + b\"\\n\" == _SEAL % crc32(rest):", "if first.startswith(_SEAL[:8]):",
+           ("calibrations/test_damage.py", "calibrations/test_store.py")),
+    Defect("a full disk is not noticed", "recording/recorder.py",
+           "        if written < len(data):\n            return self._stop(\"the disk is full\")\n", "",
+           ("recording/test_recorder.py",)),
+    Defect("rows are kept back until the end", "recording/recorder.py",
+           "elif self._rows and now_s >= self._next_flush_s:", "elif False:", ("recording/test_recorder.py",)),
+    Defect("a changed line of the audit holds", "audit/chain.py",
+           "if not seal or rest != f'{own}\"}}':", "if not seal:", ("audit",)),
+    # -- processes
+    Defect("the guardian believes half an acknowledgement", "service/supervisor/safe_line.py",
+           "received)[:-1]\n", "received)\n", ("service/supervisor/test_safe_line.py",)),
+    Defect("the guardian says it once", "service/supervisor/safe_line.py",
+           "for _ in range(_REPEATS):", "for _ in range(1):", ("service/supervisor/test_safe_line.py",)),
+    Defect("a death is no reason for the safe voltage", "service/supervisor/guardian.py",
+           "acknowledged = self.control.write_safe_voltage()", "acknowledged = None", ("service/supervisor",)),
+    Defect("the valve switches under pressure", "control/valve/valve_switch.py",
+           "return now_s - self._vented_s >= self.settings.dwell_s", "return True", ("control/valve",)),
+)  # fmt: skip
