@@ -88,8 +88,16 @@ def _summary(diagnosis: Diagnosis, circumstances: ReportContext) -> Iterator[str
     yield notes(words.all_notes(diagnosis, circumstances.notes))
     yield section("What is missing in the simulation", tables.causes_table(diagnosis, circumstances.about))
     yield section("What no effect explains", tables.leftover_table(diagnosis) + leftover_figures(diagnosis))
-    lines = "".join(f"<li>{escape(line)}</li>" for line in circumstances.loop)
-    yield section("What it is worth in commanded force, on the twin", f"<ul>{lines}</ul>" if lines else "")
+    yield section("What it is worth in commanded force, on the twin", _loop(circumstances.loop))
+
+
+def _loop(sentences: Sequence[str]) -> str:
+    """The answer, then its details."""
+    if not sentences:
+        return ""
+    answer, *details = map(escape, sentences)
+    lines = "".join(f"<li>{line}</li>" for line in details)
+    return f"<p><strong>{answer}</strong></p>" + (f"<ul>{lines}</ul>" if lines else "")
 
 
 def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:

@@ -162,20 +162,24 @@ def _mean_settled_s(runs: list[SimulatedRun]) -> float:
     return float(np.mean([settled_s for one in runs for settled_s in one.settled_s]))
 
 
+def answer_sentence(gain: ClosedLoopGain) -> str:
+    """Return whether the commanded force gets better, for terminal and page."""
+    low, high = gain.rms_ratio_ci95
+    said = "gains nothing certain" if low <= 1.0 <= high else "makes it better" if high < 1.0 else "makes it worse"
+    return (
+        f"Error of the commanded force, on the twin: to compensate what was found {said}: {gain.before_rms_n:.2f} N before, "
+        f"{gain.after_rms_n:.2f} N after"
+    )
+
+
 def format_gain(gain: ClosedLoopGain) -> list[str]:
-    """Return the lines that tell the gain in a terminal."""
+    """Return the lines that tell the gain, the answer first."""
     low, high = gain.rms_ratio_ci95
     lines = [
-        f"error in commanded force on the twin, {len(gain.seeds)} seeds",
-        f"  RMS {_change(gain.before_rms_n, gain.after_rms_n)} N",
-        f"  after / before: {gain.rms_ratio:.2f}, 95 % interval {low:.2f} .. {high:.2f}",
-        f"  largest error {_change(gain.before_max_n, gain.after_max_n)} N",
-        f"  a step is within 1 N for good after {_change(gain.before_settled_s, gain.after_settled_s)} s",
-        *(
-            ["  no gain: the interval holds 1, what was found matters little for the force that is commanded"]
-            if low <= 1.0 <= high
-            else []
-        ),
+        answer_sentence(gain),
+        f"after / before: {gain.rms_ratio:.2f}, 95 % interval {low:.2f} .. {high:.2f}, {len(gain.seeds)} seeds",
+        f"largest error {_change(gain.before_max_n, gain.after_max_n)} N",
+        f"a step is within 1 N for good after {_change(gain.before_settled_s, gain.after_settled_s)} s",
         f"compensated: {', '.join(gain.compensated) or 'nothing'}",
         *(f"not compensated: {name}: {why}" for name, why in gain.not_compensated),
     ]

@@ -266,8 +266,9 @@ def test_the_closed_loop_is_measured_only_when_asked_and_told_everywhere(
     assert answer.exit_code == 0, answer.output
     document = json.loads((tmp_path / "out.json").read_text())["closed_loop"]
     assert (document["before_rms_n"], document["after_rms_n"]) == (1.2, 0.3)
-    assert "RMS 1.20 -> 0.30 N" in " ".join(answer.stdout.split())
-    assert "RMS 1.20 -> 0.30 N" in unescape(report.read_text(encoding="utf-8"))
+    answered = "makes it better: 1.20 N before, 0.30 N after"
+    assert answered in " ".join(answer.stdout.split())
+    assert f"{answered}</strong>" in unescape(report.read_text(encoding="utf-8"))
 
 
 def test_a_loop_that_could_not_be_closed_says_why(

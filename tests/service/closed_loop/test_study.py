@@ -107,8 +107,8 @@ def test_several_at_once_with_an_interval_over_seeds():
     low, high = found.rms_ratio_ci95
     assert low <= found.rms_ratio <= high < 0.7
     told = format_gain(found)
-    assert told[0] == "error in commanded force on the twin, 2 seeds"
-    assert f"{found.before_rms_n:.2f} -> {found.after_rms_n:.2f}" in told[1]
+    assert told[0].endswith(f" makes it better: {found.before_rms_n:.2f} N before, {found.after_rms_n:.2f} N after")
+    assert told[1].endswith(", 2 seeds")
     assert "tilt-gravity" in "\n".join(told)
 
 
@@ -169,3 +169,16 @@ def test_a_straightened_command_reaches_the_pressure_of_a_straight_regulator():
 
 def test_equal_plants_give_the_null_compensation():
     assert compensation_of(BASE, BASE, ALL_INPUTS, new_model=True) == NO_COMPENSATION
+
+
+@pytest.mark.parametrize(
+    ("interval", "said"),
+    [((0.5, 0.8), "makes it better"), ((0.97, 1.02), "gains nothing certain"), ((1.1, 1.3), "makes it worse")],
+)
+def test_the_answer_says_no_more_than_its_interval(interval, said):
+    found = ClosedLoopGain(
+        before_rms_n=0.58, after_rms_n=0.59, before_max_n=1.5, after_max_n=1.5, before_settled_s=0.4, after_settled_s=0.4,
+        rms_ratio=1.0, rms_ratio_ci95=interval, seeds=(0, 1), compensated=(), not_compensated=(),
+    )  # fmt: skip
+    answer = f"to compensate what was found {said}: 0.58 N before, 0.59 N after"
+    assert format_gain(found)[0] == f"Error of the commanded force, on the twin: {answer}"
