@@ -71,13 +71,16 @@ class ProgressLine:
             self._is_over.set()
             writer.join()
 
-    def sentence(self) -> str:
-        """Return what is shown now: `fitting, 12 s, 40 %, 0:18 left: models and orders: 16 of 40`."""
+    def sentence(self, width: int = 1000) -> str:
+        """Return what is shown now: `fitting, 12 s, 40 %, 0:18 left: models and orders: 16 of 40`; where that is wider than the
+        terminal, without the task and its seconds, then without the time left."""
         now_s, progress = self._clock(), self._progress
-        words = f"{self._task}, {now_s - self._began_s:.0f} s"
-        if progress.of:
-            words += f", {100 * progress.done // progress.of} %{self._time_left(now_s)}"
-        return words + (f": {progress}" if progress.stage else "")
+        share = f"{100 * progress.done // progress.of} %" if progress.of else ""
+        left, stage = self._time_left(now_s), str(progress) if progress.stage else ""
+        heads = [f"{self._task}, {now_s - self._began_s:.0f} s", ""]
+        choices = [", ".join(part for part in (head, share, left) if part) for head in heads] + [share]
+        sentences = [": ".join(part for part in (choice, stage) if part) for choice in choices]
+        return next((one for one in sentences if len(one) <= width), f"{sentences[-1][: width - 1]}…")
 
     def _time_left(self, now_s: float) -> str:
         """Return what the stage still takes at its present speed; nothing before that can be told."""
@@ -86,7 +89,7 @@ class ProgressLine:
         if done <= 0 or spent_s < _TOLD_S:
             return ""
         left_s = round(spent_s / done * (self._progress.of - self._progress.done))
-        return f", {left_s // 60}:{left_s % 60:02d} left"
+        return f"{left_s // 60}:{left_s % 60:02d} left"
 
     def clear(self) -> None:
         """Remove the line, for what is printed where it stands; it comes back by itself."""
@@ -103,7 +106,7 @@ class ProgressLine:
                 width = shutil.get_terminal_size().columns - 1
                 with self._writing:
                     self._is_shown = True
-                    self._write(f"{_CLEAR}{_shortened(self.sentence(), width)}")
+                    self._write(f"{_CLEAR}{self.sentence(width)}")
             elif self._progress.stage != told:
                 told = self._progress.stage
                 self._write(f"{self.sentence()}\n")
@@ -115,10 +118,6 @@ class ProgressLine:
             self._stream.flush()
         except (OSError, ValueError):  # nobody reads any more
             self._is_over.set()
-
-
-def _shortened(sentence: str, width: int) -> str:
-    return sentence if len(sentence) <= width else f"{sentence[: max(0, width - 1)]}…"
 
 
 class _AboveLine:

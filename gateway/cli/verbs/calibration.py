@@ -128,7 +128,9 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
         from gateway.cli.calibration.measured_points import measured_points
 
         points = {name: measured_points(each, state.directory) for name, each in (("A", first), ("B", second))}
-        plot.write_text(comparison_page(comparison, points), encoding="utf-8")
+        from gateway.cli.diagnosis.outputs import write_all
+
+        write_all({plot: comparison_page(comparison, points)})
     click.echo(json.dumps(comparison.facts(), indent=2) if as_json else table(comparison))
 
 
@@ -167,12 +169,14 @@ def _c_source(calibration: "Calibration") -> dict[str, str]:
 
 def _write(texts: dict[Path, str], *, force: bool) -> None:
     """All or, where one is there already, none."""
+    from gateway.cli.diagnosis.outputs import write_all
+
     for path in texts:
         if path.exists() and not force:
             raise already_exists(path)
-    for path, text in texts.items():
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+    write_all(texts)
+    for path in texts:
         click.echo(f"wrote {path}", err=True)
 
 

@@ -111,7 +111,8 @@ def _text(poller: "Poller") -> None:
 
 
 def _picture(poller: "Poller", svg: Path) -> None:
+    from gateway.cli.diagnosis.outputs import write_all
     from gateway.cli.live_monitor.svg_picture import svg_picture
 
-    svg.write_text(svg_picture(poller.view(*_PICTURE_SIZE)), encoding="utf-8")
+    write_all({svg: svg_picture(poller.view(*_PICTURE_SIZE))})
     click.echo(f"wrote {svg}", err=True)

@@ -107,7 +107,9 @@ def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool, **draw
         pair = _simulate_both(recording, (first, second), state) if recording else None
         if pair and not as_json:
             click.echo(pair.sentence)
-        plot.write_text(plant_comparison_page(differing, (a, b), pair), encoding="utf-8")
+        from gateway.cli.diagnosis.outputs import write_all
+
+        write_all({plot: plant_comparison_page(differing, (a, b), pair)})
     elif recording:
         raise click.UsageError("--recording is drawn into the file of --plot, which is missing")
     if as_json:

@@ -84,6 +84,8 @@ def test_the_time_left_is_that_of_the_stage_at_its_present_speed() -> None:
     now_s[0] = 110.0
     line.tell(Progress("solving", 4, 40))
     assert line.sentence() == "fitting, 110 s, 10 %, 1:30 left: solving: 4 of 40"
+    assert line.sentence(40) == "10 %, 1:30 left: solving: 4 of 40", "on a narrow terminal the stage is not cut"
+    assert line.sentence(30) == "10 %: solving: 4 of 40"
 
 
 def test_what_is_printed_meanwhile_stands_above_the_line(
