@@ -2,7 +2,8 @@
 
 A rig with a lease wants a heartbeat. The browser that commands says once a second that it is there; while it does, this process
 changes the heartbeat register four times in a lease. When the browser goes (closed, asleep, off the network), the beat ends
-within GRACE_S and the lease does its work: no force is held for nobody. A reload within that time loses nothing.
+within GRACE_S (RELOAD_S where its connection has closed) and the lease does its work: no force is held for nobody. A reload
+within that time loses nothing.
 
 Disabling is granted to every master, whoever owns the setpoint, and to nobody else's harm: that is what `stop` is.
 """
@@ -21,6 +22,7 @@ from gateway.registers.words import ControlBit
 from gateway.web.context import WebContext
 
 GRACE_S: Final = 2.5
+RELOAD_S: Final = 1.5
 _BEATS_PER_LEASE: Final = 4.0
 _MOST_WORDS: Final = 120
 _PROOF: Final = 1234.5
@@ -55,8 +57,10 @@ class Commands:
         self.note_alive(viewer)
 
     def leave(self, viewer: str) -> None:
-        """Note that a browser's last stream has ended."""
+        """Note that a browser's last stream has ended: it is being reloaded, or gone."""
         self._present.discard(viewer)
+        if viewer == self.commander:
+            self._seen_s = min(self._seen_s, self._clock() - (GRACE_S - RELOAD_S))
 
     def note_alive(self, viewer: str) -> None:
         """Note that a browser has said that it is there."""

@@ -73,7 +73,7 @@ def in_state(number: int) -> Callable[[dict[str, int]], bool]:
 
 def enable(page: Any, force: str) -> None:
     page.fill("#setpoint", force)
-    page.click("text=Enable")
+    page.click(".steering button[type=submit]")
 
 
 def test_a_force_is_commanded_seen_and_stopped_by_one_key_out_of_an_input(gateway: RunningGateway, page: Any) -> None:

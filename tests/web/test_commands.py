@@ -12,7 +12,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.profiles import Rig
 from gateway.registers.words import State
-from gateway.web.commands import GRACE_S, Commands, RefusedCommand
+from gateway.web.commands import RELOAD_S, Commands, RefusedCommand
 from gateway.web.context import WebContext
 from tests.service.rigs import demo
 from tests.service.test_hostile_requests import Stage
@@ -127,7 +127,7 @@ def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than
         while wired.state is not State.FAULT:
             commands.note_alive("me")  # a browser that has no stream of events open is not there
             commands.note_alive("another")
-            assert wired.now_s - left_s < GRACE_S + 1.0
+            assert wired.now_s - left_s < RELOAD_S + 0.5
             if commands.is_attended:
                 await asyncio.sleep(0)
             else:
@@ -147,10 +147,10 @@ def test_a_reload_within_the_grace_loses_nothing(tmp_path: Path) -> None:
         await commands.enable("me", 12.0)
         commands.leave("me")
         began_s = wired.now_s
-        while wired.now_s < began_s + 1.5:
+        while wired.now_s < began_s + RELOAD_S - 0.3:
             await asyncio.sleep(0)
         commands.join("me")
-        while wired.now_s < began_s + 3.5:
+        while wired.now_s < began_s + 3.0:
             await asyncio.sleep(0)
         assert wired.state is State.HOLDING
 
