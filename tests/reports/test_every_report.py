@@ -2,6 +2,7 @@
 
 import re
 from html.parser import HTMLParser
+from itertools import pairwise
 
 import pytest
 
@@ -61,6 +62,8 @@ def test_the_answer_comes_first_and_the_provenance_last(html: str) -> None:
     assert body[1] == "header" and body.count("h1") == 1 and body.count("footer") == 1
     assert body.index("h1") < body.index("dl") < body.index("figure") < body.index("footer")
     assert re.search(r"\d\.\d+\sN", outline.text["h1"][0]), "an answer without its size is none"
+    levels = [int(tag[1]) for tag in body if tag in ("h1", "h2", "h3")]
+    assert all(after <= before + 1 for before, after in pairwise(levels)), "a heading is skipped"
     footer = html[html.index("<footer>") :]
     assert "Provenance" in footer and "force-gateway 0" in footer and "<h2>" not in footer.partition("</h2>")[2]
 

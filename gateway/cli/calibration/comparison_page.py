@@ -30,7 +30,7 @@ def comparison_page(comparison: Comparison, points: dict[str, MeasuredPoints]) -
     missing = [f"No measured points of {name}: {each.why}." for name, each in points.items() if each.checked is None]
     parts = [
         tiles(*_figures(comparison)),
-        f"<div class='pair'>{_loops(comparison, points)}{_differences(comparison)}</div>",
+        section("Side by side", f"<div class='pair'>{_loops(comparison, points)}{_differences(comparison)}</div>"),
         notes(missing),
         section("The branches, in figures", _table(comparison)),
     ]

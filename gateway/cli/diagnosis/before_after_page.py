@@ -45,7 +45,7 @@ def before_after_page(found: BeforeAfter) -> str:
     )
     parts = [
         tiles(*_figures(found)),
-        *pictures,
+        section("The error over time", "".join(pictures)),
         section("Held, and on the way", table(("part", "before", "after", "gained [95 %]", "verdict"), _rows(found))),
     ]
     return page(head, parts, {"before": found.before.name, "after": found.after.name})

@@ -67,7 +67,7 @@ def plant_comparison_page(differing: dict[str, list[float]], names: tuple[str, s
     rows = ([path, words.number(a, 4), words.number(b, 4)] for path, (a, b) in differing.items())
     parts = [
         _figures(differing, pair),
-        _pictures(pair) if pair else "",
+        section("Over the recording", _pictures(pair)) if pair else "",
         section("What differs", table(("number", "A", "B"), rows, "numbers") if differing else ""),
     ]
     return page(head, parts, {"recording": pair.measurement.name if pair else "", "A": names[0], "B": names[1]})

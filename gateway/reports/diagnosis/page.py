@@ -129,7 +129,7 @@ def _worst_residual(diagnosis: Diagnosis) -> str:
         return ""
     name = f", {traces[0].measurement.name}" if len(traces) > 1 else ""
     drawn = charts.residual_over_time(traces[0], changed=bool(diagnosis.causes))
-    return figure(f"Residual over time{name}", drawn, _BANDS, "full")
+    return section("What the simulation leaves", figure(f"Residual over time{name}", drawn, _BANDS, "full"))
 
 
 def _pictures(diagnosis: Diagnosis) -> Iterator[str]:

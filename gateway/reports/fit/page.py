@@ -21,6 +21,7 @@ def fit_page(evaluation: Evaluation, document: Document, raw: RawLadder | None =
     rows of its recording."""
     parts = [
         _figures(document),
+        "<h2>Measured and model</h2>",
         _pair(
             figure(
                 "Hysteresis loop",
