@@ -4,6 +4,7 @@ On a terminal it is said which rig was taken, because nothing in the answer of, 
 another.
 """
 
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -29,7 +30,8 @@ def tell_rig(rig: str, directory: Path) -> None:
         return
     others = [name for name in rigs_with_state() if name != Path(rig).stem]
     more = f"; --rig takes another: {', '.join(others)}" if others else ""
-    click.echo(click.style(f"rig {rig}, state {directory}{more}", dim=True), err=True)
+    said = f"rig {rig}, state {directory}{more}"
+    click.echo(said if os.environ.get("NO_COLOR") else click.style(said, dim=True), err=True)
 
 
 def rig_option(help_text: str = HELP, *, checks: bool = True) -> Callable[[Function], Function]:

@@ -102,10 +102,12 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
     from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
+    from gateway.progress import report
     from gateway.recording.tables.mapping_file import column_mapping
     from gateway.service.fitting.ladder_fit import fit_recording
     from gateway.service.fitting.ladder_source import RigContext, find_source, read_source
 
+    report("reading the recording")
     path = find_source(name, state_directory(options["state"], options["rig"]))
     if not path.exists():
         raise no_such_recording(path)
@@ -116,6 +118,7 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     )
     background = RigContext(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
     recording = read_source(path, mapping)
+    report("checking the ladder")
     try:
         return fit_recording(recording, question, background, options["name"] or "")
     except LadderError as error:

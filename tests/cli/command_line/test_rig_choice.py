@@ -66,3 +66,11 @@ def test_on_a_terminal_it_is_said_which_was_taken(root: Path, call, monkeypatch:
     said = call("recordings", "list").stderr
     assert f"rig demo, state {root / 'demo'}; --rig takes another: my-cell" in said
     assert call("recordings", "list", "--rig", "demo").stderr == ""
+
+
+def test_no_color_is_kept_to(root: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rig_choice, "is_terminal", lambda: True)
+    monkeypatch.setattr("click.utils.should_strip_ansi", lambda *words: False)
+    monkeypatch.setenv("NO_COLOR", "1")
+    rig_choice.tell_rig("demo", root / "demo")
+    assert "\x1b" not in capsys.readouterr().err
