@@ -187,8 +187,11 @@ def spectra(trace: Trace, *, wide: bool = False, changed: bool = True) -> Drawin
     )
     for (hertz, density), name in list(zip(both, ("before", "after"), strict=True))[: 1 + changed]:
         chart.line(hertz.tolist(), np.maximum(density, chart.y.low).tolist(), f"{name} thick", name)
-    line = peaks.spectral_line(*both[int(changed)])
-    if line is None:
-        return drawing(chart, "No line stands out.")
-    chart.mark(line.x, line.y, f"a line at {words.number(line.x)} Hz")
-    return drawing(chart, f"A line at {words.number(line.x)} Hz stands out: {words.number(line.y)} N/√Hz.")
+    peak = peaks.spectral_peak(*both[int(changed)])
+    if peak is None:
+        return drawing(chart, "No peak stands out.")
+    chart.mark(peak.x, peak.y, f"{words.number(peak.x)} Hz")
+    place = int(np.argmin(np.abs(frequency_hz - peak.x)))
+    sizes = [f"{words.number(float(density[place]), 2)} N/√Hz" for _, density in both]
+    change = f"{sizes[0]} before, {sizes[1]} after" if changed else sizes[0]
+    return drawing(chart, f"The highest peak over what is beside it: {words.number(peak.x)} Hz, {change}.")

@@ -12,7 +12,7 @@ from gateway.reports.diagnosis.series import TraceResiduals
 
 _JUST_BEFORE_S: Final = 1.0
 _MOVES_SHARE: Final = 0.02  # of the drive's range within that second: less is rest
-_LINE_RATIO: Final = 4.0  # of a density over the usual one beside it
+_PEAK_RATIO: Final = 2.0  # of a density over the usual one beside it
 _BESIDE: Final = 10  # bands on either side
 
 
@@ -76,11 +76,11 @@ def describe_means(before: Peak | None, after: Peak | None, unit: str) -> str:
     return f"{first}{last}."
 
 
-def spectral_line(frequency_hz: Floats, density: Floats) -> Peak | None:
+def spectral_peak(frequency_hz: Floats, density: Floats) -> Peak | None:
     """Return the band that stands out most from those beside it; None where none does."""
     if density.size < 2 * _BESIDE:
         return None
     usual = np.array([np.median(density[max(0, k - _BESIDE) : k + _BESIDE + 1]) for k in range(density.size)])
     ratio = density / np.maximum(usual, 1e-300)
     place = int(np.argmax(ratio))
-    return Peak(float(frequency_hz[place]), float(density[place])) if ratio[place] >= _LINE_RATIO else None
+    return Peak(float(frequency_hz[place]), float(density[place])) if ratio[place] >= _PEAK_RATIO else None

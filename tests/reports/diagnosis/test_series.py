@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gateway.reports.diagnosis import peaks
 from gateway.reports.diagnosis.series import (
     TraceResiduals,
     bin_means,
@@ -138,3 +139,23 @@ def test_the_closer_look_is_where_the_gain_is() -> None:
     before = np.where((time_s > 70.0) & (time_s < 75.0), 2.0, 0.1)
     start, end = most_improved_window(TraceResiduals(time_s, before, before, np.full(time_s.size, 0.1)))
     assert start <= 71.0 and end >= 74.0
+
+
+def test_a_spectrum_s_peak_is_found_and_chance_is_none() -> None:
+    hertz = np.geomspace(0.1, 100.0, 120)
+    noise = 0.02 * np.exp(np.random.default_rng(5).normal(0.0, 0.15, 120))
+    assert peaks.spectral_peak(hertz, noise) is None
+    noise[90] = 0.07
+    found = peaks.spectral_peak(hertz, noise)
+    assert found is not None and found.x == hertz[90]
+    assert peaks.spectral_peak(hertz[:8], noise[:8]) is None
+
+
+def test_what_happens_at_a_moment_is_told_from_the_drive() -> None:
+    time_s = np.arange(0.0, 20.0, 0.05)
+    volts = np.interp(time_s, [0.0, 5.0, 10.0, 15.0, 20.0], [0.0, 4.0, 4.0, 1.0, 1.0])
+    one = replace(trace(rows=time_s.size).measurement, time_s=time_s, command_v=volts)
+    assert peaks.describe_moment(one, 3.0) == "while the command moves from 1.64 to 2.40 V"
+    assert peaks.describe_moment(one, 8.0) == "with the command at rest at 4.00 V"
+    assert peaks.describe_moment(one, 10.3) == "within a second after a reversal"
+    assert peaks.describe_moment(replace(one, command_v=np.full(time_s.size, 2.0)), 8.0) == "with the command constant"
