@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import termios
+import threading
 from io import StringIO
 from pathlib import Path
 
@@ -91,12 +92,16 @@ def test_q_and_ctrl_c_leave_the_live_page_cleanly(fake, key: bytes) -> None:
     while b"quits" not in shown:
         shown += os.read(ours, 65536)
     os.write(ours, key)
+    patience = threading.Timer(20.0, process.kill)  # a key that does nothing fails the test, it does not hold it up
+    patience.start()
     try:
         while chunk := os.read(ours, 65536):
             shown += chunk
     except OSError:  # the far end is closed: the process has ended
         pass
     os.close(ours)
+    patience.cancel()
+    patience.join()
     assert process.stderr
     with process.stderr:
         assert process.stderr.read() == b""
