@@ -35,7 +35,7 @@ WRONG = [
     (432, 1, "W203"),
     (500, 2, "W202"),
     (2000, 1, "W202"),
-    (65535, 1, "W202"),
+    (65535, 1, "W203 address 65535 is what register 0 becomes"),
     (40001, 2, "W202 40001 is the name of address 0"),
     (40102, 2, "W202 40102 is the name of address 101"),
     (30001, 1, "W202 30001 is the name of address 0"),

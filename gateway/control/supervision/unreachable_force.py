@@ -17,6 +17,7 @@ _UNIT_SLACK: Final = 1.15  # trim and calibration move the ratio by so much
 _FRICTION_N: Final = 2.0  # what friction may hold beside it, where the true force is small
 _TIMES: Final = 3.0
 _LEAST_N: Final = 0.3  # less is noise and zero
+_LEAST_TOLD_N: Final = 0.15  # from here on it is told beside the likelier cause
 _SILENT_SHARE: Final = 0.25
 _LITTLE, _ENOUGH = 0.5, 0.7  # of the pressure that was seen at this voltage while the force was right
 _VERY_LITTLE, _PLENTY = 0.2, 0.5  # of what the ranges of the device say
@@ -63,12 +64,21 @@ class Evidence:
         return self.measured_n / self.expected_n if self.expected_n > 0.0 else nan
 
     @property
+    def _is_a_tenth(self) -> bool:
+        """Decide whether kilograms-force read as newtons would show this."""
+        return 1.0 / _UNIT_SLACK < self.factor * STANDARD_GRAVITY_M_PER_S2 < _UNIT_SLACK
+
+    @property
+    def may_be_kgf(self) -> bool:
+        """Decide whether it may be that where the force is too small to be sure: before contact is felt."""
+        about_a_tenth = 0.5 < self.factor * STANDARD_GRAVITY_M_PER_S2 < 1.6
+        return _LEAST_TOLD_N < self.measured_n <= _LEAST_N and about_a_tenth and not self.was_in_band
+
+    @property
     def looks_like_another_unit(self) -> bool:
         """Decide whether the factor is that between newtons and kilograms-force, either way."""
         if self.factor < 1.0:
-            return (
-                self.measured_n > _LEAST_N and 1.0 / _UNIT_SLACK < self.factor * STANDARD_GRAVITY_M_PER_S2 < _UNIT_SLACK
-            )
+            return self.measured_n > _LEAST_N and self._is_a_tenth
         off_n = abs(self.measured_n / STANDARD_GRAVITY_M_PER_S2 - self.expected_n)
         return self.factor > _TIMES and off_n < (_UNIT_SLACK - 1.0) * self.expected_n + _FRICTION_N
 
@@ -107,9 +117,15 @@ def _unit_words(evidence: Evidence, pressure: str) -> str:
 
 
 def _silent_words(evidence: Evidence, pressure: str) -> str:
+    unit = ""
+    if evidence.may_be_kgf:
+        unit = (
+            f"; or kgf read as N, which the factor {evidence.factor:.3g} looks like (A303): check the unit on the amplifier "
+            "against the rig file, or press with a larger precontact_force"
+        )
     if evidence.has_air:
-        return f"{pressure}: air is there, so no contact with the workpiece"
+        return f"{pressure}: air is there, so no contact with the workpiece{unit}"
     clause = f"{pressure}; " if pressure else ""
     if evidence.was_in_band:
         return f"{clause}the force was right before in this enable: contact lost or air gone; look at the gauge and at the tool"
-    return f"{clause}no air, valve closed or no contact"
+    return f"{clause}no air, valve closed or no contact{unit}"

@@ -11,6 +11,7 @@ from gateway.codes.refusals import OFF_BY_ONE, RefusalReason
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
 
+_BEFORE_THE_FIRST: Final = 0xFFFF
 _NAMES: Final = ((40001, 49999, "holding register"), (30001, 39999, "input register"), (10001, 19999, "discrete input"))
 
 
@@ -37,6 +38,8 @@ def _explain_name_as_address(address: int) -> str:
 
 
 def _explain_shift(blocks: Sequence[Block], address: int, count: int) -> str:
+    if address == _BEFORE_THE_FIRST:
+        return f"address {address} is what register 0 becomes where a client counts from 1: the first register is 1 (address 0)"
     for block in blocks:
         inside = f"block {block.name} is {block.first} .. {block.last}"
         if block.first <= address <= block.last + 1 == address + count - 1:

@@ -41,6 +41,8 @@ FAULTS: Final = (
     Setting("cell.silent", "the load-cell amplifier sends nothing"),
     Setting("cell.frozen", "it repeats its last value"),
     Setting("cell.inverted", "its signal wires are exchanged"),
+    Setting("cell.kgf", "its display is in kgf where the rig file says N: it shows a 9.81th"),
+    Setting("cell.scale", "it shows this many times the force; 9.81: N where the rig file says kgf", "1", 0.01, 100.0),
     Setting("cell.noise", "standard deviation of a reading", "N", 0.0, 50.0),
     Setting("cell.unplug", "its port disappears; back, it is another one"),
     Setting("output.silent", "the output device obeys and answers nothing"),

@@ -29,6 +29,7 @@ from gateway.service.simulation.valve import SimulatedValve
 from gateway.service.socket_requests import FaultRequest, SimulationRequest, parse_request
 from gateway.twin import Plant, Twin
 from gateway.twin.plant import with_value
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
 _LONGEST_LEAP_S: Final = 1.0  # a rig process that was stopped does not replay the hours it missed
 _TRIPPED_V: Final = 0.0  # where a simulated output goes when its own watchdog trips
@@ -124,10 +125,18 @@ class SimulatedRig:
         if self.settings.is_on("cell.silent"):
             return
         if not self.settings.is_on("cell.frozen"):
-            self._shown_n = self._wiring * self.valve.sign * float(self.twin.measured_n)
+            self._shown_n = self._in_unit(self._wiring * self.valve.sign * float(self.twin.measured_n))
         overload = abs(self._shown_n) >= self._range_n
         frame = self._cell.frame(self._shown_n, Quality.OVERLOAD if overload else Quality.OK)
         self._send_cell(self._through_noise(frame))
+
+    def _in_unit(self, force_n: float) -> float:
+        """Return what the amplifier shows where its unit is not that of the rig file. In kgf its last digit is as restless as
+        before: there are as many digits."""
+        shown_n = force_n * (self.settings.number("cell.scale") or 1.0)
+        if not self.settings.is_on("cell.kgf"):
+            return shown_n
+        return shown_n / STANDARD_GRAVITY_M_PER_S2 + self._noise.gauss(0.0, self._plant.cell.noise_n)
 
     def _answer(self, request: OutputRequest | Garbage) -> bytes:
         match request:

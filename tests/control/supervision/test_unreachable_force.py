@@ -108,3 +108,23 @@ def test_between_the_bounds_nothing_is_claimed(pressure_pa: float, learned: bool
     )
     assert words in unreachable_words(seen)
     assert ("60 kPa measured, 100 kPa expected" in unreachable_words(seen)) == learned
+
+
+@pytest.mark.parametrize(
+    ("measured_n", "was_in_band", "is_told"),
+    [(0.29, False, True), (0.2, False, True), (0.05, False, False), (0.29, True, False)],
+)
+def test_a_tenth_of_a_small_force_names_kgf_beside_the_missing_contact(
+    measured_n: float, was_in_band: bool, is_told: bool
+) -> None:
+    seen = Evidence(
+        voltage_v=0.26,
+        measured_n=measured_n,
+        expected_n=3.1,
+        pressure_pa=24e3,
+        expected_pa=24e3,
+        was_in_band=was_in_band,
+    )
+    assert "air is there, so no contact with the workpiece" in unreachable_words(seen)
+    assert ("kgf read as N" in unreachable_words(seen)) == is_told
+    assert ("(A303): check the unit on the amplifier" in unreachable_words(seen)) == is_told
