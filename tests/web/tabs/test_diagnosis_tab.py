@@ -5,6 +5,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,12 +18,17 @@ from tests.web.tabs.served_tabs import serve
 FOREVER = "import gateway.progress as p\nwhile True: p.report('searching', 1, 3)\n"
 
 
-def ended(page, within_s: float = 60.0) -> dict:
+def wait_until(page, fits: Callable[[dict], bool], within_s: float = 60.0) -> dict:
     deadline_s = time.monotonic() + within_s
-    while not (job := page.get("/api/v1/diagnosis").json["job"])["ended"]:
+    while not fits(job := page.get("/api/v1/diagnosis").json["job"]):
         assert time.monotonic() < deadline_s, job
-        time.sleep(0.05)
+        time.sleep(0.02)
     return job
+
+
+def is_searching(job: dict) -> bool:
+    assert not job["ended"], job
+    return job["stage"] == "searching"
 
 
 @pytest.fixture
@@ -43,9 +49,7 @@ def test_a_second_one_is_refused_and_a_cancelled_one_leaves_nothing(page, state,
     refused = page.post("/api/v1/diagnosis/begin", {"recording": 2})
     assert refused.status == 409
     assert refused.json["error"].startswith("E179 recording 1 is being diagnosed")
-    while (job := page.get("/api/v1/diagnosis").json["job"])["stage"] != "searching":
-        assert not job["ended"], job
-        time.sleep(0.02)
+    job = wait_until(page, is_searching)
     assert (job["done"], job["of"]) == (1, 3)
     assert page.post("/api/v1/diagnosis/cancel").json["job"]["ended"] == "cancelled"
     assert not list((state / "diagnoses").iterdir())
@@ -56,8 +60,7 @@ def test_the_end_of_the_page_ends_its_diagnosis(state, endless) -> None:
     record(state)
     with serve(state) as page:
         page.post("/api/v1/diagnosis/begin", {"recording": 1})
-        while page.get("/api/v1/diagnosis").json["job"]["stage"] != "searching":
-            time.sleep(0.02)
+        wait_until(page, is_searching)
         assert searches_of(state)
     assert not searches_of(state)
 
@@ -78,16 +81,19 @@ def test_the_end_of_the_link_ends_the_process_in_the_middle_of_its_work(endless)
     command = [sys.executable, "-m", "gateway.web.tabs.diagnosis_process", str(far_end.fileno()), "gateway_of_test"]
     with subprocess.Popen(command, pass_fds=(far_end.fileno(),)) as process:
         far_end.close()
-        with ours, ours.makefile("rb") as told:
-            assert json.loads(told.readline())["stage"] == "searching"
-        assert process.wait(20) == 1
+        try:
+            with ours, ours.makefile("rb") as told:
+                assert json.loads(told.readline())["stage"] == "searching"
+            assert process.wait(20) == 1
+        finally:
+            process.kill()
 
 
 def test_what_cannot_be_diagnosed_is_told_in_the_verbs_words(page, state) -> None:
     path = record(state)
     path.write_bytes(path.read_bytes()[:200])
     assert page.post("/api/v1/diagnosis/begin", {"recording": 1}).status == 200
-    job = ended(page)
+    job = wait_until(page, lambda job: bool(job["ended"]))
     assert job["ended"] == "failed"
     assert job["said"].startswith("E403 ")
     assert not list((state / "diagnoses").iterdir())

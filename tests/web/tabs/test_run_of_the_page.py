@@ -35,8 +35,9 @@ def test_a_run_that_nobody_looks_at_is_let_go(state, control) -> None:
         follower = RunFollower(WebContext(state, "demo", True, ControlLink(state)), lambda: now_s[0])
         await follower.begin(PLAN["plan"], "")
         now_s[0] = ABANDONED_S + 1.0
-        while follower.is_following:
-            await asyncio.sleep(0.01)
+        async with asyncio.timeout(10.0):
+            while follower.is_following:
+                await asyncio.sleep(0.01)
         return control.count("calibrate")
 
     asked = asyncio.run(begin_and_leave())
