@@ -60,7 +60,7 @@ def names_in(source: Path) -> list[str]:
             _check(archive, members)
             return [member.name.removeprefix(f"{_TOP}/") for member in members if member.isfile()][1:]
     except (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError) as error:
-        raise ArchiveError(f"{source} is damaged or no tar.gz: {error}") from None
+        raise ArchiveError(f"{source} is damaged, or no archive of `force-gateway backup` (tar.gz): {error}") from None
 
 
 def unpack(source: Path, state: Path) -> Path | None:

@@ -5,6 +5,7 @@ from copy import deepcopy
 
 import pytest
 
+from gateway.profiles import load_register_map
 from gateway.registers import MapError, UnknownRegister
 from gateway.registers.map.map_reader import read_map
 from gateway.registers.residual_cause import ResidualCause
@@ -29,6 +30,18 @@ BLOCKS = {
     "active": (1500, 1699),
 }
 SCALES = {"s": 1, "N": 0.01, "N/s": 0.1, "mV": 1, "deg": 0.1, "ms": 1, "g": 1, "us": 1, "kPa": 1, "permille": 1, "": 1}
+
+
+@pytest.mark.parametrize(
+    ("number", "name"),
+    [("40103", "force_measured"), ("30103", "force_measured"), ("102", "force_measured"), ("40001", "control_word")],
+)
+def test_a_number_for_a_name_says_whose_it_is(number, name):
+    register_map = load_register_map("force-v1")
+    with pytest.raises(
+        LookupError, match=f"{number} is not a register by name: {number} is the .* of {name}, so use {name}"
+    ):
+        register_map.find(number)
 
 
 def test_blocks_are_those_of_the_contract(register_map):

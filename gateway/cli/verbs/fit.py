@@ -122,7 +122,7 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     try:
         return fit_recording(recording, question, background, options["name"] or "")
     except LadderError as error:
-        hint = f" {recording.suggestion}" if error.flaw is LadderFlaw.COLUMNS and recording.suggestion else ""
+        hint = f". {recording.suggestion}" if error.flaw is LadderFlaw.COLUMNS and recording.suggestion else ""
         raise CliError(f"E421 {path}: {error}{hint}", exit_codes.DATA) from None
 
 

@@ -149,10 +149,18 @@ class RegisterMap:
         raise UnknownRegister(f"{name} is not a register{self._suggest_register(name)}")
 
     def _suggest_register(self, name: str) -> str:
+        if name.isdecimal() and (register := self._at_number(int(name))):
+            what = "address" if register.address == int(name) else "number"
+            return f" by name: {name} is the {what} of {register.name}, so use {register.name}"
         near = get_close_matches(
             name.lower(), [*self._by_name, *(register.name for register in self.registers)], 1, 0.6
         )
         return f"; did you mean {near[0]}?" if near else "; force-gateway registers lists them"
+
+    def _at_number(self, number: int) -> Register | None:
+        """Return the register of an address, or of the name that PLCs give it: 40103, 30103."""
+        base = next((first for first in (40001, 30001) if first <= number < first + 9999), 0)
+        return next((one for one in self.registers if one.address <= number - base < one.address + one.words), None)
 
     @cached_property
     def _by_name(self) -> dict[str, Register]:

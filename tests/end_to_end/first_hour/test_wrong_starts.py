@@ -133,3 +133,18 @@ def test_a_wrong_baud_is_found_and_named_before_ready(tmp_path: Path):
         assert gateway.status()["state"] == 0
     finally:
         stop(gateway)
+
+
+def test_one_command_without_a_heartbeat_is_a_lost_master_where_there_is_a_lease(tmp_path: Path):
+    text = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text()
+    text = text.replace("name: demo", "name: leased").replace("lease_s: null", "lease_s: 0.3")
+    (tmp_path / "leased.yaml").write_text(text)
+    gateway = start(tmp_path / "state", "--sim", rig=str(tmp_path / "leased.yaml"))
+    try:
+        assert not gateway.write(0, 1, 1000).isError()
+        said = gateway.said("A310", within_s=5.0)
+        assert "master lost" in said
+        assert "heartbeat unchanged for 3" in said
+        assert gateway.status()["output_voltage"] == 0
+    finally:
+        stop(gateway)
