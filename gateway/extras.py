@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 ANALYSIS: Final = "analysis"
-_EXTRA_OF: Final = {"numba": ANALYSIS, "openpyxl": ANALYSIS, "pyarrow": ANALYSIS}
+_EXTRA_OF: Final = {"numba": ANALYSIS, "openpyxl": ANALYSIS, "pyarrow": ANALYSIS, "distributed": "fleet"}
 
 
 class MissingExtraError(ImportError):

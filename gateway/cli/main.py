@@ -39,6 +39,7 @@ VERBS: Final = (
     "recordings",
     "metrics",
     "diagnose",
+    "fleet",
     "sim",
     "simulate",
     "effects",

@@ -145,6 +145,27 @@ ERRORS: Final = (
         "Take the missing ones over from profiles/registers/force-v1.yaml, or make the client from force-v1.",
     ),
     Explanation(
+        "E190",
+        "no recording matches",
+        "The pattern of fleet fit or fleet diagnose finds no file.",
+        "A pattern without quotes that the shell has expanded elsewhere, a misspelled folder, or another ending.",
+        "Quote it: 'recordings/cell=*/date=*/*.parquet'; ls with the same pattern shows what is there.",
+    ),
+    Explanation(
+        "E191",
+        "no Dask scheduler answers",
+        "The address given with --scheduler takes no connection of a Dask client.",
+        "No scheduler runs there, a firewall, or other versions of dask on both sides.",
+        "dask scheduler starts one and prints its address, dask worker ADDRESS joins it; without a cluster leave it out.",
+    ),
+    Explanation(
+        "E192",
+        "a recording ended its worker twice",
+        "The process that computed this row was killed, and again when it was tried alone.",
+        "Mostly memory: a recording of very many rows on a small machine. The kernel's log (dmesg) names who was killed.",
+        "Diagnose it by itself on a larger machine, or shorten it; the other rows are not touched by it.",
+    ),
+    Explanation(
         "E402",
         "recording stopped",
         "The disk did not take a batch of the recording. Control goes on, rows before that are whole.",

@@ -1,0 +1,1 @@
+"""What `fleet` computes of one recording, and what it writes of all."""

@@ -1,0 +1,133 @@
+"""Which cells drift, and why: the trend of each cell over its days, against what chance would show somewhere in the fleet.
+
+A cell's quantity is each row's `value_n`: of a diagnosis what the simulation gets wrong beyond the noise, of a fit the force at
+the middle of the voltages. Its slope is that of least squares over the days, with the interval and the chance by Student's t;
+among many cells the smallest of many chances is small, so chances are judged by Holm's step-down procedure (Holm 1979), which
+keeps the chance of even one false alarm in the whole fleet at `ALPHA`. A drift that nobody would mind is none: over the days
+that were seen it must reach `LEAST_N`.
+Why: the effect whose part of the excess has grown most in that cell, by the same slope.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from math import isfinite, sqrt
+from typing import Final
+
+import numpy as np
+
+from gateway.fleet.tasks import Row
+
+ALPHA: Final = 0.01
+LEAST_DAYS: Final = 4  # a line through three has one degree of freedom: nothing is small enough
+LEAST_N: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """Slope in N per day with its 95 % interval, and the chance of one as steep without a trend."""
+
+    slope_n_per_day: float
+    low: float
+    high: float
+    chance: float
+
+
+@dataclass(frozen=True, slots=True)
+class CellDrift:
+    """days: since the cell's first one; values_n: of each day's recordings, the median; change_n: over all days, by the
+    slope; cause: the effect that has grown most, empty for none; cause_n: by how much."""
+
+    cell: str
+    first_day: str
+    days: tuple[float, ...]
+    values_n: tuple[float, ...]
+    trend: Trend | None
+    change_n: float
+    drifts: bool
+    cause: str
+    cause_n: float
+    errors: int
+
+
+def find_drifts(rows: Iterable[Row]) -> list[CellDrift]:
+    """Return every cell, those that drift first and the steepest of them before the others. Rows without a date or with an
+    error tell of no trend."""
+    by_cell: dict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        by_cell[row["cell"]].append(row)
+    cells = [_of_cell(cell, found) for cell, found in sorted(by_cell.items())]
+    proven = _holm({one.cell: one.trend.chance for one in cells if one.trend})
+    judged = [_judge(one, is_proven=one.cell in proven) for one in cells]
+    return sorted(judged, key=lambda one: (not one.drifts, -abs(one.change_n), one.cell))
+
+
+def fit_trend(days: Sequence[float], values: Sequence[float]) -> Trend | None:
+    """Return the line's slope; None where too few days are known."""
+    from scipy.special import stdtr, stdtrit
+
+    x, y = np.asarray(days, float), np.asarray(values, float)
+    if len(set(days)) < LEAST_DAYS:
+        return None
+    freedom = len(x) - 2
+    centred = x - x.mean()
+    slope = float(centred @ y / (centred @ centred))
+    left = y - y.mean() - slope * centred
+    error = sqrt(float(left @ left) / freedom / float(centred @ centred))
+    half = float(stdtrit(freedom, 0.975)) * error
+    chance = float(2.0 * stdtr(freedom, -abs(slope) / error)) if error > 0.0 else float(slope == 0.0)
+    return Trend(slope, slope - half, slope + half, chance)
+
+
+def _of_cell(cell: str, rows: Sequence[Row]) -> CellDrift:
+    good = [row for row in rows if not row["error_code"] and _day(row["date"]) is not None]
+    days = sorted({row["date"] for row in good})
+    first = _day(days[0]) if days else None
+    since = tuple(float((_day(day) or date.min).toordinal() - first.toordinal()) for day in days) if first else ()
+    values = tuple(float(np.median([row["value_n"] for row in good if row["date"] == day])) for day in days)
+    trend = fit_trend(since, values)
+    change_n = trend.slope_n_per_day * (since[-1] - since[0]) if trend else 0.0
+    cause, cause_n = _grown(good, days, since) if trend else ("", 0.0)
+    errors = sum(bool(row["error_code"]) for row in rows)
+    return CellDrift(cell, days[0] if days else "", since, values, trend, change_n, False, cause, cause_n, errors)
+
+
+def _judge(one: CellDrift, *, is_proven: bool) -> CellDrift:
+    return replace(one, drifts=is_proven and abs(one.change_n) >= LEAST_N)
+
+
+def _grown(rows: Sequence[Row], days: Sequence[str], since: Sequence[float]) -> tuple[str, float]:
+    """The effect whose gain has changed most over the days; a day on which it is not named has 0 of it."""
+    names = {cause["name"] for row in rows for cause in row["causes"]}
+    changes = {name: _change_of(name, rows, days, since) for name in sorted(names)}
+    best = max(changes, key=lambda name: abs(changes[name]), default="")
+    return (best, changes[best]) if best else ("", 0.0)
+
+
+def _change_of(name: str, rows: Sequence[Row], days: Sequence[str], since: Sequence[float]) -> float:
+    gains = [float(np.mean([_gain_of(name, row) for row in rows if row["date"] == day])) for day in days]
+    trend = fit_trend(since, gains)
+    return trend.slope_n_per_day * (since[-1] - since[0]) if trend else 0.0
+
+
+def _gain_of(name: str, row: Row) -> float:
+    return next((cause["gain_n"] for cause in row["causes"] if cause["name"] == name), 0.0)
+
+
+def _holm(chances: Mapping[str, float]) -> set[str]:
+    """Return the names whose null hypothesis falls at ALPHA among all of them."""
+    fallen: set[str] = set()
+    order = sorted((chance, name) for name, chance in chances.items() if isfinite(chance))
+    for place, (chance, name) in enumerate(order):
+        if chance > ALPHA / (len(order) - place):
+            break
+        fallen.add(name)
+    return fallen
+
+
+def _day(text: str) -> date | None:
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        return None

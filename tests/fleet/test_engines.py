@@ -1,0 +1,68 @@
+"""The same rows whoever computes them; a worker that dies takes none with it."""
+
+import subprocess
+import sys
+from multiprocessing import resource_tracker
+from pathlib import Path
+
+import pytest
+
+from gateway.fleet.engines import Compute, Engine, processes, run_serially
+from gateway.fleet.tasks import Row, Task, find_tasks
+from tests.fleet.workers import count_bytes, die_at_some
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _tracker() -> None:
+    """The standard library's own process beside spawned ones, which stays to the end."""
+    resource_tracker.ensure_running()
+
+
+def folder_of(folder: Path, *texts: str) -> list[Task]:
+    for number, text in enumerate(texts):
+        place = folder / f"cell={number % 3}" / f"date=2026-11-{number + 1:02d}"
+        place.mkdir(parents=True)
+        (place / "press.csv").write_text(text)
+    return find_tasks([f"{folder}/cell=*/date=*/*.csv"])
+
+
+def rows_of(engine: Engine, compute: Compute, tasks: list[Task]) -> list[Row]:
+    found = dict(engine(compute, tasks))
+    assert len(found) == len(tasks)
+    return [found[task] for task in tasks]
+
+
+def test_cell_and_date_are_those_of_the_folders_and_the_order_is_that_of_the_paths(tmp_path: Path) -> None:
+    tasks = folder_of(tmp_path, "a", "b", "c", "d")
+    assert [(task.cell, task.date[-2:]) for task in tasks] == [("0", "01"), ("0", "04"), ("1", "02"), ("2", "03")]
+    assert len({task.sha256 for task in tasks}) == 4
+
+
+def test_processes_give_the_rows_of_one_and_a_death_costs_none(tmp_path: Path) -> None:
+    tasks = folder_of(tmp_path, "one", "two two", "unreadable", "once upon a time", "deadly", "six")
+    told = rows_of(processes(2), die_at_some, tasks)
+    by_file = {Path(row["file"]).read_text(): row for row in told}
+    assert by_file.pop("deadly")["error_code"] == "E192"
+    others = [task for task in tasks if Path(task.path).read_text() in by_file]
+    assert [by_file[Path(task.path).read_text()] for task in others] == rows_of(run_serially, count_bytes, others)
+    assert by_file["unreadable"]["error_code"] == "E403"
+    assert by_file["once upon a time"]["value_n"] == 16.0
+
+
+def on_a_cluster(*words: str) -> str:
+    """In a process of its own: distributed leaves threads and descriptors to the end of its process."""
+    command = [sys.executable, str(Path(__file__).with_name("on_a_cluster.py")), *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-1]
+
+
+@pytest.mark.long
+def test_a_cluster_of_two_workers_gives_the_same_rows_and_outlives_one_of_them(tmp_path: Path) -> None:
+    tasks = folder_of(tmp_path, "one", "two two", "unreadable", "once upon a time", "six")
+    assert on_a_cluster(str(tmp_path)) == repr(rows_of(run_serially, count_bytes, tasks))
+
+
+@pytest.mark.long
+def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
+    assert "E191 no Dask scheduler answers on tcp://127.0.0.1:9" in on_a_cluster(str(tmp_path), "tcp://127.0.0.1:9")
