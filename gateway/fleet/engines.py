@@ -13,6 +13,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -75,12 +76,11 @@ def _run_in_processes(workers: int, compute: Compute, tasks: Sequence[Task]) -> 
 
 
 def _alone(compute: Compute, task: Task) -> Row:
-    """In a process that nobody else uses: one that dies now died of this recording."""
-    with _pool(1) as pool:
-        try:
+    """In a process that nobody else uses: one that dies now, and again, died of this recording."""
+    for _ in range(2):
+        with _pool(1) as pool, suppress(BrokenProcessPool):
             return pool.submit(compute_row, compute, task).result()
-        except BrokenProcessPool:
-            return error_row(task, KILLED)
+    return error_row(task, KILLED)
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:

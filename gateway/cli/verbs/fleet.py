@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.fleet.engines import Engine
+    from gateway.fleet.kept_rows import KeptRows
     from gateway.fleet.tasks import Row, Task
 
 Function = Callable[..., Any]
@@ -95,9 +96,10 @@ def _absolute(name: str | None) -> str | None:
 
 def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], options: dict[str, Any]) -> None:
     from gateway.cli.diagnosis.progress_line import show_progress
-    from gateway.cli.fleet.files import write_files
+    from gateway.cli.fleet.files import KEPT, write_files
     from gateway.extras import require
     from gateway.fleet.drift import find_drifts
+    from gateway.fleet.kept_rows import KeptRows
     from gateway.fleet.page import headline
     from gateway.fleet.tasks import find_tasks
 
@@ -105,10 +107,12 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
     tasks = find_tasks(options["patterns"])
     if not tasks:
         raise CliError(f"E190 no file matches {' '.join(options['patterns'])}; quote the pattern", exit_codes.DATA)
-    engine = _engine_of(options["scheduler"], options["workers"])
+    engine = partial(_engine_of(options["scheduler"], options["workers"]), compute)
     folder = options["output"] or Path(f"fleet-{verb}")
+    if options["fresh"]:
+        (folder / KEPT).unlink(missing_ok=True)
     with show_progress(f"fleet {verb}"):
-        rows, taken_over = _compute(verb, compute, tasks, engine, folder, options)
+        rows, taken_over = _compute(tasks, engine, KeptRows(folder / KEPT, _question(verb, options)))
     rows = [dict.fromkeys(("file", "cell", "date", "sha256", *columns, "error_code", "error")) | row for row in rows]
     for row in rows:
         row["causes"] = row["causes"] or []
@@ -127,28 +131,18 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
 
 
 def _compute(
-    verb: str,
-    compute: "Callable[[Task], Row]",
-    tasks: "Sequence[Task]",
-    engine: "Engine",
-    folder: Path,
-    options: dict[str, Any],
+    tasks: "Sequence[Task]", engine: "Callable[[Sequence[Task]], Iterator[tuple[Task, Row]]]", kept: "KeptRows"
 ) -> "tuple[list[Row], int]":
     """Return a row for every task in their order, and how many of them were kept from before."""
     from gateway import progress
-    from gateway.cli.fleet.files import KEPT
     from gateway.fleet.engines import EngineError
-    from gateway.fleet.kept_rows import KeptRows
 
-    kept = KeptRows(folder / KEPT, _question(verb, options))
-    if options["fresh"]:
-        (folder / KEPT).unlink(missing_ok=True)
     rows = kept.known(list(tasks))
     missing, taken_over = [task for task in tasks if task not in rows], len(rows)
     progress.report("recordings", len(rows), len(tasks))
     try:
         with kept:
-            for task, row in engine(compute, missing):
+            for task, row in engine(missing):
                 kept.keep(row)
                 rows[task] = row
                 progress.advance(len(rows), len(tasks))
