@@ -1,0 +1,61 @@
+"""The page's and the metrics' sections of a rig file: addresses, tokens, and that a token stays at home."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
+from gateway.profiles.http_sections import split_listen, without_secrets
+
+TOKEN = "6f1c6a51d9b04c0e"
+
+
+def rig_with(tmp_path: Path, section: str) -> str:
+    file = tmp_path / "rig.yaml"
+    file.write_text(
+        (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8") + section, encoding="utf-8"
+    )
+    return str(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "split"),
+    [
+        ("127.0.0.1:8080", ("127.0.0.1", 8080)),
+        ("localhost:0", ("127.0.0.1", 0)),
+        ("[::1]:8080", ("::1", 8080)),
+        ("192.168.125.20:65535", ("192.168.125.20", 65535)),
+    ],
+)
+def test_an_address_is_a_host_and_a_port(text: str, split: tuple[str, int]) -> None:
+    assert split_listen(text) == split
+
+
+@pytest.mark.parametrize(
+    "text", ["127.0.0.1", "8080", "::1:8080", "host.example:8080", "127.0.0.1:65536", "127.0.0.1:-1", ""]
+)
+def test_anything_else_is_refused_in_the_file(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ProfileError, match=r"web\.listen"):
+        load_rig(rig_with(tmp_path, f'web: {{listen: "{text}"}}\n'))
+
+
+def test_a_page_for_others_needs_a_token_that_cannot_be_guessed(tmp_path: Path) -> None:
+    with pytest.raises(ProfileError, match=r"web\.listen: E128 0\.0\.0\.0:8080 can be reached from other machines"):
+        load_rig(rig_with(tmp_path, 'web: {listen: "0.0.0.0:8080"}\n'))
+    with pytest.raises(ProfileError, match=r"web\.token"):
+        load_rig(rig_with(tmp_path, 'web: {listen: "0.0.0.0:8080", token: short}\n'))
+    rig = load_rig(
+        rig_with(tmp_path, f'web: {{listen: "0.0.0.0:8080", token: {TOKEN}}}\nmetrics: {{listen: "[::1]:0"}}\n')
+    )
+    assert rig.web and rig.web.token == TOKEN
+    assert rig.metrics and rig.metrics.listen == "[::1]:0"
+
+
+def test_a_token_does_not_travel_with_the_rig_s_texts(tmp_path: Path) -> None:
+    """Every recording carries them, and the page shows them."""
+    rig = load_rig(rig_with(tmp_path, f'web: {{listen: "0.0.0.0:8080", token: "{TOKEN}"}}\n'))
+    assert all(TOKEN not in text for text in rig.texts.values())
+    copy = tmp_path / "copy.yaml"
+    copy.write_text(next(text for name, text in rig.texts.items() if name.endswith("rig.yaml")), encoding="utf-8")
+    assert load_rig(str(copy)).web is not None, "what is left can be read as before"
+    assert without_secrets(f"password: '{TOKEN}' # of the broker") == "password: removed-from-this-copy # of the broker"
