@@ -48,12 +48,15 @@ def fleet_page(rows: Sequence[Row], cells: Sequence[CellDrift], verb: str) -> st
     named = Counter(cause["name"] for row in rows for cause in row["causes"] or ())
     parts = (
         tiles(
-            ("recordings", str(len(rows)), "read"),
+            ("recordings", str(len(rows) - len(failed)), "read"),
             ("cells", str(len(cells)), f"{drifting} drifting"),
-            ("unreadable", str(len(failed)), "recordings"),
+            ("not read", str(len(failed)), "recordings"),
         ),
         section("Cells", table(_HEADS, map(_cell_cells, cells), "numbers")),
-        section("Day by day", grid(*(Panel(_title(one), partial(_draw, one, verb)) for one in cells[:_MOST_DRAWN]))),
+        section(
+            "Day by day",
+            grid(*(Panel(_title(one), partial(_draw, one, _axis(cells, verb))) for one in cells[:_MOST_DRAWN])),
+        ),
         section(
             "Causes that were named",
             table(("cause", "recordings"), ((escape(name), str(count)) for name, count in named.most_common()))
@@ -98,18 +101,27 @@ def _title(one: CellDrift) -> str:
     return f"Cell {one.cell or 'without a name'}" + (f": {one.cause}" if one.drifts and one.cause else "")
 
 
-def _draw(one: CellDrift, verb: str, *, wide: bool) -> Drawing:
+def _day_by_day(cells: Sequence[CellDrift], axis: Axis) -> str:
+    return grid(*(Panel(_title(one), partial(_draw, one, axis)) for one in cells[:_MOST_DRAWN]))
+
+
+def _axis(cells: Sequence[CellDrift], verb: str) -> Axis:
+    """One for all cells, so that they can be compared: of a diagnosis from 0 to where a drift would begin, at least."""
+    values = [value for one in cells for value in one.values_n]
+    return Axis(*spread([0.0, 1.5 * LEAST_N, *values] if verb == "diagnose" else values), _VALUE[verb])
+
+
+def _draw(one: CellDrift, axis: Axis, *, wide: bool) -> Drawing:
     if not one.days:
         return NOTHING
     days = Axis(0.0, max(one.days[-1], 1.0), f"days since {one.first_day}")
-    chart = Chart(days, Axis(*spread([0.0, *one.values_n] if verb == "diagnose" else one.values_n), _VALUE[verb]),
-                  f"Cell {one.cell}: {_VALUE[verb]} by day", height=170)  # fmt: skip
-    chart.points(one.days, one.values_n, "rising", "median of a day")
+    chart = Chart(days, axis, f"Cell {one.cell}: {axis.label} by day", height=170)
     if one.trend:
         middle = sum(one.days) / len(one.days)
         level = sum(one.values_n) / len(one.values_n)
         ends = [level + one.trend.slope_n_per_day * (day - middle) for day in (one.days[0], one.days[-1])]
-        chart.line((one.days[0], one.days[-1]), ends, "model", "trend")
+        chart.line((one.days[0], one.days[-1]), ends, "walk", "trend")
+    chart.points(one.days, one.values_n, "rising", "median of a day")
     return drawing(chart)
 
 

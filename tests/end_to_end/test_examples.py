@@ -21,7 +21,7 @@ from gateway.profiles import load_calibration
 from gateway.service.supervisor.guardian import RunOptions
 from tests.end_to_end.conftest import RunningGateway, start, stop
 
-LASTING = ("calibrate", "self-test", "diagnose", "simulate")
+LASTING = ("calibrate", "self-test", "diagnose", "simulate", "fleet")
 
 
 def examples_of(verb: str) -> tuple[str, ...]:
@@ -61,6 +61,9 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGatewa
         stairs = np.concatenate([np.arange(0.0, 6.01, 0.5), np.arange(5.5, -0.01, -0.5)])
         write_table(here / "ladder.csv", np.append(np.tile(np.repeat(stairs, 50), 2), np.zeros(50)))
         write_table(here / "press.csv", np.repeat(np.random.default_rng(1).uniform(0.5, 6.0, 60), 100))
+        fleet = here / "recordings" / "cell=1" / "date=2026-11-23"
+        fleet.mkdir(parents=True)
+        (fleet / "ladder.csv").write_bytes((here / "ladder.csv").read_bytes())
         assert CliRunner().invoke(command, ["backup", "kept.tar.gz"]).exit_code == 0
         ask(state, {"do": "record", "on": False})
         yield gateway

@@ -9,6 +9,8 @@ from gateway.cli.options import StateChoice, state_options
 
 EXAMPLES = ("report", "report mine.tar.gz --rig demo")
 
+EXAMPLES = ("report for-support.tar.gz", "report --show")
+
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False), default=Path("force-gateway-report.tar.gz"))
