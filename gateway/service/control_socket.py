@@ -18,6 +18,7 @@ from gateway.calibrations.upload import UploadService
 from gateway.modbus import Peer
 from gateway.processes.json_socket import Handler, JsonLineServer
 from gateway.profiles import Rig
+from gateway.recording.label import RecordingLabel
 from gateway.service.live_answers import LiveAnswers, LiveParts
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop
@@ -72,10 +73,11 @@ class ControlSocket(JsonLineServer):
         self._asked = parts
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any]:
-        is_on = parse_request(RecordRequest, request).on
-        if is_on is None:
-            return self._asked.recordings.status()
-        return self._asked.recordings.start() if is_on else self._asked.recordings.stop()
+        query, recordings = parse_request(RecordRequest, request), self._asked.recordings
+        if query.on is None:
+            return recordings.status()
+        label = RecordingLabel(query.name, query.note)
+        return recordings.start(label, query.for_s) if query.on else recordings.stop()
 
     def _calibration(self, request: dict[str, Any]) -> dict[str, Any]:
         """{"use": number} (with "force": true a rejected one, too) or {"rollback": true} begin a change; neither tells what is

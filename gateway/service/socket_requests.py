@@ -16,6 +16,7 @@ from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import adapter, build
+from gateway.recording.label import LONGEST_NAME, LONGEST_NOTE
 
 Shape = TypeVar("Shape")
 Number = Annotated[int, Ge(0), Le(999_999)]
@@ -32,10 +33,13 @@ class EmptyRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordRequest:
-    """on left out: how it is."""
+    """on left out: how it is. name, note: what the user says of it; for_s: it ends by itself after so long, 0: it does not."""
 
     __pydantic_config__ = _STRICT
     on: bool | None = None
+    name: Annotated[str, MaxLen(LONGEST_NAME)] = ""
+    note: Annotated[str, MaxLen(LONGEST_NOTE)] = ""
+    for_s: Annotated[float, Ge(0), Le(31 * 86400)] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

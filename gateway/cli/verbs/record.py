@@ -1,36 +1,108 @@
-"""`record`: start and stop a recording in the gateway that runs."""
+"""`record`: start and stop a recording in the gateway that runs; by its clock, too, so that it ends whatever becomes of us."""
 
 import json
-from typing import Any
+import time
+from pathlib import Path
+from typing import Any, Final
 
 import click
 
-from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.duration import parse_duration_s
+from gateway.cli.options import StateChoice, calibration_name, json_option, state_options
 
 _ON = {"on": True, "off": False}
+_LOOK_S: Final = 0.2
+_LONGEST_NOTE: Final = 1000  # gateway.recording.label
+_LONGEST_S: Final = 31 * 86400.0
 
 
-EXAMPLES = ("record on", "record off")
+EXAMPLES = ("record on", "record off", "record --for 1s --name before-repair --note 'new seals come tomorrow'")
+
+
+def _duration_s(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
+    """Return the seconds, for an option's callback."""
+    if value is None:
+        return None
+    duration_s = parse_duration_s(value)
+    if duration_s is None or not 0.0 < duration_s <= _LONGEST_S:
+        raise click.BadParameter(f"{value} is no duration such as 60s, 10min or 2h (at most 31d)")
+    return duration_s
+
+
+def _note(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    """Return what stands in one paragraph, for an option's callback."""
+    if value is None:
+        return None
+    note = " ".join(value.split())
+    if not note or not note.isprintable() or len(note) > _LONGEST_NOTE:
+        raise click.BadParameter(f"a note has 1 to {_LONGEST_NOTE} printable characters")
+    return note
 
 
 @click.command()
-@click.argument("what", type=click.Choice(["on", "off", "status"]), default="status")
+@click.argument("what", type=click.Choice(["on", "off", "status"]), required=False)
+@click.option("--for", "for_s", callback=_duration_s, metavar="TIME", help="Record so long (60s, 10min), and wait.")
+@click.option("--name", callback=calibration_name, help="What the recording is called.")
+@click.option("--note", callback=_note, metavar="TEXT", help="What is to be known about it.")
 @state_options
 @json_option
-def command(*, what: str, state: StateChoice, as_json: bool) -> None:
-    """Start or stop a recording in the running gateway."""
+def command(*, what: str | None, state: StateChoice, as_json: bool, for_s: float | None, **said: str | None) -> None:
+    """Start or stop a recording in the running gateway.
+
+    --for starts one that ends by itself; Ctrl-C ends it sooner and keeps it.
+    """
     from gateway.cli.control_socket import ask
 
-    request: dict[str, Any] = {"do": "record"}
-    if what in _ON:
-        request["on"] = _ON[what]
+    label = {key: value for key, value in said.items() if value}
+    starts = what == "on" or (what is None and bool(for_s or label))
+    if not starts and (for_s or label):
+        raise click.UsageError(f"--for, --name and --note are of a recording that starts, not of `record {what}`")
+    request: dict[str, Any] = {"do": "record", **label}
+    if for_s:
+        request["for_s"] = for_s
+    if starts or what in _ON:
+        request["on"] = starts
     answer = ask(state.directory, request)
+    if for_s:
+        answer = _follow(state.directory, answer["recording"], for_s)
     click.echo(json.dumps(answer) if as_json else _sentence(answer))
+
+
+def _follow(state: Path, recording: str, for_s: float) -> dict[str, Any]:
+    """Wait for the end of a recording, and return what it has become."""
+    from gateway.cli.control_socket import ask
+    from gateway.cli.diagnosis.progress_line import show_progress
+    from gateway.recording import read_entry
+
+    is_stopped = False
+    try:
+        with show_progress("record"):
+            _wait(state, for_s)
+    except KeyboardInterrupt:
+        is_stopped = True
+        ask(state, {"do": "record", "on": False})
+    entry = read_entry(Path(recording))
+    answer = {"recording": None, "written": recording, "rows": entry.rows, "duration_s": round(entry.duration_s, 6)}
+    return {**answer, "stopped": is_stopped}
+
+
+def _wait(state: Path, for_s: float) -> None:
+    """Look now and then until nothing is recorded any more, and tell how much of the time is over."""
+    from gateway.cli.control_socket import ask
+    from gateway.progress import report
+
+    began_s = time.monotonic()
+    while (status := ask(state, {"do": "record"}))["recording"]:
+        spent_s = time.monotonic() - began_s
+        report(f"{Path(status['recording']).name}, seconds", min(int(spent_s), round(for_s)), max(round(for_s), 1))
+        time.sleep(min(_LOOK_S, max(for_s - spent_s, 0.02)))
 
 
 def _sentence(answer: dict[str, Any]) -> str:
     if answer.get("recording"):
         return f"recording to {answer['recording']}, {answer.get('rows', 0)} rows so far"
     if answer.get("written"):
-        return f"recorded {answer.get('rows', 0)} rows to {answer['written']}"
+        stopped = "stopped; " if answer.get("stopped") else ""
+        length = f" ({answer['duration_s']:.1f} s)" if "duration_s" in answer else ""
+        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}"
     return "not recording"

@@ -9,6 +9,7 @@ from gateway.plants.in_use import in_use_facts
 from gateway.processes.event_log import EventLog
 from gateway.profiles import Rig
 from gateway.recording import Recorder
+from gateway.recording.label import NO_LABEL, RecordingLabel
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
 
@@ -21,15 +22,20 @@ class Recordings:
         self._rig = rig
         self._log = log
         self._current: RunRecording | None = None
+        self._label = NO_LABEL
+        self._for_s = 0.0
+        self._ends_s: float | None = None
         self.calibration = rig.calibration
         self.plant_in_use = in_use_facts(rig)
 
-    def start(self) -> dict[str, Any]:
-        """Begin a recording; ValueError when one is running."""
+    def start(self, label: RecordingLabel = NO_LABEL, for_s: float = 0.0) -> dict[str, Any]:
+        """Begin a recording; ValueError when one is running. for_s: it ends by itself so long after the next tick, 0: it does
+        not."""
         if self._current:
             raise ValueError(f"already recording to {self._current.recorder.path}")
         rig = self._rig
         header = {
+            **label.as_header(),
             "rig": rig.name,
             "rig_fingerprint": rig.fingerprint,
             "rig_texts": dict(rig.texts),
@@ -40,6 +46,7 @@ class Recordings:
             "seed": rig.seed,
         }
         self._current = RunRecording(Recorder(self._directory, header, COLUMNS))
+        self._label, self._for_s, self._ends_s = label, for_s, None
         return self.status()
 
     def use_plant(self, rig: Rig) -> None:
@@ -47,11 +54,11 @@ class Recordings:
         how they were read."""
         self.plant_in_use = in_use_facts(rig)
         if self._current:
-            ended = self.stop()
+            ended, label, for_s, ends_s = self.stop(), self._label, self._for_s, self._ends_s
             try:
-                self._log(
-                    "recording", f"{ended['written']} ends with the plant in use, {self.start()['recording']} goes on"
-                )
+                goes_on = self.start(label, for_s)["recording"]
+                self._ends_s = ends_s
+                self._log("recording", f"{ended['written']} ends with the plant in use, {goes_on} goes on")
             except OSError as error:
                 self._log("recording", f"{ended['written']} ends with the plant in use, not recording: {error}")
 
@@ -83,10 +90,19 @@ class Recordings:
             self._current.append(sample, decision, line)
 
     def flush(self, now_s: float) -> None:
-        """Write what waits, once a tick. A recorder that has stopped (disk full) is logged once and dropped."""
+        """Write what waits, once a tick. A recorder that has stopped (disk full) is logged once and dropped; one whose time is
+        over ends."""
         if self._current:
             recorder = self._current.recorder
             recorder.flush(now_s)
             if recorder.failure:
                 self._log("recording", recorder.failure)
                 self._current = None
+            elif self._is_over(now_s):
+                ended = self.stop()
+                self._log("recording", f"{ended['written']} ends after {self._for_s:g} s, {ended['rows']} rows")
+
+    def _is_over(self, now_s: float) -> bool:
+        if self._for_s and self._ends_s is None:
+            self._ends_s = now_s + self._for_s
+        return self._ends_s is not None and now_s >= self._ends_s

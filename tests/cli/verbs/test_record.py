@@ -1,0 +1,83 @@
+"""`record --for`: asks the gateway for a recording that ends by itself, waits for it, and a Ctrl-C keeps what there is."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.recording import Recorder, list_recordings
+
+
+class ScriptedGateway:
+    """Answers as control does; the recording is over after so many looks."""
+
+    def __init__(self, state: Path, looks: int = 3) -> None:
+        self.state, self.looks = state, looks
+        self.asked: list[dict[str, Any]] = []
+        self.recorder: Recorder | None = None
+
+    def ask(self, state: Path, request: dict[str, Any]) -> dict[str, Any]:
+        self.asked.append(request)
+        if request.get("on"):
+            header = {key: request[key] for key in ("name", "note") if key in request}
+            self.recorder = Recorder(self.state / "recordings", header, ("time_s",))
+            self.recorder.append((0.0,))
+            self.recorder.append((1.5,))
+        elif request.get("on") is False or len(self.asked) > self.looks:
+            self._end()
+        return {"recording": str(self.recorder.path) if self.recorder and self.recorder.is_open else None}
+
+    def _end(self) -> None:
+        assert self.recorder
+        self.recorder.close()
+
+
+@pytest.fixture
+def gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ScriptedGateway:
+    gateway = ScriptedGateway(tmp_path)
+    monkeypatch.setattr("gateway.cli.control_socket.ask", gateway.ask)
+    monkeypatch.setattr("gateway.cli.verbs.record._LOOK_S", 0.0)
+    return gateway
+
+
+def test_it_waits_for_the_end_and_says_what_was_recorded(gateway: ScriptedGateway, call, tmp_path: Path) -> None:
+    answer = call("record", "--for", "90s", "--name", "a b", "--note", "why", "--state", tmp_path)
+    assert answer.exit_code == 0, answer.output
+    assert "recorded 2 rows (1.5 s) to " in answer.output
+    assert gateway.asked[0] == {"do": "record", "on": True, "name": "a b", "note": "why", "for_s": 90.0}
+    assert gateway.asked[-1] == {"do": "record"}
+    assert list_recordings(tmp_path)[0].header["note"] == "why"
+
+
+def test_ctrl_c_ends_it_and_keeps_it(
+    gateway: ScriptedGateway, call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def press(seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gateway.cli.verbs.record.time.sleep", press)
+    answer = call("record", "--for", "1h", "--json", "--state", tmp_path)
+    assert gateway.asked[-1] == {"do": "record", "on": False}
+    said = json.loads(answer.stdout)
+    assert (said["stopped"], said["rows"]) == (True, 2)
+    assert list_recordings(tmp_path)[0].rows == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("off", "--for", "3s"), "of a recording that starts"),
+        (("status", "--name", "x"), "of a recording that starts"),
+        (("--for", "soon"), "no duration"),
+        (("--for", "0s"), "no duration"),
+        (("on", "--note", "x" * 1001), "1 to 1000"),
+        (("on", "--name", "7"), "no name"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_before_anybody_is_asked(
+    words: tuple[str, ...], why: str, gateway: ScriptedGateway, call, tmp_path: Path
+) -> None:
+    answer = call("record", *words, "--state", tmp_path)
+    assert (answer.exit_code, gateway.asked) == (2, [])
+    assert why in " ".join(answer.output.split())

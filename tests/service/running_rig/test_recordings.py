@@ -1,0 +1,63 @@
+"""Recordings of a running rig: what a user says of one stands in it, and one with a time ends by itself."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.recording import list_recordings
+from gateway.recording.label import RecordingLabel, label_of
+from gateway.service.running_rig.recordings import Recordings
+from tests.service.rigs import demo
+
+
+class Log(list[str]):
+    def __call__(self, cause: str, sentence: str) -> None:
+        self.append(sentence)
+
+
+@pytest.fixture
+def recordings(tmp_path: Path) -> Recordings:
+    return Recordings(tmp_path / "recordings", demo(), Log())
+
+
+def test_name_and_note_stand_in_the_header_and_only_where_they_were_given(
+    recordings: Recordings, tmp_path: Path
+) -> None:
+    recordings.start(RecordingLabel("before repair", "new seals tomorrow"))
+    recordings.stop()
+    recordings.start()
+    recordings.stop()
+    named, plain = list_recordings(tmp_path)
+    assert label_of(named.header) == RecordingLabel("before repair", "new seals tomorrow")
+    assert not {"name", "note"} & set(plain.header)
+
+
+def test_a_recording_with_a_time_ends_by_the_loops_clock(recordings: Recordings) -> None:
+    recordings.start(for_s=2.0)
+    recordings.flush(100.0)
+    recordings.flush(101.99)
+    assert recordings.status()["recording"]
+    recordings.flush(102.0)
+    assert recordings.status() == {"recording": None}
+    assert [line for line in recordings._log if "ends after 2 s" in line]
+
+
+def test_another_plant_takes_label_and_end_along(recordings: Recordings, tmp_path: Path) -> None:
+    recordings.start(RecordingLabel("long one"), for_s=5.0)
+    recordings.flush(10.0)
+    recordings.use_plant(demo())
+    recordings.flush(14.9)
+    assert recordings.status()["recording"].endswith("0002.fgr")
+    recordings.flush(15.0)
+    assert recordings.status() == {"recording": None}
+    assert [label_of(entry.header).name for entry in list_recordings(tmp_path)] == ["long one", "long one"]
+
+
+def test_the_next_recording_has_no_end_of_the_one_before(recordings: Recordings) -> None:
+    recordings.start(for_s=1.0)
+    recordings.flush(0.0)
+    recordings.stop()
+    recordings.start()
+    recordings.flush(50.0)
+    assert recordings.status()["recording"]
+    recordings.stop()
