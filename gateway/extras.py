@@ -9,7 +9,15 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 ANALYSIS: Final = "analysis"
-_EXTRA_OF: Final = {"numba": ANALYSIS, "openpyxl": ANALYSIS, "pyarrow": ANALYSIS, "distributed": "fleet"}
+_EXTRA_OF: Final = {
+    "numba": ANALYSIS,
+    "openpyxl": ANALYSIS,
+    "pyarrow": ANALYSIS,
+    "distributed": "fleet",
+    "prometheus_client": "metrics",
+    "aiomqtt": "mqtt",
+    "asyncua": "opcua",
+}
 
 
 class MissingExtraError(ImportError):

@@ -13,6 +13,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from gateway.live.live_state import LiveState
 from gateway.recording import Recorder
 
 
@@ -207,20 +208,21 @@ def test_a_backup_of_nothing_says_so(call, tmp_path: Path) -> None:
 
 @pytest.fixture
 def control_socket(tmp_path: Path) -> Iterator[Callable[[Any], list[Any]]]:
-    """answering(answer) serves one request on tmp_path/control.sock; the list holds what was asked."""
+    """answering(*answers) serves a request for each on tmp_path/control.sock; the list holds what was asked."""
     listeners: list[tuple[socket.socket, threading.Thread]] = []
 
-    def answering(answer: Any) -> list[Any]:
+    def answering(*answers: Any) -> list[Any]:
         requests: list[Any] = []
         listener = socket.socket(socket.AF_UNIX)
         listener.bind(str(tmp_path / "control.sock"))
         listener.listen()
 
         def serve() -> None:
-            connection, _ = listener.accept()
-            with connection, connection.makefile("rwb") as stream:
-                requests.append(json.loads(stream.readline()))
-                stream.write(json.dumps(answer).encode() + b"\n")
+            for answer in answers:
+                connection, _ = listener.accept()
+                with connection, connection.makefile("rwb") as stream:
+                    requests.append(json.loads(stream.readline()))
+                    stream.write(json.dumps(answer).encode() + b"\n")
 
         listeners.append((listener, threading.Thread(target=serve)))
         listeners[-1][1].start()
@@ -258,12 +260,13 @@ def test_record_asks_the_running_gateway(
 def test_metrics_are_figures_with_a_name_a_kind_and_base_units(call, control_socket, tmp_path: Path) -> None:
     residual = {"cause": 1, "name": "transport-delay", "warnings": 2, "age_s": None, "rms_n": 0.31}
     health = {"ticks": 500, "missed_ticks": 3, "loop_time_us": 250.0, "late_p50_us": 64, "late_p99_us": 1024}
-    requests = control_socket({"ok": True, **health, "residual": residual})
+    state = LiveState(rig="demo", simulated=True, version="1", time_unix_s=0.0, state="off")
+    requests = control_socket({"ok": True} | state.to_json(), {"ok": True, **health, "residual": residual})
     result = call("metrics", "--state", tmp_path)
-    assert (result.exit_code, requests) == (0, [{"do": "health"}])
+    assert (result.exit_code, requests) == (0, [{"do": "state"}, {"do": "health"}])
     lines = result.output.splitlines()
     values = [line for line in lines if not line.startswith("#")]
-    assert values == [
+    assert values[-8:] == [
         "force_gateway_loop_ticks_total 500",
         "force_gateway_loop_missed_ticks_total 3",
         "force_gateway_loop_step_seconds 0.00025",
@@ -274,7 +277,8 @@ def test_metrics_are_figures_with_a_name_a_kind_and_base_units(call, control_soc
         "force_gateway_residual_rms_newtons 0.31",
     ]
     assert "# TYPE force_gateway_loop_ticks_total counter" in lines
-    assert len(lines) == 3 * len(values)
+    assert 'force_gateway_state{state="off"} 1' in values and "force_gateway_up 1" in values
+    assert not any(line.startswith("force_gateway_force_newtons ") for line in values), "no sample, no figure"
 
 
 def test_what_the_gateway_refuses_is_told(call, control_socket, tmp_path: Path) -> None:

@@ -1,0 +1,97 @@
+"""The metrics as a process: `python -m gateway.telemetry.metrics_process LINK '{"state": ..., "listen": descriptor, ...}'`.
+
+It asks control when it is asked itself, keeps nothing, and so has no old values to show: where control does not answer,
+`force_gateway_up` is 0 and stands alone. Its priority is below control's; it ends with the guardian.
+"""
+
+import asyncio
+import json
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gateway.extras import MissingExtraError, import_library
+from gateway.live.control_link import ControlLink
+from gateway.live.live_state import LiveState
+from gateway.processes import exit_codes
+from gateway.processes.beside_control import exit_with_guardian, serve_behind_control
+from gateway.telemetry.series import GatewayReading, samples_of
+
+if TYPE_CHECKING:
+    from prometheus_client import Metric
+    from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+
+class ReadingCollector:
+    """What Prometheus' registry asks for the series of one reading."""
+
+    def __init__(self, reading: GatewayReading | None) -> None:
+        self._reading = reading
+
+    def collect(self) -> "Iterator[Metric]":
+        """Yield the series that are known."""
+        from prometheus_client import Metric
+
+        for series, samples in samples_of(self._reading):
+            metric = Metric(series.name.removesuffix("_total"), series.help, series.kind)
+            for labels, value in samples:
+                metric.add_sample(series.name, labels, value)
+            yield metric
+
+
+async def read_gateway(link: ControlLink) -> GatewayReading | None:
+    """Return what control answers now; None where it does not."""
+    try:
+        state = LiveState.from_json(await link.ask({"do": "state"}))
+        return GatewayReading(state, await link.ask({"do": "health"}))
+    except (OSError, ValueError):
+        return None
+
+
+def make_metrics_app(state_directory: Path) -> "Starlette":
+    """Return the application that serves /metrics. MissingExtraError without prometheus-client."""
+    prometheus = import_library("prometheus_client")
+    from prometheus_client.exposition import choose_encoder
+    from starlette.applications import Starlette
+    from starlette.responses import Response
+    from starlette.routing import Route
+
+    link = ControlLink(state_directory)
+
+    async def metrics(request: "Request") -> "Response":
+        registry = prometheus.CollectorRegistry(auto_describe=False)
+        registry.register(ReadingCollector(await read_gateway(link)))
+        encode, content_type = choose_encoder(request.headers.get("accept", ""))
+        return Response(encode(registry), headers={"content-type": content_type, "cache-control": "no-store"})
+
+    return Starlette(routes=[Route("/metrics", metrics)])
+
+
+async def serve(options: dict[str, Any]) -> None:
+    """Serve until the process ends. options: as the guardian gives them."""
+    app = make_metrics_app(Path(options["state"]))
+    import uvicorn
+
+    config = uvicorn.Config(
+        app, log_config=None, access_log=False, server_header=False, ws="none", lifespan="off", limit_concurrency=32
+    )
+    await uvicorn.Server(config).serve(sockets=[socket.socket(fileno=options["listen"])])
+
+
+def main(arguments: list[str]) -> int:
+    """Serve until the guardian ends. arguments: descriptor of the link, options as JSON."""
+    serve_behind_control()
+    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
+    try:
+        asyncio.run(serve(json.loads(arguments[1])))
+    except MissingExtraError as missing:
+        sys.stderr.write(f"{missing}\n")
+    return exit_codes.DEVICE
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

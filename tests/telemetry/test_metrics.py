@@ -1,0 +1,103 @@
+"""What Prometheus reads: one table for both ways, base units, no old values, and dashboards that ask for what there is."""
+
+import asyncio
+import json
+import re
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families as parse
+from starlette.applications import Starlette
+
+from gateway.processes.json_socket import JsonLineServer
+from gateway.telemetry.exposition import exposition
+from gateway.telemetry.metrics_process import make_metrics_app
+from gateway.telemetry.series import SERIES
+from tests.telemetry.readings import HEALTH, holding, reading, without_sample
+from tests.web.asgi import call
+
+Samples = dict[tuple[str, frozenset[tuple[str, str]]], float]
+
+
+def samples(text: str) -> Samples:
+    found = [sample for family in parse(text) for sample in family.samples]
+    return {(one.name, frozenset(one.labels.items())): one.value for one in found}
+
+
+def scrape(app: Starlette) -> Samples:
+    answer = asyncio.run(call(app, "GET", "/metrics"))
+    assert answer.status == 200 and answer.headers["content-type"].startswith("text/plain")
+    return samples(answer.body.decode())
+
+
+def test_both_ways_tell_the_same_and_an_absent_control_leaves_nothing_but_down(tmp_path: Path) -> None:
+    health = HEALTH | {"residual": {"cause": 0, "name": "none", "looks": 4}}
+
+    async def scene() -> None:
+        control = JsonLineServer(
+            tmp_path / "control.sock", {"state": lambda _: holding().to_json(), "health": lambda _: dict(health)}
+        )
+        await control.start()
+        app = make_metrics_app(tmp_path)
+        answer = await call(app, "GET", "/metrics")
+        assert samples(answer.body.decode()) == samples("\n".join(exposition(reading())) + "\n")
+        await control.close()
+        down = await call(app, "GET", "/metrics")
+        assert samples(down.body.decode()) == {("force_gateway_up", frozenset()): 0.0}
+
+    asyncio.run(scene())
+
+
+def test_without_a_gateway_the_scrape_says_down(tmp_path: Path) -> None:
+    assert scrape(make_metrics_app(tmp_path)) == {("force_gateway_up", frozenset()): 0.0}
+
+
+@pytest.mark.parametrize(
+    ("name", "labels", "value"),
+    [
+        ("force_newtons", {}, 11.5),
+        ("force_error_newtons", {}, 0.5),
+        ("pressure_pascals", {}, 200_000.0),
+        ("state", {"state": "holding"}, 1.0),
+        ("state", {"state": "fault"}, 0.0),
+        ("warning", {"code": "W301", "title": 'a "quoted" title'}, 1.0),
+        ("serial_frames_total", {"line": "output", "kind": "asked"}, 20.0),
+        ("serial_errors_total", {"line": "load_cell"}, 0.0),
+        ("loop_late_p99_seconds", {}, 0.001024),
+        ("calibration_age_seconds", {}, 60.0),
+    ],
+)
+def test_a_series_has_its_value_in_base_units(name: str, labels: dict[str, str], value: float) -> None:
+    found = samples("\n".join(exposition(reading())) + "\n")
+    assert found["force_gateway_" + name, frozenset(labels.items())] == pytest.approx(value)
+
+
+def test_a_force_that_is_not_measured_is_left_out() -> None:
+    names = {name for name, _ in samples("\n".join(exposition(without_sample())) + "\n")}
+    assert not names & {"force_gateway_force_newtons", "force_gateway_force_error_newtons"}
+    assert "force_gateway_setpoint_applied_newtons" in names
+
+
+def test_names_follow_the_custom() -> None:
+    names = [series.name for series in SERIES]
+    assert len(names) == len(set(names))
+    assert all((series.kind == "counter") == series.name.endswith("_total") for series in SERIES)
+    endings = {"N": "newtons", "V": "volts", "s": "seconds", "Pa": "pascals", "": ""}
+    for series in SERIES:
+        assert series.name.removesuffix("_total").endswith(endings[series.unit]), series.name
+
+
+@pytest.mark.parametrize("file", ["grafana.json", "telegraf.conf"])
+def test_a_shipped_file_asks_only_for_what_there_is(file: str) -> None:
+    text = (files("gateway.telemetry") / "dashboards" / file).read_text(encoding="utf-8")
+    named = set(re.findall(r"\bforce_gateway_\w+", text))
+    assert len(named) > 15
+    assert named <= {series.name for series in SERIES}
+
+
+def test_the_dashboard_is_one_that_grafana_can_import() -> None:
+    board = json.loads((files("gateway.telemetry") / "dashboards" / "grafana.json").read_text(encoding="utf-8"))
+    places = [tuple(panel["gridPos"].values()) for panel in board["panels"]]
+    assert len(set(places)) == len(places) and board["schemaVersion"] >= 36
+    assert all(panel["targets"] for panel in board["panels"])
