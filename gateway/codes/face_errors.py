@@ -57,6 +57,13 @@ FACE_ERRORS: Final = (
         "ss -ltnp shows who listens; --web 127.0.0.1:0 takes any free port.",
     ),
     Explanation(
+        "E181",
+        "the MQTT broker is away",
+        "No connection to the broker of the rig's section `mqtt`, or it broke. Control goes on; data is kept and sent later.",
+        "The broker is down, mqtt.host or mqtt.port is another, or it refuses the user name or the password.",
+        "mosquitto_sub -h HOST -p PORT -u USER -P PASSWORD -t '#' from this machine shows which of them.",
+    ),
+    Explanation(
         "E128",
         "an open page without a token",
         "The page is to listen on an address that others can reach, and whoever opens it could command the force.",

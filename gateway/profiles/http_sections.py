@@ -14,6 +14,7 @@ from gateway import defaults
 from gateway.defaults import STRICT
 from gateway.profiles.rigs.addresses import Address
 from gateway.profiles.strict_yaml.typed import adapter
+from gateway.profiles.telemetry_sections import Mqtt
 
 _SECRET: Final = re.compile(r"""(\b(?:token|password)\s*:\s*)("[^"\n]*"|'[^'\n]*'|[^\s,}#]+)""")
 _BLANK: Final = "removed-from-this-copy"
@@ -70,10 +71,14 @@ class HttpSections(Protocol):
     def metrics(self) -> Metrics | None:
         """Section `metrics`."""
 
+    @property
+    def mqtt(self) -> Mqtt | None:
+        """Section `mqtt`."""
+
 
 def http_sections_of(file: HttpSections) -> dict[str, Any]:
     """Return the sections of a rig file by their names in a Rig."""
-    return {"web": file.web, "metrics": file.metrics}
+    return {"web": file.web, "metrics": file.metrics, "mqtt": file.mqtt}
 
 
 def without_secrets(text: str) -> str:

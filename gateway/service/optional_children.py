@@ -77,6 +77,8 @@ def optional_children(rig: Rig, ring: SampleRing | None, addresses: dict[str, Ad
     if rig.is_watched and not rig.why_unwatched and ring is not None:
         watch = rig.residual_watch
         children["watch"] = {"simulated": rig.simulated, "window_s": watch.window_s, "every_s": watch.every_s}
+    if rig.mqtt:
+        children["mqtt"] = {"simulated": rig.simulated}
     for name, (host, port) in addresses.items():
         children[name] = {"simulated": rig.simulated, "settings": {"host": host, "port": port}}
     return children

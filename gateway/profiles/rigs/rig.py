@@ -20,6 +20,7 @@ from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.compensated_effects import in_simulation
 from gateway.profiles.rigs.faces import Face, RtuFace
 from gateway.profiles.rigs.rig_file import Network, ResidualWatch
+from gateway.profiles.telemetry_sections import Mqtt
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.words import ControlBit
 from gateway.twin import Plant
@@ -104,6 +105,7 @@ class Rig:
     notes: tuple[str, ...] = ()
     web: Web | None = None
     metrics: Metrics | None = None
+    mqtt: Mqtt | None = None
     valve: ValveLine | None = None
     pull_calibration: Calibration | None = None  # measured pulling, None: derived from the one of pushing
     compensation: Compensation = NO_COMPENSATION

@@ -26,6 +26,7 @@ from gateway.devices.line_settings import Baud
 from gateway.profiles.http_sections import Metrics, Web
 from gateway.profiles.rigs.addresses import Address, Network4Or6, Owner
 from gateway.profiles.rigs.faces import Face
+from gateway.profiles.telemetry_sections import Mqtt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,4 +151,5 @@ class RigFile:
     residual_watch: ResidualWatch = field(default_factory=ResidualWatch)
     web: Web | None = None  # the page in the browser; null: there is none, unless `run --web` asks for it
     metrics: Metrics | None = None  # figures for Prometheus; null: there are none, unless `run --metrics` asks for them
+    mqtt: Mqtt | None = None  # figures for an MQTT broker; null: none
     accept_no_device_watchdog: bool = False  # true: enable although the output device has no watchdog of its own

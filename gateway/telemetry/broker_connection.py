@@ -1,0 +1,105 @@
+"""A connection to an MQTT broker that is opened again for ever, and carries what a session has to say."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from gateway.extras import import_library
+from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
+
+AGAIN_S: Final = 2.0
+_KEEPALIVE_S: Final = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Broker:
+    """Where it is, and who we are there."""
+
+    host: str
+    port: int
+    username: str | None = None
+    password: str | None = field(default=None, repr=False)
+
+
+async def keep_connected(
+    broker: Broker, session: BrokerSession, say: Callable[[str], None], again_s: float = AGAIN_S
+) -> None:
+    """Keep a connection, opened again when it is lost; say when the broker is away, and when it is back. MissingExtraError without
+    aiomqtt."""
+    aiomqtt = import_library("aiomqtt")
+    is_away = False
+    while True:
+        will = session.begin()
+        try:
+            async with _client(aiomqtt, broker, will) as client:
+                if is_away:
+                    say(f"the MQTT broker {broker.host}:{broker.port} is back")
+                is_away = False
+                await _carry(client, session)
+        except* (aiomqtt.MqttError, OSError) as lost:
+            if not is_away:
+                say(
+                    f"E181 the MQTT broker {broker.host}:{broker.port} is away ({_reason(lost)}); data is kept meanwhile"
+                )
+            is_away = True
+        finally:
+            session.lose()
+        await asyncio.sleep(again_s)
+
+
+def _client(aiomqtt: Any, broker: Broker, will: BrokerMessage) -> Any:
+    return aiomqtt.Client(
+        broker.host,
+        broker.port,
+        username=broker.username,
+        password=broker.password,
+        keepalive=_KEEPALIVE_S,
+        clean_session=True,
+        will=aiomqtt.Will(will.topic, will.payload, qos=will.qos, retain=will.retain),
+    )
+
+
+async def _carry(client: Any, session: BrokerSession) -> None:
+    """Say what the session has, and have it answer, until the connection is lost."""
+    turn = asyncio.Lock()  # messages carry numbers in order: nobody speaks between the making of one and its sending
+    for topic in session.subscriptions:
+        await client.subscribe(topic, qos=1)
+    for message in session.greet():
+        await _publish(client, message)
+    async with asyncio.TaskGroup() as group:
+        group.create_task(_speak(client, session, turn))
+        group.create_task(_listen(client, session, turn))
+
+
+async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
+    while True:
+        session.ready.clear()
+        while True:
+            async with turn:
+                message = session.next_message()
+                if message is None:
+                    break
+                await _publish(client, message)
+                session.drop_sent()
+        await session.ready.wait()
+
+
+async def _listen(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
+    async for message in client.messages:
+        if message.retain:  # of yesterday: a command that waits in the broker must never be carried out
+            continue
+        async with turn:
+            for answer in await session.answer(str(message.topic), bytes(message.payload or b"")):
+                await _publish(client, answer)
+
+
+async def _publish(client: Any, message: BrokerMessage) -> None:
+    await client.publish(message.topic, message.payload, qos=message.qos, retain=message.retain)
+
+
+def _reason(lost: BaseExceptionGroup[BaseException]) -> str:
+    first: BaseException = lost
+    while isinstance(first, BaseExceptionGroup):
+        first = first.exceptions[0]
+    return str(first)

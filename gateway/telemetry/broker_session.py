@@ -1,0 +1,49 @@
+"""What a connection to an MQTT broker carries: messages, and the session that makes them, without the connection itself."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from gateway.live.live_state import LiveState
+
+
+@dataclass(frozen=True, slots=True)
+class BrokerMessage:
+    """One message to publish."""
+
+    topic: str
+    payload: bytes
+    qos: int = 0
+    retain: bool = False
+
+
+class BrokerSession(Protocol):
+    """Makes messages; `broker_connection` sends them. ready: set when `next_message` has one."""
+
+    ready: asyncio.Event
+
+    @property
+    def subscriptions(self) -> Sequence[str]:
+        """Topics that it listens to."""
+
+    def begin(self) -> BrokerMessage:
+        """Begin a connection, and return its will."""
+
+    def greet(self) -> Sequence[BrokerMessage]:
+        """Return what comes first on a new connection."""
+
+    def offer(self, state: LiveState | None, time_unix_s: float) -> None:
+        """Take what control answered now; None: it did not."""
+
+    def next_message(self) -> BrokerMessage | None:
+        """Return the oldest message that waits; it waits on until `drop_sent`."""
+
+    def drop_sent(self) -> None:
+        """Forget that message: it has been sent."""
+
+    def lose(self) -> None:
+        """Note that the connection is gone."""
+
+    async def answer(self, topic: str, payload: bytes) -> Sequence[BrokerMessage]:
+        """Return what a message to one of its topics makes it say."""

@@ -1,0 +1,90 @@
+"""MQTT as a process: `python -m gateway.telemetry.mqtt_process LINK '{"rig": ..., "state": ..., "simulated": ...}'`.
+
+One look at control's state, five times a second, feeds two connections: plain JSON topics, and a Sparkplug B edge node where
+the rig has one. Each has a will of its own, and is opened again when the broker comes back. It ends with the guardian; the
+broker then tells the wills.
+"""
+
+import asyncio
+import json
+import socket
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.extras import MissingExtraError
+from gateway.live.control_link import ControlLink
+from gateway.live.live_state import LiveState
+from gateway.processes import exit_codes
+from gateway.processes.beside_control import exit_with_guardian, serve_behind_control
+from gateway.telemetry.broker_connection import Broker, keep_connected
+from gateway.telemetry.broker_session import BrokerSession
+from gateway.telemetry.edge_node import EdgeNode
+from gateway.telemetry.json_topics import JsonTopics
+from gateway.telemetry.register_commands import RegisterCommands
+
+if TYPE_CHECKING:
+    from gateway.profiles import Rig
+LOOK_S: Final = 0.2
+
+
+def make_sessions(rig: "Rig", link: ControlLink) -> list[BrokerSession]:
+    """Return what the rig wants to be told."""
+    mqtt = rig.mqtt
+    assert mqtt is not None  # or nobody had started us
+    command = RegisterCommands(rig.register_map, link, rig.network.units[0]).carry_out if mqtt.commands else None
+    sessions: list[BrokerSession] = [JsonTopics(mqtt.base_topic or f"force-gateway/{rig.name}", command)]
+    if mqtt.sparkplug:
+        sessions.append(EdgeNode(mqtt.sparkplug.group, mqtt.sparkplug.node or rig.name))
+    return sessions
+
+
+async def look_forever(link: ControlLink, sessions: list[BrokerSession]) -> None:
+    """Offer each session what control answers."""
+    while True:
+        began_s = time.monotonic()
+        try:
+            state = LiveState.from_json(await link.ask({"do": "state"}))
+        except (OSError, ValueError):
+            state = None
+        for session in sessions:
+            session.offer(state, time.time())
+        await asyncio.sleep(max(0.0, LOOK_S - (time.monotonic() - began_s)))
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+
+
+async def publish(options: dict[str, Any]) -> None:
+    """Publish until the process ends. options: as the guardian gives them."""
+    from gateway.profiles import load_rig
+
+    rig = load_rig(options["rig"], simulated=options["simulated"])
+    assert rig.mqtt is not None
+    password = Path(rig.mqtt.password_file).read_text().strip() if rig.mqtt.password_file else None
+    broker = Broker(rig.mqtt.host, rig.mqtt.port, rig.mqtt.username, password)
+    link = ControlLink(Path(options["state"]))
+    sessions = make_sessions(rig, link)
+    async with asyncio.TaskGroup() as group:
+        group.create_task(look_forever(link, sessions))
+        for session in sessions:
+            group.create_task(keep_connected(broker, session, _say))
+
+
+def main(arguments: list[str]) -> int:
+    """Publish until the guardian ends. arguments: descriptor of the link, options as JSON."""
+    serve_behind_control()
+    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
+    try:
+        asyncio.run(publish(json.loads(arguments[1])))
+    except* MissingExtraError as missing:
+        sys.stderr.write(f"{missing.exceptions[0]}\n")
+    except* OSError as error:
+        sys.stderr.write(f"{error.exceptions[0]}\n")
+    return exit_codes.DEVICE
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

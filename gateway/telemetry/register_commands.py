@@ -1,0 +1,50 @@
+"""Commands by MQTT: JSON with registers by name, written in the order that they are given, by the rules of any master.
+
+`{"force_setpoint": 12.0, "control_word": 1}` asks for 12 N and enables; `{"control_word": 0}` stops. The first refusal ends
+a command; the answer says what was written. A rig with a lease wants `heartbeat` from whoever commands, as from every master.
+"""
+
+import json
+from typing import Any, Final
+
+from gateway.live.control_link import ControlLink
+from gateway.modbus import pdu as P  # noqa: N812
+from gateway.registers.map.register_map import RegisterMap
+
+_IS_EXCEPTION: Final = 0x80
+
+
+class RegisterCommands:
+    """link: to control's socket, whose verb `modbus` checks, owns and audits what is written; unit: an id that is answered."""
+
+    def __init__(self, register_map: RegisterMap, link: ControlLink, unit: int) -> None:
+        self._map, self._link, self._unit = register_map, link, unit
+
+    async def carry_out(self, payload: bytes) -> dict[str, Any]:
+        """Write what the payload says; return what was written, and why no more."""
+        written: list[str] = []
+        try:
+            for name, value in _registers(payload).items():
+                await self._write(name, value)
+                written.append(name)
+        except (OSError, ValueError, LookupError, OverflowError) as error:
+            return {"ok": False, "written": written, "error": str(error) or type(error).__name__}
+        return {"ok": True, "written": written}
+
+    async def _write(self, name: str, value: float) -> None:
+        register = self._map.find(name)
+        request = P.write_registers_request(register.address, register.encode(value))
+        answer = await self._link.ask({"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()})
+        if bytes.fromhex(answer["pdu"])[0] & _IS_EXCEPTION:
+            told = await self._link.ask({"do": "last-refusal"})
+            raise ValueError(f"{name}: {told['sentence'] or 'refused'}")
+
+
+def _registers(payload: bytes) -> dict[str, float]:
+    content = json.loads(payload)
+    if not isinstance(content, dict) or not content:
+        raise ValueError('a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}')
+    for name, value in content.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ValueError(f"{name} is no number")
+    return content

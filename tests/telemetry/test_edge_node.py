@@ -1,0 +1,157 @@
+"""The Sparkplug edge node without a broker, its payloads read by Google's protobuf."""
+
+import asyncio
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.live.live_state import LiveState
+from gateway.telemetry.broker_session import BrokerMessage
+from gateway.telemetry.edge_node import REBIRTH, EdgeNode
+from gateway.telemetry.sparkplug_metrics import TYPES
+from gateway.telemetry.sparkplug_payload import DataType, SparkplugMetric, decode_values, encode_payload
+from tests.telemetry.readings import holding
+from tests.telemetry.sparkplug_schema import Payload, decoded, values
+
+NODE_NAME = "cell"
+
+
+def at(force_n: float) -> LiveState:
+    state = holding()
+    return replace(state, force=replace(state.force, measured_n=force_n))
+
+
+def drain(node: EdgeNode) -> list[BrokerMessage]:
+    sent = []
+    while (message := node.next_message()) is not None:
+        sent.append(message)
+        node.drop_sent()
+    return sent
+
+
+def forces(messages: list[BrokerMessage]) -> list[float]:
+    return [values(message.payload)["Force/Measured N"] for message in messages]
+
+
+def test_a_birth_names_all_with_types_and_its_death_has_its_bd_seq() -> None:
+    node = EdgeNode("plant", NODE_NAME)
+    for bd_seq in range(3):
+        node.offer(holding(), 1000.0)
+        will = node.begin()
+        (birth,) = node.greet()
+        assert (will.topic, will.qos, birth.topic) == ("spBv1.0/plant/NDEATH/cell", 1, "spBv1.0/plant/NBIRTH/cell")
+        assert values(will.payload) == {"bdSeq": bd_seq} and not decoded(will.payload).HasField("seq")
+        said = decoded(birth.payload)
+        assert said.HasField("seq") and said.seq == 0 and said.timestamp == 1_000_000
+        told = values(birth.payload)
+        assert told["bdSeq"] == bd_seq and told[REBIRTH] is False
+        assert set(told) == set(TYPES) | {"bdSeq", REBIRTH}
+        assert told["Force/Measured N"] == 11.5 and told["State"] == "holding" and told["Alarms/Warnings"] == "W301"
+        assert {one.name: one.datatype for one in said.metrics}["Force/Measured N"] == 10
+        node.lose()
+
+
+def test_data_tells_what_changed_and_seq_goes_round() -> None:
+    node = EdgeNode("plant", NODE_NAME)
+    node.begin()
+    node.greet()
+    node.offer(at(0.0), 0.0)
+    drain(node)
+    seqs = []
+    for number in range(1, 600):
+        node.offer(at(float(number)), float(number))
+        node.offer(at(float(number)), number + 0.5)
+        (message,) = drain(node)
+        assert values(message.payload) == {"Force/Measured N": float(number)}, "what did not change is not told"
+        seqs.append(decoded(message.payload).seq)
+    assert seqs == [number % 256 for number in range(2, 601)]
+
+
+def test_what_came_while_the_broker_was_away_follows_the_birth_in_order_as_historical() -> None:
+    node = EdgeNode("plant", NODE_NAME, room=5)
+    node.begin()
+    node.greet()
+    node.offer(at(0.0), 0.0)
+    drain(node)
+    node.offer(at(1.0), 1.0)
+    assert forces([node.next_message()]) == [1.0], "on its way when the connection breaks: it stays"
+    node.lose()
+    for number in range(2, 5):
+        node.offer(at(float(number)), float(number))
+    node.begin()
+    (birth,) = node.greet()
+    node.offer(at(9.0), 9.0)
+    sent = drain(node)
+    assert values(birth.payload)["Force/Measured N"] == 4.0
+    assert forces(sent) == [1.0, 2.0, 3.0, 4.0, 9.0]
+    assert [decoded(message.payload).metrics[0].is_historical for message in sent] == [True] * 4 + [False]
+    assert [decoded(message.payload).seq for message in sent] == [1, 2, 3, 4, 5]
+    assert [decoded(message.payload).metrics[0].timestamp for message in sent] == [1000, 2000, 3000, 4000, 9000]
+
+
+def test_a_full_store_loses_the_oldest_and_never_one_that_was_not_sent() -> None:
+    node = EdgeNode("plant", NODE_NAME, room=3)
+    for number in range(10):
+        node.offer(at(float(number)), float(number))
+    node.next_message()
+    node.offer(at(10.0), 10.0)
+    node.drop_sent()
+    assert forces(drain(node)) == [8.0, 9.0, 10.0]
+
+
+def test_only_a_rebirth_that_is_asked_for_is_answered() -> None:
+    node = EdgeNode("plant", NODE_NAME)
+    node.begin()
+    node.greet()
+
+    def asked(payload: bytes) -> list[BrokerMessage]:
+        return list(asyncio.run(node.answer("spBv1.0/plant/NCMD/cell", payload)))
+
+    command = Payload(timestamp=5)
+    command.metrics.add(name=REBIRTH, datatype=11, boolean_value=True)
+    node.offer(holding(), 7.0)
+    drain(node)
+    (birth,) = asked(command.SerializeToString())
+    assert decoded(birth.payload).seq == 0 and values(birth.payload)["bdSeq"] == 0
+    command.metrics[0].boolean_value = False
+    assert asked(command.SerializeToString()) == asked(b"\xff\xff") == asked(b"") == []
+
+
+def test_where_control_does_not_answer_nothing_old_is_told() -> None:
+    node = EdgeNode("plant", NODE_NAME)
+    node.offer(holding(), 1.0)
+    node.offer(None, 2.0)
+    node.begin()
+    (birth,) = node.greet()
+    told = {name: value for name, value in values(birth.payload).items() if value is not None}
+    assert told == {"bdSeq": 0, REBIRTH: False, "Control/Answers": False}
+
+
+@pytest.mark.parametrize(
+    ("datatype", "value"),
+    [
+        (DataType.UINT64, 2**64 - 1),
+        (DataType.DOUBLE, -1.5e-300),
+        (DataType.BOOLEAN, True),
+        (DataType.STRING, "Größe"),
+        (DataType.STRING, ""),
+        (DataType.STRING, None),
+    ],
+)
+def test_each_type_reads_as_it_was_written(datatype: DataType, value: object) -> None:
+    payload = encode_payload(2**41, [SparkplugMetric("a/b", datatype, value, 2**40, True)], 255)
+    (metric,) = decoded(payload).metrics
+    assert values(payload) == {"a/b": value} == decode_values(payload)
+    assert (metric.timestamp, metric.datatype, metric.is_historical) == (2**40, datatype, True)
+    assert (decoded(payload).timestamp, decoded(payload).seq) == (2**41, 255)
+
+
+@given(st.binary(max_size=60))
+def test_bytes_of_strangers_are_read_or_refused(payload: bytes) -> None:
+    try:
+        told = decode_values(payload)
+    except ValueError:
+        return
+    assert isinstance(told, dict)

@@ -1,0 +1,128 @@
+"""Plain JSON over MQTT: what is retained, what waits for the broker, what is heard, and what a rig file may say of it."""
+
+import asyncio
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.live.control_link import ControlLink
+from gateway.processes.json_socket import JsonLineServer
+from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
+from gateway.telemetry.broker_session import BrokerMessage
+from gateway.telemetry.json_topics import JsonTopics
+from gateway.telemetry.register_commands import RegisterCommands
+from tests.telemetry.readings import holding
+
+
+def drain(session: JsonTopics) -> list[tuple[str, Any, bool]]:
+    sent = []
+    while (message := session.next_message()) is not None:
+        sent.append(told(message))
+        session.drop_sent()
+    return sent
+
+
+def told(message: BrokerMessage) -> tuple[str, Any, bool]:
+    return message.topic.removeprefix("cell/"), json.loads(message.payload), message.retain
+
+
+def test_state_is_retained_and_force_comes_with_every_look() -> None:
+    session = JsonTopics("cell", None)
+    assert told(session.begin()) == ("online", False, True)
+    session.offer(holding(), 1.0)
+    online, state = (told(message) for message in session.greet())
+    assert online == ("online", True, True)
+    assert state[0] == "state" and state[1]["state"] == "holding" and state[2] is True
+    drain(session)
+    session.offer(replace(holding(), time_unix_s=5.0), 1.2)
+    ((topic, force, retain),) = drain(session)
+    assert (topic, force["measured_n"], force["time_unix_s"], retain) == ("force", 11.5, 1.2, False)
+
+
+def test_events_wait_for_the_broker_and_forces_do_not() -> None:
+    session = JsonTopics("cell", None)
+    session.begin()
+    session.greet()
+    session.offer(holding(), 1.0)
+    session.lose()
+    session.offer(replace(holding(), state="fault", warnings=()), 2.0)
+    assert [one for one in drain(session) if one[0] != "online"] == [
+        ("events", {"time_unix_s": 2.0, "event": "state", "value": "fault"}, False),
+        ("events", {"time_unix_s": 2.0, "event": "cleared", "code": "W301"}, False),
+    ]
+
+
+def test_a_control_that_does_not_answer_is_offline_without_an_old_state() -> None:
+    session = JsonTopics("cell", None)
+    session.begin()
+    session.offer(holding(), 1.0)
+    session.greet()
+    drain(session)
+    session.offer(None, 2.0)
+    assert drain(session) == [("online", False, True), ("state", None, True)]
+
+
+def test_commands_are_off_unless_the_rig_says_so(tmp_path: Path) -> None:
+    assert JsonTopics("cell", None).subscriptions == ()
+    text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "rig.yaml"
+    file.write_text(text + "mqtt: {host: broker.plant, sparkplug: {group: a}}\n", encoding="utf-8")
+    mqtt = load_rig(str(file)).mqtt
+    assert mqtt and (mqtt.commands, mqtt.port, mqtt.sparkplug and mqtt.sparkplug.group) == (False, 1883, "a")
+
+
+@pytest.mark.parametrize(
+    "section", ["{}", "{host: a, sparkplug: {group: a/b}}", "{host: a, password: b}", "{host: a, base_topic: 'a/#'}"]
+)
+def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> None:
+    text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "rig.yaml"
+    file.write_text(f"{text}mqtt: {section}\n", encoding="utf-8")
+    with pytest.raises(ProfileError, match="mqtt"):
+        load_rig(str(file))
+
+
+@pytest.mark.parametrize(
+    ("payload", "result", "pdus"),
+    [
+        (
+            b'{"force_setpoint": 12.0, "control_word": 1}',
+            {"ok": True, "written": ["force_setpoint", "control_word"]},
+            ["100001000102" + "04b0", "100000000102" + "0001"],
+        ),
+        (
+            b'{"force_ramp": 5, "control_word": 1}',
+            {"ok": False, "written": [], "error": "force_ramp: E999 not now"},
+            ["100002000102" + "0032"],
+        ),
+        (b"[1]", None, []),
+        (b"{", None, []),
+        (b'{"force_setpoint": true}', None, []),
+        (b'{"no_such": 1}', None, []),
+    ],
+)
+def test_a_command_is_written_in_order_until_the_first_refusal(
+    tmp_path: Path, payload: bytes, result: Any, pdus: list[str]
+) -> None:
+    asked: list[dict[str, Any]] = []
+
+    def modbus(request: dict[str, Any]) -> dict[str, Any]:
+        asked.append(request)
+        return {"pdu": "9003" if request["pdu"].startswith("100002") else request["pdu"][:10]}
+
+    async def scene() -> dict[str, Any]:
+        handlers = {"modbus": modbus, "last-refusal": lambda _: {"sentence": "E999 not now"}}
+        control, link = JsonLineServer(tmp_path / "control.sock", handlers), ControlLink(tmp_path)
+        await control.start()
+        told = await RegisterCommands(load_rig("demo").register_map, link, 1).carry_out(payload)
+        await link.close()
+        await control.close()
+        return told
+
+    answer = asyncio.run(scene())
+    assert answer == result if result else answer["ok"] is False and answer["written"] == [] and answer["error"]
+    assert [request["pdu"] for request in asked] == pdus
+    assert {request["via"] for request in asked} <= {"mqtt"}
