@@ -25,8 +25,10 @@ class Broker:
 async def keep_connected(
     broker: Broker, session: BrokerSession, say: Callable[[str], None], again_s: float = AGAIN_S
 ) -> None:
-    """Keep a connection, opened again when it is lost; say when the broker is away, and when it is back. MissingExtraError without
-    aiomqtt."""
+    """Keep a connection, opened again when it is lost; say when the broker is away, and when it is back.
+
+    MissingExtraError without aiomqtt.
+    """
     aiomqtt = import_library("aiomqtt")
     is_away = False
     while True:
